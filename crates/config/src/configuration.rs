@@ -1,8 +1,8 @@
-//! What follows from a configuration file: a declaration for the engine, the process image as the file lays it out, and
-//! what of the file is not followed.
+//! The result of a configuration file: a declaration for the engine, the process image with the layout of the file, and
+//! the settings of the file that are not followed.
 //!
-//! The image is the application's view. On the wire process data lies as the engine lays it out, byte-aligned and at
-//! its own logical addresses; [`ImageArea`] says which bits of which SyncManager are which bits of the image.
+//! The image is the application's view. On the wire the engine lays out process data byte-aligned and at its own
+//! logical addresses; [`ImageArea`] maps bits of a SyncManager to bits of the image.
 
 use std::fmt;
 use std::time::Duration;
@@ -13,25 +13,25 @@ use ringcat_engine::main_device::Declaration;
 
 use crate::eni::{Place, Port};
 
-/// What follows from a file.
+/// The configuration that results from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Configuration {
-    /// What the engine is told. Its SubDevices stand in document order; [`Configuration::subdevices`] has as many.
+    /// The declaration for the engine. Its SubDevices are in document order, as in [`Configuration::subdevices`].
     pub declaration: Declaration,
-    /// What else the file says of each SubDevice.
+    /// Other properties of each SubDevice in the file.
     pub subdevices: Vec<SubDeviceFacts>,
     /// Hot connect groups, by the number in [`SubDeviceConfig::group`].
     pub groups: Vec<String>,
     /// The process image.
     pub image: ProcessImage,
-    /// Cycle time of the fastest task; `None` where the file has none.
+    /// Cycle time of the fastest task; `None` if the file has none.
     pub cycle: Option<Duration>,
-    /// What of the file is not followed, and why.
+    /// Settings of the file that are not followed, with the reason.
     pub notices: Vec<Notice>,
 }
 
 impl Configuration {
-    /// The declaration of a SubDevice with what else the file says of it.
+    /// The declaration of a SubDevice with its other properties in the file.
     pub fn subdevice(&self, index: usize) -> Option<(&SubDeviceConfig, &SubDeviceFacts)> {
         Some((self.declaration.subdevices.get(index)?, self.subdevices.get(index)?))
     }
@@ -42,14 +42,14 @@ impl Configuration {
     }
 }
 
-/// What the file says of a SubDevice besides its declaration.
+/// Properties of a SubDevice in the file besides its declaration.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SubDeviceFacts {
     /// Its name.
     pub name: String,
-    /// `PhysAddr`: what its users call it. On the wire the engine gives it a station address of its own choice.
+    /// `PhysAddr`: the station address in the file. On the wire the engine assigns a station address of its own choice.
     pub station: Option<u16>,
-    /// What it is plugged into, where the file says so: index of the SubDevice, its port.
+    /// The upstream connection, if the file states it: index of the SubDevice, its port.
     pub plugged_into: Option<(usize, Port)>,
     /// Address for AoE.
     pub net_id: Option<[u8; 6]>,
@@ -62,29 +62,29 @@ pub struct ProcessImage {
     pub inputs_len: usize,
     /// Bytes of the output image.
     pub outputs_len: usize,
-    /// Where process data of SubDevices lies in them.
+    /// Positions of process data in the two images.
     pub areas: Vec<ImageArea>,
     /// Variables in document order.
     pub variables: Vec<Variable>,
-    /// Inputs that are copied to outputs in every cycle, cut at the borders of areas.
+    /// Inputs that are copied to outputs in every cycle, split at the borders of areas.
     pub copies: Vec<ImageCopy>,
 }
 
-/// Process data of a SubDevice and its place in the image.
+/// Process data of a SubDevice and its position in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageArea {
     /// Index of the SubDevice in the declaration.
     pub subdevice: usize,
-    /// In which image.
+    /// The image: inputs or outputs.
     pub direction: Direction,
-    /// The SyncManager; `None` where the file names none: then all process data of the SubDevice in this direction is
-    /// one row of bits, in the order of its SyncManagers.
+    /// The SyncManager. `None` if the file names none: then all process data of the SubDevice in this direction is one
+    /// sequence of bits, in the order of its SyncManagers.
     pub sync_manager: Option<u8>,
-    /// First bit in that process data.
+    /// First bit in the process data.
     pub bit_offset: u32,
     /// First bit in the image.
     pub image_bit: u32,
-    /// Bits.
+    /// Number of bits.
     pub bits: u32,
 }
 
@@ -95,43 +95,43 @@ pub struct Variable {
     pub name: String,
     /// Its type as the file writes it.
     pub data_type: String,
-    /// In which image.
+    /// The image: inputs or outputs.
     pub direction: Direction,
     /// First bit.
     pub image_bit: u32,
-    /// Bits.
+    /// Number of bits.
     pub bits: u32,
-    /// The SubDevice with this process data; `None` where it belongs to none: then it is neither written nor read.
+    /// The SubDevice with this process data; `None` if no SubDevice has it: then it is neither written nor read.
     pub subdevice: Option<usize>,
 }
 
 /// Inputs that are copied to outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageCopy {
-    /// Number of the area in [`ProcessImage::areas`] where they come from.
+    /// Source area: index in [`ProcessImage::areas`].
     pub source_area: usize,
-    /// First bit in that area.
+    /// First bit in the source area.
     pub source_bit: u32,
-    /// Number of the area where they go.
+    /// Target area: index in [`ProcessImage::areas`].
     pub target_area: usize,
-    /// First bit in that area.
+    /// First bit in the target area.
     pub target_bit: u32,
-    /// Bits.
+    /// Number of bits.
     pub bits: u32,
 }
 
-/// Something of the file that is not followed.
+/// A setting of the file that is not followed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice {
-    /// The element and what it is about.
+    /// The element and its subject.
     pub subject: String,
-    /// Why it is not followed, or what happens in its place.
+    /// Why it is not followed, or what replaces it.
     pub reason: String,
-    /// Where it first stands.
+    /// First occurrence in the file.
     pub place: Option<Place>,
-    /// How often.
+    /// Number of occurrences.
     pub times: usize,
-    /// The SubDevices that it is about.
+    /// The SubDevices concerned.
     pub subdevices: Vec<usize>,
 }
 

@@ -1,8 +1,9 @@
-//! ENI files (ETG.2100; protocol 8): bytes go in, [`Eni`] or an error with line, column and element comes out.
+//! ENI files (ETG.2100; protocol 8): input is the bytes of a file, output an [`Eni`] or an error with line, column and
+//! element.
 //!
-//! The reader is lenient where files of different tools differ (order of elements, `#x` and `0x` numbers, encodings,
-//! elements that it does not know) and strict where a wrong guess would make a wrong network: a number that is none,
-//! data with half a byte, an element that must be there. What it did not know is listed in [`Eni::unknown`].
+//! The reader is lenient where the files of tools differ (order of elements, `#x` and `0x` numbers, encodings, unknown
+//! elements). It is strict where a wrong guess would result in a wrong network: an invalid number, data with half a
+//! byte, a missing element. [`Eni::unknown`] lists unknown elements.
 
 mod element;
 mod error;

@@ -1,10 +1,9 @@
-//! From the model of an ENI to a [`Configuration`]: the file is the authority about what is configured, RingCAT decides
-//! how it gets there (docs/decisions/0022).
+//! From the model of an ENI to a [`Configuration`]: the file determines the configuration, RingCAT determines how to
+//! apply it (docs/decisions/0022).
 //!
-//! The commands of a SubDevice are classified by register. Those that a MainDevice sends by itself (addresses, AL
-//! control, EEPROM, FMMUs, delays and offsets of clocks) are held against the rest of the file and not sent;
-//! SyncManagers, watchdogs and SYNC signals become declarations; what is left is sent as it is, or named in the
-//! notices.
+//! The commands of a SubDevice are classified by register. Commands for tasks of the MainDevice (addresses, AL control,
+//! EEPROM, FMMUs, delays and offsets of clocks) are compared with the rest of the file and not sent. SyncManagers,
+//! watchdogs and SYNC signals become declarations. The remaining commands are sent unchanged or listed in the notices.
 
 mod areas;
 mod assignment;
@@ -28,10 +27,10 @@ use crate::configuration::{Configuration, SubDeviceFacts};
 use crate::eni::{Eni, EniError};
 use notices::Notices;
 
-/// Turns a file into what the engine needs.
+/// Converts a file into the configuration of the engine.
 ///
-/// An error names what would make a wrong network: contradictions in the file, or what RingCAT cannot do. What is
-/// merely not followed is in [`Configuration::notices`].
+/// An error names a setting that would result in a wrong network: a contradiction in the file, or something that
+/// RingCAT cannot do. [`Configuration::notices`] lists settings that are only not followed.
 pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
     let mut notices = Notices::default();
     let bus = bus::Bus::of(eni, &mut notices)?;

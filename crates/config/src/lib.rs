@@ -1,8 +1,9 @@
-//! Configuration files of EtherCAT networks: text goes in, what the engine needs comes out. No bus, no files, no clock.
+//! Configuration files of EtherCAT networks: input is text, output the engine's configuration. No bus access, no files,
+//! no clock.
 //!
-//! [`eni`] reads an ENI (EtherCAT Network Information, ETG.2100; protocol 8) into a typed model that keeps what the
-//! file says; [`follow`] makes a [`Configuration`] of it. In such a file the network is configured already: it counts
-//! before the SII, and what of it is not followed is said.
+//! [`eni`] reads an ENI (EtherCAT Network Information, ETG.2100; protocol 8) into a typed model that keeps the content
+//! of the file; [`follow`] converts it into a [`Configuration`]. The network configuration in the file takes precedence
+//! over the SII. Notices list the settings that are not followed.
 #![forbid(unsafe_code)]
 
 mod configuration;

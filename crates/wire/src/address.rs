@@ -1,4 +1,4 @@
-//! Newtypes for what numbers on the wire mean. Each conversion exists once.
+//! Newtypes for addresses and numbers on the wire. Each conversion exists once.
 
 use core::fmt;
 
@@ -21,7 +21,7 @@ newtype!(
     StationAddress(u16), "{:#06x}"
 );
 newtype!(
-    /// Position of a SubDevice in the order in which a frame passes the processing units, from 0.
+    /// Position of a SubDevice in the order in which a frame passes the EtherCAT processing units, starting at 0.
     Position(u16), "{}"
 );
 newtype!(
@@ -38,8 +38,8 @@ newtype!(
 );
 
 impl Position {
-    /// The ADP value with which a datagram must be sent to meet zero at this position (protocol 1.4: every
-    /// processing unit on the way adds one).
+    /// The ADP value for a datagram to the SubDevice at this position: it arrives there as zero, because every
+    /// processing unit before it adds one (protocol 1.4).
     pub const fn auto_increment(self) -> u16 {
         0u16.wrapping_sub(self.0)
     }
@@ -54,7 +54,7 @@ impl Wkc {
 }
 
 impl RegisterAddress {
-    /// The address `offset` bytes further on, wrapping at the end of the address space.
+    /// The address `offset` bytes higher, wrapping at the end of the address space.
     #[must_use]
     pub const fn offset(self, offset: u16) -> RegisterAddress {
         RegisterAddress(self.0.wrapping_add(offset))
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_third_subdevice_is_addressed_with_minus_two() {
+    fn the_third_subdevice_has_auto_increment_address_minus_two() {
         assert_eq!(Position(2).auto_increment(), 0xFFFE);
         assert_eq!(Position(0).auto_increment(), 0);
     }

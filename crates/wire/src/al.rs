@@ -1,5 +1,5 @@
-//! The EtherCAT state machine as registers show it: AL control, AL status, AL status codes, allowed transitions
-//! (protocol 3.4, 5.1, 5.3, 5.5).
+//! The EtherCAT state machine in registers: AL control, AL status, AL status codes, allowed transitions (protocol 3.4,
+//! 5.1, 5.3, 5.5).
 
 use core::fmt;
 
@@ -22,7 +22,7 @@ impl AlState {
     /// All states in the order of their codes.
     pub const ALL: [AlState; 5] = [AlState::Init, AlState::PreOp, AlState::Boot, AlState::SafeOp, AlState::Op];
 
-    /// From the state nibble; `None` for a code that names no state (as the OR of several states does).
+    /// The state of a state nibble; `None` for a code that is no state, such as the OR of several states.
     pub const fn from_code(code: u8) -> Option<AlState> {
         match code {
             1 => Some(AlState::Init),
@@ -52,7 +52,8 @@ impl fmt::Display for AlState {
     }
 }
 
-/// Whether a SubDevice that is in `from` may be asked for `to` (protocol 5.1). Asking for the present state is allowed.
+/// Whether a SubDevice in state `from` may be requested to change to `to` (protocol 5.1). Requesting the current state
+/// is allowed.
 pub const fn transition_allowed(from: AlState, to: AlState) -> bool {
     use AlState::{Boot, Init, Op, PreOp, SafeOp};
     match from {
@@ -73,16 +74,16 @@ const fn flag(set: bool, mask: u16) -> u16 {
     if set { mask } else { 0 }
 }
 
-/// Register AL_CONTROL (0x0120): what the MainDevice asks for.
+/// Register AL_CONTROL (0x0120): the state requested by the MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AlControl {
-    /// Requested state, the nibble as it is on the wire.
+    /// Requested state: the nibble on the wire.
     pub state: u8,
     /// Acknowledge the error of AL status.
     pub acknowledge: bool,
-    /// Ask for the device identification in the AL status code.
+    /// Requests the device identification in the AL status code.
     pub identification: bool,
-    /// Bits 15:6, in place.
+    /// Bits 15:6, not shifted.
     pub reserved: u16,
 }
 
@@ -120,7 +121,7 @@ impl AlControl {
             | self.reserved & RESERVED_MASK
     }
 
-    /// The requested state, where the nibble names one.
+    /// The requested state, if the nibble is a state.
     pub const fn al_state(self) -> Option<AlState> {
         AlState::from_code(self.state)
     }
@@ -136,16 +137,16 @@ impl AlControl {
     }
 }
 
-/// Register AL_STATUS (0x0130): where the SubDevice is.
+/// Register AL_STATUS (0x0130): the current state of the SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AlStatus {
-    /// Present state, the nibble as it is on the wire; of a broadcast read the OR of all.
+    /// Current state: the nibble on the wire; after a broadcast read the OR of all SubDevices.
     pub state: u8,
-    /// The SubDevice refused a request or left its state; AL_STATUS_CODE says why.
+    /// The SubDevice refused a request or left its state; AL_STATUS_CODE contains the reason.
     pub error: bool,
     /// The device identification is in AL_STATUS_CODE.
     pub identification: bool,
-    /// Bits 15:6, in place.
+    /// Bits 15:6, not shifted.
     pub reserved: u16,
 }
 
@@ -183,7 +184,7 @@ impl AlStatus {
             | self.reserved & RESERVED_MASK
     }
 
-    /// The present state, where the nibble names one.
+    /// The current state, if the nibble is a state.
     pub const fn al_state(self) -> Option<AlState> {
         AlState::from_code(self.state)
     }
@@ -209,7 +210,7 @@ impl fmt::Display for AlStatus {
     }
 }
 
-/// Register AL_STATUS_CODE (0x0134): why a SubDevice refused a request or left its state.
+/// Register AL_STATUS_CODE (0x0134): the reason for which a SubDevice refused a request or left its state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AlStatusCode(pub u16);
 
@@ -224,7 +225,7 @@ macro_rules! al_status_codes {
             /// The codes that have a name, in ascending order (protocol 5.5).
             pub const ALL: &'static [AlStatusCode] = &[$(AlStatusCode::$name),*];
 
-            /// What the code means; `None` where the standard has no name for it (see
+            /// The meaning of the code; `None` if the standard does not define it (see
             /// [`AlStatusCode::is_vendor_specific`]).
             pub const fn name(self) -> Option<&'static str> {
                 match self {

@@ -35,20 +35,20 @@ pub enum Command {
     Armw,
     /// Fixed-address read, multiple write.
     Frmw,
-    /// A reserved code; controllers ignore the datagram. Never holds 0..=14 when decoded.
+    /// A reserved code; controllers ignore the datagram. A decoded value is never 0..=14.
     Reserved(u8),
 }
 
-/// What a command's address field means.
+/// Meaning of a command's address field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Addressing {
     /// Not evaluated.
     None,
-    /// Position in the ring, counted up by every processing unit.
+    /// Position in the ring; every processing unit increments it.
     AutoIncrement,
     /// Station address or enabled alias.
     Station,
-    /// Every SubDevice; counted up by every processing unit.
+    /// All SubDevices; every processing unit increments it.
     Broadcast,
     /// Logical address, mapped by FMMUs.
     Logical,
@@ -101,7 +101,7 @@ impl Command {
         }
     }
 
-    /// What the address field means.
+    /// The meaning of the address field.
     pub const fn addressing(self) -> Addressing {
         match self {
             Command::Nop | Command::Reserved(_) => Addressing::None,
@@ -112,12 +112,12 @@ impl Command {
         }
     }
 
-    /// Whether a processing unit counts up the ADP of this command.
+    /// Whether a processing unit increments the ADP of this command.
     pub const fn counts_adp(self) -> bool {
         matches!(self.addressing(), Addressing::AutoIncrement | Addressing::Broadcast)
     }
 
-    /// Whether SubDevices put data into the datagram.
+    /// Whether SubDevices write data into the datagram (read access).
     pub const fn reads(self) -> bool {
         matches!(
             self,
@@ -134,7 +134,7 @@ impl Command {
         )
     }
 
-    /// Whether SubDevices take data out of the datagram.
+    /// Whether SubDevices take data from the datagram (write access).
     pub const fn writes(self) -> bool {
         matches!(
             self,

@@ -5,11 +5,11 @@ use crate::command::Command;
 
 /// Bytes of a datagram before its data.
 pub const HEADER_LEN: usize = 10;
-/// Bytes of the working counter behind the data.
+/// Bytes of the working counter after the data.
 pub const WKC_LEN: usize = 2;
-/// Bytes of a datagram beside its data.
+/// Bytes of a datagram in addition to its data.
 pub const OVERHEAD: usize = HEADER_LEN + WKC_LEN;
-/// Largest data of a datagram that is alone in its frame (protocol 1.3; not 1484).
+/// Maximum number of data bytes of the only datagram in a frame (protocol 1.3; not 1484).
 pub const MAX_DATA: usize = 1486;
 
 const LENGTH_MASK: u16 = 0x07FF;
@@ -20,12 +20,12 @@ pub const CIRCULATING: u16 = 0x4000;
 /// Bit "more datagrams follow" in the length field.
 pub const MORE: u16 = 0x8000;
 
-/// Addressed SubDevices and their registers or memory.
+/// The addressed SubDevices and their register or memory address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
     /// No SubDevice (NOP).
     None,
-    /// The SubDevice at a position, counted by the frame itself.
+    /// The SubDevice at a position; processing units increment the address field.
     Position(Position, RegisterAddress),
     /// The SubDevice with this station address or enabled alias.
     Station(StationAddress, RegisterAddress),
@@ -36,8 +36,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// The four address bytes of the header as one little-endian number: ADP in the low, ADO in the high half, or the
-    /// logical address.
+    /// The four address bytes of the header as one little-endian number: ADP in the low half and ADO in the high half,
+    /// or the logical address.
     pub const fn raw(self) -> u32 {
         const fn physical(adp: u16, ado: RegisterAddress) -> u32 {
             adp as u32 | (ado.0 as u32) << 16
@@ -52,12 +52,12 @@ impl Target {
     }
 }
 
-/// The header of a datagram with every bit it has on the wire.
+/// The header of a datagram with all bits on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Command.
     pub command: Command,
-    /// Tag of the MainDevice (Idx); SubDevices never change it.
+    /// Index (Idx), set by the MainDevice; SubDevices never change it.
     pub index: u8,
     /// ADP (low half) and ADO (high half), or the logical address.
     pub address: u32,
@@ -74,12 +74,12 @@ pub struct Header {
 }
 
 impl Header {
-    /// A header as a MainDevice sends it: C clear, no event.
+    /// A header as sent by a MainDevice: C clear, no event.
     pub const fn new(command: Command, index: u8, target: Target, length: u16) -> Header {
         Header { command, index, address: target.raw(), length, reserved: 0, circulating: false, more: false, irq: 0 }
     }
 
-    /// Decodes ten bytes; every pattern has a meaning.
+    /// Decodes ten bytes; every pattern is valid.
     pub const fn decode(bytes: &[u8; HEADER_LEN]) -> Header {
         let length = u16::from_le_bytes([bytes[6], bytes[7]]);
         Header {
@@ -115,12 +115,12 @@ impl Header {
         self.address as u16
     }
 
-    /// The upper half of the address: where in the SubDevice.
+    /// The upper half of the address: register or memory address in the SubDevice.
     pub const fn ado(&self) -> RegisterAddress {
         RegisterAddress((self.address >> 16) as u16)
     }
 
-    /// The address as a logical one.
+    /// The address as a logical address.
     pub const fn logical(&self) -> LogicalAddress {
         LogicalAddress(self.address)
     }
@@ -143,7 +143,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_read_of_al_status_has_these_bytes() {
+    fn a_read_of_al_status_has_the_expected_bytes() {
         // protocol 1.2: FPRD 0x1001:0x0130, two bytes, more to follow.
         let target = Target::Station(StationAddress(0x1001), RegisterAddress(0x0130));
         let header = Header { more: true, ..Header::new(Command::Fprd, 0x2A, target, 2) };

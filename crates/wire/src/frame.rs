@@ -1,7 +1,7 @@
 //! Ethernet frames that carry EtherCAT (protocol 1.1, 1.3).
 //!
-//! [`Frame::parse`] reads one in a single pass and borrows it; [`FrameBuilder`] writes one into a buffer of the
-//! caller. Plain Ethernet II, one VLAN tag and UDP are known. The frame check sequence is not part of the bytes here.
+//! [`Frame::parse`] reads and borrows a frame in one pass; [`FrameBuilder`] writes a frame into a buffer of the caller.
+//! Supported are plain Ethernet II, one VLAN tag and UDP. The bytes do not include the frame check sequence.
 
 use core::fmt;
 
@@ -28,7 +28,7 @@ pub const MIN_FRAME: usize = 60;
 pub const MAX_FRAME: usize = 1514;
 /// Longest frame with a VLAN tag, without FCS.
 pub const MAX_FRAME_VLAN: usize = 1518;
-/// Bytes on the wire beside the frame without FCS: preamble and delimiter 8, FCS 4, gap 12.
+/// Bytes on the wire in addition to the frame without FCS: preamble and delimiter 8, FCS 4, gap 12.
 pub const WIRE_OVERHEAD: usize = 24;
 /// Time of one byte at 100 Mbit/s in nanoseconds.
 pub const BYTE_TIME_NS: u64 = 80;
@@ -51,14 +51,14 @@ impl fmt::Display for MacAddress {
     }
 }
 
-/// How the EtherCAT part is wrapped.
+/// Encapsulation of the EtherCAT part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encapsulation {
     /// Directly in Ethernet II.
     Ethernet,
-    /// Behind one 802.1Q tag; the tag control information is kept.
+    /// After one 802.1Q tag; the tag control information is kept.
     Vlan {
-        /// Priority, drop eligibility and VLAN id as on the wire.
+        /// Priority, drop eligibility and VLAN id.
         tci: u16,
     },
     /// In UDP over IPv4; the 28 bytes of both headers are kept.
@@ -82,7 +82,7 @@ impl Encapsulation {
 /// Type in the EtherCAT header (protocol 1.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EthercatType {
-    /// Type 1: datagrams, the only one that controllers process.
+    /// Type 1: datagrams, the only type that controllers process.
     Datagrams,
     /// Any other type: 2 ADS, 3 RAW-IO, 4 network variables, 5 mailbox gateway.
     Other(u8),
@@ -106,36 +106,36 @@ impl EthercatType {
 /// Why bytes are not an EtherCAT frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// Too short for the part that is named.
+    /// Too short for `part`.
     Short {
-        /// What was being read.
+        /// The part of the frame.
         part: &'static str,
-        /// Bytes needed up to its end.
+        /// Bytes needed up to the end of the part.
         expected: usize,
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
     /// Another protocol.
     NotEthercat {
-        /// EtherType found (behind a VLAN tag if there is one).
+        /// EtherType found (after a VLAN tag if there is one).
         ethertype: u16,
     },
     /// IPv4, but not UDP to port 0x88A4 with a header of five words.
     NotEthercatUdp,
-    /// The EtherCAT header announces more than there is.
+    /// The length in the EtherCAT header exceeds the available bytes.
     Length {
-        /// Bytes that the header announces.
+        /// Length in the EtherCAT header.
         announced: usize,
-        /// Bytes behind the header.
+        /// Bytes after the header.
         got: usize,
     },
-    /// A datagram leaves the announced length.
+    /// A datagram extends beyond the length in the EtherCAT header.
     Datagram {
         /// Offset of the datagram in the frame.
         offset: usize,
-        /// Bytes it needs.
+        /// Bytes of the datagram.
         expected: usize,
-        /// Bytes left for it.
+        /// Bytes available for it.
         got: usize,
     },
 }
@@ -162,14 +162,14 @@ impl fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// A parsed frame, borrowing its bytes.
+/// A parsed frame that borrows its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// Destination address; controllers do not evaluate it.
     pub destination: MacAddress,
     /// Source address, with the marks of [`crate::source_address`].
     pub source: MacAddress,
-    /// How the EtherCAT part is wrapped.
+    /// Encapsulation of the EtherCAT part.
     pub encapsulation: Encapsulation,
     /// Reserved bit 11 of the EtherCAT header.
     pub reserved: bool,
@@ -177,15 +177,16 @@ pub struct Frame<'a> {
     pub ethercat_type: EthercatType,
     /// The EtherCAT part without header and padding.
     pub payload: &'a [u8],
-    /// What the EtherCAT header announces behind the last datagram. Controllers go by the datagrams (protocol 1.1), and
-    /// some MainDevices count the padding in.
+    /// Bytes after the last datagram within the length in the EtherCAT header. Controllers evaluate the datagrams
+    /// (protocol 1.1), and some MainDevices include the padding in the length.
     pub surplus: &'a [u8],
-    /// What follows the EtherCAT part, normally zeros.
+    /// Bytes after the EtherCAT part, normally zeros.
     pub padding: &'a [u8],
 }
 
 impl<'a> Frame<'a> {
-    /// Parses the wrapping and checks that all datagrams of a type 1 frame lie inside the announced length.
+    /// Parses the encapsulation and checks that all datagrams of a type 1 frame lie within the length in the EtherCAT
+    /// header.
     pub fn parse(bytes: &'a [u8]) -> Result<Frame<'a>, FrameError> {
         let (encapsulation, start) = encapsulation(bytes)?;
         let short =
@@ -214,7 +215,7 @@ impl<'a> Frame<'a> {
         Ok(frame)
     }
 
-    /// Returns the bytes of all datagrams.
+    /// Returns the total length of all datagrams.
     fn check_datagrams(&self, start: usize) -> Result<usize, FrameError> {
         let mut at = 0;
         loop {
@@ -231,7 +232,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The datagrams in order; none where the EtherCAT part is of another type.
+    /// The datagrams in order; none if the EtherCAT part has another type.
     pub fn datagrams(&self) -> Datagrams<'a> {
         match self.ethercat_type {
             EthercatType::Datagrams => Datagrams { rest: self.payload, done: false },
@@ -239,12 +240,13 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Offset of the EtherCAT payload in the frame's bytes: that of the first datagram.
+    /// Offset of the EtherCAT payload (the first datagram) in the frame.
     pub const fn payload_offset(&self) -> usize {
         self.encapsulation.header_len() + ETHERCAT_HEADER_LEN
     }
 
-    /// Writes the frame into `out` byte by byte as it was parsed and returns its length; `None` where it does not fit.
+    /// Writes the frame into `out`, byte-identical to the parsed frame, and returns its length; `None` if it does not
+    /// fit.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let start = self.encapsulation.header_len();
         let announced = self.payload.len() + self.surplus.len();
@@ -353,13 +355,13 @@ impl<'a> Iterator for Datagrams<'a> {
     }
 }
 
-/// Length of the frame that carries datagrams with these data lengths in plain Ethernet, without FCS (protocol 1.3).
+/// Length without FCS of the plain Ethernet frame with datagrams of these data lengths (protocol 1.3).
 pub fn frame_len(data_lengths: impl IntoIterator<Item = usize>) -> usize {
     let datagrams: usize = data_lengths.into_iter().map(|length| OVERHEAD + length).sum();
     (ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN + datagrams).max(MIN_FRAME)
 }
 
-/// Time that a frame of `len` bytes (without FCS) occupies at 100 Mbit/s, with preamble, FCS and gap.
+/// Time that a frame of `len` bytes (without FCS) occupies at 100 Mbit/s, including preamble, FCS and gap.
 pub const fn wire_time_ns(len: usize) -> u64 {
     (len + WIRE_OVERHEAD) as u64 * BYTE_TIME_NS
 }
@@ -375,12 +377,12 @@ pub struct FrameBuilder<'a> {
 }
 
 impl<'a> FrameBuilder<'a> {
-    /// Starts a plain Ethernet II frame; `None` where the buffer is shorter than [`MIN_FRAME`].
+    /// Starts a plain Ethernet II frame; `None` if the buffer is shorter than [`MIN_FRAME`].
     pub fn ethernet(buffer: &'a mut [u8], destination: MacAddress, source: MacAddress) -> Option<FrameBuilder<'a>> {
         Self::new(buffer, destination, source, &Encapsulation::Ethernet)
     }
 
-    /// Starts a frame with the given wrapping; `None` where the buffer is shorter than [`MIN_FRAME`].
+    /// Starts a frame with the given encapsulation; `None` if the buffer is shorter than [`MIN_FRAME`].
     pub fn new(
         buffer: &'a mut [u8],
         destination: MacAddress,
@@ -400,19 +402,19 @@ impl<'a> FrameBuilder<'a> {
         Some(FrameBuilder { buffer, limit, start, at: start + ETHERCAT_HEADER_LEN, last: None })
     }
 
-    /// Bytes of data that one more datagram may have; `None` where not even an empty one fits.
+    /// Maximum number of data bytes of one more datagram; `None` if not even an empty datagram fits.
     pub const fn room(&self) -> Option<usize> {
         self.limit.checked_sub(self.at + OVERHEAD)
     }
 
     /// Appends a datagram with zeroed data and working counter. Returns the offset of its data in the frame, or `None`
-    /// where it does not fit.
+    /// if it does not fit.
     pub fn datagram(&mut self, command: Command, index: u8, target: Target, length: usize) -> Option<usize> {
         let header = Header::new(command, index, target, u16::try_from(length).ok()?);
         self.header(header)
     }
 
-    /// Appends a datagram with this header (its M bit is kept right by the builder), zeroed data and working counter.
+    /// Appends a datagram with this header, zeroed data and working counter. The builder sets the M bit.
     pub fn header(&mut self, header: Header) -> Option<usize> {
         let length = usize::from(header.length);
         if self.room()? < length {

@@ -1,4 +1,4 @@
-//! What EtherCAT looks like on the wire: a codec without state, policy, allocation, clock or I/O.
+//! The EtherCAT codec: frames, registers, SII and mailbox messages, without state, policy, allocation, clock or I/O.
 //!
 //! * [`frame`]: Ethernet, VLAN and UDP encapsulation, the EtherCAT header, reading and building frames;
 //! * [`datagram`], [`command`]: one EtherCAT command and its header;
@@ -11,8 +11,8 @@
 //!
 //! # Panic contract
 //!
-//! Decoding any bytes never panics: a malformed part is an error that gives the expected and the received value.
-//! Unknown codes from the wire are kept, so that decode and encode are inverse.
+//! Decoding any bytes never panics: a malformed part is an error that contains the expected and the received value.
+//! Unknown codes are kept, so that decode and encode are inverse.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,9 +1,9 @@
 //! Mailbox messages (protocol 6, 10.1).
 //!
-//! [`Header`] stands before every message, [`Message`] is header and payload together; [`ErrorReply`] is the payload of
+//! [`Header`] precedes every message, [`Message`] is header and payload together; [`ErrorReply`] is the payload of
 //! protocol 0. One module per protocol reads and writes the others: [`coe`] with [`sdo`], [`foe`], [`eoe`], [`soe`],
-//! [`aoe`], [`voe`]; [`gateway`] is a message in UDP or TCP. Both ends handle sequence, counters, repeats and the
-//! joining of fragments.
+//! [`aoe`], [`voe`]; [`gateway`] is a message in UDP or TCP. Sequences, counters, repetitions and the reassembly of
+//! fragments are handled by MainDevice and SubDevice.
 
 pub mod aoe;
 pub mod coe;

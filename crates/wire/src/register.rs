@@ -1,9 +1,9 @@
 //! The registers of a SubDevice controller (protocol 3).
 //!
 //! * [`map`]: their addresses;
-//! * [`table()`]: size, access rights, reset value and groups of each;
-//! * typed views, re-exported here: `decode` takes exactly the register's bytes, `encode` gives them back. Bits
-//!   without a name are kept. Some layouts serve two registers, as that of an event and its mask.
+//! * [`table()`]: size, access rights, reset value and group of each register;
+//! * typed views, re-exported here: `decode` takes exactly the register's bytes, `encode` returns them. Bits without a
+//!   name are kept. Some layouts serve two registers, for example an event and its mask.
 
 #[macro_use]
 mod view;

@@ -1,9 +1,9 @@
-//! SubDevice information (SII): what the EEPROM of a SubDevice holds (protocol 4).
+//! SubDevice information (SII): content of the EEPROM of a SubDevice (protocol 4).
 //!
-//! [`Sii::parse`] takes a whole image and borrows it; each category also has its own decoder ([`General::decode`],
-//! [`Strings::new`], [`Pdos::new`], ...) for readers that fetch one category at a time. [`SiiWriter`] writes an image
-//! into a buffer of the caller. Unknown and vendor-specific categories are kept as bytes. How an image gets out of a
-//! controller (registers 0x0500..0x050F) is not this module's matter.
+//! [`Sii::parse`] takes and borrows a whole image; each category also has its own decoder ([`General::decode`],
+//! [`Strings::new`], [`Pdos::new`], ...) for readers that read one category at a time. [`SiiWriter`] writes an image
+//! into a buffer of the caller. Unknown and vendor-specific categories are kept as bytes. This module does not read the
+//! image from a controller (registers 0x0500..0x050F).
 
 mod category;
 mod checksum;

@@ -1,14 +1,14 @@
 //! Ring and standby marks in the source MAC address (protocol 9.7).
 //!
-//! In: the address of the MainDevice's main network interface and the marks of a frame; out: the source address to
-//! send with, and back. Which frame gets which id, and what is dropped, is the engine's matter.
+//! Converts the address of the MainDevice's main network interface and the marks of a frame into the source address of
+//! the frame, and back. The engine assigns frame ids and discards frames.
 //!
-//! Two encodings exist. [`MacCodec::FlagsFirst`] (A) is the default and the only one that carries the marks of
-//! standby; [`MacCodec::IdLast`] (B) serves rings alone.
+//! Two encodings exist. [`MacCodec::FlagsFirst`] (A) is the default and the only encoding with standby marks;
+//! [`MacCodec::IdLast`] (B) supports only the ring.
 
 use crate::frame::MacAddress;
 
-/// Bit of byte 0 that is set on frames sent on the redundant link; the same in both encodings.
+/// Bit of byte 0 that is set in frames sent on the redundant link, in both encodings.
 pub const REDUNDANT: u8 = 0x08;
 /// Bit of byte 0 that a controller with forwarding rule 1 sets in every EtherCAT frame it processes (protocol 2.6).
 pub const PROCESSED: u8 = 0x02;
@@ -22,24 +22,24 @@ pub const MAX_RETRY: u8 = 7;
 
 const RETRY_SHIFT: u32 = 4;
 
-/// Marks in a frame's source address besides the identity of its sender.
+/// Marks in the source address of a frame, in addition to the identity of its sender.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SourceMarks {
     /// Sent on the redundant link.
     pub redundant: bool,
-    /// Id that both copies of a frame share.
+    /// Id of both copies of a frame.
     pub frame_id: u8,
-    /// How often an acyclic frame was sent again, 0..=[`MAX_RETRY`].
+    /// Retry index of an acyclic frame, 0..=[`MAX_RETRY`].
     pub retry: u8,
     /// Forwarded by a standby MainDevice on its main link (A only).
     pub forwarded_on_main: bool,
     /// Forwarded by a standby MainDevice on its redundant link (A only).
     pub forwarded_on_redundant: bool,
-    /// Processed by a controller with forwarding rule 1. A missing mark proves nothing (protocol 2.6).
+    /// Processed by a controller with forwarding rule 1. A missing mark is no proof of the opposite (protocol 2.6).
     pub processed: bool,
 }
 
-/// How marks are put into the source address.
+/// Encoding of marks in the source address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum MacCodec {
     /// Encoding A: flags and retry in byte 0, id in byte 1, identity in bytes 3..=5.
@@ -54,8 +54,8 @@ const fn flag(set: bool, mask: u8) -> u8 {
 }
 
 impl MacCodec {
-    /// Source address for a frame: `nic` is the address of the main interface, for both copies. Encoding B leaves the
-    /// forwarding marks out. A retry above [`MAX_RETRY`] loses its upper bits.
+    /// Source address for a frame: `nic` is the address of the main interface, for both copies. Encoding B omits the
+    /// forwarding marks. A retry above [`MAX_RETRY`] loses its upper bits.
     pub const fn encode(self, nic: MacAddress, marks: &SourceMarks) -> MacAddress {
         let n = nic.0;
         let retry = marks.retry & MAX_RETRY;
@@ -72,8 +72,8 @@ impl MacCodec {
         })
     }
 
-    /// The marks of a received frame. Encoding B has no forwarding marks, and its retry cannot be told without the
-    /// sender's address: see [`MacCodec::retry`].
+    /// The marks of a received frame. Encoding B has no forwarding marks, and its retry index depends on the sender's
+    /// address: see [`MacCodec::retry`].
     pub const fn decode(self, source: MacAddress) -> SourceMarks {
         let flags = source.0[0];
         let (retry, forwarding) = match self {
@@ -90,7 +90,7 @@ impl MacCodec {
         }
     }
 
-    /// The id that both copies of a frame share.
+    /// The id of both copies of a frame.
     pub const fn frame_id(self, source: MacAddress) -> u8 {
         match self {
             MacCodec::FlagsFirst => source.0[1],
@@ -106,8 +106,8 @@ impl MacCodec {
         }
     }
 
-    /// Whether both addresses (marked or as the interface has them) carry the identity of one MainDevice. Byte 1 of
-    /// encoding B is left out, for retries change it.
+    /// Whether both addresses (with marks or as in the interface) contain the identity of the same MainDevice. Byte 1
+    /// of encoding B is ignored, because retries change it.
     pub const fn same_main_device(self, a: MacAddress, b: MacAddress) -> bool {
         let first = match self {
             MacCodec::FlagsFirst => 3,
@@ -116,7 +116,7 @@ impl MacCodec {
         a.0[first] == b.0[first] && a.0[first + 1] == b.0[first + 1] && a.0[first + 2] == b.0[first + 2]
     }
 
-    /// Whether the encoding carries forwarding marks, without which a standby MainDevice must not forward.
+    /// Whether the encoding contains forwarding marks, without which a standby MainDevice must not forward.
     pub const fn carries_forwarding(self) -> bool {
         matches!(self, MacCodec::FlagsFirst)
     }
@@ -141,17 +141,17 @@ mod tests {
 
     // covers: 9.7.3, codec-frames
     #[test]
-    fn the_trace_with_a_standby_reads_as_its_text_says() {
+    fn the_trace_with_a_standby_decodes_as_described() {
         let nic = [0x00, 0x00, 0x0E, 0x01, 0xBD, 0x9A];
         let plain = SourceMarks { frame_id: 0x76, ..SourceMarks::default() };
         let redundant = SourceMarks { redundant: true, ..plain };
         let processed = SourceMarks { processed: true, ..plain };
-        // 1: the redundant copy straight from the active MainDevice.
+        // 1: the redundant copy directly from the active MainDevice.
         round_trip(A, nic, redundant, [0x08, 0x76, 0x0E, 0x01, 0xBD, 0x9A]);
         // 2: the same copy, forwarded by the standby on its redundant link.
         let forwarded = SourceMarks { forwarded_on_redundant: true, ..redundant };
         round_trip(A, nic, forwarded, [0x88, 0x76, 0x0E, 0x01, 0xBD, 0x9A]);
-        // 3: the main copy behind the SubDevices.
+        // 3: the main copy after the SubDevices.
         round_trip(A, nic, processed, [0x02, 0x76, 0x0E, 0x01, 0xBD, 0x9A]);
         // 4: the main copy, forwarded by the standby on its main link.
         let forwarded = SourceMarks { forwarded_on_main: true, ..processed };
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_do_not_hide_who_sent_the_frame() {
+    fn marks_keep_the_identity_of_the_sender() {
         let nic = mac([0x00, 0x0E, 0x0C, 0x61, 0x3D, 0x7C]);
         let marks =
             SourceMarks { redundant: true, frame_id: 0xFF, retry: 7, processed: true, ..SourceMarks::default() };
@@ -208,7 +208,7 @@ mod tests {
     proptest! {
         // covers: codec-frames
         #[test]
-        fn any_address_decodes_and_encodes_to_itself_except_for_reserved_bits(bytes in any::<[u8; 6]>()) {
+        fn any_address_round_trips_except_for_reserved_bits(bytes in any::<[u8; 6]>()) {
             let source = mac(bytes);
             let mut expected = bytes;
             expected[0] &= !0x01;

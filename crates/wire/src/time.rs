@@ -16,23 +16,23 @@ impl DcTime {
         }
     }
 
-    /// Nanoseconds since the Unix epoch; `None` where they do not fit 64 bits.
+    /// Nanoseconds since the Unix epoch; `None` if they exceed 64 bits.
     pub const fn to_unix_ns(self) -> Option<u64> {
         self.0.checked_add(DC_EPOCH_UNIX_SECONDS * 1_000_000_000)
     }
 
-    /// The lower 32 bits, as 32-bit clocks and receive-time registers have them.
+    /// The lower 32 bits, as in 32-bit clocks and receive time registers.
     pub const fn low(self) -> DcTime32 {
         DcTime32(self.0 as u32)
     }
 }
 
-/// A 32-bit time of a SubDevice's clock: nanoseconds, wrapping every 4.29 s.
+/// A 32-bit time of a SubDevice's clock in nanoseconds, wrapping every 4.29 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DcTime32(pub u32);
 
 impl DcTime32 {
-    /// `self - earlier` as a signed difference, right across a wrap as long as it is below 2^31 ns (protocol 7.1).
+    /// `self - earlier` as a signed difference, correct across a wrap if it is below 2^31 ns (protocol 7.1).
     pub const fn since(self, earlier: DcTime32) -> i32 {
         self.0.wrapping_sub(earlier.0) as i32
     }
@@ -44,7 +44,7 @@ mod tests {
 
     // covers: codec-frames
     #[test]
-    fn differences_survive_the_wrap_of_a_32_bit_clock() {
+    fn differences_are_correct_across_the_wrap_of_a_32_bit_clock() {
         // protocol 7.1, wrap test: S2 port 0 at 0xFFFFF800, port 1 at 0x00000408: 3080 ns apart.
         assert_eq!(DcTime32(0x0000_0408).since(DcTime32(0xFFFF_F800)), 3080);
         assert_eq!(DcTime32(0x0000_020C).since(DcTime32(0xFFFF_FF00)), 780);

@@ -1,7 +1,7 @@
-//! The codec against bytes that others made: EEPROM images and captures of real devices.
+//! Tests of the codec with recorded bytes: EEPROM images and captures of real devices.
 //!
-//! The files lie beside the repository (`../shared/data`) and are no part of it. Where they are absent each test says
-//! so and passes.
+//! The files are beside the repository (`../shared/data`) and not part of it. If they are missing, each test prints
+//! this and passes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +15,7 @@ use ringcat_wire::sii::{
     CategoryKind, General, PdoDirection, PdoEntry, Sii, SiiHeader, SiiSyncManager, SiiWriter, SyncManagerKind,
 };
 
-/// Every file with this extension, by name; `None` and a printed line where the directory is absent.
+/// Every file with this extension, by name; `None` and a printed line if the directory is missing.
 fn files(directory: &str, extension: &str) -> Option<BTreeMap<String, PathBuf>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(directory);
     let Ok(entries) = fs::read_dir(&path) else {
@@ -39,7 +39,7 @@ fn every_sii_image_parses_or_is_refused_with_a_reason() {
                 assert!(!name.starts_with("NEGATIVE"), "{name} parses");
                 parsed += 1;
                 print_image(&name, &sii);
-                assert_image_is_written_as_it_was_read(&name, &image, &sii);
+                assert_image_round_trips(&name, &image, &sii);
             }
             Err(error) => println!("{name}: refused: {error}"),
         }
@@ -65,8 +65,8 @@ fn print_image(name: &str, sii: &Sii<'_>) {
     );
 }
 
-/// Re-encodes the fixed area and each category from what its decoder made of it, and compares up to the end marker.
-fn assert_image_is_written_as_it_was_read(name: &str, image: &[u8], sii: &Sii<'_>) {
+/// Re-encodes the fixed area and each category from the decoded values, and compares up to the end marker.
+fn assert_image_round_trips(name: &str, image: &[u8], sii: &Sii<'_>) {
     let mut buffer = vec![0; image.len()];
     assert_eq!(sii.header().encode(), image[..SiiHeader::LEN], "{name}");
     let mut writer = SiiWriter::new(&mut buffer, sii.header()).unwrap();
@@ -124,25 +124,25 @@ fn an_el2004_has_four_outputs_of_one_bit() {
     assert_eq!(sync_managers[0].kind, SyncManagerKind::Outputs);
 }
 
-/// What a capture holds, counted.
+/// Counts of a capture.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Counts {
     frames: usize,
     datagrams: usize,
     other_protocol: usize,
-    /// Of the frames, those whose EtherCAT header announces more than their datagrams take.
+    /// Frames with bytes between the last datagram and the length in the EtherCAT header.
     surplus: usize,
     upload_requests: usize,
     upload_responses: usize,
     download_requests: usize,
     download_responses: usize,
-    /// Anything else in a mailbox.
+    /// Other mailbox messages.
     other_mail: usize,
 }
 
 // covers: codec-frames
 #[test]
-fn every_captured_ethercat_frame_is_encoded_as_it_was_decoded() {
+fn every_captured_ethercat_frame_encodes_to_its_original_bytes() {
     let Some(files) = files("pcap", "pcapng") else { return };
     let mut counts = BTreeMap::new();
     for (name, path) in files {
@@ -151,7 +151,7 @@ fn every_captured_ethercat_frame_is_encoded_as_it_was_decoded() {
         println!("{name}: {found:?}");
         counts.insert(name, found);
     }
-    // As tshark counts them.
+    // Counts according to tshark.
     let frames = [
         ("ethercrab_hist_el2828_el2889_long", 19964),
         ("ethercrab_hist_el2828_el2889_noreborrow", 10000),
@@ -174,7 +174,7 @@ fn every_captured_ethercat_frame_is_encoded_as_it_was_decoded() {
     ];
     for (name, frames) in frames {
         let found = &counts[name];
-        // The MainDevice of this capture announced 28 bytes, the padding included, whatever its datagram had.
+        // The MainDevice of this capture writes length 28, including the padding, for every datagram.
         let surplus = if name == "ethercrab_sii_read_el2004" { 246 } else { 0 };
         assert_eq!((found.frames, found.surplus), (frames, surplus), "{name}");
     }
@@ -233,7 +233,7 @@ fn count_request(counts: &mut Counts, mailbox: &[u8]) {
 fn count_response(counts: &mut Counts, mailbox: &[u8]) {
     let message = coe(mailbox);
     let response = SdoResponse::decode(message.payload).unwrap();
-    // Behind the subindex of a finished download some devices leave what the request had there.
+    // After the subindex of a finished download some devices return bytes of the request.
     let said = if matches!(response, SdoResponse::DownloadDone { .. }) { 6 } else { message.payload.len() };
     assert_encoded(&message.payload[..said], |out| response.encode(out));
     match response {

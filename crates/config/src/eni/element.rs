@@ -1,4 +1,4 @@
-//! An element of the file with typed access to what is in it. Errors know line, column and the way from the root.
+//! An element of the file with typed access to its content. Errors contain line, column and the path from the root.
 
 use std::cell::{Cell, RefCell};
 use std::fmt::Display;
@@ -11,10 +11,10 @@ use super::limits::MAX_UNKNOWN;
 use super::model::Unknown;
 use super::quoted::shown;
 
-/// What all elements of a file share.
+/// Data shared by all elements of a file.
 pub(super) struct File<'a> {
     text: &'a str,
-    /// First byte of each line.
+    /// Offset of the first byte of each line.
     lines: Vec<usize>,
     unknown: RefCell<Vec<Unknown>>,
     more_unknown: Cell<usize>,
@@ -34,13 +34,13 @@ impl<'a> File<'a> {
     pub fn place(&self, at: usize) -> Place {
         let line = self.lines.partition_point(|begin| *begin <= at);
         let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(0);
-        // A file without line breaks has columns of millions: counted in characters only where that is short.
+        // The column of a file without line breaks can be in the millions: characters are counted only in short lines.
         let before = self.text.get(begin..at).unwrap_or_default();
         let column = if before.len() > 4096 { before.len() } else { before.chars().count() };
         Place { line: line as u32, column: (column + 1) as u32 }
     }
 
-    /// Unknown elements, and how many more there are.
+    /// Unknown elements, and the number of those that are not listed.
     pub fn into_unknown(self) -> (Vec<Unknown>, usize) {
         (self.unknown.into_inner(), self.more_unknown.get())
     }
@@ -91,14 +91,14 @@ impl<'a> Element<'a> {
         self.child(name).ok_or_else(|| self.error(Problem::Missing { element: name }))
     }
 
-    /// Notes children that are not among these.
+    /// Notes children whose names are not in this list.
     pub fn knows(&self, names: &[&str]) {
         for child in self.elements().filter(|child| !names.contains(&child.name())) {
             child.note_unknown();
         }
     }
 
-    /// Notes this element as one that is not known.
+    /// Notes this element as unknown.
     pub fn note_unknown(&self) {
         let mut unknown = self.file.unknown.borrow_mut();
         if unknown.len() < MAX_UNKNOWN {
@@ -108,13 +108,13 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Text of the element, CDATA too, without blanks around it.
+    /// Text of the element, including CDATA, trimmed.
     pub fn text(&self) -> String {
         let texts = self.node.children().filter(Node::is_text).filter_map(|node| node.text());
         texts.collect::<String>().trim().to_owned()
     }
 
-    /// Text of a child on one line, so that no name splits a message; empty where there is none.
+    /// Text of a child on one line, so that a name does not split a message; empty if there is no such child.
     pub fn text_of(&self, name: &str) -> String {
         let text = self.child(name).map(|child| child.text()).unwrap_or_default();
         text.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
@@ -130,7 +130,7 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// The number in a child; `None` where there is none or where it is empty.
+    /// The number in a child; `None` if the child is missing or empty.
     pub fn number_of<T: TryFrom<i64> + Bound>(&self, name: &str) -> Result<Option<T>, EniError> {
         match self.child(name) {
             Some(child) if !child.text().is_empty() => child.number().map(Some),
@@ -138,18 +138,18 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// The number in a child that must be there.
+    /// The number in a required child.
     pub fn required_number<T: TryFrom<i64> + Bound>(&self, name: &'static str) -> Result<T, EniError> {
         self.required(name)?.number()
     }
 
-    /// The element's text as yes or no.
+    /// The element's text as a boolean.
     pub fn flag(&self) -> Result<bool, EniError> {
         let text = self.text();
         flag(&text).ok_or_else(|| self.error(Problem::Value { expected: FLAGS.to_owned(), got: shown(&text) }))
     }
 
-    /// Yes or no in a child; no where there is none. An empty one is a yes.
+    /// The boolean in a child; false if the child is missing, true if it is empty.
     pub fn flag_of(&self, name: &str) -> Result<bool, EniError> {
         match self.child(name) {
             None => Ok(false),
@@ -158,7 +158,7 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Yes or no in an attribute; no where there is none.
+    /// The boolean in an attribute; false if the attribute is missing.
     pub fn flag_in(&self, attribute: &str) -> Result<bool, EniError> {
         let Some(text) = self.attribute(attribute) else { return Ok(false) };
         let expected = || format!("{FLAGS} in the attribute {attribute}");
@@ -170,7 +170,7 @@ impl<'a> Element<'a> {
         self.node.attributes().find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
     }
 
-    /// The element's text as bytes in hexadecimal, with blanks or the separators of MAC addresses between them.
+    /// The element's text as hexadecimal bytes, with optional blanks or MAC address separators.
     pub fn hex(&self) -> Result<Vec<u8>, EniError> {
         let text = self.text();
         hex(&text).ok_or_else(|| {
@@ -179,12 +179,12 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// Bytes in a child; `None` where there is none.
+    /// Bytes in a child; `None` if the child is missing.
     pub fn hex_of(&self, name: &str) -> Result<Option<Vec<u8>>, EniError> {
         self.child(name).map(|child| child.hex()).transpose()
     }
 
-    /// The four bytes of an IP address in a child, in hexadecimal or with points between them.
+    /// The four bytes of an IP address in a child, in hexadecimal or in dotted decimal form.
     pub fn ip_of(&self, name: &str) -> Result<Option<Vec<u8>>, EniError> {
         match self.child(name).map(|child| (child, child.text())) {
             Some((child, text)) if text.contains('.') => match text.parse::<Ipv4Addr>() {
@@ -205,7 +205,7 @@ impl<'a> Element<'a> {
         self.error(Problem::Value { expected: expected.to_string(), got: shown(&self.text()) })
     }
 
-    /// The way from the root, without it: `Config/Slave[2] "EL2008"/Info`.
+    /// The path from the root, without the root: `Config/Slave[2] "EL2008"/Info`.
     pub fn path(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         let mut node = Some(self.node);
@@ -219,7 +219,7 @@ impl<'a> Element<'a> {
         parts.join("/")
     }
 
-    /// Name, number among those of the same name, and what the element calls itself.
+    /// Name, number among siblings of the same name, and the element's own name.
     fn step(&self) -> String {
         let name = self.name();
         let same = |node: &Node<'_, '_>| node.is_element() && node.tag_name().name() == name;
@@ -246,7 +246,7 @@ fn flag(text: &str) -> Option<bool> {
     }
 }
 
-/// Decimal, or hexadecimal behind `#x` or `0x`.
+/// Decimal, or hexadecimal with the prefix `#x` or `0x`.
 fn number(text: &str) -> Option<i64> {
     let hexadecimal = ["#x", "#X", "0x", "0X"].iter().find_map(|prefix| text.strip_prefix(prefix));
     match hexadecimal {

@@ -1,10 +1,10 @@
-//! What is wrong with a file, and where.
+//! Errors of a file, with their position.
 
 use std::fmt;
 
 use super::kind::FileKind;
 
-/// A place in a file, both from 1; columns count characters.
+/// A position in a file. Lines and columns start at 1; columns count characters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Place {
     /// Line.
@@ -22,65 +22,65 @@ impl fmt::Display for Place {
 /// Why a file cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EniError {
-    /// Where, if it is about a place.
+    /// Position, if the error has one.
     pub place: Option<Place>,
-    /// The element, from the root: `Config/Slave[2] "EL2008"/Info/PhysAddr`. Empty where no element is at fault.
+    /// The element, from the root: `Config/Slave[2] "EL2008"/Info/PhysAddr`. Empty if no element is at fault.
     pub element: String,
-    /// What.
+    /// The error.
     pub problem: Problem,
 }
 
-/// What is wrong.
+/// The kind of error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Problem {
-    /// More than is read: what, how many there may be.
+    /// A limit is exceeded.
     TooMuch {
-        /// What there is too much of.
+        /// The counted items.
         what: &'static str,
-        /// How much is read.
+        /// The limit.
         limit: usize,
     },
-    /// The bytes are no text in the encoding that they say they have.
+    /// The bytes are no text in the declared encoding.
     Encoding {
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// No well-formed XML.
+    /// Not well-formed XML.
     Xml {
-        /// What the XML reader says.
+        /// The message of the XML reader.
         reason: String,
     },
-    /// Another kind of file.
+    /// A file of another kind.
     WrongFile {
-        /// What it looks like.
+        /// The detected kind.
         kind: FileKind,
     },
-    /// An element that must be there is not.
+    /// A required element is missing.
     Missing {
         /// Its name.
         element: &'static str,
     },
-    /// A value that is none.
+    /// An invalid value.
     Value {
-        /// What may stand here.
+        /// The valid values.
         expected: String,
-        /// What stands there.
+        /// The value in the file.
         got: String,
     },
-    /// Two places of the file, or the file and what can be, contradict each other.
+    /// Two parts of the file contradict each other, or the file contradicts what is possible.
     Contradiction(Box<Contradiction>),
 }
 
-/// Two places of the file, or the file and what can be, that contradict each other.
+/// A contradiction between two parts of the file, or between the file and what is possible.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contradiction {
-    /// What about.
+    /// The setting.
     pub what: String,
-    /// What one place says, or what must be.
+    /// The value in one part of the file, or the required value.
     pub expected: String,
-    /// What the other one says.
+    /// The value in the other part.
     pub got: String,
-    /// What to do about it; may be empty.
+    /// Advice; may be empty.
     pub hint: String,
 }
 
@@ -90,7 +90,7 @@ impl EniError {
         EniError { place: None, element: String::new(), problem }
     }
 
-    /// An error at a place, without an element.
+    /// An error at a position, without an element.
     pub(crate) fn at(place: Place, problem: Problem) -> EniError {
         EniError { place: Some(place), element: String::new(), problem }
     }
@@ -101,7 +101,7 @@ impl fmt::Display for Problem {
         match self {
             Problem::TooMuch { what, limit } => write!(f, "too much for an ENI: more than {limit} {what}"),
             Problem::Encoding { reason } => write!(f, "not readable as text: {reason}"),
-            Problem::Xml { reason } => write!(f, "no well-formed XML: {reason}"),
+            Problem::Xml { reason } => write!(f, "not well-formed XML: {reason}"),
             Problem::WrongFile { kind } => write!(f, "this is {kind}"),
             Problem::Missing { element } => write!(f, "<{element}> is missing"),
             Problem::Value { expected, got } => write!(f, "expected {expected}, got {got}"),

@@ -1,10 +1,10 @@
-//! A first pass over the text that bounds what the XML reader has to do: depth, attributes and namespaces, which it
-//! treats in quadratic time. It does not judge well-formedness; whatever it does not understand is left to the reader.
+//! A first pass over the text that limits the work of the XML reader: depth, attributes and namespaces, which the
+//! reader processes in quadratic time. It does not check well-formedness; the reader does.
 
 use super::error::{EniError, Place, Problem};
 use super::limits::{MAX_ATTRIBUTES, MAX_DEPTH};
 
-/// Refuses what is deeper or has more attributes than an ENI.
+/// Refuses a text with more levels or attributes than an ENI has.
 pub(super) fn check(text: &str) -> Result<(), EniError> {
     let bytes = text.as_bytes();
     let mut depth = 0_usize;
@@ -56,7 +56,7 @@ struct Tag {
 }
 
 impl Tag {
-    /// From `<` to behind `>`; an attribute counts by its `=` outside of quotes.
+    /// From `<` to the byte after `>`; an attribute is counted by its `=` outside of quotes.
     fn read(bytes: &[u8], begin: usize) -> Tag {
         let mut tag = Tag { kind: TagKind::Open, attributes: 0, namespaces: 0, end: bytes.len() };
         if bytes.get(begin + 1) == Some(&b'/') {
@@ -84,7 +84,7 @@ impl Tag {
     }
 }
 
-/// Where `what` stands at or behind `from`.
+/// Position of `what` at or after `from`.
 fn find(bytes: &[u8], from: usize, what: &[u8]) -> Option<usize> {
     let first = *what.first()?;
     let mut at = from;

@@ -1,4 +1,4 @@
-//! What a file is, where it is no ENI: users mix up files with similar roots, so the error says which one they have.
+//! The kind of a file that is not an ENI. Users confuse files with similar roots, so the error names the kind.
 
 use std::fmt;
 
@@ -6,12 +6,12 @@ use roxmltree::Node;
 
 use super::quoted::shown;
 
-/// What a file looks like.
+/// The kind of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// Root `EtherCATInfo` or `EtherCATInfoList` with devices.
     DeviceDescription,
-    /// What `ethercat xml` of the IgH stack prints: `EtherCATInfo` with one vendor and one device per SubDevice found.
+    /// Output of `ethercat xml` of the IgH stack: `EtherCATInfo` with one vendor and one device per SubDevice.
     EthercatXml,
     /// Root `EtherCATConfig` of a Beremiz project.
     BeremizProject,
@@ -19,16 +19,16 @@ pub enum FileKind {
     TwinCatProject,
     /// A configuration of the LinuxCNC driver.
     LinuxCnc,
-    /// An encrypted file, with what shows it.
+    /// An encrypted file, with the evidence.
     Encrypted(&'static str),
-    /// Not XML at all: no `<` at its beginning.
+    /// Not XML: no `<` at the beginning.
     NotXml,
     /// Another XML file, with the name of its root.
     OtherXml(String),
 }
 
 impl FileKind {
-    /// What bytes are that are no XML.
+    /// The kind of a file that is not XML.
     pub(super) fn of_bytes(bytes: &[u8]) -> FileKind {
         let known: [(&[u8], &'static str); 5] = [
             (b"Salted__", "encrypted with a password (OpenSSL)"),
@@ -40,12 +40,12 @@ impl FileKind {
         let found = known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, what)| *what);
         match found {
             Some(what) => FileKind::Encrypted(what),
-            None if is_random(bytes) => FileKind::Encrypted("bytes without any order"),
+            None if is_random(bytes) => FileKind::Encrypted("random bytes"),
             None => FileKind::NotXml,
         }
     }
 
-    /// What the root element tells; `None` for an ENI.
+    /// The kind by the root element; `None` for an ENI.
     pub(super) fn of(root: Node<'_, '_>) -> Option<FileKind> {
         let name = root.tag_name().name();
         let is_cipher = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "EncryptedData" | "CipherData");
@@ -64,9 +64,9 @@ impl FileKind {
     }
 }
 
-/// As many different bytes as chance makes, which neither text nor tables have.
+/// Whether the bytes have the entropy of random data, which text and tables do not reach.
 fn is_random(bytes: &[u8]) -> bool {
-    /// Bytes that are looked at; fewer tell nothing.
+    /// Number of bytes that are evaluated; fewer bytes are not significant.
     const LOOKED_AT: std::ops::RangeInclusive<usize> = 256..=4096;
     let bytes = &bytes[..bytes.len().min(*LOOKED_AT.end())];
     let mut counts = [0_u32; 256];
@@ -74,18 +74,18 @@ fn is_random(bytes: &[u8]) -> bool {
     let total = bytes.len() as f64;
     let entropy = |count: &u32| f64::from(*count) / total * (total / f64::from(*count)).log2();
     let bits: f64 = counts.iter().filter(|count| **count > 0).map(entropy).sum();
-    // 256 bytes of chance have 7.2 bits each, text has less than 6.
+    // 256 random bytes have 7.2 bits each, text has less than 6.
     LOOKED_AT.contains(&bytes.len()) && bits > 6.8
 }
 
-/// A root `EtherCATConfig` that names the schema of device descriptions.
+/// Whether a root `EtherCATConfig` names the schema of device descriptions.
 fn is_beremiz(root: Node<'_, '_>) -> bool {
     root.attributes().any(|attribute| {
         attribute.name() == "noNamespaceSchemaLocation" && attribute.value().trim().ends_with("EtherCATInfo.xsd")
     })
 }
 
-/// Comments `Slave 0`, `Slave 1` before vendor and description.
+/// Whether there are comments `Slave 0`, `Slave 1` before vendor and description.
 fn is_ethercat_xml(root: Node<'_, '_>) -> bool {
     let comments = root.descendants().take(64).filter(Node::is_comment).filter_map(|node| node.text());
     comments.map(str::trim).any(|text| text.strip_prefix("Slave ").is_some_and(|number| number.parse::<u16>().is_ok()))

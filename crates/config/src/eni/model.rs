@@ -1,4 +1,4 @@
-//! What an ENI says, as it says it (protocol 8.1). Numbers are checked to be numbers, nothing is interpreted yet.
+//! The content of an ENI as written in the file (protocol 8.1). Numbers are validated, nothing is interpreted yet.
 
 mod command;
 mod cyclic;
@@ -17,7 +17,7 @@ pub use mailbox::{CoeCommand, EoeCommand, Mailbox, MailboxBuffer, Poll, RawMailC
 pub struct Eni {
     /// Version of the schema.
     pub version: Option<String>,
-    /// What made it, where a comment in front of the root says so.
+    /// The tool that created the file, if a comment before the root names it.
     pub made_by: Option<String>,
     /// The MainDevice.
     pub main_device: MainDevice,
@@ -27,16 +27,16 @@ pub struct Eni {
     pub tasks: Vec<CyclicTask>,
     /// The process image.
     pub image: ProcessImage,
-    /// Elements that the reader does not know, at most [`super::MAX_UNKNOWN`].
+    /// Unknown elements, at most [`super::MAX_UNKNOWN`].
     pub unknown: Vec<Unknown>,
-    /// How many more of them there are.
+    /// Number of further unknown elements.
     pub more_unknown: usize,
 }
 
 /// An element that the reader does not know.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unknown {
-    /// Where.
+    /// Its position in the file.
     pub place: Place,
     /// The element, from the root.
     pub element: String,
@@ -53,35 +53,35 @@ pub struct MainDevice {
     pub source: Vec<u8>,
     /// `MailboxStates`.
     pub mailbox_states: Option<MailboxStates>,
-    /// `EoE`: it bridges Ethernet.
+    /// `EoE`: the MainDevice bridges Ethernet.
     pub eoe: bool,
-    /// `InitCmds`: for the whole bus.
+    /// `InitCmds`: commands for the whole bus.
     pub init_commands: Vec<EcatCommand>,
 }
 
-/// `MailboxStates`: where a logical read collects whether mailboxes are full.
+/// `MailboxStates`: the area in which a logical read collects the status bits of mailboxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MailboxStates {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// Logical address.
     pub start: LogicalAddress,
-    /// Bytes.
+    /// Number of bytes.
     pub count: u32,
 }
 
 /// `Slave`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SubDevice {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `Info/Name`.
     pub name: String,
-    /// `Info/PhysAddr`: its station address.
+    /// `Info/PhysAddr`: the station address.
     pub station: Option<u16>,
     /// `Info/AutoIncAddr`: 0, 65535, 65534, ...
     pub auto_increment: Option<u16>,
-    /// `Info/Physics`: a letter per port.
+    /// `Info/Physics`: one letter per port.
     pub physics: String,
     /// `Info/VendorId`.
     pub vendor_id: Option<u32>,
@@ -105,10 +105,10 @@ pub struct SubDevice {
     pub clock: Option<DistributedClock>,
 }
 
-/// Bits of an image.
+/// A range of bits in an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitRange {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `BitStart`.
     pub start: u32,
@@ -119,9 +119,9 @@ pub struct BitRange {
 /// `ProcessData`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProcessData {
-    /// `Send`: where its outputs lie in the output image.
+    /// `Send`: position of the outputs in the output image.
     pub send: Vec<BitRange>,
-    /// `Recv`: where its inputs lie in the input image.
+    /// `Recv`: position of the inputs in the input image.
     pub receive: Vec<BitRange>,
     /// `Sm0` to `Sm15`.
     pub sync_managers: Vec<SyncManagerSettings>,
@@ -145,7 +145,7 @@ pub enum SyncManagerKind {
 /// `Sm0` to `Sm15`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyncManagerSettings {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// Its number.
     pub index: u8,
@@ -159,22 +159,22 @@ pub struct SyncManagerSettings {
     pub control: Option<u8>,
     /// `Enable`.
     pub enable: Option<bool>,
-    /// `Pdo`: what is assigned to it.
+    /// `Pdo`: assigned PDOs.
     pub pdos: Vec<u16>,
 }
 
 /// `RxPdo` or `TxPdo`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pdo {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// Whether it is an RxPdo: outputs.
+    /// Whether it is an RxPdo (outputs).
     pub outputs: bool,
     /// `Index`.
     pub index: u16,
     /// `Name`.
     pub name: String,
-    /// Attribute `Sm`: where it belongs.
+    /// Attribute `Sm`: the SyncManager.
     pub sync_manager: Option<u8>,
     /// `Entry`.
     pub entries: Vec<PdoEntry>,
@@ -187,7 +187,7 @@ pub struct PdoEntry {
     pub index: u16,
     /// `SubIndex`.
     pub sub_index: u8,
-    /// `BitLen`: entries such as `ARRAY [0..99] OF BYTE` have more than a byte can say.
+    /// `BitLen`: entries such as `ARRAY [0..99] OF BYTE` exceed the range of a byte.
     pub bit_length: u16,
     /// `Name`.
     pub name: String,
@@ -208,27 +208,27 @@ pub enum Port {
     D,
 }
 
-/// `PreviousPort`: what the SubDevice is plugged into.
+/// `PreviousPort`: the upstream connection of the SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PreviousPort {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// Attribute `Selected`.
     pub selected: bool,
     /// `Port` of the other SubDevice.
     pub port: Port,
-    /// `PhysAddr` of the other SubDevice; `None` where the file only has a `DeviceId`.
+    /// `PhysAddr` of the other SubDevice; `None` if the file has only a `DeviceId`.
     pub station: Option<u16>,
 }
 
 /// `HotConnect`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HotConnect {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `GroupName`.
     pub name: String,
-    /// `GroupMemberCnt`, head included.
+    /// `GroupMemberCnt`, including the head.
     pub members: u16,
     /// `IdentifyCmd`.
     pub identify: Vec<EcatCommand>,
@@ -237,7 +237,7 @@ pub struct HotConnect {
 /// `DC`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DistributedClock {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `ReferenceClock`.
     pub reference: bool,

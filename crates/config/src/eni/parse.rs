@@ -1,4 +1,4 @@
-//! From XML to the model: the root, the MainDevice and the SubDevices; commands, cycles and images are in modules of
+//! From XML to the model: the root, the MainDevice and the SubDevices; commands, cycles and images have modules of
 //! their own. The order of elements does not matter (protocol 8.2).
 
 mod commands;
@@ -42,7 +42,7 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> EniError {
         return EniError::of_file(Problem::TooMuch { what: "XML nodes", limit: MAX_NODES as usize });
     }
     if matches!(error, roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream) {
-        let reason = "the file ends before its elements do: it was cut off, copy or export it again".to_owned();
+        let reason = "the file is truncated: an element has no end; copy or export the file again".to_owned();
         return EniError::at(File::new(text).place(text.len()), Problem::Xml { reason });
     }
     let at = error.pos();
@@ -50,7 +50,7 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> EniError {
         roxmltree::Error::DtdDetected => "a document type definition (DTD) is not read".to_owned(),
         other => other.to_string(),
     };
-    // The place stands in front of the message already.
+    // The message already contains the position at its beginning.
     if let Some(begin) = reason.rfind(" at ") {
         reason.truncate(begin);
     }

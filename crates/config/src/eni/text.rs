@@ -1,6 +1,7 @@
-//! Bytes of a file as text: byte order marks, UTF-8, UTF-16, and the one-byte encodings that an XML declaration names.
+//! Decodes the bytes of a file: byte order marks, UTF-8, UTF-16, and the one-byte encodings that an XML declaration
+//! names.
 //!
-//! A declaration that says UTF-16 in a file of single bytes is not believed: tools write it so by mistake.
+//! The reader ignores a declaration of UTF-16 in a file of single bytes: some tools write it by mistake.
 
 use std::borrow::Cow;
 
@@ -11,7 +12,7 @@ use super::kind::FileKind;
 use super::limits::MAX_BYTES;
 use super::quoted::shown;
 
-/// Bytes at the beginning in which a declaration is looked for.
+/// Bytes at the beginning that may contain the declaration.
 const DECLARATION: usize = 256;
 
 /// The text of a file.
@@ -47,7 +48,7 @@ fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, EniError> {
     }
 }
 
-/// What the XML declaration says about the encoding.
+/// The encoding in the XML declaration.
 fn declared(bytes: &[u8]) -> Option<String> {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(DECLARATION)]);
     let declaration = head.trim_start().strip_prefix("<?xml")?.split("?>").next()?.to_owned();
@@ -56,7 +57,7 @@ fn declared(bytes: &[u8]) -> Option<String> {
     Some(value[1..].split(quote).next()?.to_owned())
 }
 
-/// The first line that is not in the encoding.
+/// The error for the first line that is not in the encoding.
 fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> EniError {
     if bytes.trim_ascii_start().first() != Some(&b'<') {
         return EniError::of_file(Problem::WrongFile { kind: FileKind::of_bytes(bytes) });

@@ -1,5 +1,5 @@
-//! Which bits of a SyncManager are which logical bits: FMMUs as the commands leave them, cut at the borders of
-//! SyncManagers (protocol 3.10).
+//! Maps bits of SyncManagers to logical bits: the FMMUs after all commands, split at the borders of SyncManagers
+//! (protocol 3.10).
 
 use ringcat_engine::config::DeclaredSyncManager;
 use ringcat_engine::info::Direction;
@@ -10,7 +10,7 @@ use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, Place};
 
-/// Process data of a SyncManager with its logical place.
+/// Process data of a SyncManager with its logical position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Piece {
     pub direction: Direction,
@@ -34,7 +34,7 @@ pub(super) fn pieces(
     let mut pieces = Vec::new();
     for (number, fmmu, place) in registers.fmmus() {
         if (0x0800..0x0880).contains(&fmmu.physical_start) {
-            // Whether a mailbox is full: told of with MailboxStates.
+            // A mailbox status bit: `MailboxStates` handles it.
             continue;
         }
         let subject = format!("FMMU {number}");
@@ -73,7 +73,7 @@ pub(super) fn pieces(
     Ok(pieces)
 }
 
-/// Appends what an FMMU maps of the areas of its direction. Returns number and length of the last of them.
+/// Appends the areas of its direction that an FMMU maps. Returns number and length of the last area.
 fn map(
     fmmu: &Fmmu,
     direction: Direction,

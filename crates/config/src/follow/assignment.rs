@@ -1,5 +1,5 @@
-//! PDO assignment and mapping of a file without commands for SyncManagers: the objects that its CoE commands write say
-//! how long process data is (protocol 6.3: 0x1C10 + n, 0x1600 to 0x17FF, 0x1A00 to 0x1BFF).
+//! PDO assignment and mapping of a file without commands for SyncManagers: the objects written by its CoE commands
+//! define the length of process data (protocol 6.3: 0x1C10 + n, 0x1600 to 0x17FF, 0x1A00 to 0x1BFF).
 
 use std::collections::BTreeMap;
 
@@ -16,11 +16,11 @@ const ASSIGNED: std::ops::RangeInclusive<u16> = 0x1C12..=0x1C1F;
 const OUTPUTS: std::ops::RangeInclusive<u16> = 0x1600..=0x17FF;
 const INPUTS: std::ops::RangeInclusive<u16> = 0x1A00..=0x1BFF;
 
-/// Bits and entries of a PDO at most: what a datagram carries, subindices of an object.
+/// Maximum number of bits and entries of a PDO: data bytes of a datagram, subindices of an object.
 const PDO_BITS: u64 = 1486 * 8;
 const PDO_ENTRIES: usize = 255;
 
-/// What the commands leave in an object: subindex 0 counts.
+/// An object after all commands; subindex 0 is the number of entries.
 #[derive(Debug, Default)]
 struct Object {
     values: BTreeMap<u8, u32>,
@@ -34,7 +34,7 @@ impl Object {
             self.values.insert(command.sub_index, value(data));
             return;
         }
-        // Subindex 0 takes 16 bits, and is left out where it begins with 1.
+        // With complete access, subindex 0 has 16 bits; it is missing if the command starts at subindex 1.
         let (count, rest) = match command.sub_index {
             0 => command.data.split_at(command.data.len().min(2)),
             _ => (&[][..], &command.data[..]),
@@ -47,14 +47,14 @@ impl Object {
         }
     }
 
-    /// The values that count; `None` where one of them was never written.
+    /// The valid entries; `None` if an entry was never written.
     fn list(&self) -> Option<Vec<u32>> {
         let count = u8::try_from(*self.values.get(&0)?).ok()?;
         (1..=count).map(|sub_index| self.values.get(&sub_index).copied()).collect()
     }
 }
 
-/// The assignments that the commands of the way to SAFEOP write; `None` where there are none.
+/// The assignments written by the commands on the way to SAFEOP; `None` if there are none.
 pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Vec<PdoAssignment>> {
     let commands = &subdevice.mailbox.as_ref()?.coe;
     let mut objects: BTreeMap<u16, Object> = BTreeMap::new();
@@ -85,7 +85,7 @@ pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Ve
     (!assignments.is_empty()).then_some(assignments)
 }
 
-/// By the numbers of the PDOs; by the usual use of SyncManagers 2 and 3 where there are none.
+/// The direction by the PDO numbers; without PDOs, by the usual direction of SyncManagers 2 and 3.
 fn direction(index: u16, pdos: &[u16]) -> Option<Direction> {
     match pdos.first() {
         Some(pdo) if OUTPUTS.contains(pdo) => Some(Direction::Outputs),
@@ -96,7 +96,7 @@ fn direction(index: u16, pdos: &[u16]) -> Option<Direction> {
     }
 }
 
-/// Entries that the commands write, otherwise those that the file describes, otherwise those of the SII.
+/// The entries written by commands, otherwise the entries in the file, otherwise those of the SII.
 fn mapping(index: u16, objects: &BTreeMap<u16, Object>, subdevice: &SubDevice) -> PdoMapping {
     let written = objects.get(&index).and_then(Object::list);
     if let Some(values) = written {

@@ -1,5 +1,4 @@
-//! Where the SubDevices are: positions, hot connect groups, what is plugged into what; and the commands for the whole
-//! bus.
+//! Positions of the SubDevices, hot connect groups and upstream connections; commands for the whole bus.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,15 +10,15 @@ use super::messages::{command_name, contradiction, label, named};
 use super::notices::Notices;
 use crate::eni::{EcatCommand, Eni, EniError, Poll, Port, Target};
 
-/// Places of the SubDevices.
+/// Positions and connections of the SubDevices.
 pub(super) struct Bus {
-    /// Where each is expected; those of groups are set later.
+    /// Address of each SubDevice; the addresses of group members are set later.
     pub addresses: Vec<ConfigAddress>,
-    /// Number of its group.
+    /// Group index of each SubDevice.
     pub groups: Vec<Option<usize>>,
-    /// What each is plugged into.
+    /// Upstream connection of each SubDevice.
     pub plugged_into: Vec<Option<(usize, Port)>>,
-    /// The file writes `Ccs` the other way round: 2 downloads.
+    /// Whether the file reverses `Ccs`: 2 downloads.
     pub ccs_is_reversed: bool,
 }
 
@@ -34,18 +33,18 @@ impl Bus {
             ccs_is_reversed: ccs_is_reversed(eni),
         };
         for command in &eni.main_device.init_commands {
-            of_everybody(command, notices);
+            of_whole_bus(command, notices);
         }
         of_mailboxes(eni, notices);
         if eni.main_device.eoe {
-            let reason = "bridging Ethernet is not a matter of the file: the program's option --eoe";
+            let reason = "RingCAT bridges Ethernet with the option --eoe of the program, not from the file";
             notices.add(None, None, "Master/EoE", reason);
         }
         Ok(bus)
     }
 }
 
-/// Numbers of the groups, by SubDevice: a head and those behind it in document order.
+/// Group index of each SubDevice: a head and the SubDevices that follow it in document order.
 fn members(eni: &Eni) -> Result<Vec<Option<usize>>, EniError> {
     let mut groups = vec![None; eni.subdevices.len()];
     let mut number = 0;
@@ -55,13 +54,13 @@ fn members(eni: &Eni) -> Result<Vec<Option<usize>>, EniError> {
         let Some(members) = groups.get_mut(index..end) else {
             let what = "members of the hot connect group";
             let there = (eni.subdevices.len() - index).to_string();
-            let hint = "the members stand behind the head";
+            let hint = "the members follow the head";
             return Err(contradiction(eni, index, group.place, what, group.members.to_string(), there, hint));
         };
         if members.iter().any(Option::is_some) {
             let what = "the hot connect group";
             let got = "another group has it as a member";
-            return Err(contradiction(eni, index, group.place, what, "a head of its own", got, ""));
+            return Err(contradiction(eni, index, group.place, what, "the head of one group only", got, ""));
         }
         members.fill(Some(number));
         number += 1;
@@ -69,21 +68,21 @@ fn members(eni: &Eni) -> Result<Vec<Option<usize>>, EniError> {
     Ok(groups)
 }
 
-/// SubDevices by `PhysAddr`, which must differ; 0 says nothing.
+/// SubDevices by `PhysAddr`, which must be unique; 0 means unset.
 fn stations(eni: &Eni) -> Result<HashMap<u16, usize>, EniError> {
     let mut stations = HashMap::new();
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
         let Some(station) = subdevice.station.filter(|station| *station != 0) else { continue };
         if let Some(other) = stations.insert(station, index) {
-            let (expected, got) = ("a number of its own", format!("{station}, which {} has too", label(eni, other)));
+            let (expected, got) = ("a unique number", format!("{station}, which {} also has", label(eni, other)));
             return Err(contradiction(eni, index, subdevice.place, "PhysAddr", expected, got, ""));
         }
     }
     Ok(stations)
 }
 
-/// Positions by `AutoIncAddr`; where these are missing, or all the same, by document order. Members of groups have
-/// none.
+/// Positions by `AutoIncAddr`; if these are missing or all equal, by document order. Members of groups have no
+/// position.
 fn positions(eni: &Eni, groups: &[Option<usize>], notices: &mut Notices) -> Result<Vec<ConfigAddress>, EniError> {
     let count = eni.subdevices.len();
     let fixed: Vec<usize> = (0..count).filter(|index| groups[*index].is_none()).collect();
@@ -109,17 +108,18 @@ fn positions(eni: &Eni, groups: &[Option<usize>], notices: &mut Notices) -> Resu
         if rank > 0 && positions[usize::from(rank) - 1].0 == position {
             let other = label(eni, positions[usize::from(rank) - 1].1);
             let place = eni.subdevices[index].place;
-            let got = format!("position {position}, where {other} is too");
-            return Err(contradiction(eni, index, place, "AutoIncAddr", "a position of its own", got, ""));
+            let got = format!("position {position}, which {other} also has");
+            return Err(contradiction(eni, index, place, "AutoIncAddr", "a unique position", got, ""));
         }
-        // With groups the engine counts those that belong to none.
+        // With groups the engine counts only SubDevices without a group.
         let counted = if positions.len() == count { position } else { rank };
         addresses[index] = ConfigAddress::Position(counted);
     }
     Ok(addresses)
 }
 
-/// What `PreviousPort` says: the selected one, or the only one. It must be there, and there must be no circle.
+/// The upstream connection from `PreviousPort`: the selected one, or the only one. Its SubDevice must exist, and
+/// connections must not form a loop.
 fn plugged_into(eni: &Eni, stations: &HashMap<u16, usize>) -> Result<Vec<Option<(usize, Port)>>, EniError> {
     let mut plugged_into = vec![None; eni.subdevices.len()];
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
@@ -132,44 +132,44 @@ fn plugged_into(eni: &Eni, stations: &HashMap<u16, usize>) -> Result<Vec<Option<
         };
         plugged_into[index] = Some((*previous, port.port));
     }
-    // Each chain is followed until something that is known to end well.
-    let mut ends_well = vec![false; eni.subdevices.len()];
+    // Each chain is followed to a SubDevice that is known to be connected to the first one.
+    let mut reaches_first = vec![false; eni.subdevices.len()];
     for start in 0..plugged_into.len() {
         let mut way = Vec::new();
         let mut on_way = HashSet::new();
         let mut at = Some(start);
-        while let Some(index) = at.filter(|index| !ends_well[*index]) {
+        while let Some(index) = at.filter(|index| !reaches_first[*index]) {
             if !on_way.insert(index) {
                 let place =
                     eni.subdevices[index].previous_ports.first().map_or(eni.subdevices[index].place, |p| p.place);
-                let got = "a circle that leads back to itself";
-                return Err(contradiction(eni, index, place, "PreviousPort", "a way to the first SubDevice", got, ""));
+                let got = "a loop";
+                return Err(contradiction(eni, index, place, "PreviousPort", "a path to the first SubDevice", got, ""));
             }
             way.push(index);
             at = plugged_into[index].map(|(previous, _)| previous);
         }
-        way.into_iter().for_each(|index| ends_well[index] = true);
+        way.into_iter().for_each(|index| reaches_first[index] = true);
     }
     Ok(plugged_into)
 }
 
-/// Protocol 8.2: 1 downloads. A file whose CoE commands all have data and the value 2 has it reversed: no network is
-/// configured by reads only.
+/// Protocol 8.2: 1 downloads. If all CoE commands of a file have data and the value 2, the file reverses it: a
+/// configuration of reads only makes no sense.
 fn ccs_is_reversed(eni: &Eni) -> bool {
     let mut commands = eni.subdevices.iter().flat_map(|subdevice| &subdevice.mailbox).flat_map(|mailbox| &mailbox.coe);
     let is_there = commands.clone().next().is_some();
     is_there && commands.all(|command| command.ccs == 2 && !command.data.is_empty())
 }
 
-/// A command for the whole bus: RingCAT resets what it uses by itself, and sends none of the file's.
-fn of_everybody(command: &EcatCommand, notices: &mut Notices) {
+/// A command for the whole bus. RingCAT resets the registers that it uses, and sends none of these commands.
+fn of_whole_bus(command: &EcatCommand, notices: &mut Notices) {
     let zero = command.datagram.data.iter().all(|byte| *byte == 0);
     let ours = match command.datagram.target {
         Target::Logical(_) => false,
         Target::Register { ado, .. } => match ado.0 {
             0x0010..=0x0011 | 0x0120..=0x0135 | 0x0300..=0x0313 | 0x0500..=0x050F => true,
             0x0600..=0x06FF | 0x0800..=0x08FF | 0x0900..=0x09FF => true,
-            // The second address is switched off in any case.
+            // The second address is always disabled.
             0x0103 => zero,
             _ => command.datagram.command == Command::Nop,
         },
@@ -191,17 +191,17 @@ fn of_everybody(command: &EcatCommand, notices: &mut Notices) {
     }
 }
 
-/// How it is noticed that mail waits.
+/// Detection of full mailboxes.
 fn of_mailboxes(eni: &Eni, notices: &mut Notices) {
     if let Some(states) = &eni.main_device.mailbox_states {
         let reason =
-            "RingCAT looks for mail in its own way: a logical read where the SII offers it, otherwise by asking";
+            "RingCAT detects mail in its own way: by a logical read if the SII offers it, otherwise by polling";
         notices.add(Some(states.place), None, "MailboxStates", reason);
     }
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
         let Some(mailbox) = &subdevice.mailbox else { continue };
         if let (Some(Poll::Every(_)), Some(receive)) = (mailbox.poll, mailbox.receive) {
-            let reason = "RingCAT decides by itself how often it looks for mail";
+            let reason = "RingCAT determines the polling interval of mailboxes";
             notices.add(Some(receive.place), Some(index), "Mailbox/Recv/PollTime", reason);
         }
     }

@@ -1,5 +1,5 @@
-//! Distributed clocks: SYNC signals from the registers that the commands leave (protocol 7.3), the reference from the
-//! cyclic commands. Delays, offsets and start times are measured and computed by RingCAT.
+//! Distributed clocks: SYNC signals from the registers as written by the commands (protocol 7.3), the reference clock
+//! from the cyclic commands. RingCAT measures delays and computes offsets and start times.
 
 use ringcat_engine::config::{ClockConfig, ReferenceClock, SubDeviceConfig, SyncSignals};
 use ringcat_wire::register::map;
@@ -9,11 +9,11 @@ use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{DistributedClock, Eni};
 
-/// SYNC0 and SYNC1 in the word of 0x0980 and 0x0981.
+/// SYNC0 and SYNC1 in the word at 0x0980 and 0x0981.
 const SYNC0: u16 = 0x0300;
 const SYNC1_ON: u16 = 0x0400;
 const SYNC1: u16 = SYNC0 | SYNC1_ON;
-/// Bits that switch any signal on.
+/// Bits that activate a signal.
 const ON: u16 = 0x0600;
 
 /// SYNC signals of a SubDevice.
@@ -34,20 +34,21 @@ pub(super) fn of_subdevice(
     if let Some(clock) = clock
         && clock.cycle_0_ns != cycle_0
     {
-        let reason = format!("{} ns, but the commands set {cycle_0} ns: the commands count", clock.cycle_0_ns);
+        let reason =
+            format!("{} ns, but the commands set {cycle_0} ns: the commands take precedence", clock.cycle_0_ns);
         notices.add(Some(clock.place), Some(index), "DC/CycleTime0", reason);
     }
     let shift = clock.map_or(0, |clock| clock.shift_ns);
     Some(signals(assign_activate, cycle_0, register_1, shift))
 }
 
-/// From `DC` alone.
+/// The SYNC signals from `DC` alone.
 fn from_element(clock: &DistributedClock) -> SyncSignals {
     let assign_activate = if clock.cycle_1_ns > 0 { SYNC1 } else { SYNC0 };
     signals(assign_activate, clock.cycle_0_ns, clock.cycle_1_ns, clock.shift_ns)
 }
 
-/// The register of SYNC1 counts from SYNC0: whole cycles are its division, the rest its shift.
+/// The SYNC1 register counts from SYNC0: whole cycles are its division, the rest is its shift.
 fn signals(assign_activate: u16, cycle_0: u32, register_1: u32, shift: i32) -> SyncSignals {
     let mut signals = SyncSignals { assign_activate, ..SyncSignals::sync0(cycle_0, shift) };
     if assign_activate & SYNC1_ON != 0 && cycle_0 > 0 {

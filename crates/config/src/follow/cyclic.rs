@@ -1,4 +1,4 @@
-//! Cyclic tasks: domains, where commands put process data into the image, LRW by name, clocks (protocol 8.2).
+//! Cyclic tasks: domains, image offsets of the commands, LRW commands by name, clocks (protocol 8.2).
 
 use std::ops::Range;
 use std::time::Duration;
@@ -16,21 +16,22 @@ use super::notices::Notices;
 use super::registers::is_complete;
 use crate::eni::{CyclicCommand, CyclicState, Eni, EniError, Problem, Target};
 
-/// Looks at a pair of a logical command and a piece of process data: far more than a segment of 1,000 SubDevices needs.
-const MAX_LOOKS: usize = 5_000_000;
-/// Cycle time where the file has none.
+/// Maximum number of comparisons of a logical command with a piece of process data: far more than a segment of 1,000
+/// SubDevices needs.
+const MAX_COMPARISONS: usize = 5_000_000;
+/// Cycle time if the file has none.
 const USUAL_CYCLE: Duration = Duration::from_millis(1);
 
-/// What exchanges a piece of process data.
+/// The command that exchanges a piece of process data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cover {
     /// The task.
     pub task: usize,
-    /// Bit of the image by the offset of the command.
+    /// First bit in the image according to the command's offset.
     pub image_bit: Option<u64>,
 }
 
-/// What follows from the tasks.
+/// The result of all tasks.
 #[derive(Default)]
 pub(super) struct Cyclic {
     pub domains: Vec<DomainConfig>,
@@ -38,15 +39,15 @@ pub(super) struct Cyclic {
     /// By SubDevice and piece.
     pub covers: Vec<Vec<Option<Cover>>>,
     pub cycle: Option<Duration>,
-    /// There is a command that distributes the time.
+    /// Whether a command distributes the time.
     pub distributes: bool,
     /// The SubDevice whose time is distributed.
     pub reference: Option<usize>,
-    /// The reference follows the host.
+    /// Whether the reference clock follows the host.
     pub bus_shift: bool,
 }
 
-/// Follows the tasks.
+/// Evaluates the tasks.
 pub(super) fn follow(eni: &Eni, bus: &Bus, mappings: &[Vec<Piece>], notices: &mut Notices) -> Result<Cyclic, EniError> {
     let mut cyclic =
         Cyclic { covers: mappings.iter().map(|pieces| vec![None; pieces.len()]).collect(), ..Cyclic::default() };
@@ -62,10 +63,10 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, mappings: &[Vec<Piece>], notices: &mu
     let is_logical = |command: &CyclicCommand| command.datagram.command.addressing() == Addressing::Logical;
     let logical = commands().filter(|(_, command)| is_logical(command)).count();
     let pieces: usize = mappings.iter().map(|pieces| pieces.len() + 1).sum();
-    if logical.saturating_mul(pieces) > MAX_LOOKS {
+    if logical.saturating_mul(pieces) > MAX_COMPARISONS {
         return Err(EniError::of_file(Problem::TooMuch {
-            what: "looks at cyclic commands and FMMUs",
-            limit: MAX_LOOKS,
+            what: "comparisons of cyclic commands and FMMUs",
+            limit: MAX_COMPARISONS,
         }));
     }
     for (at, command) in commands() {
@@ -108,7 +109,7 @@ fn of_process_data(
     });
     if met.is_empty() {
         if !is_mailbox {
-            let reason = format!("{} at {logical} meets no FMMU of the file: not sent", command_name(code));
+            let reason = format!("{} at {logical} matches no FMMU of the file: not sent", command_name(code));
             notices.add(Some(command.place), None, element, reason);
         }
         return;
@@ -120,7 +121,9 @@ fn of_process_data(
         notices.add(Some(command.place), None, element.clone(), reason);
     }
     if let Some(expected) = command.datagram.count.filter(|expected| !is_mailbox && u32::from(*expected) != count) {
-        let reason = format!("Cnt is {expected}, but the FMMUs of the file give {count}: RingCAT expects what it maps");
+        let reason = format!(
+            "Cnt is {expected}, but the FMMUs of the file give {count}: RingCAT expects the value of its mapping"
+        );
         notices.add(Some(command.place), None, element, reason);
     }
     if code == Command::Lrw {
@@ -129,7 +132,7 @@ fn of_process_data(
     }
 }
 
-/// Records which pieces a command exchanges, by their bits in the logical address space. Returns the addressed
+/// Records the pieces that a command exchanges, by their bits in the logical address space. Returns the addressed
 /// SubDevices and the resulting working counter.
 fn cover(
     eni: &Eni,
@@ -170,7 +173,7 @@ fn cover(
         }
         if reads || writes {
             met.push(subdevice);
-            // Protocol 1.4: LRW counts 1 for what is read and 2 for what is written.
+            // Protocol 1.4: LRW increments by 1 for a read and by 2 for a write.
             let write = if code == Command::Lrw { 2 } else { 1 };
             count += u32::from(reads) + if writes { write } else { 0 };
         }
@@ -178,7 +181,7 @@ fn cover(
     (met, count)
 }
 
-/// Everything else: clocks and supervision are RingCAT's own matter.
+/// All other commands: RingCAT itself handles clocks and supervision.
 fn of_registers(eni: &Eni, bus: &Bus, command: &CyclicCommand, cyclic: &mut Cyclic, notices: &mut Notices) {
     let Target::Register { adp, ado } = command.datagram.target else { return };
     let code = command.datagram.command;
@@ -210,7 +213,7 @@ fn addressed(eni: &Eni, bus: &Bus, command: Command, adp: u16) -> Option<usize> 
     by_increment.or_else(|| by_position().map(|(index, _)| index))
 }
 
-/// A domain per task that exchanges something.
+/// One domain per task that exchanges process data.
 fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_cover: bool, cyclic: &mut Cyclic, notices: &mut Notices) {
     let fastest_clock = eni.subdevices.iter().filter_map(|subdevice| subdevice.clock.as_ref());
     let clock_cycle = fastest_clock.map(|clock| clock.cycle_0_ns).filter(|cycle| *cycle > 0).min();
@@ -247,7 +250,7 @@ fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_cover: bool, cyclic: &mut Cyc
                 }
             }
         }
-        // A SyncManager is exchanged as a whole: by the first task that has a part of it.
+        // A SyncManager is exchanged as a whole, by the first task that contains a part of it.
         by_task.sort_unstable_by_key(|(task, sync_manager)| (*sync_manager, *task));
         by_task.dedup_by_key(|(_, sync_manager)| *sync_manager);
         let covered = by_task.len();

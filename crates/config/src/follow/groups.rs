@@ -1,4 +1,4 @@
-//! Hot connect groups: the head is found by alias or identification, its members stand behind it (protocol 8.2).
+//! Hot connect groups: the head is identified by alias or identification, its members follow it (protocol 8.2).
 
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 
@@ -7,7 +7,7 @@ use super::identity::{Mark, group_mark};
 use super::messages::contradiction;
 use crate::eni::{Eni, EniError};
 
-/// Declares the groups in place; returns their names.
+/// Declares the groups in `configs`; returns their names.
 pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> Result<Vec<String>, EniError> {
     let mut names = Vec::new();
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
@@ -21,7 +21,7 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
                 let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4) or the \
                                 identification (register 0x0134)";
                 let got = format!("{} commands, none of that kind", group.identify.len());
-                let hint = "other kinds of identification, as a data word, are not known to RingCAT";
+                let hint = "RingCAT does not support other kinds of identification, such as a data word";
                 Err(contradiction(eni, index, group.place, what, expected, got, hint))
             }
         };

@@ -1,5 +1,5 @@
-//! Expected identity of a SubDevice: reads of the EEPROM through registers 0x0502 to 0x050B whose answers are compared,
-//! and the identification of hot connect groups (protocol 8.2).
+//! Expected identity of a SubDevice: EEPROM reads through registers 0x0502 to 0x050B with a compared response, and the
+//! identification of hot connect groups (protocol 8.2).
 
 use ringcat_engine::config::Expected;
 use ringcat_wire::register::map;
@@ -7,24 +7,24 @@ use ringcat_wire::register::map;
 use super::messages::contradiction;
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
 
-/// What a command that compares is about.
+/// The value that a command compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
     /// Two words of the EEPROM from this address.
     Eeprom {
         /// Word address.
         word: u32,
-        /// What must be there.
+        /// Expected value.
         value: u32,
     },
     /// One word of the EEPROM.
     EepromWord {
         /// Its address.
         word: u32,
-        /// What must be there.
+        /// Expected value.
         value: u16,
     },
-    /// The alias, from its register.
+    /// The alias, read from its register.
     Alias(u16),
     /// The identification in AL status code (protocol 5.3).
     Identification(u16),
@@ -36,7 +36,7 @@ const WORD_PRODUCT: u32 = 0x000A;
 const WORD_REVISION: u32 = 0x000C;
 const WORD_SERIAL: u32 = 0x000E;
 
-/// What commands compare, in their order, and whether all bits count.
+/// The values that commands compare, in order, and whether all bits are compared.
 pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
     let mut word = None;
     let mut found = Vec::new();
@@ -77,7 +77,8 @@ pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
     found
 }
 
-/// Expected identity: exactly what the commands compare. A file without commands means vendor and product of `Info`.
+/// The expected identity: exactly the values that the commands compare. A file without commands expects vendor and
+/// product of `Info`.
 pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expected, EniError> {
     let subdevice = &eni.subdevices[index];
     let mut expected = Expected::default();
@@ -90,10 +91,10 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
     for (mark, whole, place) in marks(&subdevice.init_commands).into_iter().chain(identify) {
         let Mark::Eeprom { word, value } = mark else { continue };
         let (field, what, said) = match word {
-            WORD_VENDOR => (&mut expected.vendor_id, "the vendor id that is compared", subdevice.vendor_id),
-            WORD_PRODUCT => (&mut expected.product_code, "the product code that is compared", subdevice.product_code),
-            WORD_REVISION => (&mut expected.revision, "the revision that is compared", None),
-            WORD_SERIAL => (&mut expected.serial, "the serial number that is compared", None),
+            WORD_VENDOR => (&mut expected.vendor_id, "the compared vendor id", subdevice.vendor_id),
+            WORD_PRODUCT => (&mut expected.product_code, "the compared product code", subdevice.product_code),
+            WORD_REVISION => (&mut expected.revision, "the compared revision", None),
+            WORD_SERIAL => (&mut expected.serial, "the compared serial number", None),
             _ => continue,
         };
         if !whole {
@@ -108,8 +109,8 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
     Ok(expected)
 }
 
-/// Whether a command compares something of the EEPROM that is not in [`expected`]: a part of a number (TwinCAT compares
-/// single words of the revision), or another word. Such commands are sent as they are.
+/// Whether a command compares an EEPROM value that is not in [`expected`]: a part of a number (TwinCAT compares single
+/// words of the revision), or another word. Such commands are sent unchanged.
 pub(super) fn is_sent(command: &EcatCommand, address: Option<&EcatCommand>) -> bool {
     let Target::Register { ado, .. } = command.datagram.target else { return false };
     let pair: Vec<EcatCommand> = address.into_iter().chain([command]).cloned().collect();
@@ -120,13 +121,13 @@ pub(super) fn is_sent(command: &EcatCommand, address: Option<&EcatCommand>) -> b
     ado == map::SII_DATA && command.validate.is_some() && !marks(&pair).iter().all(is_whole)
 }
 
-/// Whether a command says which words of the EEPROM the next read is about.
+/// Whether a command sets the EEPROM address of the next read.
 pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
     let Target::Register { ado, .. } = command.datagram.target else { return false };
     (ado == map::SII_CONTROL || ado == map::SII_ADDRESS) && command.datagram.command.writes()
 }
 
-/// The alias or identification by which a group is found; an alias may be read from the EEPROM or from its register.
+/// The alias or identification of a group; an alias may be read from the EEPROM or from its register.
 pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
     marks(commands).into_iter().find_map(|(mark, whole, _)| match mark {
         Mark::Eeprom { word: WORD_ALIAS, value } => Some(Mark::Alias(value as u16)),
@@ -137,7 +138,7 @@ pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
     })
 }
 
-/// Whether the PDI still has the EEPROM in PREOP: given to it at IP and not taken back.
+/// Whether the PDI keeps the EEPROM in PREOP: assigned to the PDI at IP and not taken back.
 pub(super) fn keeps_eeprom(commands: &[EcatCommand]) -> bool {
     let up = commands.iter().filter(|command| command.transitions.contains(&Transition::Ip));
     let mut given = up.filter_map(|command| match command.datagram.target {

@@ -1,8 +1,9 @@
-//! The process image: which bits of it are which bits of a SyncManager.
+//! The process image: maps bits of the image to bits of SyncManagers.
 //!
-//! FMMUs give process data logical places, cyclic commands give these a place in the image, `Send` and `Recv` say where
-//! it is by themselves; all three must agree. Offsets of commands count either from the datagram's data (EC-Engineer)
-//! or from its header, ten bytes before (TwinCAT, whose image is the frame): which one it is shows from the file.
+//! FMMUs assign logical addresses to process data, cyclic commands assign image positions to logical addresses, and
+//! `Send` and `Recv` state image positions directly; all three must agree. Offsets of commands count either from the
+//! datagram's data (EC-Engineer) or from its header, ten bytes earlier (TwinCAT, whose image is the frame). The reader
+//! detects the variant from the file.
 
 use std::collections::BTreeSet;
 
@@ -16,17 +17,17 @@ use super::registers::is_complete;
 use crate::configuration::{ImageArea, ImageCopy, ProcessImage, Variable};
 use crate::eni::{BitRange, Eni, EniError, ImageSide, Problem, SubDevice};
 
-/// Bytes of an image, at most.
+/// Maximum number of bytes of an image.
 const MAX_IMAGE: usize = 16 << 20;
 
-/// Bits from the offset of a command to its data.
+/// Bits from a command's offset to its data.
 const HEADERS: [u64; 2] = [0, 80];
-/// Names of variables that a notice shows.
+/// Names of variables shown in a notice.
 const NAMES: usize = 3;
-/// Copies, after they were cut at the borders of areas.
+/// Maximum number of copies after splitting at the borders of areas.
 const MAX_COPIES: usize = 8_192;
 
-/// The image.
+/// Creates the image.
 pub(super) fn follow(
     eni: &Eni,
     mappings: &[Vec<Piece>],
@@ -70,7 +71,7 @@ pub(super) fn follow(
     Ok(image)
 }
 
-/// SyncManagers that cyclic commands exchange, by SubDevice; all of them where no command names a SubDevice.
+/// SyncManagers that cyclic commands exchange, by SubDevice; all SyncManagers if no command addresses a SubDevice.
 fn exchanged(mappings: &[Vec<Piece>], covers: &[Vec<Option<Cover>>]) -> Vec<BTreeSet<u8>> {
     let any = covers.iter().flatten().any(Option::is_some);
     let of_subdevice = |(pieces, covers): (&Vec<Piece>, &Vec<Option<Cover>>)| {
@@ -95,8 +96,8 @@ fn range_of(subdevice: &SubDevice, direction: Direction) -> &[BitRange] {
     }
 }
 
-/// Bits from the offset of a command to its data, where one of the ways makes all process data lie where `Send` and
-/// `Recv` say.
+/// Bits from a command's offset to its data, if one of the variants puts all process data at the positions of `Send`
+/// and `Recv`.
 fn header(eni: &Eni, mappings: &[Vec<Piece>], covers: &[Vec<Option<Cover>>]) -> Option<u64> {
     let fits = |header: u64| {
         eni.subdevices.iter().zip(mappings).zip(covers).all(|((subdevice, pieces), covers)| {
@@ -157,12 +158,12 @@ fn of_subdevice(
         }
         None if ranges.is_empty() => {
             let reason =
-                "neither Send or Recv nor a cyclic command says where in the image: exchanged, but not in the image";
+                "neither Send or Recv nor a cyclic command gives an image position: exchanged, but not in the image";
             notices.add(Some(pieces[0].0.place), Some(index), "process data", reason);
         }
         None => {
             if pieces.iter().any(|(_, cover)| cover.is_some_and(|cover| cover.image_bit.is_some())) {
-                let reason = "the offsets of the cyclic commands lead elsewhere: Send and Recv count";
+                let reason = "the offsets of the cyclic commands differ: Send and Recv take precedence";
                 notices.add(Some(ranges[0].place), Some(index), side(direction), reason);
             }
             in_order(eni, index, ranges, &pieces, areas)?;
@@ -171,7 +172,7 @@ fn of_subdevice(
     Ok(())
 }
 
-/// Process data that no FMMU maps: in a file that leaves FMMUs to the SII, the ranges lie one behind the other.
+/// Process data without an FMMU: in a file that leaves FMMUs to the SII, the ranges follow one another.
 fn unmapped(
     eni: &Eni,
     index: usize,
@@ -209,7 +210,7 @@ fn area(eni: &Eni, subdevice: usize, piece: &Piece, from: u32, bit: u64, bits: u
     Ok(ImageArea { subdevice, direction, sync_manager, bit_offset, image_bit, bits })
 }
 
-/// Pieces in the order of SyncManagers fill the ranges in document order.
+/// Fills the ranges in document order with the pieces in the order of SyncManagers.
 fn in_order(
     eni: &Eni,
     index: usize,
@@ -231,7 +232,7 @@ fn in_order(
     Ok(())
 }
 
-/// Two areas of one image must not share bits.
+/// Checks that areas of one image share no bits.
 fn check_overlaps(eni: &Eni, areas: &[ImageArea]) -> Result<(), EniError> {
     let Some(pair) = areas.windows(2).find(|pair| {
         pair[0].direction == pair[1].direction
@@ -242,11 +243,19 @@ fn check_overlaps(eni: &Eni, areas: &[ImageArea]) -> Result<(), EniError> {
     let (first, second) = (pair[0], pair[1]);
     let subdevice = &eni.subdevices[second.subdevice];
     let place = range_of(subdevice, second.direction).first().map_or(subdevice.place, |range| range.place);
-    let got = format!("bit {}, which {} has too", second.image_bit, label(eni, first.subdevice));
-    Err(contradiction(eni, second.subdevice, place, side(second.direction), "bits of its own in the image", got, ""))
+    let got = format!("bit {}, which {} also has", second.image_bit, label(eni, first.subdevice));
+    Err(contradiction(
+        eni,
+        second.subdevice,
+        place,
+        side(second.direction),
+        "bits that no other SubDevice has in the image",
+        got,
+        "",
+    ))
 }
 
-/// Bytes of an image: as the file says, otherwise as many as are used.
+/// Bytes of an image: the size in the file, otherwise the used size.
 fn length(side: &ImageSide, end: u32) -> Result<usize, EniError> {
     let bytes = side.bytes.map_or(end.div_ceil(8), |bytes| bytes) as usize;
     if bytes > MAX_IMAGE {
@@ -255,7 +264,7 @@ fn length(side: &ImageSide, end: u32) -> Result<usize, EniError> {
     Ok(bytes)
 }
 
-/// The area of `areas`, sorted by direction and bit, in which a bit lies.
+/// The area of `areas`, sorted by direction and bit, that contains a bit.
 fn area_at(areas: &[ImageArea], direction: Direction, bit: u32) -> Option<usize> {
     let key = |area: &ImageArea| (area.direction == Direction::Inputs, area.image_bit);
     let behind = areas.partition_point(|area| key(area) <= (direction == Direction::Inputs, bit));
@@ -265,13 +274,13 @@ fn area_at(areas: &[ImageArea], direction: Direction, bit: u32) -> Option<usize>
 
 fn variables(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) {
     let sides = [(Direction::Inputs, &eni.image.inputs), (Direction::Outputs, &eni.image.outputs)];
-    let mut nobodys: Vec<&crate::eni::Variable> = Vec::new();
+    let mut unassigned: Vec<&crate::eni::Variable> = Vec::new();
     for (direction, side) in sides {
         for variable in &side.variables {
             let subdevice =
                 area_at(&image.areas, direction, variable.bit_offset).map(|area| image.areas[area].subdevice);
             if subdevice.is_none() {
-                nobodys.push(variable);
+                unassigned.push(variable);
             }
             image.variables.push(Variable {
                 name: variable.name.clone(),
@@ -283,15 +292,15 @@ fn variables(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) {
             });
         }
     }
-    let Some(first) = nobodys.first() else { return };
-    let names: Vec<String> = nobodys.iter().take(NAMES).map(|variable| crate::eni::quoted(&variable.name)).collect();
-    let more = if nobodys.len() > NAMES { ", ..." } else { "" };
-    let subject = format!("{} variables of no SubDevice ({}{more})", nobodys.len(), names.join(", "));
-    let reason = "nobody's process data: nothing writes or reads them, inputs stay zero";
+    let Some(first) = unassigned.first() else { return };
+    let names: Vec<String> = unassigned.iter().take(NAMES).map(|variable| crate::eni::quoted(&variable.name)).collect();
+    let more = if unassigned.len() > NAMES { ", ..." } else { "" };
+    let subject = format!("{} variables of no SubDevice ({}{more})", unassigned.len(), names.join(", "));
+    let reason = "process data of no SubDevice: not exchanged, inputs stay zero";
     notices.add(Some(first.place), None, subject, reason);
 }
 
-/// `CopyInfo`, cut at the borders of areas on both sides.
+/// `CopyInfo`, split at the borders of source and target areas.
 fn copies(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) -> Result<(), EniError> {
     let commands = eni.tasks.iter().flat_map(|task| &task.frames).flat_map(|frame| &frame.commands);
     for copy in commands.flat_map(|command| &command.copies) {
@@ -301,7 +310,7 @@ fn copies(eni: &Eni, image: &mut ProcessImage, notices: &mut Notices) -> Result<
             let source = bit(copy.source).and_then(|bit| Some((bit, area_at(&image.areas, Direction::Inputs, bit)?)));
             let target = bit(copy.target).and_then(|bit| Some((bit, area_at(&image.areas, Direction::Outputs, bit)?)));
             let (Some((from, source_area)), Some((to, target_area))) = (source, target) else {
-                let reason = "source or target is nobody's process data: not copied";
+                let reason = "source or target is process data of no SubDevice: not copied";
                 notices.add(Some(copy.place), None, "CopyInfo", reason);
                 break;
             };

@@ -14,17 +14,17 @@ use super::notices::Notices;
 use super::transitions::{at_transitions, comment};
 use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Transition};
 
-/// SoE: the value of an IDN in the elements, and the code of a write.
+/// SoE: the element flag of the value of an IDN, and the op code of a write.
 const SOE_VALUE: u8 = 0x40;
 const SOE_WRITE: u8 = 3;
 /// Drives of a SubDevice (protocol 6.6).
 const SOE_DRIVES: u8 = 8;
-/// EoE type of a command that sets addresses.
+/// EoE type of a Set IP Parameter request.
 const EOE_SET_IP: u8 = 2;
-/// Bytes of the name in it.
+/// Bytes of the DNS name in the request.
 const EOE_NAME: usize = 32;
 
-/// Appends what a SubDevice's mailbox gets.
+/// Appends the mailbox commands of a SubDevice.
 pub(super) fn startup(
     eni: &Eni,
     index: usize,
@@ -42,7 +42,7 @@ pub(super) fn startup(
             }));
         };
     if bus.ccs_is_reversed && !mailbox.coe.is_empty() {
-        let reason = "2 in all commands, which have data: taken as downloads, as some tools write it";
+        let reason = "2 in all commands, and all have data: taken as downloads, as some tools write them";
         notices.add(Some(mailbox.coe[0].place), Some(index), "CoE/InitCmd/Ccs", reason);
     }
     for command in mailbox.coe.iter().filter(|command| !command.disabled) {
@@ -81,7 +81,7 @@ pub(super) fn startup(
     Ok(())
 }
 
-/// A limit of 0 is the usual one.
+/// A limit of 0 is the default.
 fn limit(timeout_ms: u32) -> Option<Duration> {
     (timeout_ms > 0).then(|| Duration::from_millis(timeout_ms.into()))
 }
@@ -112,8 +112,8 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
 }
 
-/// The message of a command that sets addresses. Some tools write what follows the EoE header (protocol 6.5) and leave
-/// the header to the MainDevice: flags and fields that are as long as they say.
+/// The Set IP Parameter message. Some tools write only the part after the EoE header (protocol 6.5) and leave the
+/// header to the MainDevice: flags and the fields that match its length.
 fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
     /// Type 2, port 0, no result.
     const HEADER: [u8; 4] = [EOE_SET_IP, 0, 0, 0];
@@ -125,7 +125,7 @@ fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned([&HEADER, data].concat())
 }
 
-/// Flags, then all fields, or those that the flags name.
+/// Whether the data has the length of flags plus all fields, or plus the fields that the flags name.
 fn are_addresses(data: &[u8]) -> bool {
     /// Bytes of MAC address, address, mask, gateway, DNS server, name.
     const FIELDS: [usize; 6] = [6, 4, 4, 4, 4, EOE_NAME];
@@ -137,7 +137,7 @@ fn are_addresses(data: &[u8]) -> bool {
     flags != 0 && flags < 1 << FIELDS.len() && (fields.len() == packed || fields.len() == all)
 }
 
-/// Addresses, by elements of their own or as the message that is sent.
+/// The IP settings, from separate elements or from the message.
 fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
     if !command.data.is_empty() {
         return match EoeMessage::decode(&with_header(&command.data)) {

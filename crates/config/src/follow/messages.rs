@@ -1,10 +1,10 @@
-//! Errors and notices about a SubDevice of a file: how they name it, its elements and commands.
+//! Errors and notices about a SubDevice of a file: names of SubDevices, elements and commands.
 
 use ringcat_wire::command::Command;
 
 use crate::eni::{Contradiction, Eni, EniError, Place, Problem, quoted};
 
-/// An error about a SubDevice, or about what is in it.
+/// An error about a SubDevice or a part of it.
 pub(super) fn contradiction(
     eni: &Eni,
     subdevice: usize,
@@ -28,12 +28,12 @@ pub(super) fn label(eni: &Eni, subdevice: usize) -> String {
     format!("Slave {number} {}{station}", quoted(&found.name))
 }
 
-/// An element with what it is for, for messages.
+/// An element with its comment, for messages.
 pub(super) fn named(element: &str, comment: &str) -> String {
     if comment.is_empty() { element.to_owned() } else { format!("{element} {}", quoted(comment)) }
 }
 
-/// A command's name, as in specifications.
+/// A command's name, as in the specification.
 pub(super) fn command_name(command: Command) -> String {
     command.to_string()
 }

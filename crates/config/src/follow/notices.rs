@@ -1,14 +1,14 @@
-//! What of the file is not followed, alike things told once.
+//! Settings of the file that are not followed. Equal notices are combined.
 
 use std::collections::HashMap;
 
 use crate::configuration::Notice;
 use crate::eni::{Eni, Place};
 
-/// Notices of different content; the others are counted.
+/// Maximum number of different notices; further notices are counted.
 const MAX_NOTICES: usize = 500;
 
-/// A growing list.
+/// The list of notices.
 #[derive(Default)]
 pub(super) struct Notices {
     list: Vec<Notice>,
@@ -17,7 +17,7 @@ pub(super) struct Notices {
 }
 
 impl Notices {
-    /// Notes something about the file or a SubDevice.
+    /// Adds a notice about the file or a SubDevice.
     pub fn add(
         &mut self,
         place: Option<Place>,
@@ -42,7 +42,7 @@ impl Notices {
         }
     }
 
-    /// All of them, with what the reader did not know.
+    /// All notices, including unknown elements.
     pub fn into_list(mut self, eni: &Eni) -> Vec<Notice> {
         for unknown in &eni.unknown {
             self.add(Some(unknown.place), None, unknown.element.clone(), "this element is not known");

@@ -1,5 +1,5 @@
-//! What the commands of a file leave in the registers of a controller: they are replayed in the order in which they
-//! would be sent, and the result is read. So it does not matter in how many pieces a register is written.
+//! Register values of a controller after the commands of a file: the commands are replayed in the order of sending, and
+//! the result is evaluated. The number of writes to a register does not matter.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ pub(super) struct Registers {
 }
 
 impl Registers {
-    /// What the commands of these transitions leave, one transition after the other, each in document order.
+    /// The registers after the commands of these transitions, one transition after the other, each in document order.
     pub fn after(commands: &[EcatCommand], transitions: &[Transition]) -> Registers {
         let mut registers = Registers::default();
         for transition in transitions {
@@ -32,13 +32,13 @@ impl Registers {
             return;
         }
         for (offset, byte) in (0_u16..).zip(&command.datagram.data) {
-            // Only configuration registers are of interest; memory behind them would cost without use.
+            // Only configuration registers are relevant; process data memory would only cost time.
             let Some(address) = ado.0.checked_add(offset).filter(|address| *address < 0x1000) else { break };
             self.bytes.insert(address, (*byte, command.place));
         }
     }
 
-    /// Whether something wrote here.
+    /// The last write to this address, if there is one.
     pub fn place(&self, address: RegisterAddress, length: u16) -> Option<Place> {
         let end = address.0.saturating_add(length);
         self.bytes.range(address.0..end).map(|(_, (_, place))| *place).next_back()
@@ -53,12 +53,12 @@ impl Registers {
         read
     }
 
-    /// A register of 16 bits; `None` where it was never written.
+    /// A register of 16 bits; `None` if it was never written.
     pub fn word(&self, address: RegisterAddress) -> Option<u16> {
         self.place(address, 2).map(|_| u16::from_le_bytes(self.read(address)))
     }
 
-    /// A register of 32 bits; `None` where it was never written.
+    /// A register of 32 bits; `None` if it was never written.
     pub fn double_word(&self, address: RegisterAddress) -> Option<u32> {
         self.place(address, 4).map(|_| u32::from_le_bytes(self.read(address)))
     }
@@ -73,7 +73,7 @@ impl Registers {
         })
     }
 
-    /// The FMMUs that are switched on.
+    /// The activated FMMUs.
     pub fn fmmus(&self) -> impl Iterator<Item = (u8, Fmmu, Place)> + '_ {
         (0..16).filter_map(|index| {
             let address = map::fmmu(index);
@@ -84,8 +84,8 @@ impl Registers {
     }
 }
 
-/// Whether the file has the commands with which a MainDevice brings a SubDevice up. Files written by hand have a few
-/// extra ones at most, and leave the rest to the SII.
+/// Whether the file has the commands that bring a SubDevice up. Files written by hand have at most a few additional
+/// commands and leave the rest to the SII.
 pub(super) fn is_complete(commands: &[EcatCommand]) -> bool {
     commands.iter().any(|command| match command.datagram.target {
         Target::Register { ado, .. } => {

@@ -1,4 +1,4 @@
-//! One SubDevice: its commands by register, and the declaration that follows.
+//! One SubDevice: classifies its commands by register and derives its declaration.
 
 use std::time::Duration;
 
@@ -18,10 +18,10 @@ use super::transitions::{at_transitions, comment};
 use super::{assignment, clocks, identity, mail, sync_managers};
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
 
-/// The way up, in the order in which its commands are sent.
+/// The transitions to OP, in the order of sending.
 pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
 
-/// The declaration of a SubDevice, and which parts of its process data are mapped where.
+/// The declaration of a SubDevice and the mapping of its process data.
 pub(super) fn follow(
     eni: &Eni,
     index: usize,
@@ -55,12 +55,12 @@ pub(super) fn follow(
             eeprom_address = Some(command);
         }
         match class(command) {
-            Class::Ours if identity::is_sent(command, eeprom_address) => {
+            Class::Handled if identity::is_sent(command, eeprom_address) => {
                 for command in eeprom_address.into_iter().chain([command]) {
                     raw(eni, index, command, &mut startup, notices)?;
                 }
             }
-            Class::Ours => {}
+            Class::Handled => {}
             Class::State => config.state_timeouts.extend(time_limits(eni, index, command)?),
             Class::Refused(reason) => {
                 notices.add(Some(command.place), Some(index), named("InitCmd", &command.comment), reason)
@@ -76,7 +76,7 @@ pub(super) fn follow(
     Ok((config, pieces))
 }
 
-/// Whether a command goes to the SubDevice below which it stands; another one is noted.
+/// Whether a command addresses the SubDevice that contains it; otherwise a notice is added.
 fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &mut Notices) -> bool {
     let subdevice = &eni.subdevices[index];
     let mut note = |reason: String| {
@@ -92,12 +92,12 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
         Addressing::AutoIncrement if bus.groups[index].is_some() => true,
         Addressing::AutoIncrement => match subdevice.auto_increment {
             Some(own) if own != adp && subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                "{name} counts positions, and Adp {adp} is the PhysAddr: it would reach no SubDevice, so it is not sent \
                  (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(own) if own != adp => note(format!("{name} with Adp {adp} goes to another SubDevice: not sent")),
             None if subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: nobody would be reached, so it is not sent \
+                "{name} counts positions, and Adp {adp} is the PhysAddr: it would reach no SubDevice, so it is not sent \
                  (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(_) | None => true,
@@ -107,42 +107,42 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
                 || note(format!("{name} with Adp {adp} goes to another SubDevice or address: not sent"))
         }
         Addressing::Broadcast | Addressing::Logical => {
-            note(format!("{name} to everybody among the commands of a SubDevice is not sent"))
+            note(format!("{name}, a broadcast, among the commands of a SubDevice is not sent"))
         }
     }
 }
 
-/// What becomes of a command.
+/// How a command is handled.
 enum Class {
-    /// RingCAT does it by itself, or it has become part of the declaration.
-    Ours,
-    /// A state change or the look at its result.
+    /// RingCAT performs it itself, or it has become part of the declaration.
+    Handled,
+    /// A state change or the check of its result.
     State,
-    /// Sent as it is.
+    /// Sent unchanged.
     Raw,
     /// Not sent.
     Refused(&'static str),
 }
 
-/// By the register that is addressed (protocol 3).
+/// The class by the addressed register (protocol 3).
 fn class(command: &EcatCommand) -> Class {
-    let Target::Register { ado, .. } = command.datagram.target else { return Class::Ours };
+    let Target::Register { ado, .. } = command.datagram.target else { return Class::Handled };
     let zero = command.datagram.data.iter().all(|byte| *byte == 0);
     match ado.0 {
-        0x0010..=0x0011 => Class::Ours,
-        0x0100..=0x0117 => Class::Refused("ports and forwarding are the matter of RingCAT: not sent"),
+        0x0010..=0x0011 => Class::Handled,
+        0x0100..=0x0117 => Class::Refused("RingCAT controls ports and forwarding: not sent"),
         0x0120..=0x0137 => Class::State,
-        0x0300..=0x0313 => Class::Ours,
-        0x0400 | 0x0410 | 0x0420 => Class::Ours,
-        0x0500..=0x050F => Class::Ours,
-        0x0600..=0x06FF | 0x0800..=0x087F => Class::Ours,
-        0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Ours,
-        0x09A8..=0x09A9 if zero => Class::Ours,
+        0x0300..=0x0313 => Class::Handled,
+        0x0400 | 0x0410 | 0x0420 => Class::Handled,
+        0x0500..=0x050F => Class::Handled,
+        0x0600..=0x06FF | 0x0800..=0x087F => Class::Handled,
+        0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Handled,
+        0x09A8..=0x09A9 if zero => Class::Handled,
         _ => Class::Raw,
     }
 }
 
-/// The station address that is written must be that of `PhysAddr`.
+/// Checks that the written station address equals `PhysAddr`.
 fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(), EniError> {
     let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
     let (true, Some(station)) = (ado == map::STATION_ADDRESS, eni.subdevices[index].station) else { return Ok(()) };
@@ -162,7 +162,7 @@ fn is_write(command: Command) -> bool {
     command.writes() && !command.reads()
 }
 
-/// States of a transition.
+/// Source and target state of a transition.
 const fn states(transition: Transition) -> (AlState, AlState) {
     use AlState::{Boot, Init, Op, PreOp, SafeOp};
     match transition {
@@ -187,7 +187,7 @@ const fn states(transition: Transition) -> (AlState, AlState) {
 /// State in the lower bits of AL control and AL status.
 const AL_STATE: u8 = 0x0F;
 
-/// Time limits from the looks at AL status; what AL control asks for must be the state of the transition.
+/// Time limits from the checks of AL status. The state requested by AL control must be the state of the transition.
 fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<StateTimeout>, EniError> {
     let Target::Register { ado, .. } = command.datagram.target else { return Ok(Vec::new()) };
     let mut limits = Vec::new();
@@ -195,7 +195,7 @@ fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<Sta
         let (from, to) = states(*transition);
         if ado == map::AL_CONTROL && is_write(command.datagram.command) {
             let asked = command.datagram.data.first().copied().unwrap_or_default() & AL_STATE;
-            // Some tools go through INIT first, or ask again for where they are.
+            // Some tools go through INIT first, or request the current state again.
             if ![to, from, AlState::Init].iter().any(|state| state.code() == asked) {
                 let what = format!("AL control at the transition {}", transition.name());
                 return Err(contradiction(
@@ -221,7 +221,7 @@ fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<Sta
     Ok(limits)
 }
 
-/// A command that is sent as it is.
+/// Converts a command that is sent unchanged.
 fn raw(
     eni: &Eni,
     index: usize,
@@ -270,8 +270,8 @@ fn raw(
     Ok(())
 }
 
-/// SyncManagers of process data that the file switches on at SO are for OP only: outputs that act in SAFEOP already
-/// would be dangerous. Others that differ there are noted.
+/// SyncManagers of process data that the file activates at SO are active in OP only: outputs that take effect in SAFEOP
+/// would be dangerous. A notice reports other SyncManagers that differ at SO.
 fn late_sync_managers(
     index: usize,
     commands: &[EcatCommand],
@@ -289,7 +289,7 @@ fn late_sync_managers(
         match found.filter(|_| !SyncManager::decode(&before).activate.enable) {
             Some(late) => late.op_only = true,
             None => {
-                let reason = "set on the way to SAFEOP already, not to OP: RingCAT sets all SyncManagers there";
+                let reason = "set before SAFEOP, not before OP: RingCAT sets all SyncManagers there";
                 notices.add(Some(place), Some(index), format!("SyncManager {number} at SO"), reason);
             }
         }

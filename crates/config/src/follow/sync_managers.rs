@@ -1,4 +1,4 @@
-//! SyncManagers as the commands leave them (protocol 3.11, 8.1): roles, mailboxes, PDOs of their areas.
+//! SyncManagers after all commands (protocol 3.11, 8.1): roles, mailboxes, PDOs of their areas.
 
 use ringcat_engine::config::{DeclaredSyncManager, PdoEntry, PdoMapping, SyncManagerRole};
 use ringcat_wire::register::{
@@ -11,13 +11,13 @@ use super::notices::Notices;
 use super::registers::Registers;
 use crate::eni::{Eni, EniError, MailboxBuffer, Place, ProcessData, SyncManagerKind, SyncManagerSettings, Transition};
 
-/// Control bytes of mailboxes where no command says them (protocol 3.11): one buffer, event to the PDI.
+/// Control bytes of mailboxes without a command that sets them (protocol 3.11): one buffer, event to the PDI.
 const MAILBOX_OUT: u8 = 0x26;
 const MAILBOX_IN: u8 = 0x22;
-/// Bits that one entry of the engine has at most; longer ones are cut.
+/// Maximum number of bits of one entry in the engine; longer entries are split.
 const ENTRY_BITS: u16 = 248;
 
-/// All SyncManagers of a SubDevice; `None` leaves them to the SII.
+/// All SyncManagers of a SubDevice; `None`: use those of the SII.
 pub(super) fn declared(
     eni: &Eni,
     index: usize,
@@ -44,7 +44,7 @@ pub(super) fn declared(
         if found.is_empty() {
             return Ok(None);
         }
-        let reason = "made from start, control byte and PDOs of the file, because it has no commands that set them";
+        let reason = "created from start, control byte and PDOs of the file: no commands set them";
         notices.add(Some(process_data.sync_managers[0].place), Some(index), "SyncManagers", reason);
     }
     mailboxes(eni, index, &mut found)?;
@@ -59,14 +59,14 @@ pub(super) fn declared(
     Ok(Some(list))
 }
 
-/// Without the bytes that the SubDevice sets.
+/// The declaration of a register value, without the bytes that the SubDevice sets.
 fn declare(index: u8, role: SyncManagerRole, register: SyncManager) -> DeclaredSyncManager {
     let register =
         SyncManager { status: SyncManagerStatus::default(), pdi_control: SyncManagerPdiControl::default(), ..register };
     DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
 }
 
-/// By `Type`; without it by the control byte.
+/// The role by `Type`; without it by the control byte.
 fn role(settings: Option<&SyncManagerSettings>, register: &SyncManager) -> SyncManagerRole {
     let writes = register.control.direction == SyncManagerDirection::Write;
     match settings.and_then(|settings| settings.kind) {
@@ -110,7 +110,7 @@ fn check_direction(
     Err(contradiction(eni, index, place, what, expected, in_words(got), hint))
 }
 
-/// From `Sm0` to `Sm15` alone.
+/// A SyncManager from `Sm0` to `Sm15` alone.
 fn from_settings(settings: &SyncManagerSettings, process_data: &ProcessData) -> Option<DeclaredSyncManager> {
     let (start, control) = (settings.start?, settings.control?);
     let mut register = SyncManager {
@@ -129,8 +129,8 @@ fn from_settings(settings: &SyncManagerSettings, process_data: &ProcessData) -> 
     Some(declare(settings.index, role, register))
 }
 
-/// The PDOs of a SyncManager that the file describes: those that it lists, otherwise those that name it. `None` where
-/// one of the list is not described.
+/// The described PDOs of a SyncManager: those in its list, otherwise those that name it. `None` if a PDO of the list is
+/// not described.
 fn mapped<'a>(one: &DeclaredSyncManager, process_data: &'a ProcessData) -> Option<Vec<&'a crate::eni::Pdo>> {
     let settings = process_data.sync_managers.iter().find(|settings| settings.index == one.index);
     let outputs = one.role == SyncManagerRole::Outputs;
@@ -144,7 +144,8 @@ fn mapped<'a>(one: &DeclaredSyncManager, process_data: &'a ProcessData) -> Optio
     }
 }
 
-/// PDOs with their entries, for the places of these. Where they do not fit the length, the length counts.
+/// PDOs with their entries, which give variables their positions. If they do not fit the length, only the length is
+/// used.
 fn pdos(
     subdevice: usize,
     one: &DeclaredSyncManager,
@@ -154,14 +155,14 @@ fn pdos(
 ) -> Vec<PdoMapping> {
     let subject = || format!("PDOs of SyncManager {}", one.index);
     let Some(described) = mapped(one, process_data) else {
-        let reason = "not all of them are described in the file: its length is followed, entries have no places";
+        let reason = "the file does not describe all of them: its length is used, entries have no positions";
         notices.add(Some(place), Some(subdevice), subject(), reason);
         return Vec::new();
     };
     let bits: u64 = described.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
     let room = u64::from(one.register.length) * 8;
     if bits > room {
-        let reason = format!("{bits} bits, more than its {room}: its length is followed, entries have no places");
+        let reason = format!("{bits} bits, more than its {room}: its length is used, entries have no positions");
         notices.add(Some(place), Some(subdevice), subject(), reason);
         return Vec::new();
     }
@@ -170,18 +171,18 @@ fn pdos(
     described.into_iter().map(mapping).collect()
 }
 
-/// An entry, in pieces where it is longer than an object dictionary can say (`ARRAY [0..99] OF BYTE`).
+/// An entry, split if it is longer than an object dictionary allows (`ARRAY [0..99] OF BYTE`).
 pub(super) fn entries(entry: &crate::eni::PdoEntry) -> impl Iterator<Item = PdoEntry> + '_ {
     let pieces = entry.bit_length.div_ceil(ENTRY_BITS);
     (0..pieces).map(move |piece| {
         let bits = (entry.bit_length - piece * ENTRY_BITS).min(ENTRY_BITS);
-        // The first piece bears the name, the others are gaps behind it.
+        // The first piece has the name, the others are gaps that follow it.
         let (index, sub_index) = if piece == 0 { (entry.index, entry.sub_index) } else { (0, 0) };
         PdoEntry::new(index, sub_index, bits as u8)
     })
 }
 
-/// `Mailbox/Send` and `Recv` against what the commands set; added where no command does.
+/// Checks `Mailbox/Send` and `Recv` against the SyncManagers set by commands; adds SyncManagers that no command sets.
 fn mailboxes(eni: &Eni, index: usize, found: &mut Vec<(DeclaredSyncManager, Place)>) -> Result<(), EniError> {
     let Some(mailbox) = &eni.subdevices[index].mailbox else { return Ok(()) };
     let (Some(send), Some(receive)) = (mailbox.send, mailbox.receive) else { return Ok(()) };
@@ -222,7 +223,7 @@ fn buffer_declared(number: u8, role: SyncManagerRole, buffer: MailboxBuffer, con
     declare(number, role, register)
 }
 
-/// Mailboxes of BOOT: as the commands of IB set them, otherwise as `BootStrap` says; `None` leaves them to the SII.
+/// Mailboxes of BOOT: as set by the commands at IB, otherwise as in `BootStrap`; `None`: use those of the SII.
 pub(super) fn bootstrap(eni: &Eni, index: usize) -> Result<Option<[DeclaredSyncManager; 2]>, EniError> {
     let subdevice = &eni.subdevices[index];
     let Some((send, receive)) = subdevice.mailbox.as_ref().and_then(|mailbox| mailbox.bootstrap) else {

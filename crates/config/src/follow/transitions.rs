@@ -1,11 +1,11 @@
-//! Transitions of a file and start-up commands of the engine at them.
+//! Converts transitions of a file and creates start-up commands of the engine for them.
 
 use ringcat_engine::config::{StartupCommand, Transition as EngineTransition};
 
 use super::notices::Notices;
 use crate::eni::{Place, Transition};
 
-/// The engine's transition; `None` where it has no commands.
+/// The engine's transition; `None` if the engine has no commands there.
 pub(super) const fn followed(transition: Transition) -> Option<EngineTransition> {
     match transition {
         Transition::Ip => Some(EngineTransition::Ip),
@@ -26,7 +26,7 @@ pub(super) const fn followed(transition: Transition) -> Option<EngineTransition>
     }
 }
 
-/// Start-up commands for the transitions of a command; transitions at which RingCAT sends none are noted.
+/// Start-up commands for the transitions of a command; a notice reports transitions at which RingCAT sends none.
 pub(super) fn at_transitions(
     place: Place,
     transitions: &[Transition],
@@ -40,7 +40,7 @@ pub(super) fn at_transitions(
     for transition in transitions {
         match followed(*transition) {
             Some(found) => commands.push((place, make(found))),
-            // OP is reached and left through SAFEOP: the command is sent on one half of the way.
+            // The path between OP and PREOP passes SAFEOP: the command is sent at one half of the path.
             None if *transition == Transition::Op && transitions.contains(&Transition::Sp) => {}
             None if *transition == Transition::Po && transitions.contains(&Transition::Ps) => {}
             None => left.push(transition.name()),
@@ -53,7 +53,7 @@ pub(super) fn at_transitions(
     commands
 }
 
-/// A comment, if it says something.
+/// A comment, if it is not empty.
 pub(super) fn comment(text: &str) -> Option<String> {
     (!text.is_empty()).then(|| text.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Commands of a SubDevice: what becomes part of the declaration, what is sent, what is not.
+//! Commands of a SubDevice: parts of the declaration, commands that are sent, commands that are not sent.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -17,7 +17,7 @@ fn drive(configuration: &ringcat_config::Configuration) -> SubDeviceConfig {
     configuration.declaration.subdevices[3].clone()
 }
 
-/// Commands to registers, with their transitions.
+/// Register commands, with their transitions.
 fn registers(config: &SubDeviceConfig) -> Vec<(Transition, RegisterCommand)> {
     let register = |action: &StartupAction| match action {
         StartupAction::Register(command) => Some(command.clone()),
@@ -28,15 +28,15 @@ fn registers(config: &SubDeviceConfig) -> Vec<(Transition, RegisterCommand)> {
 
 // covers: 8.2, eni-commands
 #[test]
-fn commands_that_every_main_device_sends_become_part_of_the_declaration() {
+fn standard_commands_become_part_of_the_declaration() {
     let configuration = configured(SMALL);
     let drive = drive(&configuration);
     assert_eq!(drive.watchdog_divider, Some(0x09C2));
     assert_eq!(drive.pdi_watchdog_intervals, Some(1000));
     assert_eq!(drive.watchdog_intervals, Some(10_000));
-    assert!(!drive.sii_to_pdi, "the EEPROM is taken back");
+    assert!(!drive.sii_to_pdi, "the MainDevice takes the EEPROM back");
     assert_eq!(drive.limit(AlState::Init, AlState::PreOp), Duration::from_secs(7));
-    assert!(configuration.declaration.subdevices[0].startup.is_empty(), "a coupler gets nothing else");
+    assert!(configuration.declaration.subdevices[0].startup.is_empty(), "no other commands for the coupler");
     assert_eq!(configuration.declaration.subdevices[0].declared, Some(Vec::new()));
 }
 
@@ -52,26 +52,26 @@ fn only_what_the_commands_compare_is_expected() {
 
 // covers: eni-commands
 #[test]
-fn a_single_word_of_the_revision_is_compared_as_the_file_does() {
+fn a_single_word_of_the_revision_is_compared_as_in_the_file() {
     let lookup = ("<Data>000108000000</Data>", "<Data>00010c000000</Data>");
     let check = ("<Data>02000000</Data>", "<Data>0000</Data>");
     let configuration = changed(&[lookup, check]);
     let coupler = &configuration.declaration.subdevices[0];
-    assert_eq!(coupler.expected.revision, None, "the upper word may be anything");
+    assert_eq!(coupler.expected.revision, None, "the upper word is not compared");
     let commands = registers(coupler);
-    assert_eq!(commands.len(), 2, "the address, then the look");
+    assert_eq!(commands.len(), 2, "the address, then the comparison");
     assert_eq!(commands[0].1.address, RegisterAddress(0x0502));
     assert_eq!(commands[0].1.access, RegisterAccess::Write(vec![0x00, 0x01, 0x0C, 0, 0, 0]));
     let limit = Duration::from_millis(100);
     assert_eq!(commands[1].1.access, RegisterAccess::Check { data: vec![0, 0], mask: None, limit });
     let whole = changed(&[lookup]);
-    assert_eq!(whole.declaration.subdevices[0].expected.revision, Some(2), "all of it is the engine's own matter");
+    assert_eq!(whole.declaration.subdevices[0].expected.revision, Some(2), "the engine compares the whole revision");
     assert!(registers(&whole.declaration.subdevices[0]).is_empty());
 }
 
 // covers: 3.11, eni-commands
 #[test]
-fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever() {
+fn sync_managers_result_from_all_writes_whatever_their_sizes() {
     let drive = drive(&configured(SMALL));
     let declared = drive.declared.expect("the file declares them");
     let found: Vec<_> = declared.iter().map(|sm| (sm.index, sm.role, sm.register.start, sm.register.length)).collect();
@@ -98,7 +98,7 @@ fn sync_managers_are_what_the_commands_leave_in_how_many_pieces_ever() {
 
 // covers: eni-commands
 #[test]
-fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
+fn a_sync_manager_activated_at_so_is_active_in_op_only() {
     let op_only = |configuration: &ringcat_config::Configuration, subdevice: usize| {
         configuration.declaration.subdevices[subdevice].declared.as_ref().unwrap()[0].op_only
     };
@@ -109,13 +109,13 @@ fn a_sync_manager_that_is_switched_on_at_so_is_for_op_only() {
     let both = "<InitCmd><Transition>PS</Transition><Cmd>5</Cmd><Adp>1002</Adp><Ado>2048</Ado>\
         <Data>000f010004000100</Data></InitCmd>";
     let changed = changed(&[(other, &format!("{both}{other}"))]);
-    assert!(!op_only(&changed, 1), "on in SAFEOP already");
-    assert!(has_notice(&changed, &["SyncManager 0 at SO", "SAFEOP already"]));
+    assert!(!op_only(&changed, 1), "active in SAFEOP");
+    assert!(has_notice(&changed, &["SyncManager 0 at SO", "set before SAFEOP"]));
 }
 
 // covers: eni-commands
 #[test]
-fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
+fn long_entries_are_split_and_pdos_that_do_not_fit_have_no_positions() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
     let array = "<Entry><Index>#x2000</Index><SubIndex>1</SubIndex><BitLen>800</BitLen>\
         <DataType>ARRAY [0..99] OF BYTE</DataType></Entry>";
@@ -135,7 +135,7 @@ fn long_entries_are_cut_and_pdos_that_do_not_fit_have_no_places() {
 
 // covers: 7.3, eni-commands
 #[test]
-fn sync_signals_come_from_the_registers_and_the_shift_from_the_element() {
+fn sync_signals_result_from_the_registers_and_the_shift_from_the_element() {
     let configuration = configured(SMALL);
     let expected = SyncSignals {
         assign_activate: 0x0700,
@@ -146,7 +146,7 @@ fn sync_signals_come_from_the_registers_and_the_shift_from_the_element() {
     };
     assert_eq!(drive(&configuration).sync, Some(expected));
     assert_eq!(expected.sync1_register_ns(), 250_000);
-    // 2,250,000 ns: SYNC1 comes with every third SYNC0, a quarter of a cycle later.
+    // 2,250,000 ns: SYNC1 occurs with every third SYNC0, a quarter of a cycle later.
     let slower = changed(&[("<Data>40420f0090d00300</Data>", "<Data>40420f0010552200</Data>")]);
     let signals = drive(&slower).sync.unwrap();
     assert_eq!((signals.sync1_cycle_ns, signals.sync1_shift_ns), (3_000_000, 250_000));
@@ -185,7 +185,7 @@ fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
 
 // covers: 8.2, eni-commands
 #[test]
-fn a_file_that_only_says_ccs_2_means_downloads() {
+fn a_file_with_only_ccs_2_means_downloads() {
     let upload = "<Comment>look</Comment><Ccs>2</Ccs><Index>#x1018</Index><SubIndex>1</SubIndex><Data>9A000000</Data>";
     let text = SMALL.replace("<Ccs>1</Ccs>", "<Ccs>2</Ccs>").replace("<Comment>not this</Comment>", "<Ccs>2</Ccs>");
     assert!(text.contains(upload));
@@ -197,7 +197,7 @@ fn a_file_that_only_says_ccs_2_means_downloads() {
 
 // covers: eni-commands
 #[test]
-fn other_registers_are_written_and_looked_at_as_the_file_says() {
+fn other_registers_are_written_and_compared_as_in_the_file() {
     let configuration = configured(SMALL);
     let commands = registers(&drive(&configuration));
     let write = RegisterCommand {
@@ -218,7 +218,7 @@ fn other_registers_are_written_and_looked_at_as_the_file_says() {
 
 // covers: eni-commands
 #[test]
-fn what_addresses_somebody_else_is_not_sent_and_said() {
+fn a_command_for_another_subdevice_is_not_sent_and_noted() {
     let position = changed(&[("<Adp>1004</Adp><Ado>3840</Ado>", "<Adp>1003</Adp><Ado>3840</Ado>")]);
     assert!(has_notice(&position, &["own register", "FPWR with Adp 1003 goes to another SubDevice"]));
     assert!(registers(&drive(&position)).iter().all(|(_, command)| command.address != RegisterAddress(0x0F00)));
@@ -229,7 +229,7 @@ fn what_addresses_somebody_else_is_not_sent_and_said() {
 
 // covers: eni-commands
 #[test]
-fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
+fn notices_list_commands_not_followed_but_not_those_of_the_engine() {
     let configuration = configured(SMALL);
     let found = crate::notices(&configuration);
     assert_eq!(found.len(), 2, "{found:#?}");
@@ -238,10 +238,10 @@ fn what_is_ours_is_not_in_the_notices_and_what_is_not_followed_is() {
     assert!(has_notice(&ports, &["own register", "ports and forwarding"]));
 }
 
-/// Protocol 4.4, 8.2: outputs that a file switches on at SO must not act in SAFEOP.
+/// Protocol 4.4, 8.2: outputs that a file activates at SO must not act in SAFEOP.
 // covers: sync-managers-declared
 #[test]
-fn a_sync_manager_switched_on_at_so_is_op_only_and_one_changed_there_is_noted() {
+fn a_sync_manager_activated_at_so_is_op_only_and_one_changed_there_is_noted() {
     let op_only = |configuration: &ringcat_config::Configuration, index: usize| -> Vec<bool> {
         let declared = configuration.declaration.subdevices[index].declared.iter().flatten();
         declared.map(|sync_manager| sync_manager.op_only).collect()
@@ -253,12 +253,12 @@ fn a_sync_manager_switched_on_at_so_is_op_only_and_one_changed_there_is_noted() 
                  <Data>000f010004000100</Data></InitCmd>";
     let twice = changed(&[(at_so, &format!("{at_ps}{at_so}"))]);
     assert_eq!(op_only(&twice, 1), [false]);
-    assert!(has_notice(&twice, &["SyncManager 0 at SO", "SAFEOP already"]));
+    assert!(has_notice(&twice, &["SyncManager 0 at SO", "set before SAFEOP"]));
 }
 
 // covers: 6.5, eni-commands
 #[test]
-fn addresses_are_hexadecimal_have_points_or_are_the_message_itself() {
+fn addresses_are_hexadecimal_dotted_decimal_or_a_whole_message() {
     let elements = "<Type>2</Type><MAC>020000000004</MAC><IP>c0a80104</IP><Subnet>ffffff00</Subnet>";
     let ip = |configuration: &ringcat_config::Configuration| {
         drive(configuration).startup.iter().find_map(|command| match &command.action {
@@ -269,10 +269,10 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself() {
     let expected = ip(&configured(SMALL)).unwrap();
     let points = elements.replace("c0a80104", "192.168.1.4").replace("ffffff00", "255.255.255.0");
     assert_eq!(ip(&changed(&[(elements, &points)])), Some(expected.clone()));
-    // Type 2, last fragment; flags for MAC, address and mask; addresses little-endian, all fields at their places.
+    // Type 2, last fragment; flags for MAC, address and mask; addresses little-endian, all fields at their offsets.
     let message = format!("<Data>0201 0000 07000000 020000000004 0401a8c0 00ffffff {}</Data>", "00".repeat(40));
     assert_eq!(ip(&changed(&[(elements, &message)])).as_ref(), Some(&expected));
-    // Without the header of the message, all fields or only those that the flags name.
+    // Without the header of the message: all fields, or only those that the flags name.
     let bare = message.replace("0201 0000 ", "");
     assert_eq!(ip(&changed(&[(elements, &bare)])).as_ref(), Some(&expected));
     let packed = bare.replace(&"00".repeat(40), "");
@@ -287,7 +287,7 @@ fn addresses_are_hexadecimal_have_points_or_are_the_message_itself() {
 /// Protocol 8.2: PO is among the transitions; OP is reached through SAFEOP.
 // covers: 8.2, eni-commands
 #[test]
-fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
+fn a_path_over_two_transitions_is_sent_at_the_listed_one_or_noted() {
     let own = "<Transition>PS</Transition><Transition>OP</Transition>";
     let both = changed(&[(own, "<Transition>PO</Transition><Transition>PS</Transition><Transition>OP</Transition>")]);
     let transitions = |configuration: &ringcat_config::Configuration| -> Vec<Transition> {
@@ -304,7 +304,7 @@ fn a_way_over_two_transitions_is_sent_at_the_one_that_is_listed_too_or_noted() {
 
 // covers: eni-commands
 #[test]
-fn a_command_that_is_disabled_is_not_sent_whatever_it_is() {
+fn a_disabled_command_of_any_kind_is_not_sent() {
     let own = "<Comment>own register</Comment>";
     let disabled = changed(&[(own, &format!("{own}<Disabled>1</Disabled>"))]);
     assert!(registers(&drive(&disabled)).iter().all(|(_, command)| command.address != RegisterAddress(0x0F00)));
@@ -313,10 +313,10 @@ fn a_command_that_is_disabled_is_not_sent_whatever_it_is() {
     assert_eq!(drive(&enabled).startup, drive(&configured(SMALL)).startup);
 }
 
-/// Protocol 6.6: a write with several elements has more than the value in its data.
+/// Protocol 6.6: the data of a write with several elements contains more than the value.
 // covers: eni-commands
 #[test]
-fn an_idn_is_written_where_the_command_has_its_value_and_nothing_else() {
+fn an_idn_is_written_if_the_command_has_only_its_value() {
     let value = "<Elements>64</Elements>";
     let idns = |configuration: &ringcat_config::Configuration| {
         drive(configuration).startup.iter().filter(|command| matches!(command.action, StartupAction::Idn(_))).count()
@@ -337,7 +337,7 @@ fn registers_and_mailbox_commands_of_a_transition_are_in_document_order() {
     };
     let expected = ["clear assignment", "assign", "look", "own register"].map(|text| Some(text.to_owned()));
     assert_eq!(at_ps(&configured(SMALL)), expected);
-    // The mailbox of the drive behind its commands, as no schema has it and some tools may.
+    // The mailbox of the drive after its commands: no schema allows it, but some tools may write it.
     let begin = SMALL.find("      <Mailbox ").expect("it is there");
     let end = SMALL.find("</Mailbox>\n").expect("it is there") + "</Mailbox>\n".len();
     let mailbox = &SMALL[begin..end];

@@ -1,4 +1,4 @@
-//! Contradictions are refused, with line, SubDevice, expected and found value.
+//! Contradictions are refused with line, SubDevice, expected and actual value.
 
 use crate::refused;
 
@@ -10,7 +10,7 @@ fn has(text: &str, parts: &[&str]) {
 
 // covers: eni-commands
 #[test]
-fn the_station_address_that_is_set_must_be_phys_addr() {
+fn the_written_station_address_must_be_phys_addr() {
     let text = refused(&[("<Data>e903</Data>", "<Data>ea03</Data>")]);
     has(
         &text,
@@ -19,7 +19,7 @@ fn the_station_address_that_is_set_must_be_phys_addr() {
 }
 
 #[test]
-fn the_vendor_that_is_compared_must_be_that_of_info() {
+fn the_compared_vendor_must_be_the_vendor_of_info() {
     has(&refused(&[("<Data>02000000</Data>", "<Data>03000000</Data>")]), &["vendor id", "expected 0x2, got 0x3"]);
 }
 
@@ -41,7 +41,7 @@ fn mailbox_and_sync_manager_must_be_the_same_memory() {
 
 // covers: 3.10, eni-commands
 #[test]
-fn an_fmmu_must_not_lead_beyond_its_sync_manager() {
+fn an_fmmu_must_not_extend_beyond_its_sync_manager() {
     let text =
         refused(&[("<Data>00000010060000070011000201000000</Data>", "<Data>00000010080000070011000201000000</Data>")]);
     has(&text, &["FMMU 0", "SyncManager 2 (6 bytes)", "64 bits"]);
@@ -63,25 +63,25 @@ fn two_subdevices_cannot_have_the_same_bits_address_or_position() {
     let bits = ("<BitStart>20</BitStart>", "<BitStart>18</BitStart>");
     has(
         &refused(&[bits, ("00000001010004070 00f", "00000001010002050 00f")]),
-        &["Slave 3 \"Right\"", "bits of its own", "Left"],
+        &["Slave 3 \"Right\"", "bits that no other SubDevice has", "Left"],
     );
     let text = refused(&[("<PhysAddr>1003</PhysAddr><AutoIncAddr>", "<PhysAddr>1002</PhysAddr><AutoIncAddr>")]);
     has(&text, &["PhysAddr", "1002", "which Slave 2 \"Left\""]);
     let text = refused(&[("<AutoIncAddr>65534</AutoIncAddr>", "<AutoIncAddr>65535</AutoIncAddr>")]);
-    has(&text, &["AutoIncAddr", "position 1, where Slave 2"]);
+    has(&text, &["AutoIncAddr", "position 1, which Slave 2"]);
 }
 
 #[test]
-fn al_control_must_ask_for_the_state_of_its_transition() {
+fn al_control_must_request_the_state_of_its_transition() {
     has(&refused(&[("<Data>1200</Data>", "<Data>1800</Data>")]), &["AL control at the transition IP", "got 0x08"]);
 }
 
 // covers: eni-cabling
 #[test]
-fn previous_port_must_exist_and_lead_to_the_first_one() {
+fn previous_ports_must_exist_and_form_paths_to_the_first_subdevice() {
     let to = "<Port>C</Port><PhysAddr>1001</PhysAddr>";
     has(&refused(&[(to, "<Port>C</Port><PhysAddr>7</PhysAddr>")]), &["PreviousPort", "got 7"]);
-    has(&refused(&[(to, "<Port>C</Port><PhysAddr>1004</PhysAddr>")]), &["PreviousPort", "circle"]);
+    has(&refused(&[(to, "<Port>C</Port><PhysAddr>1004</PhysAddr>")]), &["PreviousPort", "a loop"]);
 }
 
 // covers: eni-read

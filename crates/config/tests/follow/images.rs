@@ -1,4 +1,4 @@
-//! The process image: where process data lies in it, copies, variables, tasks.
+//! The process image: positions of process data, copies, variables, tasks.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ const AREAS: [ImageArea; 4] = [
 
 // covers: 8.1, eni-image
 #[test]
-fn packed_bits_have_their_places_in_the_image() {
+fn packed_bits_have_their_positions_in_the_image() {
     let image = configured(SMALL).image;
     assert_eq!((image.inputs_len, image.outputs_len), (8, 10));
     assert_eq!(image.areas, AREAS);
@@ -30,7 +30,7 @@ fn packed_bits_have_their_places_in_the_image() {
 // covers: eni-image
 #[test]
 fn offsets_may_count_from_the_header_of_a_datagram_as_twincat_writes_them() {
-    // As if each datagram with its header lay in the image: ten bytes further on.
+    // As if the image contained each datagram with its header: ten bytes later.
     let moved = changed(&[
         ("<BitStart>16</BitStart>", "<BitStart>96</BitStart>"),
         ("<BitStart>20</BitStart>", "<BitStart>100</BitStart>"),
@@ -41,15 +41,15 @@ fn offsets_may_count_from_the_header_of_a_datagram_as_twincat_writes_them() {
     ]);
     let bits: Vec<_> = moved.image.areas.iter().map(|area| area.image_bit).collect();
     assert_eq!(bits, [96, 100, 112, 80]);
-    assert!(!has_notice(&moved, &["the offsets of the cyclic commands lead elsewhere"]));
+    assert!(!has_notice(&moved, &["the offsets of the cyclic commands differ"]));
 }
 
 // covers: eni-image
 #[test]
-fn where_offsets_lead_elsewhere_send_and_recv_count() {
+fn send_and_recv_take_precedence_over_different_offsets() {
     let elsewhere = changed(&[("<InputOffs>2</InputOffs><OutputOffs>2</OutputOffs>", "<OutputOffs>7</OutputOffs>")]);
     assert_eq!(elsewhere.image.areas, AREAS);
-    assert!(has_notice(&elsewhere, &["ProcessData/Send", "the offsets of the cyclic commands lead elsewhere"]));
+    assert!(has_notice(&elsewhere, &["ProcessData/Send", "the offsets of the cyclic commands differ"]));
 }
 
 // covers: eni-image
@@ -66,19 +66,19 @@ fn process_data_in_several_ranges_fills_them_in_order() {
 
 // covers: 8.2, eni-image
 #[test]
-fn copies_are_cut_at_the_borders_of_process_data() {
+fn copies_are_split_at_the_borders_of_process_data() {
     let copies = configured(SMALL).image.copies;
     let first = ImageCopy { source_area: 3, source_bit: 8, target_area: 0, target_bit: 2, bits: 2 };
     let second = ImageCopy { source_area: 3, source_bit: 10, target_area: 1, target_bit: 0, bits: 2 };
     assert_eq!(copies, [first, second]);
     let beyond = changed(&[("<DstBitOffs>18</DstBitOffs>", "<DstBitOffs>4</DstBitOffs>")]);
     assert!(beyond.image.copies.is_empty());
-    assert!(has_notice(&beyond, &["CopyInfo", "nobody's process data"]));
+    assert!(has_notice(&beyond, &["CopyInfo", "process data of no SubDevice"]));
 }
 
 // covers: eni-image
 #[test]
-fn variables_know_whose_they_are() {
+fn variables_name_their_subdevice() {
     let variables = configured(SMALL).image.variables;
     let owners: Vec<_> = variables.iter().map(|v| (v.name.as_str(), v.subdevice, v.image_bit, v.bits)).collect();
     let expected = [
@@ -94,7 +94,7 @@ fn variables_know_whose_they_are() {
 
 // covers: CR-16, eni-image
 #[test]
-fn lrw_is_named_with_the_subdevices_that_it_meets() {
+fn an_lrw_is_declared_with_the_subdevices_that_it_addresses() {
     let declaration = configured(SMALL).declaration;
     let [lrw] = &declaration.explicit_lrw[..] else { panic!("{:?}", declaration.explicit_lrw) };
     assert!(lrw.name.starts_with("frame 1, command 4 \"drive\" (line "), "{}", lrw.name);
@@ -102,7 +102,7 @@ fn lrw_is_named_with_the_subdevices_that_it_meets() {
 }
 
 #[test]
-fn a_working_counter_that_the_fmmus_do_not_give_is_said() {
+fn a_working_counter_that_differs_from_the_fmmus_is_noted() {
     let wrong = changed(&[("<DataLength>6</DataLength><Cnt>3</Cnt>", "<DataLength>6</DataLength><Cnt>4</Cnt>")]);
     assert!(has_notice(&wrong, &["command 4 \"drive\"", "Cnt is 4", "give 3"]));
 }
@@ -144,12 +144,12 @@ fn sync_managers_of_different_tasks_are_members_of_both() {
 
 // covers: eni-commands
 #[test]
-fn what_no_command_covers_is_not_exchanged_and_said() {
+fn process_data_without_a_command_is_not_exchanged_and_noted() {
     let nothing = changed(&[("<Addr>16777216</Addr>", "<Addr>33554432</Addr>")]);
     assert!(has_notice(&nothing, &["SyncManager 0", "no cyclic command covers"]));
-    assert!(has_notice(&nothing, &["command 3 \"terminals\"", "meets no FMMU"]));
+    assert!(has_notice(&nothing, &["command 3 \"terminals\"", "matches no FMMU"]));
     assert_eq!(nothing.declaration.domains[0].members.len(), 1);
-    assert_eq!(nothing.image.areas, AREAS[2..], "nor is it in the image");
+    assert_eq!(nothing.image.areas, AREAS[2..], "the image does not contain it either");
     let variable = nothing.image.variables.iter().find(|variable| variable.name.starts_with("Left")).unwrap();
     assert_eq!(variable.subdevice, None);
 }
@@ -157,7 +157,7 @@ fn what_no_command_covers_is_not_exchanged_and_said() {
 /// Protocol 8.2: a command is active in the states that it lists.
 // covers: eni-image
 #[test]
-fn process_data_that_the_file_exchanges_in_other_states_is_told() {
+fn process_data_exchanged_in_other_states_is_noted() {
     let states = "<State>SAFEOP</State><State>OP</State><Comment>drive</Comment>";
     let op = changed(&[(states, "<State>4</State><Comment>drive</Comment>")]);
     assert!(has_notice(&op, &["command 4 \"drive\"", "State is OP: RingCAT exchanges process data in SAFEOP and OP"]));

@@ -1,5 +1,4 @@
-//! What follows from an ENI (protocol 8): one own file, `files/small.xml`, and what becomes of it when something in it
-//! is different.
+//! The configuration that results from an ENI (protocol 8): one file, `files/small.xml`, and variants of it.
 
 mod commands;
 mod contradictions;
@@ -14,7 +13,7 @@ use ringcat_config::{Configuration, follow};
 /// A coupler, two terminals whose outputs share a byte, a drive with mailbox and clock.
 pub const SMALL: &str = include_str!("../files/small.xml");
 
-/// The file with some texts replaced; each must be there exactly once.
+/// The file with some texts replaced; each text must occur exactly once.
 pub fn with(changes: &[(&str, &str)]) -> String {
     changes.iter().fold(SMALL.to_owned(), |text, (from, to)| {
         assert_eq!(text.matches(from).count(), 1, "{from} is there once");
@@ -22,22 +21,22 @@ pub fn with(changes: &[(&str, &str)]) -> String {
     })
 }
 
-/// The model of a file that can be read.
+/// The model of a readable file.
 pub fn model(text: &str) -> Eni {
     eni::read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What follows from a file that can be followed.
+/// The configuration of a valid file.
 pub fn configured(text: &str) -> Configuration {
     follow(&model(text)).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What follows from the own file with some texts replaced.
+/// The configuration of the file with some texts replaced.
 pub fn changed(changes: &[(&str, &str)]) -> Configuration {
     configured(&with(changes))
 }
 
-/// Why a file cannot be read or followed.
+/// The error of a file that cannot be read or followed.
 pub fn refusal(text: &str) -> String {
     match eni::read(text.as_bytes()).and_then(|model| follow(&model)) {
         Ok(_) => panic!("it is followed"),
@@ -45,7 +44,7 @@ pub fn refusal(text: &str) -> String {
     }
 }
 
-/// Why the own file with some texts replaced cannot be read or followed.
+/// The error of the file with some texts replaced.
 pub fn refused(changes: &[(&str, &str)]) -> String {
     refusal(&with(changes))
 }

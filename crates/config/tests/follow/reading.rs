@@ -1,4 +1,4 @@
-//! Reading: encodings, dialects of numbers, other kinds of files, limits, errors with their place.
+//! Reading: encodings, number formats, other kinds of files, limits, errors with their position.
 
 use ringcat_config::eni::{self, EniError, MAX_DEPTH, Problem, Requires, Transition};
 
@@ -27,7 +27,7 @@ fn the_order_of_elements_and_the_case_of_digits_do_not_matter() {
 
 // covers: 8.2, eni-read
 #[test]
-fn a_command_keeps_all_that_the_file_says() {
+fn a_command_keeps_the_whole_content_of_the_file() {
     let text = with(&[("<Comment>read count</Comment>", "<Comment>read count</Comment><Requires>cycle</Requires>")]);
     let command = &model(&text).main_device.init_commands[0];
     assert_eq!(command.requires, Some(Requires::Cycle));
@@ -38,7 +38,7 @@ fn a_command_keeps_all_that_the_file_says() {
 
 // covers: eni-read
 #[test]
-fn files_come_in_utf_8_utf_16_and_one_byte_encodings_with_and_without_a_mark() {
+fn files_in_utf_8_utf_16_and_one_byte_encodings_are_read() {
     let text = SMALL.replace("<Name>Left</Name>", "<Name>Türe</Name>");
     let name = |bytes: &[u8]| eni::read(bytes).unwrap_or_else(|error| panic!("{error}")).subdevices[1].name.clone();
     assert_eq!(name(text.as_bytes()), "Türe");
@@ -55,7 +55,7 @@ fn files_come_in_utf_8_utf_16_and_one_byte_encodings_with_and_without_a_mark() {
         let bytes: Vec<u8> = labelled.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
         assert_eq!(name(&bytes), "Türe");
     }
-    // .NET writes this into files that are UTF-8.
+    // .NET writes this declaration into files that are UTF-8.
     assert_eq!(name(text.replace("UTF-8", "utf-16").as_bytes()), "Türe");
 }
 
@@ -74,7 +74,7 @@ fn bytes_that_are_not_in_the_encoding_are_refused_with_their_line() {
 
 // covers: eni-read
 #[test]
-fn other_files_are_called_by_their_name() {
+fn other_files_are_refused_with_their_kind() {
     let said = |text: &str, what: &str| {
         let refusal = refusal(text);
         assert!(refusal.contains(what) && refusal.contains("An ENI has the root EtherCATConfig"), "{refusal}");
@@ -114,12 +114,12 @@ fn errors_name_line_column_element_expected_and_got() {
     let mask = refused(&[("<DataMask>0300</DataMask>", "<DataMask>03</DataMask>")]);
     assert!(mask.contains("a mask of 2 bytes"), "{mask}");
     let broken = refused(&[("</Cyclic>", "</Cycle>")]);
-    assert!(broken.starts_with("line ") && broken.contains("no well-formed XML"), "{broken}");
+    assert!(broken.starts_with("line ") && broken.contains("not well-formed XML"), "{broken}");
 }
 
 // covers: eni-read
 #[test]
-fn unknown_elements_are_listed_and_do_no_harm() {
+fn unknown_elements_are_listed_and_otherwise_ignored() {
     let text = with(&[("<Name>Right</Name>", "<Name>Right</Name><Colour>red</Colour>")]);
     let unknown = &model(&text).unknown;
     assert_eq!(unknown.len(), 1);
@@ -133,7 +133,7 @@ fn unknown_elements_are_listed_and_do_no_harm() {
 
 // covers: eni-read
 #[test]
-fn what_is_too_much_is_refused_before_it_costs_anything() {
+fn files_beyond_the_limits_are_refused_at_little_cost() {
     let problem = |text: &str| match eni::read(text.as_bytes()) {
         Err(EniError { problem: Problem::TooMuch { what, .. }, .. }) => what,
         other => panic!("{other:?}"),
@@ -148,7 +148,7 @@ fn what_is_too_much_is_refused_before_it_costs_anything() {
     assert!(refusal(entities).contains("document type definition"));
 }
 
-/// What is short in a file must not become long in memory or time.
+/// A short file must not cost much memory or time.
 // covers: eni-read
 #[test]
 fn repetitions_do_not_multiply() {
@@ -172,12 +172,12 @@ fn repetitions_do_not_multiply() {
         "<EtherCATConfig><Config>{slaves}<Cyclic><Frame>{}</Frame></Cyclic></Config></EtherCATConfig>",
         reads.repeat(2_001)
     );
-    assert!(refusal(&many).contains("looks at cyclic commands"), "{}", refusal(&many));
+    assert!(refusal(&many).contains("comparisons of cyclic commands"), "{}", refusal(&many));
 }
 
 // covers: eni-read
 #[test]
-fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
+fn lengths_with_too_large_a_sum_are_refused_or_omitted() {
     let all = "<Send><BitStart>0</BitStart><BitLength>4294967295</BitLength></Send>".repeat(3);
     let by_hand = |process_data: &str| {
         format!(
@@ -192,7 +192,7 @@ fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
         "<Sm2><Type>Outputs</Type><StartAddress>4096</StartAddress><ControlByte>100</ControlByte><Pdo>5632</Pdo></Sm2>";
     let text = by_hand(&format!("{sync_manager}<RxPdo><Index>5632</Index>{entries}</RxPdo>"));
     let declared = configured(&text).declaration.subdevices[0].declared.clone().unwrap();
-    assert_eq!(declared[0].register.length, u16::MAX, "and not what is left of a sum of 32 bits");
+    assert_eq!(declared[0].register.length, u16::MAX, "and not the sum modulo 2^32");
     let assign = "<Mailbox><CoE><InitCmds><InitCmd CompleteAccess=\"1\"><Transition>PS</Transition><Index>7186</Index>\
                   <Data>01000016</Data></InitCmd></InitCmds></CoE></Mailbox>";
     let described = format!("<ProcessData><RxPdo><Index>5632</Index>{entries}</RxPdo></ProcessData>");
@@ -203,11 +203,11 @@ fn lengths_that_add_up_to_too_much_are_refused_or_left_out() {
 
 // covers: eni-read
 #[test]
-fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
+fn a_truncated_file_is_refused_with_the_position_of_its_end() {
     let last = SMALL.rfind("</Config>").expect("it is there");
     for end in [last, last + 4, SMALL.len() / 2] {
         let text = refusal(&SMALL[..end]);
-        assert!(text.contains("the file ends before its elements do: it was cut off"), "{text}");
+        assert!(text.contains("the file is truncated: an element has no end"), "{text}");
         let line = format!("line {}, column ", SMALL[..end].matches('\n').count() + 1);
         assert!(text.starts_with(&line), "{text}");
     }
@@ -215,7 +215,7 @@ fn a_file_that_was_cut_off_is_told_as_such_with_its_end() {
 
 // covers: eni-read
 #[test]
-fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
+fn an_encrypted_file_is_refused_with_the_tool_that_writes_such_files() {
     let mut state = 1_u64;
     let mut chance = || {
         state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
@@ -226,7 +226,7 @@ fn an_encrypted_file_is_called_so_with_the_tool_that_makes_such_files() {
         <EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
     let salted = [&b"Salted__"[..], &random].concat();
     for (bytes, what) in [
-        (&random[..], "bytes without any order"),
+        (&random[..], "random bytes"),
         (&salted[..], "encrypted with a password (OpenSSL)"),
         (&xml[..], "XML encryption"),
         (b"PK\x03\x04\x14\x00", "a ZIP archive"),

@@ -1,5 +1,5 @@
-//! Real files, where `../shared/data/eni` lies beside the repository: each gives a configuration, or an error that says
-//! what to do. Where they are absent the test says so and passes.
+//! Real files, if `../shared/data/eni` exists beside the repository: each results in a configuration or in an error
+//! with advice. If the files are missing, the tests print this and pass.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,14 +27,14 @@ fn configuration(path: &Path) -> Result<Configuration, String> {
     follow(&model).map_err(|error| error.to_string())
 }
 
-/// Problems that each real file has.
+/// The error of a real file.
 fn refusal(path: &Path) -> Problem {
     eni::read(&fs::read(path).unwrap()).expect_err("it is no ENI").problem
 }
 
 // covers: eni-read
 #[test]
-fn every_real_file_gives_a_configuration_or_says_what_it_is() {
+fn every_real_file_results_in_a_configuration_or_its_kind() {
     for path in files("eni") {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let found = configuration(&path);
@@ -48,7 +48,7 @@ fn every_real_file_gives_a_configuration_or_says_what_it_is() {
     }
 }
 
-/// Drives of an EC-Engineer file: in the order of the file, with LRW over all of them.
+/// Drives of an EC-Engineer file: in the order of the file, with one LRW for all.
 // covers: eni-read
 #[test]
 fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
@@ -81,10 +81,10 @@ fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
     }
 }
 
-/// Terminals of a TwinCAT file, whose image is made of whole datagrams.
+/// Terminals of a TwinCAT file: the image consists of whole datagrams.
 // covers: eni-read
 #[test]
-fn terminals_of_twincat_lie_where_their_variables_are() {
+fn terminals_of_twincat_have_the_positions_of_their_variables() {
     for path in files("eni").iter().filter(|path| path.to_string_lossy().contains("twincat")) {
         let found = configuration(path).unwrap();
         let areas: Vec<_> = found.image.areas.iter().map(|a| (a.subdevice, a.direction, a.image_bit, a.bits)).collect();
@@ -102,8 +102,8 @@ fn terminals_of_twincat_lie_where_their_variables_are() {
 
 // covers: eni-read
 #[test]
-fn device_descriptions_and_eeprom_images_are_called_by_their_name() {
-    // Large ones take long in an unoptimised build, and say the same.
+fn device_descriptions_and_eeprom_images_are_refused_with_their_kind() {
+    // Large files take long in an unoptimised build and show nothing more.
     let small = |path: &PathBuf| fs::metadata(path).is_ok_and(|file| file.len() < 60_000);
     for path in files("esi").iter().filter(|path| small(path)) {
         assert_eq!(refusal(path), Problem::WrongFile { kind: FileKind::DeviceDescription }, "{}", path.display());

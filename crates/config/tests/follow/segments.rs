@@ -32,7 +32,7 @@ fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file() {
 }
 
 #[test]
-fn without_auto_inc_addr_the_order_of_the_file_counts_and_that_is_said() {
+fn without_auto_inc_addr_the_order_of_the_file_is_used_and_noted() {
     let zeros = changed(&[
         ("<AutoIncAddr>65535</AutoIncAddr>", ""),
         ("<AutoIncAddr>65534</AutoIncAddr>", ""),
@@ -45,12 +45,12 @@ fn without_auto_inc_addr_the_order_of_the_file_counts_and_that_is_said() {
 const GROUP: &str = "<HotConnect><GroupName>Gripper</GroupName><GroupMemberCnt>2</GroupMemberCnt>\
     <IdentifyCmd><Cmd>1</Cmd><Adp>0</Adp><Ado>18</Ado><DataLength>2</DataLength>\
     <Validate><Data>3412</Data></Validate></IdentifyCmd></HotConnect>";
-/// Where the second SubDevice has its `PreviousPort`, which becomes a group's head.
+/// `PreviousPort` of the second SubDevice, which becomes the head of a group.
 const HEAD: &str = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1001</PhysAddr></PreviousPort>";
 
 // covers: 8.2, eni-cabling
 #[test]
-fn a_hot_connect_group_is_found_by_its_alias_and_its_members_are_behind_it() {
+fn a_hot_connect_group_is_found_by_alias_and_its_members_follow_it() {
     let configuration = changed(&[(HEAD, GROUP)]);
     let alias = |offset| ConfigAddress::Alias { alias: 0x1234, offset };
     let expected = [ConfigAddress::Position(0), alias(0), alias(1), ConfigAddress::Position(1)];
@@ -84,7 +84,7 @@ fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
 
 // covers: 7, eni-image
 #[test]
-fn the_reference_is_whom_the_cycle_asks_for_the_time() {
+fn the_reference_clock_is_the_subdevice_addressed_by_the_cyclic_time_command() {
     let clocks = configured(SMALL).declaration.clocks.expect("the file uses clocks");
     assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(3), false));
     let bus_shift = "<Cmd><Cmd>5</Cmd><Adp>1004</Adp><Ado>2320</Ado><DataLength>4</DataLength></Cmd>";
@@ -100,7 +100,7 @@ fn the_reference_is_whom_the_cycle_asks_for_the_time() {
 
 // covers: eni-commands
 #[test]
-fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says() {
+fn a_file_without_commands_uses_the_sii_and_expects_the_identity_of_info() {
     let text = "<EtherCATConfig><Config><Slave><Info><Name>A</Name><PhysAddr>1001</PhysAddr><VendorId>2</VendorId>\
         <ProductCode>0</ProductCode></Info><ProcessData><Send><BitStart>8</BitStart><BitLength>16</BitLength></Send>\
         <Send><BitStart>32</BitStart><BitLength>8</BitLength></Send></ProcessData></Slave></Config></EtherCATConfig>";
@@ -116,10 +116,10 @@ fn a_file_without_commands_leaves_the_rest_to_the_sii_and_expects_what_info_says
     assert!(has_notice(&configuration, &["Cyclic/CycleTime", "1ms is taken"]));
 }
 
-/// As users write it with start-up lists only (a common problem: a mapping that differs from the SII).
+/// A file with start-up lists only, as users write it (a common problem: a mapping that differs from the SII).
 // covers: 6.3, eni-commands
 #[test]
-fn a_file_with_nothing_but_coe_commands_says_with_them_how_long_process_data_is() {
+fn a_file_with_only_coe_commands_defines_the_length_of_process_data() {
     let command = |object: &str, sub_index: u8, complete: u8, data: &str| {
         format!(
             "<InitCmd CompleteAccess=\"{complete}\"><Transition>PS</Transition><Ccs>1</Ccs><Index>{object}</Index>\

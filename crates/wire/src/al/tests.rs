@@ -13,7 +13,7 @@ fn states_have_the_codes_and_names_of_the_standard() {
 }
 
 #[test]
-fn a_nibble_that_is_no_state_has_no_state() {
+fn a_nibble_that_is_no_state_decodes_to_none() {
     for code in (0..=255u8).filter(|c| ![1, 2, 3, 4, 8].contains(c)) {
         assert_eq!(AlState::from_code(code), None);
     }
@@ -76,7 +76,7 @@ fn al_status_codes_have_their_numbers() {
 }
 
 #[test]
-fn an_al_status_code_is_shown_with_number_and_name() {
+fn an_al_status_code_is_displayed_with_number_and_name() {
     assert_eq!(AlStatusCode::SYNC_MANAGER_WATCHDOG.to_string(), "0x001b SM watchdog");
     assert_eq!(AlStatusCode(0x8001).to_string(), "0x8001 vendor specific");
     assert_eq!(AlStatusCode(0x0005).to_string(), "0x0005 unknown code");

@@ -20,7 +20,7 @@ fn brd_al_status() -> ([u8; MIN_FRAME], usize) {
 
 // covers: 1.1, 1.2, codec-frames
 #[test]
-fn a_broadcast_read_of_al_status_has_these_bytes() {
+fn a_broadcast_read_of_al_status_has_the_expected_bytes() {
     let mut expected = vec![
         0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x00, 0x76, 0x0E, 0x01, 0xBD, 0x9A, 0x88, 0xA4, 0x0E, 0x10, 0x07, 0x11,
         0x00, 0x00, 0x30, 0x01, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
@@ -50,7 +50,7 @@ fn a_full_frame_takes_123_microseconds() {
 
 // covers: 1.3, codec-frames
 #[test]
-fn one_datagram_carries_1486_bytes_and_not_one_more() {
+fn one_datagram_has_at_most_1486_bytes() {
     let mut buffer = [0; MAX_FRAME];
     let target = Target::Logical(LogicalAddress(0));
     let mut builder = FrameBuilder::ethernet(&mut buffer, MacAddress::BROADCAST, SOURCE).unwrap();
@@ -96,7 +96,7 @@ fn ethercat_in_udp_is_read_and_kept() {
 
 // covers: codec-frames
 #[test]
-fn errors_say_what_was_expected_and_what_came() {
+fn errors_contain_the_expected_and_the_received_value() {
     let (mut buffer, length) = brd_al_status();
     assert_eq!(
         Frame::parse(&buffer[..13]),
@@ -115,7 +115,7 @@ fn errors_say_what_was_expected_and_what_came() {
 }
 
 #[test]
-fn padding_that_the_header_counts_in_is_surplus_and_kept() {
+fn padding_within_the_header_length_is_surplus_and_kept() {
     let (mut buffer, length) = brd_al_status();
     buffer[14] = 44;
     buffer[40] = 7;
@@ -143,7 +143,7 @@ fn other_ethercat_types_are_kept_as_bytes() {
 proptest! {
     // covers: codec-frames
     #[test]
-    fn parsing_any_bytes_never_panics_and_what_parses_encodes_back(
+    fn parsing_any_bytes_never_panics_and_parsed_frames_encode_back(
         mut bytes in proptest::collection::vec(any::<u8>(), 0..200),
         ethertype in 0..4u8,
     ) {
@@ -161,7 +161,7 @@ proptest! {
 
     // covers: codec-frames
     #[test]
-    fn what_is_built_parses_back(
+    fn built_frames_parse_back(
         datagrams in proptest::collection::vec((0..15u8, any::<u8>(), any::<u32>(), 0..60usize), 1..8),
     ) {
         let mut buffer = [0xAA; MAX_FRAME];

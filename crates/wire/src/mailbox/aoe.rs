@@ -1,7 +1,7 @@
 //! AoE: ADS requests to a SubDevice (protocol 6.7; layout of the public ADS specification).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol AoE: an [`AmsHeader`] and the data of a command,
-//! which is [`AdsRequest`] or [`AdsResponse`].
+//! Converts the payload of a mailbox message of protocol AoE: an [`AmsHeader`] and the data of a command,
+//! [`AdsRequest`] or [`AdsResponse`].
 
 mod command;
 mod error;
@@ -13,7 +13,7 @@ pub use command::{AdsRequest, AdsResponse};
 pub use error::AdsErrorCode;
 pub use header::{AdsCommand, AmsAddress, AmsHeader, NetId};
 
-/// Index groups that SubDevices offer (protocol 6.7).
+/// Index groups of SubDevices (protocol 6.7).
 pub mod index_group {
     /// SDO: the offset is index in the upper half, complete access in bit 8, subindex in bits 7:0.
     pub const SDO: u32 = 0xF302;

@@ -1,7 +1,7 @@
-//! CoE: the two bytes before every message (protocol 6.3).
+//! CoE: the two-byte header of every message (protocol 6.3).
 //!
-//! Behind them: SDO transfers in [`super::sdo`], the [`Emergency`], SDO information in [`SdoInformation`] with the
-//! descriptions it carries, a PDO as it is. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
+//! After the header: SDO transfers in [`super::sdo`], the [`Emergency`], SDO information in [`SdoInformation`] with its
+//! descriptions, or a PDO. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
 
 mod description;
 mod diagnosis;
@@ -38,7 +38,7 @@ pub enum CoeService {
     RxPdoRemote,
     /// 8: SDO information.
     SdoInformation,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -110,7 +110,7 @@ impl CoeHeader {
         CoeHeader { number: 0, reserved: 0, service }
     }
 
-    /// Decodes two bytes; every pattern has a meaning.
+    /// Decodes two bytes; every pattern is valid.
     pub const fn decode(bytes: &[u8; Self::LEN]) -> CoeHeader {
         let word = u16::from_le_bytes(*bytes);
         CoeHeader {

@@ -1,7 +1,7 @@
-//! EoE: Ethernet frames in fragments, and what an IP stack behind a SubDevice needs (protocol 6.5).
+//! EoE: Ethernet frames in fragments, and IP parameters and address filter of a SubDevice (protocol 6.5).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol EoE. Cutting frames into fragments and putting
-//! them together again is the matter of both ends; [`EoeFragment::max_data`] says how much fits.
+//! Converts the payload of a mailbox message of protocol EoE. MainDevice and SubDevice fragment and reassemble frames;
+//! [`EoeFragment::max_data`] returns the data bytes of a fragment.
 
 mod filter;
 mod fragment;
@@ -20,40 +20,40 @@ pub use fragment::{BLOCK, EoeFragment};
 pub use ip::{IpParameters, MAX_NAME};
 pub use result::EoeResult;
 
-/// A message, with the port of the SubDevice that it is for: 0 is the SubDevice itself or any.
+/// A message with its port: 0 is the SubDevice itself or any port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EoeMessage<'a> {
     /// Port, 0..=15.
     pub port: u8,
-    /// What it says.
+    /// Content.
     pub body: EoeBody<'a>,
 }
 
-/// What a message says.
+/// Content of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EoeBody<'a> {
     /// 0: a part of a frame.
     Fragment(EoeFragment<'a>),
-    /// 1: when the SubDevice sent the frame that asked for it.
+    /// 1: time at which the SubDevice sent the frame, if the fragment requested it.
     TimeStamp {
         /// Number of the frame, 0..=15.
         frame: u8,
         /// Lower half of the time, nanoseconds.
         time_ns: u32,
     },
-    /// 2: sets the addresses.
+    /// 2: sets the IP parameters.
     SetIp(IpParameters<'a>),
-    /// 3: whether that worked.
+    /// 3: result of type 2.
     SetIpDone(EoeResult),
     /// 4: sets the address filter.
     SetFilter(AddressFilter),
-    /// 5: whether that worked.
+    /// 5: result of type 4.
     SetFilterDone(EoeResult),
-    /// 6: asks for the addresses.
+    /// 6: requests the IP parameters.
     GetIp,
-    /// 7: the addresses.
+    /// 7: the IP parameters.
     Ip(EoeResult, IpParameters<'a>),
-    /// 8: asks for the address filter.
+    /// 8: requests the address filter.
     GetFilter,
     /// 9: the address filter.
     Filter(EoeResult, AddressFilter),
@@ -94,12 +94,12 @@ impl<'a> EoeMessage<'a> {
         Ok(EoeMessage { port: (head >> PORT_SHIFT & 0x0F) as u8, body })
     }
 
-    /// Encodes a payload and returns its length; `None` where it does not fit `out`, or where [`EoeFragment`] or
-    /// [`AddressFilter`] cannot be said. A port or frame number above 15 loses its upper bits.
+    /// Encodes a payload and returns its length; `None` if it does not fit `out`, or if [`EoeFragment`] or
+    /// [`AddressFilter`] cannot be encoded. A port or frame number above 15 loses its upper bits.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         let port = u16::from(self.port & 0x0F) << PORT_SHIFT;
-        // All but fragments of more than one piece are complete in themselves.
+        // All messages are complete, except fragments of a frame with several fragments.
         let mut head = |kind: u16, word: u16| {
             pen.put_u16(kind | port | LAST)?;
             pen.put_u16(word)

@@ -7,7 +7,7 @@ use core::fmt;
 pub struct ErrorReply {
     /// Service type; [`ErrorReply::SERVICE`].
     pub service: u16,
-    /// What is wrong; one of the constants.
+    /// The error; one of the constants.
     pub detail: u16,
 }
 
@@ -17,7 +17,7 @@ impl ErrorReply {
     /// The only service type.
     pub const SERVICE: u16 = 1;
 
-    /// Syntax of the header.
+    /// Syntax error in the header.
     pub const SYNTAX: u16 = 0x01;
     /// The protocol is not supported.
     pub const UNSUPPORTED_PROTOCOL: u16 = 0x02;
@@ -53,7 +53,7 @@ impl ErrorReply {
         [service[0], service[1], detail[0], detail[1]]
     }
 
-    /// What the detail means; `None` for a code that is not in the table.
+    /// The meaning of the detail; `None` for a code that is not in the table.
     pub const fn detail_name(&self) -> Option<&'static str> {
         Some(match self.detail {
             Self::SYNTAX => "syntax of header",
@@ -84,7 +84,7 @@ mod tests {
 
     // covers: codec-mailbox
     #[test]
-    fn an_unsupported_protocol_is_refused_with_these_bytes() {
+    fn an_unsupported_protocol_reply_has_the_expected_bytes() {
         let reply = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL);
         assert_eq!(reply.encode(), [0x01, 0x00, 0x02, 0x00]);
         assert_eq!(reply.to_string(), "0x0002 protocol not supported");

@@ -19,46 +19,46 @@ const BUSY: u8 = 6;
 /// A message of the file transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FoeMessage<'a> {
-    /// RRQ: asks for a file.
+    /// RRQ: requests a file.
     Read {
         /// Password, 0 for none.
         password: u32,
         /// Name of the file.
         name: &'a [u8],
     },
-    /// WRQ: asks for permission to send a file.
+    /// WRQ: requests permission to send a file.
     Write {
         /// Password, 0 for none.
         password: u32,
         /// Name of the file.
         name: &'a [u8],
     },
-    /// DATA: a piece of the file. One shorter than [`FoeMessage::max_data`] ends it.
+    /// DATA: a packet of the file. A packet shorter than [`FoeMessage::max_data`] is the last one.
     Data {
         /// Number of the packet, the first is 1.
         packet: u32,
-        /// The piece.
+        /// The data of the packet.
         data: &'a [u8],
     },
-    /// ACK: the packet has arrived; 0 answers [`FoeMessage::Write`].
+    /// ACK: acknowledges a packet; packet 0 responds to [`FoeMessage::Write`].
     Acknowledge {
         /// Number of the packet.
         packet: u32,
     },
     /// ERR: the transfer has failed.
     Error {
-        /// Why.
+        /// Error code.
         code: FoeErrorCode,
-        /// What the other end says about it.
+        /// Error text of the sender.
         text: &'a [u8],
     },
-    /// BUSY instead of an acknowledgement or of data: the last message is to be sent again later.
+    /// BUSY, sent in place of an acknowledgement or of data: the receiver repeats its last message later.
     Busy {
-        /// So much is done.
+        /// Progress.
         done: u16,
-        /// Total.
+        /// Progress at the end of the operation.
         entire: u16,
-        /// What the other end is doing.
+        /// Description of the operation.
         text: &'a [u8],
     },
 }
@@ -72,7 +72,7 @@ impl<'a> FoeMessage<'a> {
         mailbox_size.saturating_sub(super::Header::LEN + Self::OVERHEAD)
     }
 
-    /// Decodes a payload. NUL characters at the end of names and texts are left out.
+    /// Decodes a payload. NUL characters at the end of names and texts are removed.
     pub fn decode(payload: &'a [u8]) -> Result<FoeMessage<'a>, PayloadError> {
         let (&[opcode, _, a, b, c, d], rest) = split(payload, "FoE message")?;
         let number = u32::from_le_bytes([a, b, c, d]);
@@ -91,7 +91,7 @@ impl<'a> FoeMessage<'a> {
         })
     }
 
-    /// Encodes a payload and returns its length; `None` where it does not fit `out`.
+    /// Encodes a payload and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let (opcode, number, rest): (u8, u32, &[u8]) = match *self {
             FoeMessage::Read { password, name } => (READ, password, name),
@@ -146,19 +146,19 @@ mod tests {
     }
 
     #[test]
-    fn an_end_mark_is_no_part_of_a_name() {
+    fn a_terminating_nul_is_not_part_of_a_name() {
         let name = FoeMessage::decode(b"\x01\x00\x00\x00\x00\x00a\x00b\x00\x00");
         assert_eq!(name, Ok(FoeMessage::Read { password: 0, name: b"a\x00b" }));
     }
 
     // covers: 6.4, codec-mailbox
     #[test]
-    fn a_packet_has_the_mailbox_without_twelve_bytes() {
+    fn a_packet_has_the_mailbox_size_minus_twelve_bytes() {
         assert_eq!([128, 1024, 12, 4].map(FoeMessage::max_data), [116, 1012, 0, 0]);
     }
 
     #[test]
-    fn what_is_no_message_is_refused_with_both_sides_named() {
+    fn an_invalid_message_is_refused_with_expected_and_received_value() {
         let error = FoeMessage::decode(&[4, 0, 1, 0, 0]).unwrap_err();
         assert_eq!(error.to_string(), "FoE message too short: expected at least 6 bytes, got 5");
         assert_eq!(FoeMessage::decode(&[7, 0, 0, 0, 0, 0]).unwrap_err().to_string(), "unknown FoE opcode 0x7");
@@ -166,7 +166,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_reads_back(
+        fn any_bytes_never_panic_and_decoded_messages_read_back(
             opcode in 0u8..9,
             rest in proptest::collection::vec(any::<u8>(), 0..40),
         ) {

@@ -1,7 +1,7 @@
 //! The mailbox gateway: mailbox messages in UDP and TCP (protocol 10.1, ETG.8200).
 //!
-//! Converts the messages of a client: an EtherCAT header of type 5 and one mailbox message. In a stream they follow one
-//! another; [`frame_length`] says where one ends. The gateway handles access rights.
+//! Converts the messages of a client: an EtherCAT header of type 5 and one mailbox message. In a stream, messages
+//! follow one another; [`frame_length`] returns the length of a message. The gateway handles access rights.
 
 use core::fmt;
 
@@ -13,17 +13,17 @@ pub const PORT: u16 = 0x88A4;
 pub const ETHERCAT_TYPE: u8 = 5;
 /// Bytes of the EtherCAT header.
 pub const HEADER_LEN: usize = 2;
-/// Most bytes behind the EtherCAT header.
+/// Maximum number of bytes after the EtherCAT header.
 pub const MAX_LENGTH: usize = 0x07FF;
 
 const TYPE_SHIFT: u16 = 12;
 
-/// Why bytes are no mailbox message for a gateway.
+/// The reason for which bytes are no mailbox message for a gateway.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GatewayError {
     /// Shorter than the EtherCAT header.
     Short {
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
     /// The EtherCAT header has another type.
@@ -31,14 +31,14 @@ pub enum GatewayError {
         /// The type.
         got: u8,
     },
-    /// The EtherCAT header announces another length than there is or than the mailbox message has.
+    /// The length in the EtherCAT header differs from the available bytes or from the length of the mailbox message.
     Length {
-        /// Bytes that the header announces.
+        /// Length in the EtherCAT header.
         announced: usize,
-        /// Bytes behind the header, or of the mailbox message.
+        /// Bytes after the header, or of the mailbox message.
         got: usize,
     },
-    /// The mailbox message itself is broken.
+    /// The mailbox message is malformed.
     Message(MessageError),
 }
 
@@ -57,7 +57,7 @@ impl fmt::Display for GatewayError {
 
 impl core::error::Error for GatewayError {}
 
-/// Bytes of a whole message, EtherCAT header included, from its first two bytes; of another type than 5 it is none.
+/// Bytes of a whole message, including the EtherCAT header, from its first two bytes; an error if the type is not 5.
 pub const fn frame_length(header: [u8; HEADER_LEN]) -> Result<usize, GatewayError> {
     let word = u16::from_le_bytes(header);
     let kind = (word >> TYPE_SHIFT) as u8;
@@ -67,7 +67,7 @@ pub const fn frame_length(header: [u8; HEADER_LEN]) -> Result<usize, GatewayErro
     Ok(HEADER_LEN + (word as usize & MAX_LENGTH))
 }
 
-/// Reads a message. Bytes behind the announced length are padding.
+/// Reads a message. Bytes after the length in the EtherCAT header are padding.
 pub fn decode(bytes: &[u8]) -> Result<Message<'_>, GatewayError> {
     let (header, rest) = bytes.split_first_chunk().ok_or(GatewayError::Short { got: bytes.len() })?;
     let announced = frame_length(*header)? - HEADER_LEN;
@@ -77,8 +77,8 @@ pub fn decode(bytes: &[u8]) -> Result<Message<'_>, GatewayError> {
     if got == announced { Ok(message) } else { Err(GatewayError::Length { announced, got }) }
 }
 
-/// Writes a message and returns its length; `None` where it does not fit `out`, is longer than the header can say, or
-/// has another length than its own header says.
+/// Writes a message and returns its length; `None` if it does not fit `out`, exceeds the length field, or differs from
+/// the length in its own header.
 pub fn encode(message: &Message<'_>, out: &mut [u8]) -> Option<usize> {
     let length = Header::LEN + message.payload.len();
     if length > MAX_LENGTH || usize::from(message.header.length) != message.payload.len() {
@@ -136,7 +136,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+        fn any_bytes_never_panic_and_decoded_messages_encode_back(
             length in 0u8..32,
             mut bytes in proptest::collection::vec(any::<u8>(), 0..40),
         ) {

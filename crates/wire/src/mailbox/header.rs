@@ -19,7 +19,7 @@ pub enum Protocol {
     Soe,
     /// 15: vendor protocol over EtherCAT.
     Voe,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -68,18 +68,18 @@ impl fmt::Display for Protocol {
     }
 }
 
-/// The largest counter value; 0 means "no counter".
+/// The largest counter value; 0 means that the sender uses no counter.
 pub const MAX_COUNTER: u8 = 7;
 
-/// The counter of the message after one with this counter: 1..=7, then 1 again.
+/// The counter that follows this counter: 1..=7, then 1 again.
 pub const fn next_counter(counter: u8) -> u8 {
     if counter < MAX_COUNTER { counter + 1 } else { 1 }
 }
 
-/// The header of a message with every bit it has.
+/// The header of a message with all bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Header {
-    /// Bytes behind the header.
+    /// Bytes after the header.
     pub length: u16,
     /// Station address of the destination or the source; 0 is the MainDevice.
     pub address: u16,
@@ -104,7 +104,7 @@ impl Header {
         Header { length, address: 0, channel: 0, priority: 0, protocol, counter, reserved: false }
     }
 
-    /// Decodes six bytes; every pattern has a meaning.
+    /// Decodes six bytes; every pattern is valid.
     pub const fn decode(b: &[u8; Self::LEN]) -> Header {
         Header {
             length: u16::from_le_bytes([b[0], b[1]]),
@@ -127,19 +127,19 @@ impl Header {
     }
 }
 
-/// Why the bytes of a mailbox are no message.
+/// The reason for which the bytes of a mailbox are no message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageError {
     /// Shorter than a header.
     Short {
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
-    /// The header announces more than there is.
+    /// The length in the header exceeds the available bytes.
     Length {
-        /// Bytes that the header announces.
+        /// Length in the header.
         announced: usize,
-        /// Bytes behind the header.
+        /// Bytes after the header.
         got: usize,
     },
 }
@@ -162,12 +162,12 @@ impl core::error::Error for MessageError {}
 pub struct Message<'a> {
     /// The header.
     pub header: Header,
-    /// What follows it, as long as the header says.
+    /// The payload, with the length in the header.
     pub payload: &'a [u8],
 }
 
 impl<'a> Message<'a> {
-    /// Reads the content of a mailbox; bytes behind the announced length are left out.
+    /// Reads the content of a mailbox; bytes after the length in the header are ignored.
     pub fn decode(mailbox: &'a [u8]) -> Result<Message<'a>, MessageError> {
         let short = MessageError::Short { got: mailbox.len() };
         let (header, rest) = mailbox.split_first_chunk().ok_or(short)?;
@@ -185,7 +185,7 @@ mod tests {
 
     // covers: codec-mailbox
     #[test]
-    fn a_coe_message_of_ten_bytes_has_this_header() {
+    fn a_coe_message_of_ten_bytes_has_the_expected_header() {
         let header = Header::new(Protocol::Coe, 5, 10);
         assert_eq!(header.encode(), [0x0A, 0x00, 0x00, 0x00, 0x00, 0x53]);
         let full = Header {
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_ends_where_its_header_says() {
+    fn a_message_has_the_length_in_its_header() {
         let mailbox = [0x02, 0, 0, 0, 0, 0x13, 0xAA, 0xBB, 0xCC];
         let message = Message::decode(&mailbox).unwrap();
         assert_eq!(message.header, Header::new(Protocol::Coe, 1, 2));

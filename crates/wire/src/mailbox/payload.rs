@@ -1,31 +1,31 @@
-//! Why the payload of a mailbox message says nothing, and a pen that writes one into a buffer of the caller.
+//! Errors of mailbox payloads, and a writer of fields into a buffer of the caller.
 
 use core::fmt;
 
 use super::coe::CoeService;
 
-/// Why bytes are not the message that was expected.
+/// The reason for which bytes are not the expected message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PayloadError {
     /// Too short.
     Short {
-        /// What was to be read.
+        /// The expected part.
         what: &'static str,
-        /// Bytes that it has at least.
+        /// Minimum number of bytes.
         expected: usize,
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
-    /// The CoE service is another one.
+    /// The CoE service differs.
     Service {
         /// The service expected.
         expected: CoeService,
         /// The service found.
         got: CoeService,
     },
-    /// A code that decides about the rest means nothing.
+    /// An unknown code, which determines the remaining layout.
     Code {
-        /// What the code stands for.
+        /// The kind of code.
         what: &'static str,
         /// The code.
         got: u16,
@@ -46,7 +46,7 @@ impl fmt::Display for PayloadError {
 
 impl core::error::Error for PayloadError {}
 
-/// The first `N` bytes and what is behind them.
+/// The first `N` bytes and the bytes after them.
 pub(super) fn split<'a, const N: usize>(
     bytes: &'a [u8],
     what: &'static str,
@@ -54,7 +54,7 @@ pub(super) fn split<'a, const N: usize>(
     bytes.split_first_chunk().ok_or(PayloadError::Short { what, expected: N, got: bytes.len() })
 }
 
-/// Writes one field behind the other; `None` where there is no room.
+/// Writes fields one after the other; `None` if the buffer is full.
 pub(super) struct Pen<'b> {
     out: &'b mut [u8],
     at: usize,

@@ -1,7 +1,7 @@
-//! SDO upload and download, expedited, normal and in segments (protocol 6.3).
+//! SDO upload and download, expedited, normal and segmented (protocol 6.3).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol CoE: CoE header, command byte and what follows.
-//! Which message may follow which, toggles and time limits are the engine's matter.
+//! Converts the payload of a mailbox message of protocol CoE: CoE header, command byte and the rest of the message. The
+//! engine handles sequences, toggle bits and time limits.
 
 mod abort;
 mod codec;
@@ -16,33 +16,33 @@ pub use abort::AbortCode;
 pub use request::SdoRequest;
 pub use response::SdoResponse;
 
-/// Bytes of CoE header, command, index, subindex and size: all of an SDO message but the data of a normal transfer.
+/// Bytes of CoE header, command, index, subindex and size: an SDO message without the data of a normal transfer.
 pub const INITIATE_LEN: usize = 10;
-/// Bytes of CoE header and command: all of a segment but its data.
+/// Bytes of CoE header and command: a segment without its data.
 pub const SEGMENT_OVERHEAD: usize = 3;
-/// Data bytes that every segment has; shorter data is padded.
+/// Minimum number of data bytes of a segment; shorter data is padded.
 pub const SEGMENT_MIN_DATA: usize = 7;
-/// Most data of an expedited transfer.
+/// Maximum number of data bytes of an expedited transfer.
 pub const EXPEDITED_MAX_DATA: usize = 4;
 
-/// Why bytes are not the SDO message that was expected.
+/// The reason for which bytes are not the expected SDO message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SdoError {
     /// Too short.
     Short {
-        /// Bytes that such a message has at least.
+        /// Minimum number of bytes of the message.
         expected: usize,
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
-    /// The CoE service is another one.
+    /// The CoE service differs.
     Service {
         /// The service expected.
         expected: CoeService,
         /// The service found.
         got: CoeService,
     },
-    /// The upper three bits of the command byte mean nothing here.
+    /// The upper three bits of the command byte are invalid in this message.
     Command {
         /// The command byte.
         got: u8,

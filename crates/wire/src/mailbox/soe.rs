@@ -1,8 +1,8 @@
-//! SoE: reading and writing the elements of IDNs of a drive (protocol 6.6).
+//! SoE: reading and writing the elements of the IDNs of a drive (protocol 6.6).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox comes
-//! in fragments; all but the last are marked incomplete and tell how many follow in place of the IDN. Putting them
-//! together is the reader's matter.
+//! Converts the payload of a mailbox message of protocol SoE. Data that does not fit into one mailbox is sent in
+//! fragments: all but the last are marked incomplete and contain the number of following fragments in place of the IDN.
+//! The reader reassembles the fragments.
 
 mod attribute;
 mod error;
@@ -19,22 +19,22 @@ const ERROR: u8 = 1 << 4;
 const DRIVE_SHIFT: u8 = 5;
 const OPERATION: u8 = 0x07;
 
-/// What a message is for.
+/// Operation of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SoeOperation {
     /// 1: reads elements.
     ReadRequest,
-    /// 2: what was read.
+    /// 2: response to a read.
     ReadResponse,
     /// 3: writes an element.
     WriteRequest,
-    /// 4: it is written.
+    /// 4: response to a write.
     WriteResponse,
-    /// 5: the procedure command behind an IDN has ended or changed; comes unasked.
+    /// 5: a procedure command has ended or changed; sent without a request.
     Notification,
-    /// 6: emergency; comes unasked.
+    /// 6: emergency; sent without a request.
     Emergency,
-    /// 0 and 7 mean nothing.
+    /// 0 and 7 are not defined.
     Other(u8),
 }
 
@@ -66,18 +66,18 @@ impl SoeOperation {
     }
 }
 
-/// Which elements of an IDN; several are packed in the order of the bits.
+/// Elements of an IDN; several elements are packed in the order of the bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SoeElements(pub u8);
 
 impl SoeElements {
     /// Bit: data state, 16 bits.
     pub const DATA_STATE: SoeElements = SoeElements(1 << 0);
-    /// Bit: name, a string with two lengths before it.
+    /// Bit: name, a string after two length fields.
     pub const NAME: SoeElements = SoeElements(1 << 1);
     /// Bit: [`IdnAttribute`], 32 bits.
     pub const ATTRIBUTE: SoeElements = SoeElements(1 << 2);
-    /// Bit: unit, a string with two lengths before it.
+    /// Bit: unit, a string after two length fields.
     pub const UNIT: SoeElements = SoeElements(1 << 3);
     /// Bit: smallest value.
     pub const MINIMUM: SoeElements = SoeElements(1 << 4);
@@ -88,21 +88,21 @@ impl SoeElements {
     /// Bit: default value.
     pub const DEFAULT: SoeElements = SoeElements(1 << 7);
 
-    /// All of these bits are set.
+    /// Whether all of these bits are set.
     pub const fn has(self, elements: SoeElements) -> bool {
         self.0 & elements.0 == elements.0
     }
 
-    /// The single elements, in the order in which their data follow each other.
+    /// The single elements, in the order of their data.
     pub fn iter(self) -> impl Iterator<Item = SoeElements> {
         (0..8).map(|bit| SoeElements(1 << bit)).filter(move |element| self.has(*element))
     }
 }
 
-/// One message, whole or a fragment.
+/// One message, complete or a fragment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SoeMessage<'a> {
-    /// What it is for.
+    /// Operation.
     pub operation: SoeOperation,
     /// Another fragment follows.
     pub incomplete: bool,
@@ -112,7 +112,7 @@ pub struct SoeMessage<'a> {
     pub drive: u8,
     /// Elements.
     pub elements: SoeElements,
-    /// The IDN, or how many fragments follow where the message is incomplete.
+    /// The IDN, or the number of following fragments if the message is incomplete.
     pub number: u16,
     /// Data, or a part of it.
     pub data: &'a [u8],
@@ -122,7 +122,7 @@ impl<'a> SoeMessage<'a> {
     /// Bytes before the data.
     pub const OVERHEAD: usize = 4;
 
-    /// A whole message without an error.
+    /// A complete message without an error.
     pub const fn whole(
         operation: SoeOperation,
         drive: u8,
@@ -138,7 +138,7 @@ impl<'a> SoeMessage<'a> {
         mailbox_size.saturating_sub(super::Header::LEN + Self::OVERHEAD)
     }
 
-    /// Decodes a payload; every four bytes mean something.
+    /// Decodes a payload; every pattern of the first four bytes is valid.
     pub fn decode(payload: &'a [u8]) -> Result<SoeMessage<'a>, PayloadError> {
         let (&[head, elements, low, high], data) = split(payload, "SoE message")?;
         Ok(SoeMessage {
@@ -152,8 +152,7 @@ impl<'a> SoeMessage<'a> {
         })
     }
 
-    /// Encodes a payload and returns its length; `None` where it does not fit `out`. A drive above 7 loses its upper
-    /// bits.
+    /// Encodes a payload and returns its length; `None` if it does not fit `out`. A drive above 7 loses its upper bits.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut head = self.operation.code() | self.drive << DRIVE_SHIFT;
         if self.incomplete {
@@ -169,17 +168,17 @@ impl<'a> SoeMessage<'a> {
         Some(pen.length())
     }
 
-    /// The IDN; `None` in a fragment that another one follows.
+    /// The IDN; `None` in a fragment that is not the last one.
     pub const fn idn(&self) -> Option<Idn> {
         if self.incomplete { None } else { Some(Idn(self.number)) }
     }
 
-    /// Fragments that follow.
+    /// Number of following fragments.
     pub const fn fragments_left(&self) -> u16 {
         if self.incomplete { self.number } else { 0 }
     }
 
-    /// Why the request failed, where it failed. An error that lacks its code is a general one.
+    /// The error code of a failed request. An error without a code is a general error.
     pub fn error_code(&self) -> Option<SoeErrorCode> {
         let code =
             self.data.first_chunk().map_or(SoeErrorCode::GENERAL, |code| SoeErrorCode(u16::from_le_bytes(*code)));
@@ -250,13 +249,13 @@ mod tests {
     }
 
     #[test]
-    fn a_fragment_has_the_mailbox_without_ten_bytes() {
+    fn a_fragment_has_the_mailbox_size_minus_ten_bytes() {
         assert_eq!([128, 10, 3].map(SoeMessage::max_data), [118, 0, 0]);
     }
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+        fn any_bytes_never_panic_and_decoded_messages_encode_back(
             bytes in proptest::collection::vec(any::<u8>(), 0..40)
         ) {
             if let Ok(message) = SoeMessage::decode(&bytes) {

@@ -2,12 +2,12 @@
 
 use super::payload::{PayloadError, Pen, split};
 
-/// A message of a vendor; what the data means is the vendor's matter.
+/// A message of a vendor; the vendor defines the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoeMessage<'a> {
     /// Vendor, as in the identity.
     pub vendor_id: u32,
-    /// Kind of message, the vendor's own.
+    /// Message type, defined by the vendor.
     pub vendor_type: u16,
     /// The data.
     pub data: &'a [u8],
@@ -23,7 +23,7 @@ impl<'a> VoeMessage<'a> {
         Ok(VoeMessage { vendor_id: u32::from_le_bytes([a, b, c, d]), vendor_type: u16::from_le_bytes([e, f]), data })
     }
 
-    /// Encodes the payload and returns its length; `None` where it does not fit `out`.
+    /// Encodes the payload and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         pen.put_u32(self.vendor_id)?;
@@ -40,7 +40,7 @@ mod tests {
 
     // covers: 6.8, codec-mailbox
     #[test]
-    fn a_vendor_message_has_these_bytes() {
+    fn a_vendor_message_has_the_expected_bytes() {
         let message = VoeMessage { vendor_id: 0x0000_0C47, vendor_type: 0x0102, data: b"hello" };
         let bytes = b"\x47\x0C\x00\x00\x02\x01hello";
         let mut out = [0; 16];
@@ -54,7 +54,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+        fn any_bytes_never_panic_and_decoded_messages_encode_back(
             bytes in proptest::collection::vec(any::<u8>(), 0..40)
         ) {
             if let Ok(message) = VoeMessage::decode(&bytes) {

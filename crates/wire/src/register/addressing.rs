@@ -6,8 +6,8 @@ use crate::address::StationAddress;
 number_bytes!(StationAddress(u16));
 
 number_register! {
-    /// Registers REGISTER_WRITE_ENABLE (0x0020) and ESC_WRITE_ENABLE (0x0030): writing opens what is protected, for
-    /// the rest of the frame.
+    /// Registers REGISTER_WRITE_ENABLE (0x0020) and ESC_WRITE_ENABLE (0x0030): a write permits writes to protected
+    /// registers for the rest of the frame.
     WriteEnable(u8, reset 0)
 }
 
@@ -21,12 +21,12 @@ bit_register! {
 }
 
 number_register! {
-    /// Registers ESC_RESET_ECAT (0x0040) and ESC_RESET_PDI (0x0041). Written with [`EscReset::SEQUENCE`] in three
-    /// consecutive frames they reset the controller; read they tell how many steps were accepted.
+    /// Registers ESC_RESET_ECAT (0x0040) and ESC_RESET_PDI (0x0041). Writing [`EscReset::SEQUENCE`] in three
+    /// consecutive frames resets the controller; reading returns the number of accepted steps.
     EscReset(u8, reset 0)
 }
 
 impl EscReset {
-    /// What has to be written: 'R', 'E', 'S'.
+    /// The values to write: 'R', 'E', 'S'.
     pub const SEQUENCE: [EscReset; 3] = [EscReset(b'R'), EscReset(b'E'), EscReset(b'S')];
 }

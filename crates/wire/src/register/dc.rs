@@ -1,6 +1,6 @@
 //! Distributed clocks: receive times, system time, control loop, registers 0x0900..0x0936 (protocol 3.12).
 //!
-//! Times themselves are [`DcTime`] and [`DcTime32`].
+//! Times are [`DcTime`] and [`DcTime32`].
 
 use crate::time::{DcTime, DcTime32};
 
@@ -9,7 +9,7 @@ number_bytes!(DcTime(u64));
 // A single receive time, and the SyncManager event times.
 number_bytes!(DcTime32(u32));
 
-/// Register DC_RECEIVE_TIME (0x0900): when the latching frame arrived at each port.
+/// Register DC_RECEIVE_TIME (0x0900): time at which the latching frame arrived at each port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DcReceiveTimes {
     /// Port 0..3, local time.
@@ -42,7 +42,7 @@ number_register! {
 }
 
 number_register! {
-    /// Register DC_SYSTEM_TIME_DELAY (0x0928): nanoseconds from the reference clock to here.
+    /// Register DC_SYSTEM_TIME_DELAY (0x0928): nanoseconds from the reference clock to this SubDevice.
     DcSystemTimeDelay(u32, reset 0)
 }
 
@@ -51,7 +51,7 @@ bit_register! {
     DcSystemTimeDifference(u32, reset 0) {
         /// Mean magnitude in nanoseconds, 31 bits.
         magnitude_ns: u32 = 0, 31;
-        /// The local copy is not behind the received system time.
+        /// The local copy is equal to or ahead of the received system time.
         local_ahead: bool = 31, 1;
     }
 }
@@ -82,8 +82,8 @@ number_register! {
 }
 
 impl DcSpeedCounterDifference {
-    /// How much faster than by itself the clock runs because of it, in parts per billion: Diff / (5 (Start + Diff + 2)
-    /// (Start - Diff + 2)), see protocol 7.2.1. 0 where Diff is beyond what Start allows.
+    /// The speed deviation of the clock caused by this value, in parts per billion: Diff / (5 (Start + Diff + 2) (Start
+    /// - Diff + 2)), see protocol 7.2.1. 0 if Diff exceeds the range allowed by Start.
     pub const fn deviation_ppb(self, start: DcSpeedCounterStart) -> i64 {
         let (diff, start) = (self.0 as i64, start.0 as i64);
         let product = 5 * (start + diff + 2) * (start - diff + 2);

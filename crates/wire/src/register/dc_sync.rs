@@ -2,7 +2,7 @@
 //! status registers from the data sheet's register description).
 
 bit_register! {
-    /// Register DC_CYCLIC_UNIT_CONTROL (0x0980): which units the PDI controls (0: EtherCAT).
+    /// Register DC_CYCLIC_UNIT_CONTROL (0x0980): units controlled by the PDI (0: by EtherCAT).
     DcCyclicUnitControl(u8, reset 0, reserved kept) {
         /// SYNC unit.
         sync_by_pdi: bool = 0, 1;
@@ -28,7 +28,7 @@ bit_register! {
         extend_start_time: bool = 4, 1;
         /// The start time is checked for plausibility.
         start_plausibility: bool = 5, 1;
-        /// What counts as near future.
+        /// Selects the near future of the plausibility check.
         near_future_select: bool = 6, 1;
         /// Debug pulse on both SYNC signals.
         debug_pulse: bool = 7, 1;

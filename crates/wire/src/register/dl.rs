@@ -2,15 +2,15 @@
 
 use super::view::Field;
 
-/// What a port does about its loop (protocol 2.2).
+/// Loop setting of a port (protocol 2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LoopControl {
     /// Open while there is a link.
     #[default]
     Auto,
-    /// Closes with the link, opens again only when told to.
+    /// Closes when the link is lost, opens again only by a command.
     AutoClose,
-    /// Always open, frames are lost while there is no link.
+    /// Always open; frames are lost while there is no link.
     Open,
     /// Always closed.
     Closed,
@@ -45,9 +45,9 @@ impl Field for [LoopControl; 4] {
 bit_register! {
     /// Register DL_CONTROL (0x0100).
     DlControl(u32, reset 0x0007_0001, reserved kept) {
-        /// Destroy frames that are not EtherCAT and mark the source address of those that are (protocol 2.6).
+        /// Destroys frames that are not EtherCAT and marks the source address of EtherCAT frames (protocol 2.6).
         forwarding_rule: bool = 0, 1;
-        /// The loop settings hold for about one second.
+        /// The loop settings apply for about one second.
         temporary: bool = 1, 1;
         /// Loop of port 0..3.
         loops: [LoopControl; 4] = 8, 8;
@@ -57,7 +57,7 @@ bit_register! {
         ebus_low_jitter: bool = 19, 1;
         /// EBUS remote link down signalling time.
         ebus_remote_link_down: bool = 22, 1;
-        /// The alias works as a station address.
+        /// The alias is used as a station address.
         alias_enable: bool = 24, 1;
     }
 }
@@ -74,7 +74,7 @@ pub struct PortStatus {
     pub link: bool,
     /// The loop is closed.
     pub loop_closed: bool,
-    /// Communication established: a link that enhanced link detection finds good too.
+    /// Communication established: the link is also good according to enhanced link detection.
     pub communication: bool,
 }
 

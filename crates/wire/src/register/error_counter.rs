@@ -1,9 +1,9 @@
 //! Error counters, registers 0x0300..0x0313 (protocol 2.5). All saturate at 255; any write clears the group.
 
-/// Reception errors of one port, RX_ERROR_COUNTER (0x0300 + 2 x port).
+/// Receive errors of one port, RX_ERROR_COUNTER (0x0300 + 2 x port).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RxErrorCounter {
-    /// Frames whose bad FCS was seen here first.
+    /// Frames with a wrong FCS that were not marked by a previous controller.
     pub invalid_frames: u8,
     /// RX_ER symbols.
     pub rx_errors: u8,
@@ -29,9 +29,9 @@ impl RxErrorCounter {
 pub struct ErrorCounters {
     /// RX_ERROR_COUNTER of port 0..3.
     pub rx: [RxErrorCounter; 4],
-    /// FORWARDED_RX_ERROR_COUNTER of port 0..3: bad frames that a controller before has marked.
+    /// FORWARDED_RX_ERROR_COUNTER of port 0..3: bad frames that a previous controller has marked.
     pub forwarded: [u8; 4],
-    /// EPU_ERROR_COUNTER: errors of the EtherCAT processing unit, circulating frames among them.
+    /// EPU_ERROR_COUNTER: errors of the EtherCAT processing unit, including circulating frames.
     pub epu: u8,
     /// PDI_ERROR_COUNTER.
     pub pdi: u8,

@@ -1,4 +1,4 @@
-//! Registers that depend on the kind of controller, 0x0E00..0x0F1F (protocol 3.13).
+//! Registers that depend on the type of controller, 0x0E00..0x0F1F (protocol 3.13).
 
 number_register! {
     /// Register PRODUCT_ID (0x0E00): product id, or the power-on values of the pins.

@@ -25,9 +25,9 @@ bit_register! {
         sync0: bool = 2, 1;
         /// SYNC1.
         sync1: bool = 3, 1;
-        /// The activation of a SyncManager changed; cleared by the PDI reading an activate register.
+        /// The activation of a SyncManager changed; the PDI clears it by reading an activate register.
         sync_manager_activation: bool = 4, 1;
-        /// The MainDevice wants something of the emulated EEPROM.
+        /// An EEPROM emulation command of the MainDevice is pending.
         eeprom_emulation: bool = 5, 1;
         /// The process data watchdog has expired.
         process_data_watchdog: bool = 6, 1;

@@ -7,7 +7,7 @@ use crate::address::LogicalAddress;
 pub struct Fmmu {
     /// First logical byte.
     pub logical_start: LogicalAddress,
-    /// Logical bytes touched, also those touched in part.
+    /// Logical bytes, including partly mapped bytes.
     pub length: u16,
     /// First bit in the first byte, 0..=7.
     pub logical_start_bit: u8,
@@ -17,13 +17,13 @@ pub struct Fmmu {
     pub physical_start: u16,
     /// First bit in the first physical byte, 0..=7.
     pub physical_start_bit: u8,
-    /// Takes part in reads.
+    /// Enabled for reads.
     pub read: bool,
-    /// Takes part in writes.
+    /// Enabled for writes.
     pub write: bool,
-    /// Switched on.
+    /// Activated.
     pub active: bool,
-    /// The other bits of bytes +6, +7, +A, +B, +C and the bytes +D, +E, +F, in place.
+    /// The other bits of bytes +6, +7, +A, +B, +C and the bytes +D, +E, +F, not shifted.
     pub reserved: [u8; 8],
 }
 
@@ -87,7 +87,7 @@ impl Fmmu {
         ]
     }
 
-    /// Bits mapped; 0 where the settings describe none.
+    /// Number of mapped bits; 0 if the settings describe none.
     pub const fn bit_length(&self) -> u32 {
         let end = self.length as u32 * 8 + (self.logical_stop_bit & BIT_MASK) as u32 + 1;
         end.saturating_sub(8 + (self.logical_start_bit & BIT_MASK) as u32)

@@ -1,8 +1,8 @@
-//! What a controller is and can do, registers 0x0000..0x0009 (protocol 3.1).
+//! Type and features of a controller, registers 0x0000..0x0009 (protocol 3.1).
 
 use super::view::Field;
 
-/// What stands at a port of the controller.
+/// Physical layer of a port of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum PortKind {
     /// The controller has no such port.
@@ -72,7 +72,7 @@ bit_register! {
         enhanced_link_detection_ebus: bool = 5, 1;
         /// Enhanced link detection at MII ports.
         enhanced_link_detection_mii: bool = 6, 1;
-        /// FCS errors are counted apart from other errors.
+        /// FCS errors are counted separately from other errors.
         separate_fcs_errors: bool = 7, 1;
         /// Enhanced activation of DC SYNC.
         enhanced_dc_sync_activation: bool = 8, 1;

@@ -5,7 +5,7 @@ bit_register! {
     LedOverride(u8, reset 0, reserved kept) {
         /// Pattern: 0 off, 1..=12 flashes, 13 blinking, 14 flickering, 15 on.
         code: u8 = 0, 4;
-        /// The pattern replaces the controller's own.
+        /// The pattern replaces that of the controller.
         enable: bool = 4, 1;
     }
 }

@@ -40,7 +40,7 @@ bit_register! {
     MiiControl(u16, reset 0, reserved kept) {
         /// Allows the write command of the same frame.
         write_enable: bool = 0, 1;
-        /// The PDI may take the interface.
+        /// The PDI may take over the interface.
         pdi_control_possible: bool = 1, 1;
         /// Links are detected through the interface.
         link_detection: bool = 2, 1;
@@ -81,7 +81,7 @@ number_register! {
 bit_register! {
     /// Register MII_ECAT_ACCESS (0x0516).
     MiiEcatAccess(u8, reset 0, reserved kept) {
-        /// The PDI may not take the interface.
+        /// The PDI may not take over the interface.
         exclusive: bool = 0, 1;
     }
 }

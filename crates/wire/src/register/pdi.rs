@@ -3,7 +3,7 @@
 
 use super::view::Field;
 
-/// Register PDI_CONTROL (0x0140): what kind of interface leads to the SubDevice's application.
+/// Register PDI_CONTROL (0x0140): type of the interface to the application of the SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum PdiControl {
     /// None.
@@ -92,9 +92,9 @@ bit_register! {
         device_emulation: bool = 0, 1;
         /// Enhanced link detection at all ports.
         enhanced_link_detection: bool = 1, 1;
-        /// The SYNC unit is there.
+        /// The SYNC unit exists.
         sync_unit: bool = 2, 1;
-        /// The LATCH unit is there.
+        /// The LATCH unit exists.
         latch_unit: bool = 3, 1;
         /// Enhanced link detection at port 0..3.
         enhanced_link_detection_ports: [bool; 4] = 4, 4;

@@ -44,7 +44,7 @@ bit_register! {
     SiiConfiguration(u8, reset 0, reserved kept) {
         /// The EEPROM is offered to the PDI.
         offer_pdi: bool = 0, 1;
-        /// Takes the EEPROM away from the PDI.
+        /// Takes the EEPROM back from the PDI.
         force_ecat: bool = 1, 1;
     }
 }
@@ -84,7 +84,7 @@ bit_register! {
 }
 
 impl SiiControl {
-    /// What a MainDevice writes for a command: write enable is set for a write only.
+    /// The value that a MainDevice writes for a command: write enable is set for a write only.
     pub fn request(command: SiiCommand) -> SiiControl {
         SiiControl { command, write_enable: command == SiiCommand::Write, ..SiiControl::default() }
     }

@@ -5,7 +5,7 @@ use super::view::Field;
 /// Buffer type of a SyncManager.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SyncManagerMode {
-    /// Three buffers: always the last complete value, neither side waits.
+    /// Three buffers: the reader gets the last complete value, neither side waits.
     #[default]
     Buffered,
     /// One buffer with hand-shake.
@@ -87,7 +87,7 @@ bit_register! {
         read_event: bool = 1, 1;
         /// The mailbox is full.
         mailbox_full: bool = 3, 1;
-        /// Buffer that was written last; 3 is none.
+        /// Buffer that was written last; 3: none.
         last_buffer: u8 = 4, 2;
         /// The read buffer is open.
         read_buffer_open: bool = 6, 1;
@@ -99,9 +99,9 @@ bit_register! {
 bit_register! {
     /// Activate byte of a SyncManager (+6).
     SyncManagerActivate(u8, reset 0, reserved kept) {
-        /// Switched on.
+        /// Activated.
         enable: bool = 0, 1;
-        /// Toggled by the MainDevice to have the last mail again.
+        /// Toggled by the MainDevice to request the last mail again.
         repeat_request: bool = 1, 1;
         /// Latch event on a buffer change by EtherCAT.
         latch_ecat: bool = 6, 1;
@@ -113,9 +113,9 @@ bit_register! {
 bit_register! {
     /// PDI control byte of a SyncManager (+7), written by the PDI.
     SyncManagerPdiControl(u8, reset 0, reserved kept) {
-        /// The PDI has switched the SyncManager off.
+        /// The PDI has deactivated the SyncManager.
         deactivate: bool = 0, 1;
-        /// Follows the repeat request when the mail is back.
+        /// Set to the repeat request when the mail is available again.
         repeat_acknowledge: bool = 1, 1;
     }
 }
@@ -125,7 +125,7 @@ bit_register! {
 pub struct SyncManager {
     /// First physical byte.
     pub start: u16,
-    /// Bytes; 0 switches the SyncManager off.
+    /// Bytes; 0 deactivates the SyncManager.
     pub length: u16,
     /// Control byte.
     pub control: SyncManagerControl,

@@ -3,7 +3,7 @@
 use super::map;
 use crate::address::RegisterAddress;
 
-/// What a side may do with a register.
+/// Access rights of one side to a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Access {
     /// Nothing.
@@ -28,10 +28,10 @@ impl Access {
     }
 }
 
-/// What a register belongs to.
+/// Group of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RegisterGroup {
-    /// What the controller is (protocol 3.1).
+    /// Type and features of the controller (protocol 3.1).
     Information,
     /// Addresses, protection, reset (protocol 3.2).
     Addressing,
@@ -57,13 +57,13 @@ pub enum RegisterGroup {
     SyncManager,
     /// Distributed clocks (protocol 3.12).
     DistributedClocks,
-    /// Depends on the controller (protocol 3.13).
+    /// Specific to the controller (protocol 3.13).
     EscSpecific,
     /// RAM (protocol 3.13).
     Ram,
 }
 
-/// Counters of which any write clears all (protocol 2.5).
+/// Counters that any write to one of them clears together (protocol 2.5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ClearGroup {
     /// 0x0300..0x030B.
@@ -81,32 +81,32 @@ pub enum ClearGroup {
 /// One row of the register table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RegisterInfo {
-    /// Address, of the first one where the register repeats.
+    /// Address; the first address if the register repeats.
     pub address: RegisterAddress,
     /// Bytes of one register.
     pub size: u16,
-    /// How often the register repeats (ports, FMMUs, SyncManagers), at most.
+    /// Maximum number of repetitions of the register (ports, FMMUs, SyncManagers).
     pub count: u8,
-    /// Bytes from one repetition to the next.
+    /// Distance between repetitions in bytes.
     pub stride: u16,
     /// Data sheet name.
     pub name: &'static str,
-    /// Access of the EtherCAT side. A counter that a write clears is writable.
+    /// Access of the EtherCAT side. A counter that is cleared by a write is writable.
     pub ecat: Access,
-    /// Access of the PDI side, where the register is not given to it by another (EEPROM, SYNC and LATCH units).
+    /// Access of the PDI side, unless another register assigns the access (EEPROM, SYNC and LATCH units).
     pub pdi: Access,
-    /// Value after a reset; 0 where it depends on the device.
+    /// Value after a reset; 0 if it depends on the device.
     pub reset: u64,
-    /// Writes take over with the good FCS of their frame.
+    /// Writes take effect after a valid FCS of the frame.
     pub shadowed: bool,
-    /// What the register belongs to.
+    /// Group of the register.
     pub group: RegisterGroup,
-    /// Which counters are cleared with this one.
+    /// Counters that are cleared together with this one.
     pub clear_group: Option<ClearGroup>,
 }
 
 impl RegisterInfo {
-    /// Which repetition of the register holds this address; `None` where none does.
+    /// The repetition of the register that contains this address; `None` if there is none.
     pub const fn instance(&self, address: RegisterAddress) -> Option<u8> {
         let Some(offset) = address.0.checked_sub(self.address.0) else { return None };
         let instance = offset / self.stride;
@@ -130,7 +130,7 @@ impl RegisterInfo {
     }
 }
 
-/// The register that holds this address; `None` in gaps.
+/// The register that contains this address; `None` in gaps.
 pub fn find(address: RegisterAddress) -> Option<&'static RegisterInfo> {
     TABLE.iter().find(|info| info.instance(address).is_some())
 }
@@ -175,7 +175,7 @@ const fn sync_manager(name: &'static str, offset: u16, size: u16, ecat: Access, 
     row(RegisterGroup::SyncManager, name, address, size, ecat, pdi).repeated(16, 8)
 }
 
-/// All registers in ascending order; the parts of SyncManagers, which repeat, stand side by side.
+/// All registers in ascending order; the repeating parts of SyncManagers are interleaved.
 pub(super) static TABLE: &[RegisterInfo] = &[
     reg!(Information, TYPE, 1, R, R),
     reg!(Information, REVISION, 1, R, R),
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_stand_in_ascending_order() {
+    fn rows_are_in_ascending_order() {
         assert!(TABLE.windows(2).all(|pair| pair[0].address < pair[1].address));
     }
 

@@ -367,7 +367,7 @@ fn esc_specific_vectors() {
 }
 
 #[test]
-fn numbers_too_large_for_their_field_touch_no_other() {
+fn numbers_too_large_for_their_field_change_no_other_field() {
     assert_eq!(DlControl { rx_fifo: 0xFF, ..DlControl::default() }.bits(), 0x0007_0001);
     assert_eq!(SiiControl { command: SiiCommand::Reserved(0xFF), ..SiiControl::default() }.bits(), 0x0700);
     assert_eq!(WriteProtection { protected: false, reserved: 0xFF }.bits(), 0xFE);
@@ -408,7 +408,7 @@ mod any_bytes_round_trip {
 
 // covers: 7.2.1
 #[test]
-fn the_speed_counter_says_how_fast_its_clock_is_made_to_run() {
+fn the_speed_counter_gives_the_deviation_of_its_clock() {
     let ppb = |diff: i16, start: u16| DcSpeedCounterDifference(diff).deviation_ppb(DcSpeedCounterStart(start));
     assert_eq!((ppb(0, 0x1000), ppb(1, 0x1000), ppb(-100, 0x1000)), (0, 11, -1_191));
     // 3969 / (5 * 8067 * 129)

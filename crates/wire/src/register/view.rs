@@ -1,10 +1,10 @@
-//! How typed views of registers are declared: bit fields with everything unnamed kept, and plain numbers.
+//! Macros that declare typed views of registers: bit fields, which keep all unnamed bits, and plain numbers.
 
 /// A value that fills a bit field of a register.
 pub(super) trait Field: Copy {
     /// From the field's bits, shifted down and masked.
     fn from_field(raw: u32) -> Self;
-    /// To the field's bits; bits beyond the field's width are cut off by the caller.
+    /// To the field's bits; the caller cuts off bits beyond the field's width.
     fn to_field(self) -> u32;
 }
 
@@ -49,8 +49,8 @@ pub(super) const fn low_bits(width: u32) -> u32 {
     u32::MAX >> (32 - width)
 }
 
-/// Declares a register of named bit fields, `field: Type = lowest bit, width;`. Registers with bits that have no name
-/// say `reserved kept` and get a field for them.
+/// Declares a register of named bit fields, `field: Type = lowest bit, width;`. Registers with unnamed bits are
+/// declared with `reserved kept` and get a field for them.
 macro_rules! bit_register {
     ($(#[$doc:meta])* $name:ident($bits:ty, reset $reset:literal $(, $reserved:ident kept)?) {
         $($(#[$field_doc:meta])* $field:ident: $type:ty = $shift:literal, $width:literal;)*
@@ -60,7 +60,7 @@ macro_rules! bit_register {
         pub struct $name {
             $($(#[$field_doc])* pub $field: $type,)*
             $(
-                /// All other bits, in place.
+                /// All other bits, not shifted.
                 pub $reserved: $bits,
             )?
         }
@@ -139,7 +139,7 @@ macro_rules! number_register {
     };
 }
 
-/// Gives a newtype around a number the bytes of a register.
+/// Implements conversion to and from the bytes of a register for a newtype of a number.
 macro_rules! number_bytes {
     ($name:ident($number:ty)) => {
         impl $name {

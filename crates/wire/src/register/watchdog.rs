@@ -21,7 +21,7 @@ number_register! {
 }
 
 impl WatchdogTime {
-    /// The time; `None` where the watchdog is off.
+    /// The time; `None` if the watchdog is disabled.
     pub const fn duration_ns(self, divider: WatchdogDivider) -> Option<u64> {
         match self.0 {
             0 => None,

@@ -1,11 +1,11 @@
-//! The chain of categories behind the fixed area (protocol 4.2).
+//! The list of categories after the fixed area (protocol 4.2).
 
 use core::fmt;
 
-/// What a category holds.
+/// Type of a category.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CategoryKind {
-    /// 0: nothing, to be skipped.
+    /// 0: no content, skipped.
     Nop,
     /// 10: [`super::Strings`].
     Strings,
@@ -17,15 +17,15 @@ pub enum CategoryKind {
     Fmmu,
     /// 41: [`super::SiiSyncManagers`].
     SyncManager,
-    /// 50: [`super::Pdos`] that the SubDevice sends.
+    /// 50: [`super::Pdos`] sent by the SubDevice (TxPDO).
     TxPdo,
-    /// 51: [`super::Pdos`] that the SubDevice receives.
+    /// 51: [`super::Pdos`] received by the SubDevice (RxPDO).
     RxPdo,
     /// 60: [`super::DcModes`].
     Dc,
-    /// 0xFFFF: end of the chain; it has no length field.
+    /// 0xFFFF: end of the list, without a length field.
     End,
-    /// Any other; bit 15 set: of the vendor.
+    /// Any other code; vendor-specific if bit 15 is set.
     Other(u16),
 }
 
@@ -64,7 +64,7 @@ impl CategoryKind {
         }
     }
 
-    /// Whether the vendor defines what the category holds.
+    /// Whether the vendor defines the content of the category.
     pub const fn is_vendor_specific(self) -> bool {
         matches!(self, CategoryKind::Other(code) if code & 0x8000 != 0)
     }
@@ -91,9 +91,9 @@ impl fmt::Display for CategoryKind {
 /// The two words before the data of a category.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CategoryHeader {
-    /// What follows.
+    /// Type of the category.
     pub kind: CategoryKind,
-    /// Words of data; without meaning where the kind is [`CategoryKind::End`].
+    /// Words of data; not defined if the type is [`CategoryKind::End`].
     pub words: u16,
 }
 
@@ -116,7 +116,7 @@ impl CategoryHeader {
         [kind[0], kind[1], words[0], words[1]]
     }
 
-    /// Bytes of data behind the header.
+    /// Bytes of data after the header.
     pub const fn data_len(&self) -> usize {
         self.words as usize * 2
     }
@@ -125,7 +125,7 @@ impl CategoryHeader {
 /// A category inside an image, borrowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Category<'a> {
-    /// What it holds.
+    /// Type of the category.
     pub kind: CategoryKind,
     /// Byte offset of its header in the image.
     pub offset: usize,
@@ -153,7 +153,7 @@ impl<'a> Categories<'a> {
         Categories { image, at }
     }
 
-    /// Byte offset of the category header that comes next, of the end marker, or of what is not a category.
+    /// Byte offset of the next category header, of the end marker, or of invalid bytes.
     pub(super) const fn position(&self) -> usize {
         self.at
     }
@@ -182,7 +182,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_header_of_a_sync_manager_category_has_these_bytes() {
+    fn a_header_of_a_sync_manager_category_has_the_expected_bytes() {
         let header = CategoryHeader { kind: CategoryKind::SyncManager, words: 16 };
         assert_eq!(header.encode(), [41, 0, 16, 0]);
         assert_eq!(CategoryHeader::decode(&[41, 0, 16, 0]), header);

@@ -1,6 +1,6 @@
 //! The checksum over the first seven words of the SII (protocol 4.1).
 
-/// Value of word 7 with which a controller accepts any configuration area (test purposes only).
+/// Value of word 7 with which a controller accepts any configuration area (for tests only).
 pub const CHECKSUM_DISABLED: u16 = 0x88A4;
 
 const POLYNOMIAL: u8 = 0x07;
@@ -28,7 +28,7 @@ mod tests {
     // covers: codec-sii
     #[test]
     fn the_images_of_real_devices_have_these_checksums() {
-        // protocol 4.1; the bytes that are not given are zero.
+        // protocol 4.1; bytes that are not listed are zero.
         let vectors: [(&[u8], u8); 9] = [
             (&[0x05, 0x0E, 0x03, 0x06, 0x10, 0x27], 0xD7),
             (&[0x80, 0x02], 0xC6),

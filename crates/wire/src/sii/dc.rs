@@ -3,7 +3,7 @@
 /// One operation mode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DcMode {
-    /// Cycle of SYNC0 in nanoseconds; 0 where the factor gives it.
+    /// Cycle of SYNC0 in nanoseconds; 0 if the factor defines it.
     pub sync0_cycle_ns: u32,
     /// Shift of SYNC0 in nanoseconds.
     pub sync0_shift_ns: u32,
@@ -27,7 +27,7 @@ impl DcMode {
     /// Bytes of a mode.
     pub const LEN: usize = 24;
 
-    /// Decodes a mode; every pattern has a meaning.
+    /// Decodes a mode; every pattern is valid.
     pub const fn decode(b: &[u8; Self::LEN]) -> DcMode {
         DcMode {
             sync0_cycle_ns: u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
@@ -58,7 +58,7 @@ impl DcMode {
     }
 }
 
-/// Iterator over the modes of a category. Bytes that make no whole mode are left out.
+/// Iterator over the modes of a category. An incomplete mode at the end is ignored.
 #[derive(Clone, Debug)]
 pub struct DcModes<'a> {
     data: &'a [u8],
@@ -89,7 +89,7 @@ mod tests {
 
     // covers: codec-sii
     #[test]
-    fn a_mode_with_sync0_and_sync1_has_these_bytes() {
+    fn a_mode_with_sync0_and_sync1_has_the_expected_bytes() {
         let bytes = [
             0x40, 0x42, 0x0F, 0x00, // SYNC0 cycle 1 ms
             0x10, 0x27, 0x00, 0x00, // SYNC0 shift 10 us

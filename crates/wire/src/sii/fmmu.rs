@@ -1,9 +1,9 @@
-//! Category FMMU: one byte per FMMU says what it is meant for (protocol 4.2).
+//! Category FMMU: one byte per FMMU, its usage (protocol 4.2).
 
-/// What an FMMU is meant for.
+/// Usage of an FMMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FmmuUsage {
-    /// 0x00 or 0xFF: nothing. Written as 0x00.
+    /// 0x00 or 0xFF: unused. Written as 0x00.
     Unused,
     /// 1: process data outputs.
     Outputs,
@@ -11,7 +11,7 @@ pub enum FmmuUsage {
     Inputs,
     /// 3: status of the mailbox that the MainDevice reads.
     MailboxStatus,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 

@@ -1,6 +1,6 @@
 //! Category GENERAL: names, mailbox details, ports (protocol 4.3).
 
-/// What CoE of a SubDevice can do.
+/// CoE features of a SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct CoeDetails(pub u8);
 
@@ -91,10 +91,10 @@ impl GeneralFlags {
     }
 }
 
-/// What a port is made of.
+/// Physical layer of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PhysicalPort {
-    /// 0: there is none.
+    /// 0: not used.
     Unused,
     /// 1: MII.
     Mii,
@@ -102,7 +102,7 @@ pub enum PhysicalPort {
     Ebus,
     /// 4: MII with fast hot connect.
     FastHotConnect,
-    /// Any other; 2 is reserved.
+    /// Any other code; 2 is reserved.
     Other(u8),
 }
 
@@ -130,7 +130,7 @@ impl PhysicalPort {
     }
 }
 
-/// The general category. Indices point into [`super::Strings`], 0 for none.
+/// The general category. Indices refer to [`super::Strings`], 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct General {
     /// String index of the group.
@@ -143,7 +143,7 @@ pub struct General {
     pub name: u8,
     /// Byte 0x04: reserved, in old images the physical layer of the ports.
     pub reserved_04: u8,
-    /// What CoE can do.
+    /// CoE features.
     pub coe: CoeDetails,
     /// Byte 0x06; bit 0: FoE.
     pub foe: u8,
@@ -157,7 +157,7 @@ pub struct General {
     pub sysman_class: u8,
     /// Flags.
     pub flags: GeneralFlags,
-    /// Current taken from the EBUS in milliamperes; negative where the SubDevice feeds it.
+    /// Current consumption from the EBUS in milliamperes; negative if the SubDevice supplies current.
     pub ebus_current_ma: i16,
     /// Byte 0x0E: the group index again.
     pub group_again: u8,
@@ -175,7 +175,7 @@ impl General {
     /// Bytes of the category.
     pub const LEN: usize = 32;
 
-    /// Decodes the data of a category; `None` where it has less than [`General::LEN`] bytes.
+    /// Decodes the data of a category; `None` if it has less than [`General::LEN`] bytes.
     pub fn decode(data: &[u8]) -> Option<General> {
         let b: &[u8; Self::LEN] = data.first_chunk()?;
         let mut reserved_14 = [0; 12];
@@ -228,7 +228,7 @@ impl General {
         out
     }
 
-    /// What the four ports are made of, port 0 first.
+    /// The physical layers of the four ports, port 0 first.
     pub const fn ports(&self) -> [PhysicalPort; 4] {
         let p = self.physical_ports;
         [
@@ -247,7 +247,7 @@ mod tests {
 
     // covers: 4.3, codec-sii
     #[test]
-    fn every_field_of_general_is_in_its_place() {
+    fn every_field_of_general_is_at_its_offset() {
         let bytes = [
             0x02, 0x03, 0x01, 0x04, 0x00, 0x2F, 0x01, 0x01, 0x00, 0x02, 0x00, 0x1A, // up to the flags
             0x18, 0xFC, 0x02, 0x00, 0x31, 0x00, 0x80, 0x0F, // current, group, ports, ID switch

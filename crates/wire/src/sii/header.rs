@@ -1,4 +1,4 @@
-//! The fixed area of the SII, words 0x00..0x40 (protocol 4.1). Every byte is kept, reserved ones too.
+//! The fixed area of the SII, words 0x00..0x40 (protocol 4.1). All bytes are kept, including reserved ones.
 
 use super::checksum::{CHECKSUM_DISABLED, checksum};
 
@@ -11,11 +11,11 @@ pub struct Identity {
     pub product_code: u32,
     /// Revision number.
     pub revision: u32,
-    /// Serial number; 0 where the vendor gives none.
+    /// Serial number; 0 if the vendor assigns none.
     pub serial: u32,
 }
 
-/// Where the mailboxes of a SubDevice lie. "Receive" and "send" are the SubDevice's view.
+/// Addresses and sizes of the mailboxes of a SubDevice. "Receive" and "send" are from the view of the SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct MailboxLayout {
     /// Address of the mailbox that the MainDevice writes.
@@ -54,7 +54,7 @@ impl MailboxLayout {
     }
 }
 
-/// Mailbox protocols that a SubDevice speaks (word 0x1C).
+/// Mailbox protocols of a SubDevice (word 0x1C).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct MailboxProtocols(pub u16);
 
@@ -118,7 +118,7 @@ pub struct SiiHeader {
     pub alias: u16,
     /// Words 0x05 and 0x06: reserved, or further configuration of the controller.
     pub reserved_05: [u16; 2],
-    /// Word 0x07 as it stands; the checksum is its low byte.
+    /// Word 0x07, unchanged; the checksum is its low byte.
     pub checksum: u16,
     /// Words 0x08..0x10.
     pub identity: Identity,
@@ -141,7 +141,7 @@ pub struct SiiHeader {
 }
 
 impl Default for SiiHeader {
-    /// All zero, but 2 KByte (16 KBit) and version 1. The checksum is not yet right.
+    /// All zero, except 2 KByte (16 KBit) and version 1. The checksum is not valid yet.
     fn default() -> SiiHeader {
         let zero = SiiHeader::decode(&[0; SiiHeader::LEN]);
         SiiHeader { size_kbit_minus_1: 15, version: 1, ..zero }
@@ -152,7 +152,7 @@ impl SiiHeader {
     /// Bytes of the fixed area.
     pub const LEN: usize = 128;
 
-    /// Decodes the fixed area; every pattern has a meaning.
+    /// Decodes the fixed area; every pattern is valid.
     pub fn decode(bytes: &[u8; Self::LEN]) -> SiiHeader {
         let word = |at: usize| u16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]);
         let double = |at: usize| u32::from(word(at)) | u32::from(word(at + 1)) << 16;
@@ -182,7 +182,7 @@ impl SiiHeader {
         }
     }
 
-    /// Encodes the fixed area, the checksum as the field says ([`SiiHeader::with_checksum`] makes it right).
+    /// Encodes the fixed area with the checksum of the field ([`SiiHeader::with_checksum`] computes it).
     pub fn encode(&self) -> [u8; Self::LEN] {
         let mut out = [0; Self::LEN];
         let mut put = |at: usize, word: u16| out[2 * at..2 * at + 2].copy_from_slice(&word.to_le_bytes());
@@ -214,19 +214,19 @@ impl SiiHeader {
         out
     }
 
-    /// The checksum that belongs to the first seven words.
+    /// The checksum of the first seven words.
     pub fn computed_checksum(&self) -> u8 {
         let bytes = self.encode();
         checksum(&core::array::from_fn(|n| bytes[n]))
     }
 
-    /// The same header with the checksum that belongs to it.
+    /// The same header with its computed checksum.
     #[must_use]
     pub fn with_checksum(self) -> SiiHeader {
         SiiHeader { checksum: u16::from(self.computed_checksum()), ..self }
     }
 
-    /// Whether a controller accepts this area: the low byte of word 7 is right, or the check is disabled.
+    /// Whether a controller accepts this area: the low byte of word 7 is valid, or the check is disabled.
     pub fn checksum_ok(&self) -> bool {
         self.checksum == CHECKSUM_DISABLED || self.checksum & 0xFF == u16::from(self.computed_checksum())
     }
@@ -258,7 +258,7 @@ mod tests {
 
     // covers: 4.1, codec-sii
     #[test]
-    fn every_field_of_the_fixed_area_is_in_its_place() {
+    fn every_field_of_the_fixed_area_is_at_its_offset() {
         let header = SiiHeader::decode(&literal());
         let expected = SiiHeader {
             pdi_control: 0x0680,

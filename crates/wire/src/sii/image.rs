@@ -1,4 +1,4 @@
-//! A whole SII image: fixed area, then categories up to the end marker (protocol 4.1, 4.2).
+//! A whole SII image: the fixed area, then categories up to the end marker (protocol 4.1, 4.2).
 
 use core::fmt;
 
@@ -11,19 +11,19 @@ use super::pdo::{Pdo, PdoDirection, Pdos};
 use super::strings::Strings;
 use super::sync_manager::{SiiSyncManager, SiiSyncManagers};
 
-/// Why bytes are not an SII image.
+/// The reason for which bytes are not an SII image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SiiError {
     /// Shorter than the fixed area.
     Short {
         /// Bytes of the fixed area.
         expected: usize,
-        /// Bytes there.
+        /// Bytes available.
         got: usize,
     },
-    /// The low byte of word 7 does not fit the first seven words.
+    /// The low byte of word 7 does not match the first seven words.
     Checksum {
-        /// The checksum that belongs to the first seven words.
+        /// The checksum of the first seven words.
         expected: u8,
         /// Word 7.
         got: u16,
@@ -32,18 +32,18 @@ pub enum SiiError {
     CategoryHeader {
         /// Byte offset of the header.
         offset: usize,
-        /// Bytes left for it.
+        /// Bytes available for it.
         got: usize,
     },
-    /// A category leaves the image.
+    /// A category extends beyond the image.
     Category {
         /// Kind of the category.
         kind: CategoryKind,
         /// Byte offset of its header.
         offset: usize,
-        /// Bytes of data it announces.
+        /// Bytes of data in its header.
         expected: usize,
-        /// Bytes left for them.
+        /// Bytes available for them.
         got: usize,
     },
 }
@@ -67,19 +67,18 @@ impl fmt::Display for SiiError {
 
 impl core::error::Error for SiiError {}
 
-/// An SII image whose checksum is right and whose categories lie inside it.
+/// An SII image with a valid checksum and with all categories inside the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sii<'a> {
     image: &'a [u8],
     header: SiiHeader,
     used: usize,
-    /// Whether the chain of categories ended with the end marker, not with the end of the image.
+    /// Whether the list of categories ended with the end marker, not with the end of the image.
     pub end_marker: bool,
 }
 
 impl<'a> Sii<'a> {
-    /// Checks the checksum and walks the chain of categories. What is inside the categories is judged by their
-    /// decoders.
+    /// Checks the checksum and the list of categories. The decoders check the content of the categories.
     pub fn parse(image: &'a [u8]) -> Result<Sii<'a>, SiiError> {
         let short = SiiError::Short { expected: SiiHeader::LEN, got: image.len() };
         let header = SiiHeader::decode(image.first_chunk().ok_or(short)?);
@@ -93,7 +92,7 @@ impl<'a> Sii<'a> {
         if rest.is_empty() {
             return Ok(Sii { image, header, used: offset, end_marker: false });
         }
-        // The end marker is one word; nothing need follow it.
+        // The end marker is one word; no data has to follow it.
         if rest.starts_with(&CategoryKind::End.code().to_le_bytes()) {
             return Ok(Sii { image, header, used: offset + 2, end_marker: true });
         }
@@ -112,12 +111,12 @@ impl<'a> Sii<'a> {
         &self.header
     }
 
-    /// Bytes from the start of the image to the end of the chain, the end marker included.
+    /// Bytes from the start of the image to the end of the list, including the end marker.
     pub const fn used(&self) -> usize {
         self.used
     }
 
-    /// All categories in order, also unknown ones and those of the vendor.
+    /// All categories in order, including unknown and vendor-specific ones.
     pub const fn categories(&self) -> Categories<'a> {
         Categories::new(self.image, SiiHeader::LEN)
     }
@@ -127,7 +126,7 @@ impl<'a> Sii<'a> {
         self.categories().filter(move |category: &Category<'_>| category.kind == kind).map(|category| category.data)
     }
 
-    /// The strings; none where the image has no such category.
+    /// The strings; none if the image has no such category.
     pub fn strings(&self) -> Strings<'a> {
         Strings::new(self.all(CategoryKind::Strings).next().unwrap_or_default())
     }
@@ -137,17 +136,17 @@ impl<'a> Sii<'a> {
         General::decode(self.all(CategoryKind::General).next()?)
     }
 
-    /// What each FMMU is meant for, FMMU 0 first. A padding byte at the end of the category comes as one more.
+    /// The usage of each FMMU, FMMU 0 first. A padding byte at the end of the category appears as an additional entry.
     pub fn fmmu_usages(&self) -> impl Iterator<Item = FmmuUsage> + Clone + use<'a> {
         self.all(CategoryKind::Fmmu).flat_map(FmmuUsages::new)
     }
 
-    /// The sync managers, SM 0 first.
+    /// The SyncManagers, SM 0 first.
     pub fn sync_managers(&self) -> impl Iterator<Item = SiiSyncManager> + Clone + use<'a> {
         self.all(CategoryKind::SyncManager).flat_map(SiiSyncManagers::new)
     }
 
-    /// The PDOs of one direction; they may be spread over several categories.
+    /// The PDOs of one direction; several categories may contain them.
     pub fn pdos(&self, direction: PdoDirection) -> impl Iterator<Item = Pdo<'a>> + Clone + use<'a> {
         self.all(direction.category()).flat_map(Pdos::new)
     }

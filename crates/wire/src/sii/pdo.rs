@@ -1,8 +1,8 @@
-//! Categories TXPDO and RXPDO: PDOs back to back, each with its entries behind it (protocol 4.5).
+//! Categories TXPDO and RXPDO: consecutive PDOs, each followed by its entries (protocol 4.5).
 
 use super::category::CategoryKind;
 
-/// Which way a PDO goes, seen from the SubDevice.
+/// Direction of a PDO, seen from the SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PdoDirection {
     /// From the SubDevice: inputs.
@@ -12,7 +12,7 @@ pub enum PdoDirection {
 }
 
 impl PdoDirection {
-    /// The category that holds such PDOs.
+    /// The category of such PDOs.
     pub const fn category(self) -> CategoryKind {
         match self {
             PdoDirection::Tx => CategoryKind::TxPdo,
@@ -30,7 +30,7 @@ pub struct Pdo<'a> {
     pub index: u16,
     /// Number of entries.
     pub entry_count: u8,
-    /// Sync manager to which it is assigned by default.
+    /// SyncManager to which it is assigned by default.
     pub sync_manager: Option<u8>,
     /// Synchronisation byte.
     pub synchronisation: u8,
@@ -50,7 +50,7 @@ impl<'a> Pdo<'a> {
         PdoEntries { data: self.entries }
     }
 
-    /// Sum of the bit lengths of its entries, gaps included.
+    /// Sum of the bit lengths of its entries, including gaps.
     pub fn bit_length(&self) -> u32 {
         self.entries().map(|entry| u32::from(entry.bit_length)).sum()
     }
@@ -71,7 +71,7 @@ impl<'a> Pdo<'a> {
     }
 }
 
-/// What one entry of a PDO maps.
+/// One entry of a PDO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PdoEntry {
     /// Index of the object; 0 is a gap.
@@ -82,7 +82,7 @@ pub struct PdoEntry {
     pub name: u8,
     /// CoE data type.
     pub data_type: u8,
-    /// Bits.
+    /// Number of bits.
     pub bit_length: u8,
     /// Flags.
     pub flags: u16,
@@ -92,7 +92,7 @@ impl PdoEntry {
     /// Bytes of an entry.
     pub const LEN: usize = 8;
 
-    /// Decodes an entry; every pattern has a meaning.
+    /// Decodes an entry; every pattern is valid.
     pub const fn decode(b: &[u8; Self::LEN]) -> PdoEntry {
         PdoEntry {
             index: u16::from_le_bytes([b[0], b[1]]),
@@ -116,13 +116,13 @@ impl PdoEntry {
         self.encode() == [0xFF; Self::LEN]
     }
 
-    /// Whether it is a gap: bits that map no object.
+    /// Whether the entry is a gap: bits without an object.
     pub const fn is_gap(&self) -> bool {
         self.index == 0
     }
 }
 
-/// Iterator over the PDOs of a category. Ends where the next one would leave the category.
+/// Iterator over the PDOs of a category. Ends at a PDO that would extend beyond the category.
 #[derive(Clone, Debug)]
 pub struct Pdos<'a> {
     data: &'a [u8],
@@ -134,7 +134,7 @@ impl<'a> Pdos<'a> {
         Pdos { data }
     }
 
-    /// What has not been read yet; behind the last PDO of a sound category it is empty.
+    /// The bytes not read yet; empty after the last PDO of a valid category.
     pub const fn rest(&self) -> &'a [u8] {
         self.data
     }
@@ -166,12 +166,12 @@ impl Iterator for PdoEntries<'_> {
     }
 }
 
-/// A PDO to be written.
+/// A PDO to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PdoDescription<'a> {
     /// Index of the PDO mapping object.
     pub index: u16,
-    /// Sync manager to which it is assigned by default.
+    /// SyncManager to which it is assigned by default.
     pub sync_manager: Option<u8>,
     /// Synchronisation byte.
     pub synchronisation: u8,
@@ -184,7 +184,7 @@ pub struct PdoDescription<'a> {
 }
 
 impl PdoDescription<'_> {
-    /// The bytes before the entries; `None` where there are too many entries.
+    /// The bytes before the entries; `None` if there are too many entries.
     pub(super) fn encode_header(&self) -> Option<[u8; Pdo::HEADER_LEN]> {
         let count = u8::try_from(self.entries.len()).ok()?;
         let index = self.index.to_le_bytes();
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pdo_whose_entries_leave_the_category_is_left_in_the_rest() {
+    fn a_pdo_with_entries_beyond_the_category_stays_in_the_rest() {
         let mut pdos = Pdos::new(&LITERAL[..20]);
         assert_eq!(pdos.next(), None);
         assert_eq!(pdos.rest().len(), 20);

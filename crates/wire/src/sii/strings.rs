@@ -1,6 +1,6 @@
-//! Category STRINGS: a count, then length and characters of each string (protocol 4.2).
+//! Category STRINGS: the number of strings, then length and characters of each string (protocol 4.2).
 
-/// The strings of an image, addressed by index from 1.
+/// The strings of an image, with indices starting at 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Strings<'a> {
     count: u8,
@@ -16,18 +16,18 @@ impl<'a> Strings<'a> {
         }
     }
 
-    /// How many strings the category announces.
+    /// Number of strings in the category header.
     pub const fn count(&self) -> u8 {
         self.count
     }
 
-    /// The characters of a string; `None` for index 0 ("no string"), an index above the count, and a string that leaves
-    /// the category.
+    /// The characters of a string; `None` for index 0 ("no string"), an index above the count, and a string that
+    /// extends beyond the category.
     pub fn string(&self, index: u8) -> Option<&'a [u8]> {
         self.iter().nth(usize::from(index.checked_sub(1)?))
     }
 
-    /// All strings in order, that of index 1 first. Ends early where a string leaves the category.
+    /// All strings in order, starting at index 1. Ends at a string that extends beyond the category.
     pub const fn iter(&self) -> StringsIter<'a> {
         StringsIter { left: self.count, data: self.data }
     }
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_string_that_leaves_the_category_ends_the_strings() {
+    fn a_string_beyond_the_category_ends_the_strings() {
         let strings = Strings::new(&[2, 1, b'a', 9, b'b']);
         assert_eq!(strings.iter().collect::<Vec<_>>(), [b"a"]);
         assert_eq!(strings.string(2), None);

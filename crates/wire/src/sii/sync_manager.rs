@@ -1,9 +1,9 @@
-//! Category SYNCM: eight bytes per sync manager (protocol 4.4).
+//! Category SYNCM: eight bytes per SyncManager (protocol 4.4).
 
-/// What a sync manager is meant for.
+/// Type of a SyncManager.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SyncManagerKind {
-    /// 0: nothing, or not said.
+    /// 0: unused, or not stated.
     #[default]
     Unused,
     /// 1: mailbox from MainDevice to SubDevice.
@@ -14,7 +14,7 @@ pub enum SyncManagerKind {
     Outputs,
     /// 4: process data from SubDevice to MainDevice.
     Inputs,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -44,36 +44,36 @@ impl SyncManagerKind {
     }
 }
 
-/// How a sync manager is to be set up.
+/// Settings of a SyncManager.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SiiSyncManager {
     /// Physical start address.
     pub start: u16,
     /// Default length in bytes.
     pub length: u16,
-    /// Control byte, as register 0x0804 takes it.
+    /// Control byte of register 0x0804.
     pub control: u8,
-    /// Status byte, without meaning.
+    /// Status byte, not used.
     pub status: u8,
     /// Enable byte; see the constants.
     pub enable: u8,
-    /// What it is meant for.
+    /// Type.
     pub kind: SyncManagerKind,
 }
 
 impl SiiSyncManager {
     /// Bytes of one entry.
     pub const LEN: usize = 8;
-    /// Bit of [`SiiSyncManager::enable`]: to be activated.
+    /// Bit of [`SiiSyncManager::enable`]: activate the SyncManager.
     pub const ENABLE: u8 = 1 << 0;
     /// Bit of [`SiiSyncManager::enable`]: the content is fixed.
     pub const FIXED_CONTENT: u8 = 1 << 1;
-    /// Bit of [`SiiSyncManager::enable`]: virtual, no hardware behind it.
+    /// Bit of [`SiiSyncManager::enable`]: virtual, without hardware.
     pub const VIRTUAL: u8 = 1 << 2;
-    /// Bit of [`SiiSyncManager::enable`]: to be activated in OP only.
+    /// Bit of [`SiiSyncManager::enable`]: activate the SyncManager in OP only.
     pub const OP_ONLY: u8 = 1 << 3;
 
-    /// Decodes one entry; every pattern has a meaning.
+    /// Decodes one entry; every pattern is valid.
     pub const fn decode(b: &[u8; Self::LEN]) -> SiiSyncManager {
         SiiSyncManager {
             start: u16::from_le_bytes([b[0], b[1]]),
@@ -92,13 +92,13 @@ impl SiiSyncManager {
         [start[0], start[1], length[0], length[1], self.control, self.status, self.enable, self.kind.code()]
     }
 
-    /// Whether it is to be activated.
+    /// Whether the SyncManager has to be activated.
     pub const fn is_enabled(&self) -> bool {
         self.enable & Self::ENABLE != 0
     }
 
-    /// What its control byte alone says it is for: a mailbox or process data, by its direction (protocol 3.11). Some
-    /// images name no type. [`SyncManagerKind::Unused`] where mode or direction are reserved.
+    /// The type derived from the control byte alone: a mailbox or process data, by its direction (protocol 3.11). Some
+    /// images contain no type. [`SyncManagerKind::Unused`] if mode or direction are reserved.
     pub const fn kind_of_control(&self) -> SyncManagerKind {
         match (self.control & 0x03, self.control & 0x0C) {
             (0b10, 0x04) => SyncManagerKind::MailboxOut,
@@ -115,7 +115,7 @@ impl SiiSyncManager {
     }
 }
 
-/// Iterator over the entries of a category, SM 0 first. Bytes that make no whole entry are left out.
+/// Iterator over the entries of a category, SM 0 first. An incomplete entry at the end is ignored.
 #[derive(Clone, Debug)]
 pub struct SiiSyncManagers<'a> {
     data: &'a [u8],
@@ -146,7 +146,7 @@ mod tests {
 
     // covers: codec-sii
     #[test]
-    fn a_write_mailbox_and_an_input_have_these_bytes() {
+    fn a_write_mailbox_and_an_input_have_the_expected_bytes() {
         let data = [
             0x00, 0x10, 0x80, 0x00, 0x26, 0x00, 0x01, 0x01, // SM 0
             0x00, 0x11, 0x02, 0x00, 0x20, 0x00, 0x0B, 0x04, // SM 1
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_control_byte_tells_what_a_sync_manager_without_a_type_is_for() {
+    fn a_control_byte_gives_the_type_of_a_sync_manager_without_a_type() {
         use SyncManagerKind::{Inputs, MailboxIn, MailboxOut, Outputs, Unused};
         let controls = [0x26, 0x22, 0x64, 0x24, 0x44, 0x20, 0x00, 0x01, 0x28];
         let kinds = [MailboxOut, MailboxIn, Outputs, Outputs, Outputs, Inputs, Inputs, Unused, Unused];

@@ -1,4 +1,4 @@
-//! Whole images: literal ones, broken ones, and what the writer writes.
+//! Whole images: literal images, invalid images, and images of the writer.
 
 use super::*;
 use proptest::collection::vec;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-/// Categories of a small device, with an unknown one, one of the vendor and a NOP between them.
+/// Categories of a small device, including an unknown category, a vendor-specific one and a NOP.
 const CATEGORIES: [u8; 146] = [
     0x0A, 0x00, 0x06, 0x00, // STRINGS, 6 words
     2, 6, b'E', b'L', b'9', b'9', b'9', b'9', 3, b'B', b'u', b's', //
@@ -32,7 +32,7 @@ fn image(categories: &[u8]) -> Vec<u8> {
     image
 }
 
-/// Reads all there is to read.
+/// Reads all content.
 fn read_everything(sii: &Sii<'_>) -> usize {
     let entries = |direction| sii.pdos(direction).map(|pdo| pdo.entries().count()).sum::<usize>();
     sii.strings().iter().count()
@@ -80,7 +80,7 @@ fn unknown_and_vendor_categories_are_kept_as_bytes() {
 }
 
 #[test]
-fn an_image_may_end_where_its_last_category_ends() {
+fn an_image_may_end_after_its_last_category() {
     let image = image(&CATEGORIES[..144]);
     let sii = Sii::parse(&image).unwrap();
     assert!(!sii.end_marker);
@@ -89,7 +89,7 @@ fn an_image_may_end_where_its_last_category_ends() {
 }
 
 #[test]
-fn what_follows_the_end_marker_does_not_count() {
+fn bytes_after_the_end_marker_are_ignored() {
     let mut image = image(&CATEGORIES);
     let used = image.len();
     image.extend([0x0A, 0x00, 0xFF]);
@@ -99,7 +99,7 @@ fn what_follows_the_end_marker_does_not_count() {
 
 // covers: codec-sii
 #[test]
-fn a_broken_image_is_refused_with_its_reason() {
+fn an_invalid_image_is_refused_with_the_reason() {
     let good = image(&CATEGORIES);
     assert_eq!(Sii::parse(&good[..127]), Err(SiiError::Short { expected: 128, got: 127 }));
     let mut wrong = good.clone();
@@ -113,7 +113,7 @@ fn a_broken_image_is_refused_with_its_reason() {
 
 // covers: codec-sii
 #[test]
-fn the_literal_image_is_what_the_writer_writes() {
+fn the_writer_creates_the_literal_image() {
     let expected = image(&CATEGORIES);
     let mut buffer = [0; 512];
     let mut writer = SiiWriter::new(&mut buffer, Sii::parse(&expected).unwrap().header()).unwrap();
@@ -155,7 +155,7 @@ fn the_literal_image_is_what_the_writer_writes() {
 }
 
 #[test]
-fn the_writer_refuses_what_does_not_fit() {
+fn the_writer_refuses_items_that_do_not_fit() {
     let header = SiiHeader::default();
     let full = SiiWriter::new(&mut [0; 127], &header).unwrap_err();
     assert_eq!(full, SiiWriteError::Full { expected: 128, got: 127 });
@@ -169,7 +169,7 @@ fn the_writer_refuses_what_does_not_fit() {
     let long = std::vec![0; 0x2_0000];
     let too_long = SiiWriteError::TooLong { kind: CategoryKind::Other(99), bytes: 0x2_0000 };
     assert_eq!(writer.category(CategoryKind::Other(99), &long), Err(too_long));
-    // A refused category leaves no trace.
+    // A refused category leaves the image unchanged.
     writer.category(CategoryKind::Other(99), &[7]).unwrap();
     assert_eq!(writer.finish(), Err(SiiWriteError::Full { expected: 136, got: 134 }));
     assert_eq!(buffer[128..], [99, 0, 1, 0, 7, 0]);
@@ -207,7 +207,7 @@ proptest! {
     }
 
     #[test]
-    fn any_categories_behind_a_good_fixed_area_are_read_without_panic(
+    fn any_categories_after_a_valid_fixed_area_are_read_without_panic(
         parts in vec((
             prop_oneof![Just(10_u16), Just(30), Just(40), Just(41), Just(50), Just(51), Just(60), any::<u16>()],
             0_u16..40, vec(any::<u8>(), 0..80)), 0..8),
@@ -215,7 +215,7 @@ proptest! {
         let mut categories = Vec::new();
         for (kind, words, data) in &parts {
             categories.extend(kind.to_le_bytes());
-            // Some lengths are right, others come from the generator.
+            // Some lengths are valid, others come from the generator.
             let right = data.len() as u16 / 2;
             categories.extend(if words % 4 == 0 { words } else { &right }.to_le_bytes());
             categories.extend(&data[..data.len() / 2 * 2]);
@@ -229,7 +229,7 @@ proptest! {
 
     // covers: codec-sii
     #[test]
-    fn what_the_writer_writes_parses_back(content in content(), alias in any::<u16>(), general in any::<[u8; 32]>()) {
+    fn written_images_parse_back(content in content(), alias in any::<u16>(), general in any::<[u8; 32]>()) {
         let (strings, usages, sync_managers, pdos, modes) = content;
         let strings: Vec<&str> = strings.iter().map(String::as_str).collect();
         let usages: Vec<_> = usages.into_iter().map(FmmuUsage::from_code).collect();

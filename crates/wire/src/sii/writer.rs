@@ -11,15 +11,15 @@ use super::header::SiiHeader;
 use super::pdo::{PdoDescription, PdoDirection};
 use super::sync_manager::SiiSyncManager;
 
-/// An erased EEPROM reads so; the rest of the buffer is filled with it.
+/// Value of an erased EEPROM; the rest of the buffer is filled with it.
 const ERASED: u8 = 0xFF;
 
-/// Why an image cannot be written.
+/// The reason for which an image cannot be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SiiWriteError {
     /// The buffer is too small.
     Full {
-        /// Bytes needed up to the end of what was to be written.
+        /// Bytes needed up to the end of the item.
         expected: usize,
         /// Bytes of the buffer.
         got: usize,
@@ -28,17 +28,17 @@ pub enum SiiWriteError {
     TooLong {
         /// Kind of the category.
         kind: CategoryKind,
-        /// Its bytes.
+        /// Bytes of the category.
         bytes: usize,
     },
     /// More than 255 strings, more than 255 characters in one, or more than 255 entries in a PDO.
     TooMany {
-        /// What there is too much of.
+        /// Kind of items.
         what: &'static str,
-        /// How many.
+        /// Number of items.
         got: usize,
     },
-    /// The end marker is written by [`SiiWriter::finish`] alone.
+    /// Only [`SiiWriter::finish`] writes the end marker.
     EndMarker,
 }
 
@@ -57,7 +57,7 @@ impl fmt::Display for SiiWriteError {
 
 impl core::error::Error for SiiWriteError {}
 
-/// Writes the fixed area, then categories in the order of the calls. A failed call leaves what was written before it.
+/// Writes the fixed area, then categories in the order of the calls. A failed call keeps everything written before it.
 #[derive(Debug)]
 pub struct SiiWriter<'b> {
     buffer: &'b mut [u8],
@@ -65,7 +65,7 @@ pub struct SiiWriter<'b> {
 }
 
 impl<'b> SiiWriter<'b> {
-    /// Writes the fixed area with the checksum that belongs to it; a disabled check (0x88A4) stays disabled.
+    /// Writes the fixed area with its computed checksum; a disabled check (0x88A4) stays disabled.
     pub fn new(buffer: &'b mut [u8], header: &SiiHeader) -> Result<SiiWriter<'b>, SiiWriteError> {
         let header = if header.checksum == CHECKSUM_DISABLED { *header } else { header.with_checksum() };
         let full = SiiWriteError::Full { expected: SiiHeader::LEN, got: buffer.len() };
@@ -79,7 +79,7 @@ impl<'b> SiiWriter<'b> {
         Ok(())
     }
 
-    /// Appends the strings; the first one gets index 1.
+    /// Appends the strings; the first string gets index 1.
     pub fn strings(&mut self, strings: &[&str]) -> Result<(), SiiWriteError> {
         let byte = |what, got| u8::try_from(got).map_err(|_| SiiWriteError::TooMany { what, got });
         let count = byte("strings", strings.len())?;
@@ -101,14 +101,14 @@ impl<'b> SiiWriter<'b> {
         self.category(CategoryKind::General, &general.encode())
     }
 
-    /// Appends what the FMMUs are meant for, FMMU 0 first.
+    /// Appends the usages of the FMMUs, FMMU 0 first.
     pub fn fmmus(&mut self, usages: &[FmmuUsage]) -> Result<(), SiiWriteError> {
         let mut data = self.open(CategoryKind::Fmmu, usages.len())?;
         usages.iter().for_each(|usage| data.put(&[usage.code()]));
         Ok(())
     }
 
-    /// Appends the sync managers, SM 0 first.
+    /// Appends the SyncManagers, SM 0 first.
     pub fn sync_managers(&mut self, sync_managers: &[SiiSyncManager]) -> Result<(), SiiWriteError> {
         let mut data = self.open(CategoryKind::SyncManager, sync_managers.len() * SiiSyncManager::LEN)?;
         sync_managers.iter().for_each(|sync_manager| data.put(&sync_manager.encode()));
@@ -137,7 +137,8 @@ impl<'b> SiiWriter<'b> {
         Ok(())
     }
 
-    /// Writes the end marker and fills the rest of the buffer with 0xFF. Returns the bytes up to the end marker's end.
+    /// Writes the end marker and fills the rest of the buffer with 0xFF. Returns the bytes up to the end of the end
+    /// marker.
     pub fn finish(self) -> Result<usize, SiiWriteError> {
         let end = self.at + 2;
         let full = SiiWriteError::Full { expected: end, got: self.buffer.len() };
@@ -147,7 +148,7 @@ impl<'b> SiiWriter<'b> {
         Ok(end)
     }
 
-    /// Writes a category header and gives the zeroed room behind it.
+    /// Writes a category header and returns the zeroed space after it.
     fn open(&mut self, kind: CategoryKind, length: usize) -> Result<Room<'_>, SiiWriteError> {
         if kind == CategoryKind::End {
             return Err(SiiWriteError::EndMarker);
@@ -166,7 +167,7 @@ impl<'b> SiiWriter<'b> {
     }
 }
 
-/// The data of a category that is being written; its size was counted before.
+/// The data of a category during writing; its size was determined before.
 struct Room<'b> {
     data: &'b mut [u8],
     at: usize,

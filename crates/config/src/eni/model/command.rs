@@ -1,12 +1,11 @@
-//! Commands of an ENI: what is sent, at which transitions, and what must come back (protocol 8.1).
+//! Commands of an ENI: datagram, transitions and expected response (protocol 8.1).
 
 use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::command::Command;
 
 use crate::eni::Place;
 
-/// A transition of the state machine at which commands are sent (protocol 8.2); `Op` is OP to PREOP, `Po` the other
-/// way.
+/// A transition of the state machine at which commands are sent (protocol 8.2); `Op` is OP to PREOP, `Po` the reverse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Transition {
     /// INIT to INIT.
@@ -42,7 +41,7 @@ pub enum Transition {
 }
 
 impl Transition {
-    /// All of them.
+    /// All transitions.
     pub const ALL: [Transition; 15] = [
         Transition::Ii,
         Transition::Ip,
@@ -61,7 +60,7 @@ impl Transition {
         Transition::Bi,
     ];
 
-    /// As the file writes it.
+    /// The name in the file.
     pub const fn name(self) -> &'static str {
         match self {
             Transition::Ii => "II",
@@ -83,12 +82,12 @@ impl Transition {
     }
 }
 
-/// What a datagram addresses.
+/// The address of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// `Adp` and `Ado`.
     Register {
-        /// Position, station address or nothing, depending on the command.
+        /// Position, station address or unused, depending on the command.
         adp: u16,
         /// Register.
         ado: RegisterAddress,
@@ -102,53 +101,53 @@ pub enum Target {
 pub struct Datagram {
     /// `Cmd`.
     pub command: Command,
-    /// Where it goes.
+    /// Its address.
     pub target: Target,
-    /// `Data`, or as many zeros as `DataLength` says.
+    /// `Data`, or `DataLength` zeros.
     pub data: Vec<u8>,
-    /// `Cnt`: the working counter that is expected.
+    /// `Cnt`: the expected working counter.
     pub count: Option<u16>,
 }
 
-/// `Requires`: with what the command begins.
+/// `Requires`: what the command starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Requires {
-    /// A frame of its own.
+    /// A separate frame.
     Frame,
-    /// A cycle of its own.
+    /// A separate cycle.
     Cycle,
 }
 
 /// `Validate`: a read is repeated until `answer & mask == data`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Validate {
-    /// What must come.
+    /// The expected value.
     pub data: Vec<u8>,
-    /// Bits that count; all of them where there is no mask.
+    /// The bits to compare; all bits if there is no mask.
     pub mask: Option<Vec<u8>>,
-    /// Milliseconds.
+    /// Time limit in milliseconds.
     pub timeout_ms: u32,
 }
 
 /// `InitCmd` with a datagram (ECatCmd).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EcatCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// When it is sent.
+    /// Transitions at which it is sent.
     pub transitions: Vec<Transition>,
-    /// A command of the MainDevice that comes before those of the SubDevices.
+    /// A command of the MainDevice that precedes those of the SubDevices.
     pub before_subdevices: bool,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
-    /// With what it begins.
+    /// `Requires`.
     pub requires: Option<Requires>,
-    /// What is sent.
+    /// The datagram.
     pub datagram: Datagram,
-    /// How often it is sent again when the working counter is wrong.
+    /// Number of repetitions if the working counter is wrong.
     pub retries: u16,
-    /// What the answer must be.
+    /// The expected response.
     pub validate: Option<Validate>,
-    /// Milliseconds, as some tools write for state changes.
+    /// Time limit in milliseconds, which some tools write for state changes.
     pub timeout_ms: Option<u32>,
 }

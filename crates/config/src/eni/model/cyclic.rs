@@ -1,11 +1,11 @@
-//! What an ENI says of cycles and of the process image (protocol 8.1).
+//! Cycles and process image of an ENI (protocol 8.1).
 
 use std::fmt;
 
 use super::command::Datagram;
 use crate::eni::Place;
 
-/// A state in which a cyclic command is sent (protocol 8.2: numbers count states, they are no AL codes).
+/// A state in which a cyclic command is sent (protocol 8.2: ordinal numbers, not AL state codes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CyclicState {
     /// 1, INIT.
@@ -32,7 +32,7 @@ impl fmt::Display for CyclicState {
 /// `Cyclic`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CyclicTask {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `Comment`.
     pub comment: String,
@@ -52,26 +52,26 @@ pub struct Frame {
 /// `Cyclic/Frame/Cmd`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CyclicCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// When it is sent.
+    /// States in which it is sent.
     pub states: Vec<CyclicState>,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
-    /// What is sent.
+    /// The datagram.
     pub datagram: Datagram,
-    /// `InputOffs`: byte in the input image.
+    /// `InputOffs`: byte offset in the input image.
     pub input_offset: Option<u32>,
-    /// `OutputOffs`: byte in the output image.
+    /// `OutputOffs`: byte offset in the output image.
     pub output_offset: Option<u32>,
     /// `CopyInfos`.
     pub copies: Vec<CopyInfo>,
 }
 
-/// `CopyInfo`: bits of the input image that become bits of the output image.
+/// `CopyInfo`: bits of the input image that are copied to the output image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CopyInfo {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `SrcBitOffs`.
     pub source: u32,
@@ -93,7 +93,7 @@ pub struct ProcessImage {
 /// `Inputs` or `Outputs`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImageSide {
-    /// `ByteSize`; `None` where the file has no image.
+    /// `ByteSize`; `None` if the file has no image.
     pub bytes: Option<u32>,
     /// `Variable`.
     pub variables: Vec<Variable>,
@@ -102,7 +102,7 @@ pub struct ImageSide {
 /// `Variable`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variable {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `Name`.
     pub name: String,

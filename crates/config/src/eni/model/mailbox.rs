@@ -1,4 +1,4 @@
-//! What an ENI says of a mailbox: buffers, protocols, commands of each protocol (protocol 8.1).
+//! Mailboxes of an ENI: buffers, protocols, commands of each protocol (protocol 8.1).
 
 use super::command::Transition;
 use crate::eni::Place;
@@ -6,18 +6,18 @@ use crate::eni::Place;
 /// `Send` or `Recv` of a mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MailboxBuffer {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// First byte.
+    /// Start address.
     pub start: u16,
-    /// Bytes.
+    /// Number of bytes.
     pub length: u16,
 }
 
-/// How it is noticed that a mail waits.
+/// How the MainDevice detects a full mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Poll {
-    /// `PollTime`, milliseconds.
+    /// `PollTime` in milliseconds.
     Every(u32),
     /// `StatusBitAddr`: bit in the area of `MailboxStates`.
     StatusBit(u32),
@@ -51,15 +51,15 @@ pub struct Mailbox {
 /// `CoE/InitCmds/InitCmd`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoeCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// When it is sent.
+    /// Transitions at which it is sent.
     pub transitions: Vec<Transition>,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
-    /// Milliseconds; 0 is the tool's default.
+    /// Time limit in milliseconds; 0 is the tool's default.
     pub timeout_ms: u32,
-    /// `Ccs`: 1 downloads, 2 uploads; some files have it the other way round (protocol 8.2).
+    /// `Ccs`: 1 downloads, 2 uploads; some files have it reversed (protocol 8.2).
     pub ccs: u8,
     /// Attribute `CompleteAccess`.
     pub complete_access: bool,
@@ -76,15 +76,15 @@ pub struct CoeCommand {
 /// `SoE/InitCmds/InitCmd`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SoeCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// When it is sent.
+    /// Transitions at which it is sent.
     pub transitions: Vec<Transition>,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
-    /// Milliseconds; 0 is the tool's default.
+    /// Time limit in milliseconds; 0 is the tool's default.
     pub timeout_ms: u32,
-    /// `OpCode`: 2 reads, 3 writes, missing writes.
+    /// `OpCode`: 2 reads, 3 writes; a missing one writes.
     pub op_code: u8,
     /// `DriveNo`.
     pub drive: u8,
@@ -100,32 +100,32 @@ pub struct SoeCommand {
     pub disabled: bool,
 }
 
-/// `EoE/InitCmds/InitCmd`: with `Type` 2 it sets addresses.
+/// `EoE/InitCmds/InitCmd`: with `Type` 2 it sets IP parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EoeCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
-    /// When it is sent.
+    /// Transitions at which it is sent.
     pub transitions: Vec<Transition>,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
-    /// Milliseconds; 0 is the tool's default.
+    /// Time limit in milliseconds; 0 is the tool's default.
     pub timeout_ms: u32,
     /// `Type`.
     pub kind: Option<u8>,
     /// `MAC`.
     pub mac: Option<Vec<u8>>,
-    /// `IP`, in hexadecimal or with points.
+    /// `IP`, in hexadecimal or dotted decimal form.
     pub ip: Option<Vec<u8>>,
     /// `Subnet`.
     pub subnet: Option<Vec<u8>>,
     /// `DefGateway`.
     pub gateway: Option<Vec<u8>>,
-    /// `ServerIP`: DNS.
+    /// `ServerIP`: DNS server.
     pub server: Option<Vec<u8>>,
     /// `DNSName`.
     pub name: Option<String>,
-    /// `Data`: the message behind the mailbox header.
+    /// `Data`: the message after the mailbox header.
     pub data: Vec<u8>,
     /// `Disabled`: not sent.
     pub disabled: bool,
@@ -134,13 +134,13 @@ pub struct EoeCommand {
 /// A mailbox command of another protocol, as bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RawMailCommand {
-    /// Where it stands.
+    /// Its position in the file.
     pub place: Place,
     /// `AoE`, `FoE` or `VoE`.
     pub protocol: &'static str,
-    /// When it is sent.
+    /// Transitions at which it is sent.
     pub transitions: Vec<Transition>,
-    /// What it is for.
+    /// `Comment`.
     pub comment: String,
     /// `Data`.
     pub data: Vec<u8>,

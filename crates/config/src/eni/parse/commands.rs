@@ -1,4 +1,4 @@
-//! Commands with a datagram: `InitCmd`, `IdentifyCmd` and what is alike in `Cmd` of a cycle (protocol 8.2).
+//! Commands with a datagram: `InitCmd`, `IdentifyCmd` and the common part of a cyclic `Cmd` (protocol 8.2).
 
 use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::command::{Addressing, Command};
@@ -8,10 +8,10 @@ use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{Datagram, EcatCommand, Requires, Target, Transition, Validate};
 use crate::eni::quoted::shown;
 
-/// Bytes of a datagram at most (protocol 1.3).
+/// Maximum number of data bytes of a datagram (protocol 1.3).
 const MAX_DATA: u16 = 1486;
 
-/// The commands in `InitCmds` of an element, but for those that are switched off as mailbox commands can be.
+/// The commands in `InitCmds` of an element, except those that are disabled as mailbox commands can be.
 pub(super) fn list(parent: Element<'_>) -> Result<Vec<EcatCommand>, EniError> {
     let Some(commands) = parent.child("InitCmds") else { return Ok(Vec::new()) };
     commands.knows(&["InitCmd"]);
@@ -56,7 +56,7 @@ pub(super) fn command(element: Element<'_>) -> Result<EcatCommand, EniError> {
     if let Some(validate) = &validate
         && validate.data.len() > datagram.data.len()
     {
-        let expected = format!("at most {} bytes, as many as are read", datagram.data.len());
+        let expected = format!("at most {} bytes, the length of the read", datagram.data.len());
         let got = shown(&format!("{} bytes", validate.data.len()));
         return Err(element.required("Validate")?.error(Problem::Value { expected, got }));
     }
@@ -73,7 +73,7 @@ pub(super) fn command(element: Element<'_>) -> Result<EcatCommand, EniError> {
     })
 }
 
-/// All `Transition` of a command.
+/// All `Transition` elements of a command.
 pub(super) fn transitions(element: Element<'_>) -> Result<Vec<Transition>, EniError> {
     let one = |element: Element<'_>| {
         let text = element.text().to_uppercase();
@@ -81,7 +81,7 @@ pub(super) fn transitions(element: Element<'_>) -> Result<Vec<Transition>, EniEr
         found.ok_or_else(|| element.wrong("a transition such as IP, PS or SO"))
     };
     let mut found: Vec<Transition> = element.children("Transition").map(one).collect::<Result<_, _>>()?;
-    // Twice the same says no more than once.
+    // A repeated transition has no effect.
     let mut seen = [false; Transition::ALL.len()];
     found.retain(|transition| !std::mem::replace(&mut seen[*transition as usize], true));
     Ok(found)
@@ -109,7 +109,7 @@ pub(super) fn datagram(element: Element<'_>) -> Result<Datagram, EniError> {
     };
     let target = match command.addressing() {
         Addressing::Logical => Target::Logical(LogicalAddress(element.required_number("Addr")?)),
-        // What a NOP addresses means nothing.
+        // The address of a NOP has no meaning.
         Addressing::None => register(element, false)?,
         Addressing::AutoIncrement | Addressing::Station | Addressing::Broadcast => register(element, true)?,
     };
@@ -126,12 +126,12 @@ fn data(element: Element<'_>) -> Result<Vec<u8>, EniError> {
         (Some(data), _) => data.hex()?,
         (None, Some(length)) => match length.number::<u16>()? {
             bytes if bytes <= MAX_DATA => vec![0; usize::from(bytes)],
-            _ => return Err(length.wrong(format!("at most {MAX_DATA} bytes, which is what a frame carries"))),
+            _ => return Err(length.wrong(format!("at most {MAX_DATA} bytes, the capacity of a frame"))),
         },
         (None, None) => return Err(element.error(Problem::Missing { element: "Data" })),
     };
     if data.len() > usize::from(MAX_DATA) {
-        let expected = format!("at most {MAX_DATA} bytes, which is what a frame carries");
+        let expected = format!("at most {MAX_DATA} bytes, the capacity of a frame");
         let got = format!("{} bytes", data.len());
         return Err(element.required("Data")?.error(Problem::Value { expected, got }));
     }

@@ -39,12 +39,12 @@ pub(super) fn mailbox(element: Element<'_>) -> Result<Mailbox, EniError> {
     })
 }
 
-/// `Recv`; some files spell it out.
+/// `Recv`; some files write `Receive`.
 fn receiving(element: Element<'_>) -> Option<Element<'_>> {
     element.child("Recv").or_else(|| element.child("Receive"))
 }
 
-/// A buffer; `None` where it has no place or no length.
+/// A buffer; `None` if it has no address or no length.
 fn buffer(element: Option<Element<'_>>) -> Result<Option<MailboxBuffer>, EniError> {
     let Some(element) = element else { return Ok(None) };
     element.knows(&["Start", "Length", "ShortSend", "PollTime", "StatusBitAddr"]);
@@ -166,7 +166,7 @@ fn raw(element: Element<'_>, protocol: &'static str) -> Result<RawMailCommand, E
     })
 }
 
-/// Six decimal numbers with points between them, or bytes in hexadecimal.
+/// Six decimal numbers separated by points, or bytes in hexadecimal.
 fn net_id(element: Element<'_>) -> Result<[u8; 6], EniError> {
     let text = element.text();
     let numbers: Option<Vec<u8>> = text.split('.').map(|number| number.trim().parse().ok()).collect();

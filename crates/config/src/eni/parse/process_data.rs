@@ -9,9 +9,9 @@ use crate::eni::quoted::shown;
 
 /// PDOs that can be assigned to a SyncManager: subindices of an object (protocol 6.3).
 const ASSIGNED: usize = 255;
-/// PDOs that a SubDevice can describe: 0x1600 to 0x17FF and 0x1A00 to 0x1BFF (protocol 6.3).
+/// PDOs of a SubDevice: 0x1600 to 0x17FF and 0x1A00 to 0x1BFF (protocol 6.3).
 const PDOS: usize = 1024;
-/// SyncManagers that a controller can have.
+/// SyncManagers of a SubDevice controller.
 const SYNC_MANAGERS: u8 = 16;
 
 /// `ProcessData`.
@@ -137,7 +137,7 @@ fn image_side(element: Element<'_>) -> Result<ImageSide, EniError> {
     Ok(ImageSide { bytes, variables: element.children("Variable").map(variable).collect::<Result<_, _>>()? })
 }
 
-/// A variable may lie behind the image: TwinCAT's state information of devices does.
+/// A variable may lie beyond the end of the image, as TwinCAT's state information of devices does.
 fn variable(element: Element<'_>) -> Result<Variable, EniError> {
     element.knows(&["Name", "Comment", "DataType", "BitSize", "BitOffs"]);
     let bits: u32 = element.required_number("BitSize")?;

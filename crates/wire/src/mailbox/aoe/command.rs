@@ -2,10 +2,10 @@
 
 use super::{AdsCommand, AdsErrorCode, PayloadError, Pen, split};
 
-/// What a request asks for.
+/// An ADS request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AdsRequest<'a> {
-    /// Name and version.
+    /// Reads name and version.
     ReadDeviceInfo,
     /// Reads.
     Read {
@@ -13,7 +13,7 @@ pub enum AdsRequest<'a> {
         group: u32,
         /// Index offset.
         offset: u32,
-        /// Bytes wanted.
+        /// Bytes to read.
         length: u32,
     },
     /// Writes.
@@ -22,7 +22,7 @@ pub enum AdsRequest<'a> {
         group: u32,
         /// Index offset.
         offset: u32,
-        /// What is written.
+        /// The data to write.
         data: &'a [u8],
     },
     /// Reads the states.
@@ -42,9 +42,9 @@ pub enum AdsRequest<'a> {
         group: u32,
         /// Index offset.
         offset: u32,
-        /// Bytes wanted.
+        /// Bytes to read.
         read_length: u32,
-        /// What is written.
+        /// The data to write.
         data: &'a [u8],
     },
 }
@@ -62,7 +62,7 @@ impl<'a> AdsRequest<'a> {
         }
     }
 
-    /// Decodes the data of a command. Notifications and unknown commands are an error with the code of the command.
+    /// Decodes the data of a command. Notifications and unknown commands are an error that contains the command code.
     pub fn decode(command: AdsCommand, data: &'a [u8]) -> Result<AdsRequest<'a>, PayloadError> {
         let mut fields = Fields(data);
         Ok(match command {
@@ -92,7 +92,7 @@ impl<'a> AdsRequest<'a> {
         })
     }
 
-    /// Encodes the data of the command and returns its length; `None` where it does not fit `out`.
+    /// Encodes the data of the command and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         match *self {
@@ -123,47 +123,47 @@ impl<'a> AdsRequest<'a> {
     }
 }
 
-/// What a response tells.
+/// An ADS response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AdsResponse<'a> {
     /// Name and version.
     DeviceInfo {
-        /// Whether it worked.
+        /// Result.
         result: AdsErrorCode,
-        /// Version.
+        /// Major version.
         major: u8,
-        /// Version.
+        /// Minor version.
         minor: u8,
-        /// Version.
+        /// Build number.
         build: u16,
-        /// Name, NUL behind it.
+        /// Name, padded with NUL.
         name: [u8; 16],
     },
-    /// What was read, by [`AdsCommand::Read`] or [`AdsCommand::ReadWrite`].
+    /// Response to [`AdsCommand::Read`] and [`AdsCommand::ReadWrite`].
     Data {
-        /// Whether it worked.
+        /// Result.
         result: AdsErrorCode,
         /// The data.
         data: &'a [u8],
     },
-    /// The states.
+    /// Response to [`AdsCommand::ReadState`].
     State {
-        /// Whether it worked.
+        /// Result.
         result: AdsErrorCode,
         /// State of ADS.
         ads_state: u16,
         /// State of the device.
         device_state: u16,
     },
-    /// The answer to [`AdsCommand::Write`] and [`AdsCommand::WriteControl`].
+    /// Response to [`AdsCommand::Write`] and [`AdsCommand::WriteControl`].
     Done {
-        /// Whether it worked.
+        /// Result.
         result: AdsErrorCode,
     },
 }
 
 impl<'a> AdsResponse<'a> {
-    /// Whether the request worked.
+    /// The result of the request.
     pub const fn result(&self) -> AdsErrorCode {
         match self {
             AdsResponse::DeviceInfo { result, .. }
@@ -173,7 +173,7 @@ impl<'a> AdsResponse<'a> {
         }
     }
 
-    /// Decodes the data of a response to a command. A failed request may be answered with its result alone.
+    /// Decodes the data of a response to a command. The response to a failed request may contain only the result.
     pub fn decode(command: AdsCommand, data: &'a [u8]) -> Result<AdsResponse<'a>, PayloadError> {
         let mut fields = Fields(data);
         let result = AdsErrorCode(fields.long()?);
@@ -199,7 +199,7 @@ impl<'a> AdsResponse<'a> {
         })
     }
 
-    /// Encodes the data of the response and returns its length; `None` where it does not fit `out`.
+    /// Encodes the data of the response and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         pen.put_u32(self.result().0)?;
@@ -229,7 +229,7 @@ fn put_counted(pen: &mut Pen<'_>, data: &[u8]) -> Option<()> {
     pen.put(data)
 }
 
-/// Takes one field after the other.
+/// Reads the fields one after the other.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

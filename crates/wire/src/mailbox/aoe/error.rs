@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why a request failed. Unknown codes are kept.
+/// The reason for which a request failed. Unknown codes are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AdsErrorCode(pub u32);
 
@@ -17,7 +17,7 @@ macro_rules! ads_errors {
             /// Every code of the table, in ascending order.
             pub const ALL: &'static [AdsErrorCode] = &[$(AdsErrorCode::$name),*];
 
-            /// What the code means; `None` for a code that is not in the table.
+            /// The meaning of the code; `None` for a code that is not in the table.
             pub const fn name(self) -> Option<&'static str> {
                 match self.0 {
                     $($code => Some($text),)*

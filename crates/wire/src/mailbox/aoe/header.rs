@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::{AdsErrorCode, PayloadError, split};
 
-/// Address of a device in the ADS network.
+/// Address of a device in the ADS network (AMS NetId).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct NetId(pub [u8; 6]);
 
@@ -24,7 +24,7 @@ pub struct AmsAddress {
     pub port: u16,
 }
 
-/// What a message is for.
+/// ADS command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AdsCommand {
     /// 1: name and version.
@@ -35,17 +35,17 @@ pub enum AdsCommand {
     Write,
     /// 4: read the states of ADS and of the device.
     ReadState,
-    /// 5: change them.
+    /// 5: change the states.
     WriteControl,
-    /// 6: ask for notifications.
+    /// 6: add a notification.
     AddNotification,
-    /// 7: end them.
+    /// 7: delete a notification.
     DeleteNotification,
-    /// 8: a notification; comes unasked.
+    /// 8: a notification, sent without a request.
     Notification,
-    /// 9: write and read at once.
+    /// 9: write and read in one command.
     ReadWrite,
-    /// Any other.
+    /// Any other code.
     Other(u16),
 }
 
@@ -90,15 +90,15 @@ pub struct AmsHeader {
     pub target: AmsAddress,
     /// Sender.
     pub source: AmsAddress,
-    /// What it is for.
+    /// ADS command.
     pub command: AdsCommand,
     /// Flags; [`AmsHeader::REQUEST`] or [`AmsHeader::RESPONSE`].
     pub flags: u16,
-    /// Bytes behind the header.
+    /// Bytes after the header.
     pub length: u32,
-    /// Why the message could not be delivered.
+    /// Error of the message transport.
     pub error: AdsErrorCode,
-    /// Chosen by the sender of the request, the same in the response.
+    /// Set by the sender of the request and returned in the response.
     pub invoke_id: u32,
 }
 
@@ -110,7 +110,7 @@ impl AmsHeader {
     /// Flags of a response.
     pub const RESPONSE: u16 = 0x0005;
 
-    /// Decodes the header; `data` is as long as the header says.
+    /// Decodes the header; `data` has the length in the header.
     pub fn decode(payload: &[u8]) -> Result<(AmsHeader, &[u8]), PayloadError> {
         let (b, rest) = split::<32>(payload, "AMS header")?;
         let word = |at: usize| u16::from_le_bytes([b[at], b[at + 1]]);
@@ -148,7 +148,7 @@ impl AmsHeader {
         out
     }
 
-    /// The header of the response to this request: sender and receiver change places.
+    /// The header of the response to this request: sender and receiver are exchanged.
     pub const fn response(&self, length: u32) -> AmsHeader {
         AmsHeader {
             target: self.source,
@@ -161,7 +161,7 @@ impl AmsHeader {
         }
     }
 
-    /// It is a response.
+    /// Whether the message is a response.
     pub const fn is_response(&self) -> bool {
         self.flags & 0x0001 != 0
     }

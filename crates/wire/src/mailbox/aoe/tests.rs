@@ -122,7 +122,7 @@ fn commands_without_a_known_layout_are_refused_with_their_code() {
 
 proptest! {
     #[test]
-    fn any_bytes_never_panic_and_what_decodes_reads_back(
+    fn any_bytes_never_panic_and_decoded_messages_read_back(
         command in 0usize..6,
         length in 0u8..16,
         mut bytes in proptest::collection::vec(any::<u8>(), 0..80),
@@ -131,7 +131,7 @@ proptest! {
             prop_assert_eq!(&header.encode()[..], &bytes[..32]);
             prop_assert_eq!(data.len(), header.length as usize);
         }
-        // A length that has a chance to be right.
+        // A length that may be valid.
         for at in [4, 8, 12] {
             if let Some(field) = bytes.get_mut(at..at + 4) {
                 field.copy_from_slice(&[length, 0, 0, 0]);

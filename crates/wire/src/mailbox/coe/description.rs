@@ -1,11 +1,11 @@
-//! What SDO information tells about an object and about an entry (protocol 6.3).
+//! Descriptions of an object and of an entry in SDO information (protocol 6.3).
 //!
-//! In and out: the data of an [`SdoInformation`](super::SdoInformation), its fragments put together.
+//! Converts the data of an [`SdoInformation`](super::SdoInformation) after the reassembly of fragments.
 
 use super::DataType;
 use crate::mailbox::payload::{PayloadError, Pen, split};
 
-/// What an object is.
+/// Object code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ObjectCode {
     /// 2: DOMAIN.
@@ -20,7 +20,7 @@ pub enum ObjectCode {
     Array,
     /// 9: RECORD, entries of several types.
     Record,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -57,13 +57,13 @@ impl ObjectCode {
 pub struct ObjectDescription<'a> {
     /// Index.
     pub index: u16,
-    /// Data type of the object as a whole.
+    /// Data type of the whole object.
     pub data_type: DataType,
     /// Largest subindex.
     pub max_sub_index: u8,
-    /// What it is.
+    /// Object code.
     pub code: ObjectCode,
-    /// Name, without an end mark.
+    /// Name, without terminating NUL.
     pub name: &'a [u8],
 }
 
@@ -83,7 +83,7 @@ impl<'a> ObjectDescription<'a> {
         })
     }
 
-    /// Encodes data of an object response and returns its length; `None` where it does not fit `out`.
+    /// Encodes data of an object response and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         pen.put_u16(self.index)?;
@@ -94,7 +94,7 @@ impl<'a> ObjectDescription<'a> {
     }
 }
 
-/// Which optional parts of an entry description are asked for or there.
+/// The optional parts of an entry description, requested or present.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ValueInfo(pub u8);
 
@@ -103,7 +103,7 @@ impl ValueInfo {
     pub const ACCESS: u8 = 1 << 0;
     /// Bit: category.
     pub const CATEGORY: u8 = 1 << 1;
-    /// Bit: whether it can be mapped.
+    /// Bit: PDO mapping.
     pub const PDO: u8 = 1 << 2;
     /// Bit: unit.
     pub const UNIT: u8 = 1 << 3;
@@ -113,10 +113,10 @@ impl ValueInfo {
     pub const MINIMUM: u8 = 1 << 5;
     /// Bit: largest value.
     pub const MAXIMUM: u8 = 1 << 6;
-    /// Everything.
+    /// All parts.
     pub const ALL: ValueInfo = ValueInfo(0x7F);
 
-    /// All of these bits are set.
+    /// Whether all of these bits are set.
     pub const fn has(self, bits: u8) -> bool {
         self.0 & bits == bits
     }
@@ -143,29 +143,29 @@ impl AccessRights {
     pub const RX_MAPPABLE: u16 = 1 << 6;
     /// Bit: can be mapped to a TxPDO.
     pub const TX_MAPPABLE: u16 = 1 << 7;
-    /// Bit: is to be stored for the exchange of a device.
+    /// Bit: stored for the replacement of a device (backup).
     pub const BACKUP: u16 = 1 << 8;
     /// Bit: is a start-up parameter.
     pub const SETTING: u16 = 1 << 9;
-    /// Read in each state.
+    /// Readable in every state.
     pub const READ: u16 = Self::READ_PREOP | Self::READ_SAFEOP | Self::READ_OP;
-    /// Written in each state.
+    /// Writable in every state.
     pub const WRITE: u16 = Self::WRITE_PREOP | Self::WRITE_SAFEOP | Self::WRITE_OP;
 
-    /// All of these bits are set.
+    /// Whether all of these bits are set.
     pub const fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
     }
 }
 
-/// What an entry request asks for.
+/// An entry request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct EntryRequest {
     /// Index.
     pub index: u16,
     /// Subindex.
     pub sub_index: u8,
-    /// Wanted parts.
+    /// Requested parts.
     pub value_info: ValueInfo,
 }
 
@@ -193,7 +193,8 @@ pub struct EntryDescription<'a> {
     pub index: u16,
     /// Subindex.
     pub sub_index: u8,
-    /// Which parts the SubDevice says are there. The bits of unit, default, minimum and maximum follow the fields.
+    /// The parts that the SubDevice declares as present. The bits of unit, default, minimum and maximum match the
+    /// fields.
     pub value_info: ValueInfo,
     /// Data type.
     pub data_type: DataType,
@@ -203,13 +204,13 @@ pub struct EntryDescription<'a> {
     pub access: AccessRights,
     /// Unit (ETG.1004).
     pub unit: Option<u16>,
-    /// Default value, little-endian, as long as the entry.
+    /// Default value, little-endian, with the length of the entry.
     pub default: Option<&'a [u8]>,
-    /// Smallest value, likewise.
+    /// Smallest value, in the same format.
     pub minimum: Option<&'a [u8]>,
-    /// Largest value, likewise.
+    /// Largest value, in the same format.
     pub maximum: Option<&'a [u8]>,
-    /// Name, without an end mark.
+    /// Name, without terminating NUL.
     pub name: &'a [u8],
 }
 
@@ -252,8 +253,8 @@ impl<'a> EntryDescription<'a> {
         })
     }
 
-    /// Encodes data of an entry response and returns its length; `None` where it does not fit `out`, or where default,
-    /// minimum or maximum is not as long as the entry.
+    /// Encodes data of an entry response and returns its length; `None` if it does not fit `out`, or if default,
+    /// minimum or maximum does not have the length of the entry.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let bytes = usize::from(self.bit_length).div_ceil(8);
         let mut info =
@@ -298,7 +299,7 @@ mod tests {
 
     // covers: 6.3, codec-mailbox
     #[test]
-    fn an_object_description_has_these_bytes() {
+    fn an_object_description_has_the_expected_bytes() {
         let object = ObjectDescription {
             index: 0x1018,
             data_type: DataType::IDENTITY,
@@ -319,7 +320,7 @@ mod tests {
 
     // covers: 6.3, codec-mailbox
     #[test]
-    fn an_entry_description_has_these_bytes() {
+    fn an_entry_description_has_the_expected_bytes() {
         let entry = EntryDescription {
             index: 0x8010,
             sub_index: 1,
@@ -345,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bit_has_a_byte_of_default_value() {
+    fn a_one_bit_entry_has_a_default_value_of_one_byte() {
         let bytes = b"\x00\x60\x01\x17\x01\x00\x01\x00\x87\x00\x01In";
         let entry = EntryDescription::decode(bytes).unwrap();
         assert_eq!((entry.bit_length, entry.default, entry.name), (1, Some(&[1][..]), &b"In"[..]));
@@ -355,7 +356,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_reads_back(data in proptest::collection::vec(any::<u8>(), 0..60)) {
+        fn any_bytes_never_panic_and_decoded_messages_read_back(data in proptest::collection::vec(any::<u8>(), 0..60)) {
             let mut out = [0; 64];
             if let Ok(object) = ObjectDescription::decode(&data) {
                 let length = object.encode(&mut out).unwrap();

@@ -1,25 +1,25 @@
-//! The diagnosis history, object 0x10F3 (protocol 6.3 name it; layout of ETG.1020).
+//! The diagnosis history, object 0x10F3 (named in protocol 6.3; layout of ETG.1020).
 //!
-//! Subindex 1 is the number of messages that the SubDevice keeps, 2 the subindex of the newest message, 3 that of the
-//! newest acknowledged one, 4 whether there are new ones, 5 flags, 6 and up the messages: octet strings that
-//! [`DiagnosisMessage`] reads and writes.
+//! Subindex 1 is the maximum number of stored messages, 2 the subindex of the newest message, 3 the subindex of the
+//! newest acknowledged message, 4 whether there are new messages, 5 flags. The messages start at subindex 6: octet
+//! strings that [`DiagnosisMessage`] reads and writes.
 
 use crate::mailbox::payload::{PayloadError, Pen, split};
 
-/// What an entry of object 0x10F3 is.
+/// Index and subindices of object 0x10F3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DiagnosisHistory;
 
 impl DiagnosisHistory {
     /// Index of the object.
     pub const INDEX: u16 = 0x10F3;
-    /// Subindex: most messages that are kept (u8).
+    /// Subindex: maximum number of stored messages (u8).
     pub const MAXIMUM_MESSAGES: u8 = 1;
     /// Subindex: subindex of the newest message, 0 for none (u8).
     pub const NEWEST_MESSAGE: u8 = 2;
     /// Subindex: subindex of the newest acknowledged message; written by the MainDevice, 0 clears the history (u8).
     pub const NEWEST_ACKNOWLEDGED: u8 = 3;
-    /// Subindex: whether there are messages that were not acknowledged (bool).
+    /// Subindex: whether there are unacknowledged messages (bool).
     pub const NEW_AVAILABLE: u8 = 4;
     /// Subindex: [`DiagnosisFlags`] (u16).
     pub const FLAGS: u8 = 5;
@@ -27,12 +27,12 @@ impl DiagnosisHistory {
     pub const FIRST_MESSAGE: u8 = 6;
 }
 
-/// How the history is kept.
+/// Settings of the history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DiagnosisFlags(pub u16);
 
 impl DiagnosisFlags {
-    /// Bit: each message is sent as an emergency too.
+    /// Bit: each message is also sent as an emergency.
     pub const EMERGENCY: u16 = 1 << 0;
     /// Bit: information is not stored.
     pub const NO_INFORMATION: u16 = 1 << 1;
@@ -40,27 +40,27 @@ impl DiagnosisFlags {
     pub const NO_WARNINGS: u16 = 1 << 2;
     /// Bit: errors are not stored.
     pub const NO_ERRORS: u16 = 1 << 3;
-    /// Bit: a full history keeps what was not acknowledged; without it the oldest message is overwritten.
+    /// Bit: a full history keeps unacknowledged messages; without it the oldest message is overwritten.
     pub const ACKNOWLEDGE: u16 = 1 << 4;
-    /// Bit: a message was lost, overwritten before it was acknowledged or not stored.
+    /// Bit: a message was lost: overwritten before its acknowledgement, or not stored.
     pub const LOST: u16 = 1 << 5;
 
-    /// All of these bits are set.
+    /// Whether all of these bits are set.
     pub const fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
     }
 }
 
-/// How grave a message is.
+/// Severity of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DiagnosisKind {
-    /// 0.
+    /// Code 0.
     Information,
-    /// 1.
+    /// Code 1.
     Warning,
-    /// 2.
+    /// Code 2.
     Error,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -89,21 +89,21 @@ impl DiagnosisKind {
 /// One message of the history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagnosisMessage<'a> {
-    /// Diagnosis code: in the lower half 0xE800 for a code of the vendor in the upper half.
+    /// Diagnosis code: the lower half is 0xE800 if the upper half is a code of the vendor.
     pub code: u32,
-    /// How grave.
+    /// Severity.
     pub kind: DiagnosisKind,
-    /// The time stamp is that of the local clock of the SubDevice, not of a global one.
+    /// The time stamp is from the local clock of the SubDevice, not from a global clock.
     pub local_time: bool,
     /// Bits 7:5 of the flags, reserved.
     pub reserved: u8,
-    /// Text in the device description (ESI), 0 for none.
+    /// Text id of the device description (ESI), 0 for none.
     pub text: u16,
-    /// Time in nanoseconds, 0 where the SubDevice has no clock.
+    /// Time in nanoseconds, 0 if the SubDevice has no clock.
     pub time_ns: u64,
-    /// Number of parameters, as the flags say.
+    /// Number of parameters.
     pub parameter_count: u8,
-    /// The parameters as bytes.
+    /// The encoded parameters.
     pub parameters: &'a [u8],
 }
 
@@ -128,7 +128,7 @@ impl<'a> DiagnosisMessage<'a> {
         })
     }
 
-    /// Encodes one message and returns its length; `None` where it does not fit `out`.
+    /// Encodes one message and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         pen.put_u32(self.code)?;
@@ -140,7 +140,7 @@ impl<'a> DiagnosisMessage<'a> {
         Some(pen.length())
     }
 
-    /// The parameters one by one; ends at the first that is cut off.
+    /// The parameters one by one; ends at the first truncated parameter.
     pub const fn parameters(&self) -> DiagnosisParameters<'a> {
         DiagnosisParameters { rest: self.parameters, left: self.parameter_count }
     }
@@ -157,13 +157,13 @@ pub enum DiagnosisParameter<'a> {
     Ascii(&'a [u8]),
     /// UTF-16 text, little-endian.
     Unicode(&'a [u8]),
-    /// Number of a text in the device description.
+    /// Text id of the device description.
     Text(u16),
 }
 
 impl DiagnosisParameter<'_> {
-    /// Encodes the parameter and returns its length; `None` where it does not fit `out`, is longer than 4,095 bytes, or
-    /// is a value whose length is not that of its type.
+    /// Encodes the parameter and returns its length; `None` if it does not fit `out`, is longer than 4,095 bytes, or is
+    /// a value without the length of its type.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         let length = |data: &[u8]| u16::try_from(data.len()).ok().filter(|length| *length <= MAX_LENGTH);
@@ -259,7 +259,7 @@ mod tests {
 
     // covers: 6.3, codec-mailbox
     #[test]
-    fn a_message_with_parameters_has_these_bytes() {
+    fn a_message_with_parameters_has_the_expected_bytes() {
         let message = DiagnosisMessage::decode(MESSAGE).unwrap();
         assert_eq!(message.code, 0x1234_0000 | u32::from(DiagnosisMessage::VENDOR_CODE));
         assert_eq!((message.kind, message.local_time, message.text), (DiagnosisKind::Error, true, 7));
@@ -280,7 +280,7 @@ mod tests {
 
     // covers: codec-mailbox
     #[test]
-    fn parameters_end_where_they_are_cut_off() {
+    fn parameters_end_at_a_truncated_parameter() {
         let message = DiagnosisMessage::decode(&MESSAGE[..23]).unwrap();
         assert_eq!(message.parameters().count(), 1);
         let short = PayloadError::Short { what: "diagnosis message", expected: 16, got: 15 };
@@ -292,7 +292,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_encodes_again(
+        fn any_bytes_never_panic_and_decoded_messages_encode_back(
             bytes in proptest::collection::vec(any::<u8>(), 0..64)
         ) {
             if let Ok(message) = DiagnosisMessage::decode(&bytes) {

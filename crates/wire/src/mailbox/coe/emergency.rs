@@ -1,6 +1,7 @@
-//! The emergency message of CoE (protocol 6.3), and what the error codes stand for (CiA 301).
+//! The emergency message of CoE (protocol 6.3), and the classes of error codes (CiA 301).
 
-/// An emergency message, behind its CoE header. It comes unasked, also between a request and its response.
+/// An emergency message, after its CoE header. The SubDevice sends it without a request, also between a request and its
+/// response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Emergency {
     /// Error code.
@@ -12,13 +13,13 @@ pub struct Emergency {
 }
 
 impl Emergency {
-    /// Bytes of the message behind the CoE header.
+    /// Bytes of the message after the CoE header.
     pub const LEN: usize = 8;
-    /// Error code: what was wrong before is so no longer.
+    /// Error code: the error is cleared.
     pub const ERROR_RESET: u16 = 0x0000;
-    /// Error code: the way from PREOP to SAFEOP failed.
+    /// Error code: the transition from PREOP to SAFEOP failed.
     pub const PREOP_TO_SAFEOP_FAILED: u16 = 0xA000;
-    /// Error code: the way from SAFEOP to OP failed.
+    /// Error code: the transition from SAFEOP to OP failed.
     pub const SAFEOP_TO_OP_FAILED: u16 = 0xA001;
 
     /// Decodes eight bytes.
@@ -37,7 +38,7 @@ impl Emergency {
         [code[0], code[1], self.error_register, a, b, c, d, e]
     }
 
-    /// The class that the error code belongs to; `None` for a class that CiA 301 does not name.
+    /// The class of the error code; `None` for a class that CiA 301 does not name.
     pub const fn class_name(&self) -> Option<&'static str> {
         Some(match self.error_code {
             Self::PREOP_TO_SAFEOP_FAILED => "transition from PREOP to SAFEOP failed",
@@ -82,7 +83,7 @@ mod tests {
 
     // covers: codec-mailbox
     #[test]
-    fn an_emergency_has_these_bytes() {
+    fn an_emergency_has_the_expected_bytes() {
         let emergency = Emergency { error_code: 0x8130, error_register: 0x11, data: [1, 2, 3, 4, 5] };
         assert_eq!(emergency.encode(), [0x30, 0x81, 0x11, 1, 2, 3, 4, 5]);
     }

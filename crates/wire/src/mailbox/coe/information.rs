@@ -1,10 +1,10 @@
 //! SDO information: the lists of objects of a SubDevice, one object, one entry, errors, in fragments (protocol 6.3).
 //!
-//! In goes or out comes the payload of a mailbox message of protocol CoE. Data that does not fit into one mailbox comes
-//! in fragments: each but the last is marked incomplete, and each tells how many follow. Only the first begins with
-//! list type or index; putting the fragments together is the reader's matter. Whole data is read by
-//! [`ListType`] and [`Indices`], [`ObjectDescription`](super::ObjectDescription) and
-//! [`EntryDescription`](super::EntryDescription).
+//! Converts the payload of a mailbox message of protocol CoE. Data that does not fit into one mailbox is sent in
+//! fragments: all but the last are marked incomplete, and each contains the number of following fragments. Only the
+//! first begins with list type or index. The reader reassembles the fragments. [`ListType`] and [`Indices`],
+//! [`ObjectDescription`](super::ObjectDescription) and [`EntryDescription`](super::EntryDescription) read reassembled
+//! data.
 
 use core::fmt;
 
@@ -15,24 +15,24 @@ use crate::mailbox::sdo::AbortCode;
 
 const INCOMPLETE: u8 = 0x80;
 
-/// What an SDO information message says.
+/// Opcode of an SDO information message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InformationOpcode {
-    /// 1: asks for a list; data is the [`ListType`].
+    /// 1: list request; data is the [`ListType`].
     ListRequest,
-    /// 2: the list; data is the [`ListType`], then [`Indices`] or five counts.
+    /// 2: list response; data is the [`ListType`], then [`Indices`] or five counts.
     ListResponse,
-    /// 3: asks for an object; data is its index.
+    /// 3: object request; data is the index.
     ObjectRequest,
     /// 4: [`ObjectDescription`](super::ObjectDescription).
     ObjectResponse,
-    /// 5: asks for an entry; data is index, subindex, [`ValueInfo`](super::ValueInfo).
+    /// 5: entry request; data is index, subindex, [`ValueInfo`](super::ValueInfo).
     EntryRequest,
     /// 6: [`EntryDescription`](super::EntryDescription).
     EntryResponse,
     /// 7: [`AbortCode`].
     Error,
-    /// Any other.
+    /// Any other code.
     Other(u8),
 }
 
@@ -66,10 +66,10 @@ impl InformationOpcode {
     }
 }
 
-/// Which objects a list has.
+/// An object list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ListType {
-    /// 0: no objects but the lengths of the five lists, in the order of their codes.
+    /// 0: no objects, but the lengths of the five lists, in the order of their codes.
     Lengths,
     /// 1: all objects.
     All,
@@ -77,11 +77,11 @@ pub enum ListType {
     RxMappable,
     /// 3: objects that can be mapped to a TxPDO.
     TxMappable,
-    /// 4: objects that are to be stored for the exchange of a device.
+    /// 4: objects that are stored for the replacement of a device.
     Backup,
-    /// 5: objects that are used as start-up parameters.
+    /// 5: start-up parameters.
     Settings,
-    /// Any other.
+    /// Any other code.
     Other(u16),
 }
 
@@ -131,7 +131,7 @@ impl fmt::Display for ListType {
     }
 }
 
-/// Numbers of 16 bits, as a list carries them; a last odd byte is no number.
+/// The 16-bit numbers of a list; a trailing odd byte is ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Indices<'a>(pub &'a [u8]);
 
@@ -142,12 +142,12 @@ impl Indices<'_> {
     }
 }
 
-/// One message, whole or a fragment.
+/// One message, complete or a fragment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SdoInformation<'a> {
-    /// What it says.
+    /// Opcode.
     pub opcode: InformationOpcode,
-    /// Fragments that follow; 0 in the last one and in a message that has all data.
+    /// Number of following fragments; 0 in the last fragment and in a complete message.
     pub fragments_left: u16,
     /// The data, or a part of it.
     pub data: &'a [u8],
@@ -156,10 +156,10 @@ pub struct SdoInformation<'a> {
 }
 
 impl<'a> SdoInformation<'a> {
-    /// Bytes before the data, CoE header included.
+    /// Bytes before the data, including the CoE header.
     pub const OVERHEAD: usize = 6;
 
-    /// A message that has all data.
+    /// A complete message.
     pub const fn whole(opcode: InformationOpcode, data: &'a [u8]) -> SdoInformation<'a> {
         SdoInformation { opcode, fragments_left: 0, data, incomplete: false }
     }
@@ -180,7 +180,7 @@ impl<'a> SdoInformation<'a> {
         })
     }
 
-    /// Encodes the payload of a CoE message and returns its length; `None` where it does not fit `out`.
+    /// Encodes the payload of a CoE message and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let mut pen = Pen::new(out);
         pen.put(&CoeHeader::new(CoeService::SdoInformation).encode())?;
@@ -190,18 +190,18 @@ impl<'a> SdoInformation<'a> {
         Some(pen.length())
     }
 
-    /// The list type at the start of whole data or of a first fragment, and what follows.
+    /// The list type at the start of reassembled data or of a first fragment, and the numbers that follow.
     pub fn list(&self) -> Result<(ListType, Indices<'a>), PayloadError> {
         let (code, rest) = split::<2>(self.data, "object list")?;
         Ok((ListType::from_code(u16::from_le_bytes(*code)), Indices(rest)))
     }
 
-    /// The index that an object request names.
+    /// The index in an object request.
     pub fn object(&self) -> Result<u16, PayloadError> {
         u16_at(self.data, 0).ok_or(PayloadError::Short { what: "object request", expected: 2, got: self.data.len() })
     }
 
-    /// Why the request failed.
+    /// The reason for which the request failed.
     pub fn abort_code(&self) -> Result<AbortCode, PayloadError> {
         let short = PayloadError::Short { what: "SDO information error", expected: 4, got: self.data.len() };
         u32_at(self.data, 0).map(AbortCode).ok_or(short)
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn data_is_read_as_what_it_is() {
+    fn the_data_of_each_opcode_is_decoded() {
         use InformationOpcode::*;
         let (list, indices) = SdoInformation::whole(ListResponse, &[2, 0, 0x10, 0x60, 0x20, 0x60, 9]).list().unwrap();
         assert_eq!((list, indices.iter().collect::<Vec<_>>()), (ListType::RxMappable, std::vec![0x6010, 0x6020]));
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn another_service_is_refused_with_both_sides_named() {
+    fn another_service_is_refused_with_expected_and_received_service() {
         let error = SdoInformation::decode(&[0, 0x20, 1, 0, 0, 0]).unwrap_err();
         assert_eq!(error.to_string(), "expected SDO information, got SDO request");
         let short = PayloadError::Short { what: "SDO information message", expected: 6, got: 5 };
@@ -281,7 +281,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_never_panic_and_what_decodes_reads_back(
+        fn any_bytes_never_panic_and_decoded_messages_read_back(
             rest in proptest::collection::vec(any::<u8>(), 0..40),
         ) {
             let mut bytes = std::vec![0, 0x80];

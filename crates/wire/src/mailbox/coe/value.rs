@@ -25,7 +25,7 @@ macro_rules! data_types {
                 }
             }
 
-            /// Bits of a value; `None` where the type does not say.
+            /// Bits of a value; `None` if the type has no fixed length.
             pub const fn bits(self) -> Option<u16> {
                 match self.0 {
                     $($code => $bits,)*

@@ -1,18 +1,18 @@
-//! The filter for MAC addresses of an EoE SubDevice (protocol 6.5).
+//! The MAC address filter of an EoE SubDevice (protocol 6.5).
 
 use super::{PayloadError, Pen, split};
 
-/// Most addresses: their number has four bits.
+/// Maximum number of addresses: the count has four bits.
 const MAX_ADDRESSES: usize = 15;
-/// Most masks: their number has two bits.
+/// Maximum number of masks: the count has two bits.
 const MAX_MASKS: usize = 3;
-/// Places for addresses and masks in the message.
+/// Slots for addresses and masks in the message.
 const ADDRESS_PLACES: usize = 16;
 const MASK_PLACES: usize = 4;
 const MAC_LEN: usize = 6;
 const NO_BROADCAST: u16 = 1 << 7;
 
-/// Which frames pass.
+/// The filter settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AddressFilter {
     /// Broadcasts do not pass.

@@ -3,7 +3,7 @@
 use super::head::{FRAGMENT, LAST, OVERHEAD, TIME_APPENDED, TIME_REQUESTED};
 use crate::mailbox::payload::{PayloadError, Pen};
 
-/// Offsets and sizes are counted in blocks of this number of bytes.
+/// Unit of offsets and sizes in bytes.
 pub const BLOCK: usize = 32;
 
 const OFFSET_SHIFT: u16 = 6;
@@ -14,17 +14,17 @@ const TIME_LEN: usize = 4;
 /// A part of an Ethernet frame without its check sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EoeFragment<'a> {
-    /// Number of the frame, 0..=15: tells frames apart whose fragments mix.
+    /// Number of the frame, 0..=15: distinguishes frames with interleaved fragments.
     pub frame: u8,
     /// Number of the fragment, 0..=63.
     pub number: u8,
-    /// Where the data belongs, in blocks of 32 bytes; in fragment 0 the size of the whole frame, rounded up to blocks.
+    /// Offset of the data in blocks of 32 bytes; in fragment 0 the size of the whole frame, rounded up to blocks.
     pub blocks: u8,
     /// No fragment of this frame follows.
     pub last: bool,
-    /// The sender wants to know when the frame left the SubDevice.
+    /// The sender requests the time at which the frame left the SubDevice.
     pub time_requested: bool,
-    /// When the frame arrived at the SubDevice: lower half of the time, nanoseconds. Comes with the last fragment.
+    /// Time at which the frame arrived at the SubDevice: lower half, nanoseconds. Only in the last fragment.
     pub time_ns: Option<u32>,
     /// The data; a multiple of 32 bytes in all fragments but the last.
     pub data: &'a [u8],
@@ -37,7 +37,7 @@ impl<'a> EoeFragment<'a> {
         room - room % BLOCK
     }
 
-    /// Where the data belongs in the frame, bytes.
+    /// Offset of the data in the frame in bytes.
     pub const fn offset(&self) -> usize {
         if self.number == 0 { 0 } else { self.blocks as usize * BLOCK }
     }

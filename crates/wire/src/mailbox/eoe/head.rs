@@ -1,6 +1,6 @@
-//! The first word of an EoE message: its kind, the port that it is for, and flags of a fragment (protocol 6.5).
+//! The first word of an EoE message: type, port and fragment flags (protocol 6.5).
 
-/// Bytes before the data: this word and one that depends on the kind.
+/// Bytes before the data: this word and a word that depends on the type.
 pub(super) const OVERHEAD: usize = 4;
 
 pub(super) const FRAGMENT: u16 = 0;

@@ -1,4 +1,4 @@
-//! The addresses of an IP stack behind a SubDevice (protocol 6.5).
+//! The IP parameters of a SubDevice (protocol 6.5).
 
 use core::net::Ipv4Addr;
 
@@ -14,10 +14,10 @@ const GATEWAY: u32 = 1 << 3;
 const DNS: u32 = 1 << 4;
 const NAME: u32 = 1 << 5;
 
-/// Bytes of all fields behind the flags.
+/// Bytes of all fields after the flags.
 const FIELDS_LEN: usize = 6 + 4 * 4 + MAX_NAME;
 
-/// Addresses that are set, or told; what is `None` is not.
+/// IP parameters to set, or as reported; `None`: not contained in the message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct IpParameters<'a> {
     /// MAC address.
@@ -30,13 +30,13 @@ pub struct IpParameters<'a> {
     pub gateway: Option<Ipv4Addr>,
     /// DNS server.
     pub dns: Option<Ipv4Addr>,
-    /// Name, at most [`MAX_NAME`] bytes, without an end mark.
+    /// DNS name, at most [`MAX_NAME`] bytes, without terminating NUL.
     pub name: Option<&'a [u8]>,
 }
 
 impl<'a> IpParameters<'a> {
-    /// Decodes flags and fields. A message of all 58 bytes has each field at its place, a shorter one has the present
-    /// fields packed.
+    /// Decodes flags and fields. A message of 58 bytes has each field at a fixed offset; a shorter message has the
+    /// present fields packed.
     pub(super) fn decode(data: &'a [u8]) -> Result<IpParameters<'a>, PayloadError> {
         let (flags, rest) = split(data, "EoE IP parameters")?;
         let mut fields = Fields { flags: u32::from_le_bytes(*flags), fixed: rest.len() >= FIELDS_LEN, rest };
@@ -50,7 +50,7 @@ impl<'a> IpParameters<'a> {
         })
     }
 
-    /// Writes all fields, zeros where there is nothing: some SubDevices take no notice of what is behind a gap.
+    /// Writes all fields, with zeros for absent fields: some SubDevices ignore fields that follow an absent field.
     pub(super) fn encode(&self, pen: &mut Pen<'_>) -> Option<()> {
         let present = [
             (self.mac.is_some(), MAC),
@@ -74,7 +74,7 @@ impl<'a> IpParameters<'a> {
     }
 }
 
-/// Takes one field after the other.
+/// Reads the fields one after the other.
 struct Fields<'a> {
     flags: u32,
     fixed: bool,
@@ -96,7 +96,7 @@ impl<'a> Fields<'a> {
         Ok(self.field::<4>(bit)?.map(|&[d, c, b, a]| Ipv4Addr::new(a, b, c, d)))
     }
 
-    /// A name ends at its end mark, or where there is no more.
+    /// A name ends at NUL or at the end of the message.
     fn name(&self) -> Option<&'a [u8]> {
         let bytes = self.rest.get(..MAX_NAME).unwrap_or(self.rest);
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());

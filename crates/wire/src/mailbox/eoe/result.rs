@@ -2,25 +2,25 @@
 
 use core::fmt;
 
-/// Whether a request worked. Unknown codes are kept.
+/// Result of a request. Unknown codes are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EoeResult(pub u16);
 
 impl EoeResult {
-    /// It worked.
+    /// Success.
     pub const OK: EoeResult = EoeResult(0x0000);
     /// Unspecified error.
     pub const UNSPECIFIED: EoeResult = EoeResult(0x0001);
     /// The frame type is not supported.
     pub const UNSUPPORTED_FRAME_TYPE: EoeResult = EoeResult(0x0002);
-    /// There is no IP stack.
+    /// The SubDevice has no IP stack.
     pub const NO_IP_SUPPORT: EoeResult = EoeResult(0x0201);
-    /// There is no DHCP.
+    /// The SubDevice has no DHCP.
     pub const NO_DHCP_SUPPORT: EoeResult = EoeResult(0x0202);
-    /// There is no address filter.
+    /// The SubDevice has no address filter.
     pub const NO_FILTER_SUPPORT: EoeResult = EoeResult(0x0401);
 
-    /// What the code means; `None` for a code that is not in the table.
+    /// The meaning of the code; `None` for a code that is not in the table.
     pub const fn name(self) -> Option<&'static str> {
         Some(match self {
             EoeResult::OK => "No error",

@@ -19,7 +19,7 @@ const FIRST: EoeFragment<'_> =
 
 // covers: 6.5, codec-mailbox
 #[test]
-fn fragments_have_these_bytes() {
+fn fragments_have_the_expected_bytes() {
     let first = encoded(EoeBody::Fragment(FIRST));
     assert_eq!(first[..5], [0x00, 0x04, 0xC0, 0x50, 7]);
     assert_eq!(decoded(&first), EoeMessage { port: 0, body: EoeBody::Fragment(FIRST) });
@@ -51,7 +51,7 @@ fn a_fragment_has_whole_blocks_of_the_mailbox() {
 
 // covers: 6.5, codec-mailbox
 #[test]
-fn ip_parameters_have_fixed_places_and_little_endian_addresses() {
+fn ip_parameters_have_fixed_offsets_and_little_endian_addresses() {
     let parameters = IpParameters {
         mac: Some([2, 0, 0, 0, 0, 1]),
         address: Some(Ipv4Addr::new(192, 168, 0, 1)),
@@ -72,7 +72,7 @@ fn ip_parameters_have_fixed_places_and_little_endian_addresses() {
 
 // covers: 6.5, codec-mailbox
 #[test]
-fn packed_ip_parameters_are_understood() {
+fn packed_ip_parameters_are_decoded() {
     let bytes = [0x02, 0x01, 0, 0, 0x22, 0, 0, 0, 0x01, 0x00, 0xA8, 0xC0, b'a', b'b'];
     let expected =
         IpParameters { address: Some(Ipv4Addr::new(192, 168, 0, 1)), name: Some(b"ab"), ..IpParameters::default() };
@@ -97,7 +97,7 @@ fn a_filter_has_sixteen_addresses_and_four_masks() {
 
 // covers: 6.5
 #[test]
-fn requests_and_results_have_these_bytes() {
+fn requests_and_results_have_the_expected_bytes() {
     let vectors: [(EoeBody<'_>, &[u8]); 5] = [
         (EoeBody::TimeStamp { frame: 5, time_ns: 1 }, &[0x01, 0x01, 0x00, 0x50, 1, 0, 0, 0]),
         (EoeBody::SetIpDone(EoeResult::OK), &[0x03, 0x01, 0, 0]),
@@ -120,7 +120,7 @@ fn requests_and_results_have_these_bytes() {
 }
 
 #[test]
-fn what_is_no_message_is_refused() {
+fn an_invalid_message_is_refused() {
     let short = PayloadError::Short { what: "EoE message", expected: 4, got: 3 };
     assert_eq!(EoeMessage::decode(&[0, 1, 0]), Err(short));
     assert_eq!(EoeMessage::decode(&[0x0A, 1, 0, 0]).unwrap_err().to_string(), "unknown EoE type 0xa");
@@ -130,7 +130,7 @@ fn what_is_no_message_is_refused() {
 
 proptest! {
     #[test]
-    fn any_bytes_never_panic_and_what_decodes_reads_back(
+    fn any_bytes_never_panic_and_decoded_messages_read_back(
         kind in 0u8..11,
         rest in proptest::collection::vec(any::<u8>(), 0..140),
     ) {

@@ -2,13 +2,13 @@
 
 use core::fmt;
 
-/// Why a file transfer failed. Unknown codes are kept.
+/// The reason for which a file transfer failed. Unknown codes are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FoeErrorCode(pub u32);
 
-/// First of the codes; old stacks count from 0 instead.
+/// First code; old stacks start at 0 instead.
 const BASE: u32 = 0x8000;
-/// Last code that old stacks know, without [`BASE`].
+/// Last code of old stacks, without [`BASE`].
 const LAST_OLD: u32 = 9;
 
 macro_rules! foe_errors {
@@ -22,7 +22,7 @@ macro_rules! foe_errors {
             /// Every code of the table, in ascending order.
             pub const ALL: &'static [FoeErrorCode] = &[$(FoeErrorCode::$name),*];
 
-            /// What the code means, also where it is one of an old stack; `None` for a code that is not in the table.
+            /// The meaning of the code, also of an old stack; `None` for a code that is not in the table.
             pub const fn name(self) -> Option<&'static str> {
                 match self.modern().0 {
                     $($code => Some($text),)*
@@ -51,7 +51,7 @@ foe_errors! {
 }
 
 impl FoeErrorCode {
-    /// The code as it is sent today: old stacks left 0x8000 out.
+    /// The code as sent today: old stacks omitted 0x8000.
     pub const fn modern(self) -> FoeErrorCode {
         if self.0 <= LAST_OLD { FoeErrorCode(BASE | self.0) } else { self }
     }
@@ -79,7 +79,7 @@ mod tests {
 
     // covers: 6.4, codec-mailbox
     #[test]
-    fn codes_of_old_stacks_are_understood() {
+    fn codes_of_old_stacks_are_translated() {
         assert_eq!(FoeErrorCode(1).to_string(), "0x0001 Not found");
         assert_eq!(FoeErrorCode(9).modern(), FoeErrorCode::NOT_BOOTSTRAP);
         assert_eq!(FoeErrorCode(10).name(), None);

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why an SDO transfer was refused or given up. Unknown codes are kept.
+/// The reason for which an SDO transfer was refused or aborted. Unknown codes are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AbortCode(pub u32);
 
@@ -17,7 +17,7 @@ macro_rules! abort_codes {
             /// Every code of the table, in ascending order.
             pub const ALL: &'static [AbortCode] = &[$(AbortCode::$name),*];
 
-            /// What the code means; `None` for a code that is not in the table.
+            /// The meaning of the code; `None` for a code that is not in the table.
             pub const fn name(self) -> Option<&'static str> {
                 match self.0 {
                     $($code => Some($text),)*
@@ -79,7 +79,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn an_unknown_code_is_kept_and_shown() {
+    fn an_unknown_code_is_kept_and_displayed() {
         assert_eq!(AbortCode(0x1234_5678).to_string(), "0x12345678 unknown abort code");
         assert_eq!(AbortCode::OBJECT_DOES_NOT_EXIST.to_string(), "0x06020000 Object does not exist");
     }

@@ -1,4 +1,4 @@
-//! Parts that SDO requests and responses share: command bits, addresses, expedited data, segments (protocol 6.3).
+//! Common parts of SDO requests and responses: command bits, addresses, expedited data, segments (protocol 6.3).
 
 use super::{AbortCode, EXPEDITED_MAX_DATA, INITIATE_LEN, SEGMENT_MIN_DATA, SEGMENT_OVERHEAD, SdoError};
 use crate::bytes::u32_at;
@@ -44,19 +44,19 @@ impl<'a> Head<'a> {
         }
     }
 
-    /// The four bytes behind the subindex as a number.
+    /// The four bytes after the subindex as a number.
     pub fn size(&self) -> Result<u32, SdoError> {
         u32_at(self.bytes, 6).ok_or(SdoError::Short { expected: INITIATE_LEN, got: self.bytes.len() })
     }
 
-    /// Data of an expedited transfer; all four bytes where the size is not indicated.
+    /// Data of an expedited transfer; all four bytes if the size is not indicated.
     pub fn expedited(&self) -> Result<&'a [u8], SdoError> {
         let unused = if self.flag(SIZE_INDICATED) { usize::from(self.command >> 2 & 0x03) } else { 0 };
         let short = SdoError::Short { expected: INITIATE_LEN, got: self.bytes.len() };
         self.bytes.get(6..INITIATE_LEN - unused).ok_or(short)
     }
 
-    /// Total size of a normal transfer and the data that came with it; what is behind the total is padding.
+    /// Total size of a normal transfer and the data of the message; bytes beyond the total are padding.
     pub fn normal(&self) -> Result<(u32, &'a [u8]), SdoError> {
         let total = self.size()?;
         let data = &self.bytes[INITIATE_LEN..];
@@ -64,10 +64,10 @@ impl<'a> Head<'a> {
         Ok((total, &data[..length]))
     }
 
-    /// Toggle, whether it is the last one, and the data of a segment.
+    /// Toggle, whether the segment is the last one, and its data.
     pub fn segment(&self) -> Result<(bool, bool, &'a [u8]), SdoError> {
         let data = &self.bytes[SEGMENT_OVERHEAD..];
-        // Only a segment of the least length says how much of it is padding. One that lacks the padding is understood.
+        // Only a segment of minimum length indicates its padding. A segment without padding is accepted.
         let length = if data.len() > SEGMENT_MIN_DATA {
             data.len()
         } else {
@@ -85,7 +85,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// Writes one SDO message into a buffer of the caller; `None` where it does not fit.
+/// Writes one SDO message into a buffer of the caller; `None` if it does not fit.
 pub(super) struct Encoder<'b> {
     pub out: &'b mut [u8],
     pub service: CoeService,
@@ -100,7 +100,7 @@ impl Encoder<'_> {
         Some(&mut out[SEGMENT_OVERHEAD..])
     }
 
-    /// A message without data: command and, where there is one, the object with four bytes behind it.
+    /// A message without data: command and, if there is an object, index, subindex and four bytes.
     pub fn initiate(mut self, specifier: u8, flags: u8, object: (u16, u8), size: u32) -> Option<usize> {
         let out = self.start(INITIATE_LEN, specifier, flags)?;
         out[..2].copy_from_slice(&object.0.to_le_bytes());
@@ -109,7 +109,7 @@ impl Encoder<'_> {
         Some(INITIATE_LEN)
     }
 
-    /// A message of an expedited transfer; `None` also where the data is not 1 to 4 bytes long.
+    /// A message of an expedited transfer; `None` also if the data is not 1 to 4 bytes long.
     pub fn expedited(self, specifier: u8, flags: u8, object: (u16, u8), data: &[u8]) -> Option<usize> {
         if data.is_empty() || data.len() > EXPEDITED_MAX_DATA {
             return None;
@@ -120,7 +120,7 @@ impl Encoder<'_> {
         self.initiate(specifier, flags | EXPEDITED | SIZE_INDICATED | unused, object, u32::from_le_bytes(size))
     }
 
-    /// The first message of a normal transfer; `None` also where there is more data than the total says.
+    /// The first message of a normal transfer; `None` also if the data is longer than the total.
     pub fn normal(self, specifier: u8, flags: u8, object: (u16, u8), total: u32, data: &[u8]) -> Option<usize> {
         if u32::try_from(data.len()).ok()? > total {
             return None;
@@ -141,7 +141,7 @@ impl Encoder<'_> {
         Some(length)
     }
 
-    /// A message that says nothing but its toggle.
+    /// A message that contains only its toggle.
     pub fn toggle(self, specifier: u8, toggle: bool) -> Option<usize> {
         self.initiate(specifier, toggle_bit(toggle), (0, 0), 0)
     }
@@ -151,7 +151,7 @@ const fn toggle_bit(toggle: bool) -> u8 {
     if toggle { TOGGLE } else { 0 }
 }
 
-/// The flag of complete access.
+/// The complete access bit.
 pub(super) const fn complete_access_bit(complete_access: bool) -> u8 {
     if complete_access { COMPLETE_ACCESS } else { 0 }
 }

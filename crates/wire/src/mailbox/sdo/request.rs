@@ -1,4 +1,4 @@
-//! SDO requests: what a MainDevice sends (protocol 6.3).
+//! SDO requests of a MainDevice (protocol 6.3).
 
 use super::codec::{ABORT, COMPLETE_ACCESS, EXPEDITED, Encoder, Head, TOGGLE, complete_access_bit};
 use super::{AbortCode, SdoError};
@@ -18,18 +18,18 @@ pub enum SdoRequest<'a> {
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Whether all entries are written at once.
+        /// Complete access: writes all entries at once.
         complete_access: bool,
         /// The value, 1..=4 bytes.
         data: &'a [u8],
     },
-    /// Starts writing an object; segments follow where `data` is shorter than `total`.
+    /// Starts writing an object; segments follow if `data` is shorter than `total`.
     DownloadNormal {
         /// Index of the object.
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Whether all entries are written at once.
+        /// Complete access: writes all entries at once.
         complete_access: bool,
         /// Bytes of the value.
         total: u32,
@@ -42,30 +42,30 @@ pub enum SdoRequest<'a> {
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Whether all entries are read at once.
+        /// Complete access: reads all entries at once.
         complete_access: bool,
     },
-    /// Goes on writing.
+    /// Writes the next segment.
     DownloadSegment {
         /// Toggle, false in the first segment.
         toggle: bool,
-        /// Whether no segment follows.
+        /// Whether this is the last segment.
         last: bool,
         /// The next bytes of the value.
         data: &'a [u8],
     },
-    /// Asks for the next bytes of what is being read.
+    /// Reads the next segment.
     UploadSegment {
         /// Toggle, false in the first segment.
         toggle: bool,
     },
-    /// Gives up the transfer.
+    /// Aborts the transfer.
     Abort {
         /// Index of the object.
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Why.
+        /// Abort code.
         code: AbortCode,
     },
 }
@@ -105,8 +105,8 @@ impl<'a> SdoRequest<'a> {
         }
     }
 
-    /// Encodes the payload of a CoE message and returns its length; `None` where it does not fit `out`, where expedited
-    /// data is not 1 to 4 bytes long, or where there is more data than `total`.
+    /// Encodes the payload of a CoE message and returns its length; `None` if it does not fit `out`, if expedited data
+    /// is not 1 to 4 bytes long, or if `data` is longer than `total`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let encoder = Encoder { out, service: CoeService::SdoRequest };
         match *self {

@@ -1,4 +1,4 @@
-//! SDO responses: what a SubDevice answers (protocol 6.3).
+//! SDO responses of a SubDevice (protocol 6.3).
 
 use super::codec::{ABORT, COMPLETE_ACCESS, EXPEDITED, Encoder, Head, TOGGLE, complete_access_bit};
 use super::{AbortCode, SdoError};
@@ -9,10 +9,10 @@ const DOWNLOAD_SEGMENT: u8 = 1;
 const UPLOAD: u8 = 2;
 const DOWNLOAD: u8 = 3;
 
-/// An answer of the SDO server of a SubDevice.
+/// A response of the SDO server of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SdoResponse<'a> {
-    /// The object is written, or the segments may come.
+    /// The object is written, or the server accepts segments.
     DownloadDone {
         /// Index of the object.
         index: u16,
@@ -25,18 +25,18 @@ pub enum SdoResponse<'a> {
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Whether it is all entries at once.
+        /// Complete access: the value contains all entries.
         complete_access: bool,
         /// The value, 1..=4 bytes.
         data: &'a [u8],
     },
-    /// The first bytes of a value; more is to be asked for where `data` is shorter than `total`.
+    /// The first bytes of a value; segments have to be requested if `data` is shorter than `total`.
     UploadNormal {
         /// Index of the object.
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Whether it is all entries at once.
+        /// Complete access: the value contains all entries.
         complete_access: bool,
         /// Bytes of the value.
         total: u32,
@@ -48,28 +48,28 @@ pub enum SdoResponse<'a> {
         /// Toggle of the segment.
         toggle: bool,
     },
-    /// The next bytes of what is being read.
+    /// The next segment of an upload.
     UploadSegment {
         /// Toggle of the request.
         toggle: bool,
-        /// Whether no segment follows.
+        /// Whether this is the last segment.
         last: bool,
         /// The next bytes of the value.
         data: &'a [u8],
     },
-    /// The transfer is refused or given up.
+    /// The transfer is refused or aborted.
     Abort {
         /// Index of the object.
         index: u16,
         /// Subindex.
         sub_index: u8,
-        /// Why.
+        /// Abort code.
         code: AbortCode,
     },
 }
 
 impl<'a> SdoResponse<'a> {
-    /// Decodes the payload of a CoE message. An abort is understood as SDO request and as SDO response.
+    /// Decodes the payload of a CoE message. An abort is accepted with the service SDO request or SDO response.
     pub fn decode(payload: &'a [u8]) -> Result<SdoResponse<'a>, SdoError> {
         let head = Head::decode(payload)?;
         let abort = head.specifier() == ABORT && head.service == CoeService::SdoRequest;
@@ -104,8 +104,8 @@ impl<'a> SdoResponse<'a> {
         }
     }
 
-    /// Encodes the payload of a CoE message and returns its length; `None` where it does not fit `out`, where expedited
-    /// data is not 1 to 4 bytes long, or where there is more data than `total`.
+    /// Encodes the payload of a CoE message and returns its length; `None` if it does not fit `out`, if expedited data
+    /// is not 1 to 4 bytes long, or if `data` is longer than `total`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
         let encoder = Encoder { out, service: CoeService::SdoResponse };
         match *self {

@@ -116,7 +116,7 @@ fn one_vector_for_every_response() {
 }
 
 #[test]
-fn an_abort_of_a_subdevice_is_understood_with_both_services() {
+fn an_abort_of_a_subdevice_is_decoded_with_both_services() {
     let abort = SdoResponse::Abort { index: OBJECT, sub_index: 1, code: AbortCode::READ_ONLY };
     let mut bytes = [0x00, 0x20, 0x80, 0x12, 0x1C, 1, 0x02, 0x00, 0x01, 0x06];
     assert_eq!(SdoResponse::decode(&bytes), Ok(abort));
@@ -133,7 +133,7 @@ fn expedited_data_without_an_indicated_size_is_four_bytes() {
 }
 
 #[test]
-fn bytes_behind_the_total_of_a_normal_transfer_are_padding() {
+fn bytes_beyond_the_total_of_a_normal_transfer_are_padding() {
     let bytes = [0x00, 0x30, 0x41, 0x12, 0x1C, 1, 2, 0, 0, 0, 7, 8, 0, 0];
     let expected =
         SdoResponse::UploadNormal { index: OBJECT, sub_index: 1, complete_access: false, total: 2, data: &[7, 8] };
@@ -141,7 +141,7 @@ fn bytes_behind_the_total_of_a_normal_transfer_are_padding() {
 }
 
 #[test]
-fn a_short_segment_without_its_padding_is_understood() {
+fn a_short_segment_without_padding_is_decoded() {
     let bytes = [0x00, 0x30, 0x0B, 1, 2];
     assert_eq!(
         SdoResponse::decode(&bytes),
@@ -151,7 +151,7 @@ fn a_short_segment_without_its_padding_is_understood() {
 }
 
 #[test]
-fn what_cannot_be_said_is_not_encoded() {
+fn invalid_messages_are_not_encoded() {
     let expedited = |data| SdoRequest::DownloadExpedited { index: OBJECT, sub_index: 0, complete_access: false, data };
     let mut out = [0; 64];
     assert_eq!(expedited(&[]).encode(&mut out), None);
@@ -163,7 +163,7 @@ fn what_cannot_be_said_is_not_encoded() {
 }
 
 #[test]
-fn another_service_and_an_unknown_command_are_refused_with_both_sides_named() {
+fn another_service_and_an_unknown_command_are_refused_with_expected_and_received() {
     let emergency = [0x00, 0x10, 0, 0, 0, 0, 0, 0, 0, 0];
     let error = SdoResponse::decode(&emergency).unwrap_err();
     assert_eq!(error.to_string(), "expected SDO response, got emergency");
@@ -247,7 +247,7 @@ proptest! {
 
     // covers: codec-mailbox
     #[test]
-    fn any_bytes_never_panic_and_what_decodes_can_be_said_again(
+    fn any_bytes_never_panic_and_decoded_messages_can_be_encoded(
         service in 2_u8..4,
         rest in proptest::collection::vec(any::<u8>(), 0..40),
     ) {

@@ -1,11 +1,11 @@
 //! The attribute of an IDN, element 3 (protocol 6.6; bits of IEC 61491).
 
-/// How long the data of an IDN is.
+/// Length of the data of an IDN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum IdnLength {
-    /// So many bytes: 1, 2, 4 or 8.
+    /// Fixed length: 1, 2, 4 or 8 bytes.
     Fixed(u8),
-    /// A list of elements of so many bytes; two lengths of 16 bits in bytes, present and largest, stand before it.
+    /// A list of elements with this number of bytes; before it two 16-bit lengths in bytes: current and maximum.
     List(u8),
 }
 
@@ -26,7 +26,7 @@ impl IdnAttribute {
     /// Bit: cannot be written in OP (communication phase 4).
     pub const PROTECTED_OP: u32 = 1 << 30;
 
-    /// An attribute with conversion factor 1 for data of this length. An element size that is none is taken as 1 byte.
+    /// An attribute with conversion factor 1 for data of this length. An invalid element size is replaced by 1 byte.
     pub const fn new(length: IdnLength) -> IdnAttribute {
         let (bytes, list) = match length {
             IdnLength::Fixed(bytes) => (bytes, 0),
@@ -41,7 +41,7 @@ impl IdnAttribute {
         IdnAttribute(1 | size << LENGTH_SHIFT | list)
     }
 
-    /// The same for a procedure command.
+    /// The attribute of a procedure command.
     pub const fn command(self) -> IdnAttribute {
         IdnAttribute(self.0 | COMMAND)
     }
@@ -52,7 +52,7 @@ impl IdnAttribute {
         if self.0 & LIST != 0 { IdnLength::List(bytes) } else { IdnLength::Fixed(bytes) }
     }
 
-    /// It is a procedure command.
+    /// Whether the IDN is a procedure command.
     pub const fn is_command(self) -> bool {
         self.0 & COMMAND != 0
     }
@@ -67,12 +67,12 @@ impl IdnAttribute {
         (self.0 >> 20 & 0x07) as u8
     }
 
-    /// Places behind the decimal point.
+    /// Decimal places.
     pub const fn decimals(self) -> u8 {
         (self.0 >> DECIMALS_SHIFT & 0x0F) as u8
     }
 
-    /// All of these bits are set.
+    /// Whether all of these bits are set.
     pub const fn has(self, bits: u32) -> bool {
         self.0 & bits == bits
     }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why reading or writing an element failed. Unknown codes are kept.
+/// The reason for which reading or writing an element failed. Unknown codes are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SoeErrorCode(pub u16);
 
@@ -17,7 +17,7 @@ macro_rules! soe_errors {
             /// Every code of the table, in ascending order.
             pub const ALL: &'static [SoeErrorCode] = &[$(SoeErrorCode::$name),*];
 
-            /// What the code means; `None` for a code that is not in the table.
+            /// The meaning of the code; `None` for a code that is not in the table.
             pub const fn name(self) -> Option<&'static str> {
                 match self.0 {
                     $($code => Some($text),)*

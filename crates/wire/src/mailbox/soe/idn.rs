@@ -3,7 +3,7 @@
 use core::fmt;
 use core::str::FromStr;
 
-/// An IDN: bit 15 tells product from standard, bits 14:12 the parameter set, bits 11:0 the number.
+/// An IDN: bit 15 distinguishes product from standard, bits 14:12 are the parameter set, bits 11:0 the number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Idn(pub u16);
 
@@ -23,7 +23,7 @@ impl Idn {
         Idn(PRODUCT | Idn::standard(set, number).0)
     }
 
-    /// It is the vendor's own (P), not of the standard (S).
+    /// Whether the IDN is a product IDN (P) of the vendor, not a standard IDN (S).
     pub const fn is_product(self) -> bool {
         self.0 & PRODUCT != 0
     }
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_idn_is_refused() {
+    fn an_invalid_idn_is_refused() {
         for text in ["", "S", "S-0", "S-8-1", "S-0-4096", "Q-0-1", "S-0-1-2", "S-+1-2", "S-0-", "S-0- 1"] {
             assert_eq!(text.parse::<Idn>(), Err(ParseIdnError), "{text}");
         }
