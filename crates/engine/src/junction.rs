@@ -90,14 +90,14 @@ pub enum JunctionError {
         /// The connection.
         connection: JunctionConnection,
         /// The evidence.
-        shown: Shown,
+        shown: ClosingEvidence,
     },
 }
 
 /// Evidence that no cable closes a ring where it was declared, from closing both ends for a moment. Then an intact ring
 /// loses no SubDevice, and a ring that is broken elsewhere loses those behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Shown {
+pub enum ClosingEvidence {
     /// A SubDevice did not answer that would have answered with the cable.
     CutOff {
         /// Position of the first of them.
@@ -112,12 +112,12 @@ pub enum Shown {
     NoFrame,
 }
 
-impl fmt::Display for Shown {
+impl fmt::Display for ClosingEvidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Shown::CutOff { position } => write!(f, "the SubDevice at position {position} is cut off"),
-            Shown::StillThere { position } => write!(f, "the SubDevice at position {position} still answers"),
-            Shown::NoFrame => f.write_str("no frame comes back"),
+            ClosingEvidence::CutOff { position } => write!(f, "the SubDevice at position {position} is cut off"),
+            ClosingEvidence::StillThere { position } => write!(f, "the SubDevice at position {position} still answers"),
+            ClosingEvidence::NoFrame => f.write_str("no frame comes back"),
         }
     }
 }

@@ -45,10 +45,10 @@ impl<'a> Tree<'a> {
     fn new(wiring: &'a Wiring, has_clock: &'a [bool]) -> Tree<'a> {
         let count = wiring.count();
         let mut tree = Tree { wiring, has_clock, parents: vec![None; count], branches: vec![Vec::new(); count] };
-        let mut is_met = vec![false; count];
-        for arrival in (0..super::wiring::TREES).flat_map(|link| wiring.way(link)) {
-            if !core::mem::replace(&mut is_met[arrival.at.node], true)
-                && let Some(near) = wiring.far(arrival.at).filter(|near| is_met[near.node])
+        let mut is_reached = vec![false; count];
+        for arrival in (0..super::wiring::TREES).flat_map(|link| wiring.path(link)) {
+            if !core::mem::replace(&mut is_reached[arrival.at.node], true)
+                && let Some(near) = wiring.far(arrival.at).filter(|near| is_reached[near.node])
             {
                 tree.parents[arrival.at.node] = Some(near);
                 tree.branches[near.node].push(near);

@@ -31,7 +31,7 @@ pub struct Cables {
 
 impl Cables {
     /// These cables are there, and no others.
-    pub fn see(&mut self, present: impl Iterator<Item = (End, End)>) {
+    pub fn set_present(&mut self, present: impl Iterator<Item = (End, End)>) {
         let present: alloc::collections::BTreeSet<Ends> = present.map(ends).collect();
         for (ends, known) in &mut self.known {
             known.is_old |= !present.contains(ends);
@@ -112,10 +112,10 @@ mod tests {
         let cable = [ends((one, other))];
         let mut cables = Cables::default();
         cables.learn(&cable, 350);
-        cables.see([(other, one)].into_iter());
+        cables.set_present([(other, one)].into_iter());
         assert_eq!((cables.measured(&cable), cables.remembered(&cable)), (Some(350), Some(350)));
-        cables.see(core::iter::empty());
-        cables.see([(other, one)].into_iter());
+        cables.set_present(core::iter::empty());
+        cables.set_present([(other, one)].into_iter());
         assert_eq!((cables.measured(&cable), cables.remembered(&cable)), (None, Some(350)));
         cables.learn(&cable, 360);
         assert_eq!(cables.measured(&cable), Some(360));
@@ -135,8 +135,8 @@ mod tests {
         assert_eq!(cables.measured_with(&[x, y], &[a, x, x, y, y, a], 2 * 1_500), Some(1_400));
         cables.learn(&[a, a], 200);
         assert_eq!((cables.measured(&[x, y]), cables.measured(&[a, x, x])), (Some(1_400), Some(1_700)));
-        cables.see([a, x].into_iter());
-        cables.see([a, x, y].into_iter());
+        cables.set_present([a, x].into_iter());
+        cables.set_present([a, x, y].into_iter());
         assert_eq!(
             (cables.measured(&[x]), cables.measured(&[y]), cables.remembered(&[y])),
             (Some(800), None, Some(600))

@@ -70,17 +70,17 @@ impl SyncWindow {
 mod tests {
     use super::*;
 
-    fn told(window: &mut SyncWindow, results: impl IntoIterator<Item = bool>) -> usize {
+    fn changes(window: &mut SyncWindow, results: impl IntoIterator<Item = bool>) -> usize {
         results.into_iter().filter(|inside| window.take(*inside)).count()
     }
 
     #[test]
     fn three_results_in_a_row_are_a_change_and_the_first_one_is_to_the_inside() {
         let mut window = SyncWindow::default();
-        assert_eq!(told(&mut window, [false; 10]), 0);
-        assert_eq!(told(&mut window, [true, true, false, true, true]), 0);
-        assert_eq!(told(&mut window, [true]), 1);
-        assert_eq!(told(&mut window, [false, false, true, false, false]), 0);
+        assert_eq!(changes(&mut window, [false; 10]), 0);
+        assert_eq!(changes(&mut window, [true, true, false, true, true]), 0);
+        assert_eq!(changes(&mut window, [true]), 1);
+        assert_eq!(changes(&mut window, [false, false, true, false, false]), 0);
         assert!(window.take(false) && window.is_outside());
     }
 
@@ -89,9 +89,9 @@ mod tests {
     fn clocks_at_the_edge_of_their_window_are_told_less_and_less_often() {
         let mut window = SyncWindow::default();
         let flaps = (0..100_000).map(|number| number % 20 < 10);
-        assert!(told(&mut window, flaps) < 12);
+        assert!(changes(&mut window, flaps) < 12);
         // After a calm time it begins anew.
-        told(&mut window, [true; 300_000]);
-        assert_eq!(told(&mut window, [false, false, false, true, true, true]), 2);
+        changes(&mut window, [true; 300_000]);
+        assert_eq!(changes(&mut window, [false, false, false, true, true, true]), 2);
     }
 }

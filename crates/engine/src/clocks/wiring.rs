@@ -94,7 +94,7 @@ impl Wiring {
     }
 
     /// Arrivals of a frame of a link, in order.
-    pub fn way(&self, tree: usize) -> Vec<Arrival> {
+    pub fn path(&self, tree: usize) -> Vec<Arrival> {
         let limit = 4 * self.far.len() + 4;
         let mut arrivals = Vec::new();
         let mut next = self.entries[tree];
@@ -122,9 +122,9 @@ impl Wiring {
     pub fn entry_ports(&self) -> Vec<u8> {
         let mut ports: Vec<Option<u8>> = vec![None; self.far.len()];
         for tree in 0..TREES {
-            let way = self.way(tree);
-            let processed = processed_in(&way, self.far.len());
-            for Arrival { at, .. } in way.iter().filter(|arrival| processed[arrival.at.node]) {
+            let path = self.path(tree);
+            let processed = processed_in(&path, self.far.len());
+            for Arrival { at, .. } in path.iter().filter(|arrival| processed[arrival.at.node]) {
                 ports[at.node].get_or_insert(at.port);
             }
         }
@@ -140,9 +140,9 @@ impl Wiring {
         let mut trees = vec![0; self.far.len()];
         let mut is_seen = vec![false; self.far.len()];
         for tree in 0..TREES {
-            let way = self.way(tree);
-            let here = processed_in(&way, self.far.len());
-            for Arrival { at, .. } in way.iter().filter(|arrival| here[arrival.at.node] && !is_seen[arrival.at.node]) {
+            let path = self.path(tree);
+            let here = processed_in(&path, self.far.len());
+            for Arrival { at, .. } in path.iter().filter(|arrival| here[arrival.at.node] && !is_seen[arrival.at.node]) {
                 ports[at.node][usize::from(at.port & 3)] = true;
                 trees[at.node] = tree;
             }
@@ -153,9 +153,9 @@ impl Wiring {
 }
 
 /// Which SubDevices process the frame, by position.
-pub(super) fn processed_in(way: &[Arrival], count: usize) -> Vec<bool> {
+pub(super) fn processed_in(path: &[Arrival], count: usize) -> Vec<bool> {
     let mut processed = vec![false; count];
-    way.iter().filter(|arrival| arrival.processed).for_each(|arrival| processed[arrival.at.node] = true);
+    path.iter().filter(|arrival| arrival.processed).for_each(|arrival| processed[arrival.at.node] = true);
     processed
 }
 
@@ -203,8 +203,8 @@ mod tests {
         Topology { nodes, main_count: 5, local_rings, ..Topology::default() }
     }
 
-    fn ways(wiring: &Wiring, tree: usize) -> Vec<(usize, u8, bool)> {
-        wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
+    fn paths(wiring: &Wiring, tree: usize) -> Vec<(usize, u8, bool)> {
+        wiring.path(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
     }
 
     // covers: 9.4, dc-delays
@@ -213,10 +213,10 @@ mod tests {
         let whole = Wiring::new(&junction(), false, |_| true);
         let round =
             [(0, 0, true), (1, 0, true), (2, 0, true), (3, 0, true), (0, 1, false), (4, 0, true), (0, 2, false)];
-        assert_eq!(ways(&whole, 0), round);
+        assert_eq!(paths(&whole, 0), round);
         assert_eq!(whole.cables().count(), 5);
         let open = Wiring::new(&junction(), false, |at| at.node != 3);
-        assert_eq!(ways(&open, 0).len(), 9);
+        assert_eq!(paths(&open, 0).len(), 9);
         // Broken between 1 and 2: the second half is entered from behind.
         let mut topology = junction();
         (topology.nodes[2].parent, topology.nodes[1].children[1]) = (None, None);
@@ -232,7 +232,7 @@ mod tests {
             (4, 0, true),
             (0, 2, false),
         ];
-        assert_eq!(ways(&broken, 0), parts);
+        assert_eq!(paths(&broken, 0), parts);
         assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
     }
 
@@ -247,7 +247,7 @@ mod tests {
         }
         topology.open_ports = vec![PortOf { node: 2, port: 1 }];
         let wiring = Wiring::new(&topology, true, |_| true);
-        assert_eq!(ways(&wiring, 0), [(0, 0, true), (1, 0, true), (2, 0, true)]);
-        assert_eq!(ways(&wiring, 1), [(2, 1, false), (1, 1, false), (3, 0, true), (1, 2, false), (0, 1, false)]);
+        assert_eq!(paths(&wiring, 0), [(0, 0, true), (1, 0, true), (2, 0, true)]);
+        assert_eq!(paths(&wiring, 1), [(2, 1, false), (1, 1, false), (3, 0, true), (1, 2, false), (0, 1, false)]);
     }
 }

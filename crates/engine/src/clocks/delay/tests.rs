@@ -179,13 +179,13 @@ fn walk(wiring: &Wiring, passages: &[Passage], cable: impl Fn(PortOf) -> i64) ->
     let count = wiring.count();
     let (mut at, mut arrivals, mut units) = (0, vec![[0; 4]; count], vec![0; count]);
     let mut first: Vec<Option<i64>> = vec![None; count];
-    let way = wiring.way(0);
-    for (step, arrival) in way.iter().enumerate() {
+    let path = wiring.path(0);
+    for (step, arrival) in path.iter().enumerate() {
         let PortOf { node, port } = arrival.at;
         if step > 0 {
             let near = wiring.far(arrival.at).expect("it came from somewhere");
             let passage = passages.get(near.node).copied().unwrap_or_default();
-            at += if way[step - 1].processed { passage.processed } else { passage.forwarded };
+            at += if path[step - 1].processed { passage.processed } else { passage.forwarded };
             at += (300 + cable(near.max(arrival.at))) << FRACTION;
         }
         let begin = *first[node].get_or_insert(at);
@@ -215,7 +215,7 @@ fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> V
     let (times, truth) = walk(&wiring, passages, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
     let stations = stations(7);
     let segment = Segment { wiring: &wiring, stations: &stations, passages };
-    segment.see(cables);
+    segment.set_present(cables);
     let delays = segment.propagation(&times, 0, cables);
     (0..7).map(|node| Some((delays.units[node]? - truth[node]) >> FRACTION)).collect()
 }
