@@ -1,10 +1,10 @@
-//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1).
-//!
-//! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
-//! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known
-//! about cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock,
-//! is none: clocks there are a group whose place within the branch is not known (`clocks::places`).
+//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1). The path
+//! of the frame is followed port by port ([`Wiring::path`]). Between two arrivals at a SubDevice with a clock lies a
+//! branch. The clock measures the time of the branch; without the times that the SubDevices in the branch measured
+//! themselves, the rest is the time on cables. SubDevices without a clock are part of the cable. A cable takes the same
+//! time in both directions; with this and the known times of cables ([`Cables`]) the delays follow. Behind a fork
+//! without a clock they may not follow: then the clocks there form a group with an unknown place within the branch
+//! (`clocks::places`).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -19,37 +19,37 @@ use super::places::{Place, Places, Range};
 use super::wiring::{Arrival, TREES, Wiring, processed_in};
 use crate::topology::PortOf;
 
-/// Longer than this no frame is on its way: a thousand SubDevices take 2 ms.
+/// Longest possible round trip of a frame: a thousand SubDevices take 2 ms.
 pub(super) const MOST_NS: i64 = 20_000_000;
 
-/// Cables that take as long together as they are known to, to within this and so much for each, are those that are
-/// known.
+/// Tolerance between a measured sum and the remembered times of its cables, and further tolerance per section: within
+/// it, the cables are the remembered ones.
 const SAME: i64 = 30 << FRACTION;
 const SAME_CABLE: i64 = 10 << FRACTION;
 
-/// Times at which the frame came in at port 0..3 after it came in at the port of entry, with fraction
-/// ([`super::FRACTION`]). Those of ports that it did not come in at say nothing.
+/// Times at which the frame came in at port 0..3, relative to the entry port, with fraction ([`super::FRACTION`]).
+/// Times of ports at which it did not come in have no meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortTimes(pub [i64; 4]);
 
-/// What a measurement is about.
+/// The segment that was measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<'a> {
-    /// Who is connected to whom.
+    /// The connections between ports.
     pub wiring: &'a Wiring,
     /// Station addresses by position.
     pub stations: &'a [StationAddress],
-    /// What is known of passages by position, see [`Passage`]; those without one take nothing beyond what all do.
+    /// Known passages by position, see [`Passage`]; a SubDevice without one takes no additional time.
     pub passages: &'a [Passage],
 }
 
-/// What a frame takes through a SubDevice from port to port, with fraction, less what it takes through all (protocol
-/// 7.1: there, tDiff is the difference of both).
+/// Time of a frame through a SubDevice from port to port, with fraction, beyond a base time that all SubDevices have in
+/// common (protocol 7.1: tDiff is the difference between both fields).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Passage {
-    /// Where its processing unit meets the frame.
+    /// Path through the processing unit.
     pub processed: i64,
-    /// Where it does not.
+    /// Path without the processing unit.
     pub forwarded: i64,
 }
 
@@ -58,14 +58,14 @@ impl Segment<'_> {
         Some((*self.stations.get(at.node)?, at.port))
     }
 
-    /// Notes which cables are there.
+    /// Sets the connected cables ([`Cables::set_present`]).
     pub fn set_present(&self, cables: &mut Cables) {
         cables.set_present(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
     }
 
-    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a
-    /// clock. Delays count for those of whom it is known how far they are from the reference or, where that is on
-    /// another link, from the first clock. What was measured of cables is learned.
+    /// Propagation delays. `times` by position, in units of one clock (see [`super::Measurements::mean`]); `None`
+    /// without a clock. Delays are known if the time to the reference clock is known or, if that is on the other link,
+    /// to the first clock. Measured times of cables are stored in `cables`.
     pub fn propagation(&self, times: &[Option<PortTimes>], reference: usize, cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
         let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
@@ -82,38 +82,38 @@ impl Segment<'_> {
     }
 }
 
-/// The arrivals of one frame, with what clocks say about them.
+/// The arrivals of one frame, with the times that the clocks measured.
 struct Walk<'a, C: Fn(usize) -> Option<PortTimes>> {
     segment: &'a Segment<'a>,
     path: &'a [Arrival],
     clock: &'a C,
-    /// Place of each SubDevice's last arrival.
+    /// By position: index of the last arrival at the SubDevice.
     last: Vec<usize>,
-    /// Place of its next arrival, by place.
+    /// By index of an arrival: index of the next arrival at the same SubDevice.
     next: Vec<Option<usize>>,
 }
 
-/// From one arrival at a clock to the next, with nothing but cables and SubDevices without a clock in between.
+/// The path from one clock to the next, with only cables and SubDevices without a clock in between.
 #[derive(Clone, Copy, Debug)]
 struct Section {
     from: usize,
     to: usize,
-    /// What its cables are known to take.
+    /// Known time of its cables.
     known: Option<i64>,
-    /// What they take, as known or as follows.
+    /// Time of its cables, known or derived.
     time: Option<i64>,
-    /// What the SubDevice at its end takes for what lies behind it.
+    /// Time that the SubDevice at its end measured for the branches behind it.
     span: i64,
 }
 
-/// What is known of the cables of a branch.
+/// Result for the cables of a branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BranchTimes {
-    /// All, or what a fork without a clock does not hide.
+    /// All times follow, except those that a fork without a clock hides.
     Exact,
-    /// Which of several cables of a ring takes what is not known.
+    /// Several cables of a ring share a time; the single times are unknown.
     Shared,
-    /// Each, and they do not take as long together.
+    /// The known times of all cables contradict the measured sum.
     Contradictory,
 }
 
@@ -142,7 +142,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         let count = delays.units.len();
         let mut places = Places::new(count);
         let mut units: Vec<Option<Place>> = vec![None; count];
-        // What comes before the first clock, and between the branches in front of it, nobody measures.
+        // The path before the first clock, and between branches in front of it, is not measured.
         delays.is_guessed |= self.trunk(cables, &mut places);
         for place in 0..self.path.len() {
             let PortOf { node, port } = self.path[place].at;
@@ -164,7 +164,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         places.conclude(&units, reference, delays);
     }
 
-    /// From the port of entry to the processing unit.
+    /// Time from the entry port to the processing unit.
     fn to_unit(&self, first: usize, times: &PortTimes) -> i64 {
         let mut place = first;
         while !self.path[place].processed {
@@ -174,7 +174,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         if place == first { 0 } else { times.0[usize::from(self.path[place].at.port & 3)] }
     }
 
-    /// The way that nobody measures as a whole. Returns whether something in it is not known.
+    /// The path outside all branches, of which no clock measures the whole. Returns whether a time in it is not known.
     fn trunk(&self, cables: &Cables, places: &mut Places) -> bool {
         let (mut at, mut is_guessed) = (places.begin(), false);
         for section in self.sections(0, self.path.len(), &|hops| cables.remembered(hops)) {
@@ -192,8 +192,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         is_guessed
     }
 
-    /// Finds out which part of the time from one arrival at a SubDevice to its next one which cables of the branch
-    /// take. `begin` is the place of the first one.
+    /// Divides the time `took` between two arrivals at a SubDevice among the cables of the branch. `begin` is the place
+    /// of the first arrival.
     fn branch(
         &self,
         from: usize,
@@ -212,17 +212,17 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
             all.is_some_and(|all| (all - total).abs() <= SAME + sections.len() as i64 * SAME_CABLE)
         };
         if sections.iter().any(|section| section.known.is_none()) {
-            // Cables that were away are those from before where all of them take as long together.
+            // Cables that were disconnected are the same as before if their remembered times match the measured sum.
             let before = self.sections(from, to, &|hops| cables.remembered(hops));
             sections = if fits(&before) { before } else { sections };
         }
         let mut is_plausible = true;
         if known(&sections) > total && sections.iter().any(|section| section.known.is_none()) {
-            // What is known cannot be right.
+            // The known times exceed the measured sum: they are wrong.
             sections.iter_mut().for_each(|section| section.known = None);
             is_plausible = false;
         }
-        // Where all is known, the difference to what was measured now is shared by all.
+        // If all times are known, the difference to the measured sum is distributed.
         let all_known = sections.iter().all(|section| section.known.is_some());
         let rest = total - known(&sections);
         let is_one_cable = sections.len() == 2 && sections.iter().all(|section| section.hops() == 1);
@@ -245,7 +245,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         found
     }
 
-    /// What all gaps take where each is known, and something is left over.
+    /// Sets the times of sections that are all known, and distributes the rest by number of hops.
     fn share(&self, sections: &mut [Section], rest: i64) {
         let all: i64 = sections.iter().map(Section::hops).sum();
         let (mut shared, mut done) = (0, 0);
@@ -257,8 +257,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         }
     }
 
-    /// What gaps take that are not known and have a time together: what follows from that, and from what is known of
-    /// cables.
+    /// Sets the times of sections that follow from the sum `rest` of all unknown sections and from the known cables.
     fn follow(&self, sections: &mut [Section], rest: i64, cables: Option<&Cables>) {
         let unknown = || sections.iter().filter(|section| section.known.is_none());
         let together: Vec<Ends> = unknown().flat_map(|section| self.hops(section.from, section.to)).collect();
@@ -274,8 +273,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         sections.iter_mut().zip(times).for_each(|(section, time)| section.time = time);
     }
 
-    /// Notes where the frame comes to clocks in a branch: from its beginning as far as is known, from its end as well,
-    /// and in between clocks are apart from both.
+    /// Records when the frame reaches the clocks of a branch: from its beginning as far as the times are known, and
+    /// from its end as well. Clocks in between form groups of their own.
     fn enter(&self, sections: &[Section], (to, begin, end): (usize, Place, Place), rest: i64, places: &mut Places) {
         let first = sections.iter().position(|section| section.time.is_none()).unwrap_or(sections.len());
         let last = sections.iter().rposition(|section| section.time.is_none()).unwrap_or(0);
@@ -285,7 +284,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
             at = match took(section) {
                 Some(took) => at.after(took),
                 None if number == last && first < last => {
-                    // What follows is known.
+                    // All sections after this one are known.
                     let behind = sections[number + 1..]
                         .iter()
                         .map(|section| took(section).unwrap_or(0) + section.span)
@@ -302,8 +301,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         }
     }
 
-    /// The least and the most that the way through the first gaps may take, of all whose unknown cables take `rest`
-    /// together.
+    /// Range of the time through the sections `front`, if the unknown cables of all sections take `rest` together.
     fn range(&self, front: &[Section], all: &[Section], rest: i64) -> Range {
         let unknown = |sections: &[Section]| -> Vec<Ends> {
             sections
@@ -314,7 +312,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         };
         let (before, all) = (unknown(front), unknown(all));
         let count = |of: &[Ends], ends: &Ends| of.iter().filter(|other| *other == ends).count() as i64;
-        // All of it on that cable of which most is in front, or least.
+        // The extremes: one cable takes all of the rest, namely that with the largest or the smallest part in front.
         let shares = || all.iter().map(|ends| rest * count(&before, ends) / count(&all, ends).max(1));
         let (least, most) = (shares().min().unwrap_or(0), shares().max().unwrap_or(0));
         let spans = front.split_last().map_or(0, |(_, before)| before.iter().map(|section| section.span).sum());
@@ -323,7 +321,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         (fixed + least, fixed + most)
     }
 
-    /// The SubDevice without a clock between two places that has a branch there, if one has.
+    /// The first SubDevice without a clock but with a branch between two arrivals.
     fn fork(&self, from: usize, to: usize) -> Option<usize> {
         let between = self.path.get(from..to.min(self.path.len()))?.iter().map(|arrival| arrival.at.node);
         let is_fork = |node: &usize| {
@@ -335,8 +333,8 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         between.filter(|node| (self.clock)(*node).is_none()).find(is_fork)
     }
 
-    /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there
-    /// and back the same cable takes as long.
+    /// Whether several sections are unknown, and some of them contain a cable that the frame passes in one direction
+    /// only. (If it passes a cable in both directions, both times are equal.)
     fn are_several(&self, sections: &[Section]) -> bool {
         let unknown = || sections.iter().filter(|section| section.known.is_none());
         let mut cables: Vec<Ends> = unknown().flat_map(|section| self.hops(section.from, section.to)).collect();
@@ -344,36 +342,35 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         unknown().count() > 1 && cables.chunk_by(|one, other| one == other).any(|same| same.len() == 1)
     }
 
-    /// What is known of the passage behind an arrival.
+    /// Known time of the passage after an arrival.
     fn passage(&self, place: usize) -> i64 {
         let Arrival { at, processed } = self.path[place];
         let passage = self.segment.passages.get(at.node).copied().unwrap_or_default();
         if processed { passage.processed } else { passage.forwarded }
     }
 
-    /// What is known of all passages on the way of a gap.
+    /// Known time of all passages of a section.
     fn in_passages(&self, section: &Section) -> i64 {
         (section.from..section.to).map(|hop| self.passage(hop)).sum()
     }
 
-    /// The cables between two places, each as often as the frame takes it.
+    /// The cables between two arrivals, each as often as the frame passes it.
     fn hops(&self, from: usize, to: usize) -> Vec<Ends> {
         (from..to).filter_map(|hop| self.cable(hop)).map(ends).collect()
     }
 
-    /// Both ends of the cable behind an arrival.
+    /// Both ends of the cable after an arrival.
     fn cable(&self, place: usize) -> Option<(End, End)> {
         let far = self.path.get(place + 1)?.at;
         let near = self.segment.wiring.far(far)?;
         Some((self.segment.end(near)?, self.segment.end(far)?))
     }
 
-    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a
-    /// SubDevice with a clock.
+    /// The sections between two arrivals. `known` returns the known time of cables.
     fn sections(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Section> {
         let mut sections = Vec::new();
         let mut begin = from;
-        // The SubDevice at the beginning of a branch is not part of it; one at the beginning of the way is.
+        // The SubDevice in front of a branch is not part of it; the first SubDevice of the path is.
         let mut place = if from == 0 && to == self.path.len() { from } else { from + 1 };
         let section = |from: usize, to: usize, span: i64| {
             let hops = self.hops(from, to);

@@ -234,7 +234,8 @@ impl<'s> Walk<'s> {
             if self.is_open(node, 0) {
                 return 0;
             }
-            // The last open port before port 0: then no other SubDevice needs to precede this one.
+            // With the last open port in the order of processing as the entry, no other SubDevice needs to precede this
+            // one.
             TRAVEL.into_iter().rev().find(|port| self.is_open(node, *port)).unwrap_or(0)
         };
         self.earliest(node).unwrap_or_else(by_ports)
