@@ -1,13 +1,11 @@
-//! Distributed clocks as arithmetic: what follows from latched times, and what to do about it (protocol 7).
-//!
-//! * [`wiring`]: the way of a frame through the segment;
-//! * [`delay`]: propagation delays along it, with what is known about [`cables`] and what follows from `sums` of them;
+//! Distributed clocks as arithmetic: delays, drifts and phases from latched times, start times, corrections (protocol
+//! 7).
+//! * [`wiring`]: the path of a frame through the segment;
+//! * [`delay`]: propagation delays along this path, with known times of [`cables`] and of `sums` of cables;
 //! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
-//! * [`start`]: when SYNC signals begin;
-//! * [`follow`]: making a cycle of the host follow the reference clock.
-//!
-//! Nothing here talks to the bus: [`crate::procedures::clocks`] does, and the cyclic datagrams are in
-//! [`crate::exchange`].
+//! * [`start`]: start times of SYNC signals;
+//! * [`follow`]: adjusts the cycle of the host to the reference clock. This module has no access to the bus:
+//!   [`crate::procedures::clocks`] measures and writes, [`crate::exchange`] sends the cyclic datagrams.
 
 pub mod branches;
 pub mod cable_ends;
@@ -31,10 +29,10 @@ pub use start::first_pulse;
 pub(crate) use window::SyncWindow;
 pub use wiring::Wiring;
 
-/// Fractional bits of times in nanoseconds here: halves add up over hundreds of hops.
+/// Fractional bits of times in nanoseconds: rounding errors of half a nanosecond would add up over hundreds of hops.
 pub const FRACTION: u32 = 8;
 
-/// The 64-bit time nearest to `near` whose low half is `low`: what a clock or a datagram of 32 bits means.
+/// The 64-bit time nearest to `near` with the low half `low`: extends a time of a 32-bit clock or datagram.
 pub const fn extend(low: u32, near: u64) -> u64 {
     near.wrapping_add(low.wrapping_sub(near as u32) as i32 as u64)
 }

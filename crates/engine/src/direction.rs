@@ -1,8 +1,8 @@
-//! Which way process data goes.
+//! The direction of process data.
 
 use ringcat_wire::sii::PdoDirection;
 
-/// Which way process data goes, seen from the MainDevice.
+/// The direction of process data, from the point of view of the MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// From the MainDevice to the SubDevice.

@@ -1,47 +1,47 @@
-//! Process data domains: their numbers, and how they are judged.
+//! Process data domains: numbers, and the states that follow from working counters.
 
 /// Number of a domain, in the order of declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DomainId(pub usize);
 
-/// Judgement of a domain's working counters.
+/// State of a domain by its working counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DomainState {
-    /// No SubDevice answered, or no frame came back in time ([`DomainStatus::returned`]).
+    /// No SubDevice processed a frame, or no frame came back in time ([`DomainStatus::returned`]).
     #[default]
     Zero,
-    /// Some answered, or one was met twice.
+    /// Some SubDevices did not process the frames, or one processed a frame twice.
     Incomplete,
-    /// All answered.
+    /// All SubDevices processed the frames.
     Complete,
 }
 
-/// A domain after it was judged.
+/// Result of a domain's last evaluated cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DomainStatus {
-    /// Sum of the working counters of all datagrams and both copies, as really sent (LRW, or LWR and LRD).
+    /// Sum of the working counters of all datagrams and both copies, for the commands in use (LRW, or LWR and LRD).
     pub wkc: u32,
-    /// The sum with all SubDevices.
+    /// The sum if all SubDevices process the frames.
     pub expected: u32,
-    /// The judgement: every datagram by its own working counter; SubDevices declared optional may be missing.
+    /// The state: every datagram is evaluated by its own working counter; optional SubDevices may be missing.
     pub state: DomainState,
-    /// Whether a frame of the judged cycle came back in time, whatever its working counters were.
+    /// Whether a frame of the evaluated cycle came back in time, whatever its working counters.
     pub returned: bool,
-    /// Frames are still out and not overdue: the other fields are those of the last judgement.
+    /// Frames are on the wire and not overdue: the other fields are those of the last evaluated cycle.
     pub pending: bool,
-    /// How often the domain was due while its frames were still out.
+    /// How often the domain was due while its frames were on the wire.
     pub skipped: u64,
 }
 
-/// How old a SubDevice's inputs are. It put them into a frame itself: shared working counters are not trusted alone
-/// (decision 0023).
+/// Age of a SubDevice's inputs. Evidence is that the SubDevice itself wrote them into a frame: a working counter that
+/// several SubDevices share is not enough (decision 0023).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freshness {
-    /// They never came.
+    /// No inputs were received yet.
     Never,
-    /// The SubDevice put them into a frame of the cycle that was judged last, or of a newer one.
+    /// The SubDevice wrote them into a frame of the last evaluated cycle, or of a later one.
     Fresh,
-    /// They are this many cycles older than the last judgement.
+    /// They are older than the last evaluated cycle by this number of cycles.
     Stale {
         /// Cycles of the exchange.
         cycles: u64,
@@ -49,7 +49,7 @@ pub enum Freshness {
 }
 
 impl DomainStatus {
-    /// The judgement in words, as an operator is told.
+    /// The state in words, for an operator.
     pub const fn in_words(&self) -> &'static str {
         match self.state {
             DomainState::Zero if self.returned => "no SubDevice answers",

@@ -1,27 +1,26 @@
-//! Junction redundancy as the application requests it (protocol 9.4): the mode, and declared connections.
-//!
-//! A local ring leaves a junction through one port and comes back to it through another one. A connection names the
-//! cable that comes back, the *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring.
-//! The form of a connection is checked here, its match with the segment when it is applied.
+//! Junction redundancy as the application requests it (protocol 9.4): the mode, and declared connections. A local ring
+//! begins at one port of a junction and returns to another port. A connection names the cable that returns, the
+//! *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring. This module checks the form
+//! of a connection; it is compared with the segment when it is applied.
 
 use core::fmt;
 
 /// Port of a junction to which the closing cable of a declared connection leads (JR-06).
 pub const HEAD_PORT: u8 = 1;
-/// Port at which the ring then begins: the one that frames pass before [`HEAD_PORT`] (protocol 9.4).
+/// Port at which the ring then begins: frames pass it before [`HEAD_PORT`] (protocol 9.4).
 pub const START_PORT: u8 = 3;
-/// Ports that a SubDevice can have.
+/// Largest number of ports of a SubDevice.
 const PORTS: u8 = 4;
 
 /// Handling of local rings (JR-03).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum JunctionMode {
-    /// Local rings are unknown: one that breaks is reported as a crossed line (JR-04).
+    /// Local rings are not known: a break in one is reported as a crossed line (JR-04).
     #[default]
     Disabled,
-    /// Local rings that exist at the scan are learned, and watched from then on.
+    /// Local rings that exist at the scan are learned, and supervised from then on.
     Automatic,
-    /// Local rings that the application declares are watched from the start on.
+    /// Local rings that the application declares are supervised from the start on.
     Strict,
 }
 
@@ -85,25 +84,25 @@ pub enum JunctionError {
     },
     /// The mode is strict and there is no connection.
     NoConnection,
-    /// The closing cable does not exist: the segment showed it when both of its ends were closed for a moment.
+    /// The closing cable does not exist: this was detected when both of its ends were closed for a moment.
     NotThere {
         /// The connection.
         connection: JunctionConnection,
         /// The evidence.
-        shown: Shown,
+        shown: ClosingEvidence,
     },
 }
 
-/// Evidence that no cable closes a ring where it was declared, from closing both ends for a moment. Then an intact ring
-/// loses no SubDevice, and a ring that is broken elsewhere loses those behind its break.
+/// Evidence that no cable connects the declared ports, from closing both ports for a moment. An intact ring then loses
+/// no SubDevice; a ring that is broken elsewhere loses the SubDevices behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Shown {
-    /// A SubDevice did not answer that would have answered with the cable.
+pub enum ClosingEvidence {
+    /// A SubDevice did not answer, although it would be reached if the cable existed.
     CutOff {
         /// Position of the first of them.
         position: usize,
     },
-    /// A SubDevice behind the break did answer.
+    /// A SubDevice behind the break answered.
     StillThere {
         /// Position of the first of them.
         position: usize,
@@ -112,12 +111,12 @@ pub enum Shown {
     NoFrame,
 }
 
-impl fmt::Display for Shown {
+impl fmt::Display for ClosingEvidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Shown::CutOff { position } => write!(f, "the SubDevice at position {position} is cut off"),
-            Shown::StillThere { position } => write!(f, "the SubDevice at position {position} still answers"),
-            Shown::NoFrame => f.write_str("no frame comes back"),
+            ClosingEvidence::CutOff { position } => write!(f, "the SubDevice at position {position} is cut off"),
+            ClosingEvidence::StillThere { position } => write!(f, "the SubDevice at position {position} still answers"),
+            ClosingEvidence::NoFrame => f.write_str("no frame comes back"),
         }
     }
 }
@@ -185,7 +184,7 @@ mod tests {
 
     // covers: JR-06, junctions
     #[test]
-    fn connections_have_their_head_at_port_1_and_their_tail_at_another_port_than_0() {
+    fn a_connection_has_its_head_at_port_1_and_its_tail_not_at_port_0() {
         let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
         assert_eq!(good.check(&[], 5), Ok(()));
         let head = |head_port| JunctionConnection { head_port, ..good };
@@ -199,8 +198,8 @@ mod tests {
         assert_eq!(tail(3).check(&[], 5), Ok(()));
         assert_eq!(good.check(&[], 4), Err(JunctionError::UnknownTail(good)));
         assert_eq!(good.check(&[], 1), Err(JunctionError::UnknownHead(good)));
-        let itself = JunctionConnection { tail: 1, ..good };
-        assert_eq!(itself.check(&[], 5), Err(JunctionError::Taken(itself)));
+        let same_subdevice = JunctionConnection { tail: 1, ..good };
+        assert_eq!(same_subdevice.check(&[], 5), Err(JunctionError::Taken(same_subdevice)));
         assert_eq!(good.check(&[tail(2)], 5), Err(JunctionError::Taken(good)), "the head has one port 1");
     }
 }

@@ -27,7 +27,7 @@ impl Link {
     }
 }
 
-/// The interfaces of a MainDevice. One link is a ring of one: the same code runs on both sets.
+/// The interfaces of a MainDevice. The same code runs with one link and with two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkSet {
     /// The main link alone.

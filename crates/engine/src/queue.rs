@@ -1,6 +1,5 @@
-//! Between the two halves of the engine: a bounded single-producer single-consumer queue of words.
-//!
-//! Without locks and without `unsafe`: the slots are atomics. The producer never waits; what does not fit is counted.
+//! A bounded single-producer single-consumer queue of words, between the two halves of the engine. It needs neither
+//! locks nor `unsafe`: the slots are atomics. The producer never waits; messages that do not fit are counted.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;

@@ -61,9 +61,9 @@ pub enum Redundancy {
     /// There is one link.
     #[default]
     None,
-    /// No frame has shown it yet.
+    /// No frame has proved a state yet.
     Unknown,
-    /// The ring is closed and passes frames both ways.
+    /// The ring is closed and passes frames in both directions.
     Ready,
     /// The next break isolates SubDevices.
     Lost {
@@ -79,7 +79,7 @@ pub enum Redundancy {
 pub enum RedundancyLoss {
     /// The ring is open.
     Open,
-    /// The ring passes frames one way only: the copies sent on this link do not come back.
+    /// The ring passes frames in one direction only: the copies sent on this link do not come back.
     OneWay(Link),
 }
 
@@ -97,21 +97,22 @@ impl fmt::Display for RedundancyLoss {
 pub struct LinkStatus {
     /// Whether the interface has a carrier; `None` where the link layer does not report it.
     pub carrier: Option<bool>,
-    /// SubDevices that processed the last frames sent on this link. In a closed straight ring MAIN reaches all of them.
+    /// Number of SubDevices that processed the last frames sent on this link. In a closed ring without branches, all of
+    /// them process the frames of MAIN.
     pub answering: u16,
-    /// AL states of these, ORed: bits 0 to 3 as in register AL_STATUS.
+    /// AL states of these SubDevices, ORed: bits 0 to 3 as in register AL_STATUS.
     pub al_states: u8,
 }
 
 impl LinkStatus {
-    /// The link is up: it has a carrier, or SubDevices answer on it where the carrier is not known.
+    /// Whether the link is up: it has a carrier; if the carrier is not known: SubDevices answer on it.
     pub fn is_up(&self) -> bool {
         self.carrier.unwrap_or(self.answering > 0)
     }
 
     /// Whether any SubDevice on this link is in a state.
     pub fn has(&self, state: AlState) -> bool {
-        // BOOT is a separate number among the bits (protocol 5.1).
+        // BOOT is coded as 3, INIT and PREOP together (protocol 5.1).
         self.al_states & state.code() == state.code()
     }
 }
@@ -126,30 +127,30 @@ impl Cable {
 /// The ring and both links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RingStatus {
-    /// Closed or open, as the frames show it.
+    /// Closed or open, as proved by frames.
     pub state: RingState,
     /// Whether the ring tolerates a further break.
     pub redundancy: Redundancy,
     /// By [`Link::index`].
     pub links: [LinkStatus; 2],
-    /// Place of the break, once known.
+    /// The cable that is broken, once known.
     pub place: Option<Cable>,
     /// The SubDevices at the near and at the far end of that cable.
     pub place_ends: [Option<Occupant>; 2],
     /// Number of changes since activation, including those too frequent for an event each.
     pub changes: u32,
-    /// It changes too often for an event per change.
+    /// The ring changes too often for an event per change.
     pub unsteady: bool,
 }
 
 impl RingStatus {
-    /// A link.
+    /// The status of a link.
     pub fn link(&self, link: Link) -> &LinkStatus {
         &self.links[link.index()]
     }
 
-    /// SubDevices answer on the redundant link because the ring is broken: without it they would be lost
-    /// (`redundancy_active` of the IgH manual).
+    /// Whether SubDevices are reached on the redundant link only, because the ring is broken (`redundancy_active` of
+    /// the IgH manual).
     pub fn redundancy_active(&self) -> bool {
         self.state == RingState::Open && self.link(Link::Redundant).answering > 0
     }
@@ -163,7 +164,7 @@ mod tests {
 
     // covers: CR-12
     #[test]
-    fn a_cable_is_named_by_its_ends() {
+    fn a_cable_is_displayed_by_its_two_ends() {
         let (near, far) = (Some(PortOf { node: 7, port: 1 }), Some(PortOf { node: 8, port: 0 }));
         assert_eq!(Cable { near, far }.to_string(), "between SubDevice 7 port 1 and SubDevice 8 port 0");
         let host = Cable { near: None, far: Some(PortOf { node: 0, port: 0 }) };
@@ -174,16 +175,16 @@ mod tests {
 
     // covers: ring-status
     #[test]
-    fn redundancy_is_active_where_the_redundant_link_carries_somebody() {
+    fn redundancy_is_active_if_an_open_ring_has_subdevices_on_the_redundant_link() {
         let mut status = RingStatus { state: RingState::Open, ..RingStatus::default() };
         status.links[0].answering = 5;
-        assert!(!status.redundancy_active(), "all are on MAIN");
+        assert!(!status.redundancy_active(), "MAIN reaches all SubDevices");
         status.links[1] = LinkStatus { carrier: None, answering: 2, al_states: 0x0C };
         assert!(status.redundancy_active());
         let redundant = status.link(Link::Redundant);
         assert!(redundant.is_up() && redundant.has(AlState::Op) && redundant.has(AlState::SafeOp));
         assert!(!redundant.has(AlState::PreOp));
         status.state = RingState::Closed;
-        assert!(!status.redundancy_active(), "a branch on port 2 is met by the redundant copy of a closed ring");
+        assert!(!status.redundancy_active(), "in a closed ring, a branch on port 2 processes the redundant copy");
     }
 }

@@ -74,13 +74,13 @@ impl Supervisor {
         self.shared.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
     }
 
-    /// Connects the board of the exchange, whose view of the ring counts from now on.
+    /// Attaches the board of the exchange; from now on [`Bus::ring`] returns the ring state that the exchange posts.
     pub fn attach(&mut self, board: Arc<Board>) {
         self.shared.borrow_mut().board = Some(board);
     }
 
-    /// Wakes procedures when a bell rings.
-    pub(crate) fn hear(&mut self, bell: Bell) {
+    /// Attaches the request counter of cyclic threads: procedures wake when it changes.
+    pub(crate) fn attach_bell(&mut self, bell: Bell) {
         self.shared.borrow_mut().bell = bell;
     }
 
@@ -110,7 +110,7 @@ impl Supervisor {
         }
     }
 
-    /// Gives up overdue frames, fires timers, and runs procedures until all of them wait.
+    /// Gives up overdue frames, fires expired timers, and runs procedures until all of them wait.
     pub fn poll(&mut self, now: Instant) {
         {
             let shared = &mut *self.shared.borrow_mut();

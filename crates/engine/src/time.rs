@@ -11,7 +11,7 @@ impl Instant {
     /// A point that is never reached.
     pub const NEVER: Instant = Instant(u64::MAX);
 
-    /// Time since `earlier`, zero where that lies ahead.
+    /// Time since `earlier`; zero if `earlier` is later.
     pub const fn since(self, earlier: Instant) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }

@@ -126,7 +126,7 @@ pub use ringcat_engine::event::{Event, Occupant, TimedEvent};
 pub use ringcat_engine::exchange::ReferenceTime;
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
-pub use ringcat_engine::junction::{JunctionConnection, JunctionError, JunctionMode, Shown};
+pub use ringcat_engine::junction::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};

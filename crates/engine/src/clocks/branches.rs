@@ -1,10 +1,8 @@
-//! Which ports to close, one set after the other, so that what is behind forks without a clock can be measured
-//! (protocol 7.1).
-//!
-//! A clock in front of such a fork sees what all of its branches take together. With all of them closed but one, it
-//! sees that one: the way to the fork, then the way into each branch. What follows from these sums is exact. In: the
-//! cables, and who has a clock. Out: sets of ports. SubDevices behind them are out of reach meanwhile, so this is for
-//! the set-up, before anything is exchanged with them.
+//! Sets of ports to close, one after the other, to measure the branches behind forks without a clock (protocol 7.1). A
+//! clock in front of such a fork measures the time of all branches together. With all branches closed, it measures the
+//! path to the fork; with one branch open, the path into this branch. The single times follow exactly from these sums.
+//! Input: the cables, and which SubDevices have a clock. Output: sets of ports. SubDevices behind closed ports are not
+//! reachable, so this is done at set-up only, before the exchange of process data.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,7 +10,7 @@ use alloc::vec::Vec;
 use super::wiring::Wiring;
 use crate::topology::{PortOf, Topology};
 
-/// Sets that are measured at most: four for each of sixteen forks. What is not known then is told.
+/// Largest number of sets: four for each of sixteen forks. Delays that remain unknown are reported.
 const MOST_SETS: usize = 64;
 
 /// Ports to close, set by set. `has_clock` by position.
@@ -31,13 +29,13 @@ pub fn are_hidden(topology: &Topology, has_clock: &[bool]) -> bool {
     !sets(&Wiring::new(topology, false, |_| true), has_clock).is_empty()
 }
 
-/// Who is behind whom, as frames meet them.
+/// The SubDevices as a tree, in the order in which frames reach them.
 struct Tree<'a> {
     wiring: &'a Wiring,
     has_clock: &'a [bool],
-    /// By position, the port of whom it hangs on.
+    /// By position: the port to which the SubDevice is connected.
     parents: Vec<Option<PortOf>>,
-    /// By position, the ports at which something hangs, in the order of the way.
+    /// By position: the ports with a SubDevice behind them, in the order of the path.
     branches: Vec<Vec<PortOf>>,
 }
 
@@ -45,10 +43,10 @@ impl<'a> Tree<'a> {
     fn new(wiring: &'a Wiring, has_clock: &'a [bool]) -> Tree<'a> {
         let count = wiring.count();
         let mut tree = Tree { wiring, has_clock, parents: vec![None; count], branches: vec![Vec::new(); count] };
-        let mut is_met = vec![false; count];
-        for arrival in (0..super::wiring::TREES).flat_map(|link| wiring.way(link)) {
-            if !core::mem::replace(&mut is_met[arrival.at.node], true)
-                && let Some(near) = wiring.far(arrival.at).filter(|near| is_met[near.node])
+        let mut is_reached = vec![false; count];
+        for arrival in (0..super::wiring::TREES).flat_map(|link| wiring.path(link)) {
+            if !core::mem::replace(&mut is_reached[arrival.at.node], true)
+                && let Some(near) = wiring.far(arrival.at).filter(|near| is_reached[near.node])
             {
                 tree.parents[arrival.at.node] = Some(near);
                 tree.branches[near.node].push(near);
@@ -61,8 +59,8 @@ impl<'a> Tree<'a> {
         !self.has_clock.get(node).copied().unwrap_or(false) && self.branches[node].len() > 1
     }
 
-    /// All that leads away from the way to a fork and, beyond it, into one of its branches. `None` where no clock is in
-    /// front: nothing measures that way.
+    /// The ports that lead away from the path to a fork and on into its branch `open`. `None` if there is no clock in
+    /// front of the fork: then nothing measures this path.
     fn closed(&self, fork: usize, open: Option<PortOf>) -> Option<Vec<PortOf>> {
         let mut closed = Vec::new();
         let mut close = |node: usize, but: Option<PortOf>| {
@@ -70,7 +68,7 @@ impl<'a> Tree<'a> {
         };
         close(fork, open);
         let mut at = fork;
-        // Up to a clock, which sees for itself.
+        // Up to the next clock.
         for _ in 0..self.parents.len() {
             let near = self.parents[at]?;
             if self.has_clock.get(near.node).copied().unwrap_or(false) {
@@ -101,9 +99,9 @@ mod tests {
     use super::*;
     use crate::topology::Node;
 
-    /// A clock 0; a fork 1 with a clock 2, a clock 3, and behind it a fork 4 with two clocks.
+    /// Clock 0; fork 1 with the clocks 2 and 3 and the fork 4, which has two clocks.
     #[test]
-    fn the_way_to_each_fork_and_into_each_of_its_branches_is_left_open_alone() {
+    fn each_set_leaves_the_path_to_a_fork_and_into_one_branch_open() {
         let mut topology = Topology { nodes: vec![Node::default(); 7], main_count: 7, ..Topology::default() };
         for (parent, port, child) in [(0, 1, 1), (1, 3, 2), (1, 1, 3), (1, 2, 4), (4, 3, 5), (4, 1, 6)] {
             topology.nodes[parent].children[usize::from(port)] = Some(child);

@@ -1,8 +1,9 @@
-//! Cables by the ports at their ends: station addresses, which stay as they are when positions move.
+//! Cables by the ports at their ends. SubDevices are named by station address, because positions change with the
+//! cabling.
 
 use ringcat_wire::address::StationAddress;
 
-/// A port, by the station address of its SubDevice.
+/// A port: the station address of its SubDevice, and the port number.
 pub type End = (StationAddress, u8);
 
 /// Both ends of a cable, the smaller one first.

@@ -1,10 +1,10 @@
-//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1).
-//!
-//! The frame's way is followed port by port ([`Wiring::way`]). Between two arrivals at a SubDevice with a clock lies a
-//! branch: what its clock says the branch took, less what the SubDevices in the branch say that they took, is the time
-//! on cables. SubDevices without a clock are part of the cable. There and back a cable takes as long, and what is known
-//! about cables ([`Cables`]) counts: what follows from that is a delay. What does not, behind a fork without a clock,
-//! is none: clocks there are a group whose place within the branch is not known (`clocks::places`).
+//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1). The path
+//! of the frame is followed port by port ([`Wiring::path`]). Between two arrivals at a SubDevice with a clock lies a
+//! branch. The clock measures the time of the branch; without the times that the SubDevices in the branch measured
+//! themselves, the rest is the time on cables. SubDevices without a clock are part of the cable. A cable takes the same
+//! time in both directions; with this and the known times of cables ([`Cables`]) the delays follow. Behind a fork
+//! without a clock they may not follow: then the clocks there form a group with an unknown place within the branch
+//! (`clocks::places`).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -19,37 +19,37 @@ use super::places::{Place, Places, Range};
 use super::wiring::{Arrival, TREES, Wiring, processed_in};
 use crate::topology::PortOf;
 
-/// Longer than this no frame is on its way: a thousand SubDevices take 2 ms.
+/// Longest possible round trip of a frame: a thousand SubDevices take 2 ms.
 pub(super) const MOST_NS: i64 = 20_000_000;
 
-/// Cables that take as long together as they are known to, to within this and so much for each, are those that are
-/// known.
+/// Tolerance between a measured sum and the remembered times of its cables, and further tolerance per section: within
+/// it, the cables are the remembered ones.
 const SAME: i64 = 30 << FRACTION;
 const SAME_CABLE: i64 = 10 << FRACTION;
 
-/// Times at which the frame came in at port 0..3 after it came in at the port of entry, with fraction
-/// ([`super::FRACTION`]). Those of ports that it did not come in at say nothing.
+/// Times at which the frame came in at port 0..3, relative to the entry port, with fraction ([`super::FRACTION`]).
+/// Times of ports at which it did not come in have no meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortTimes(pub [i64; 4]);
 
-/// What a measurement is about.
+/// The segment that was measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<'a> {
-    /// Who is connected to whom.
+    /// The connections between ports.
     pub wiring: &'a Wiring,
     /// Station addresses by position.
     pub stations: &'a [StationAddress],
-    /// What is known of passages by position, see [`Passage`]; those without one take nothing beyond what all do.
+    /// Known passages by position, see [`Passage`]; a SubDevice without one takes no additional time.
     pub passages: &'a [Passage],
 }
 
-/// What a frame takes through a SubDevice from port to port, with fraction, less what it takes through all (protocol
-/// 7.1: there, tDiff is the difference of both).
+/// Time of a frame through a SubDevice from port to port, with fraction, beyond a base time that all SubDevices have in
+/// common (protocol 7.1: tDiff is the difference between both fields).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Passage {
-    /// Where its processing unit meets the frame.
+    /// Path through the processing unit.
     pub processed: i64,
-    /// Where it does not.
+    /// Path without the processing unit.
     pub forwarded: i64,
 }
 
@@ -58,94 +58,94 @@ impl Segment<'_> {
         Some((*self.stations.get(at.node)?, at.port))
     }
 
-    /// Notes which cables are there.
-    pub fn see(&self, cables: &mut Cables) {
-        cables.see(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
+    /// Sets the connected cables ([`Cables::set_present`]).
+    pub fn set_present(&self, cables: &mut Cables) {
+        cables.set_present(self.wiring.cables().filter_map(|(near, far)| Some((self.end(near)?, self.end(far)?))));
     }
 
-    /// Propagation delays. `times` by position, on one clock (see [`super::Measurements::mean`]); `None` without a
-    /// clock. Delays count for those of whom it is known how far they are from the reference or, where that is on
-    /// another link, from the first clock. What was measured of cables is learned.
+    /// Propagation delays. `times` by position, in units of one clock (see [`super::Measurements::mean`]); `None`
+    /// without a clock. Delays are known if the time to the reference clock is known or, if that is on the other link,
+    /// to the first clock. Measured times of cables are stored in `cables`.
     pub fn propagation(&self, times: &[Option<PortTimes>], reference: usize, cables: &mut Cables) -> Delays {
         let count = self.wiring.count();
         let mut delays = Delays { units: vec![None; count], trees: vec![0; count], ..Delays::default() };
         for tree in 0..TREES {
-            let way = self.wiring.way(tree);
-            let processed = processed_in(&way, count);
+            let path = self.wiring.path(tree);
+            let processed = processed_in(&path, count);
             let is_here = |node: &usize| processed[*node] && delays.units[*node].is_none();
             let here: Vec<bool> = (0..count).map(|node| is_here(&node)).collect();
             here.iter().zip(&mut delays.trees).filter(|(is, _)| **is).for_each(|(_, of)| *of = tree);
             let clock = |node: usize| times.get(node).copied().flatten().filter(|_| here[node]);
-            Walk::new(self, &way, &clock).run(&mut delays, reference, cables);
+            Walk::new(self, &path, &clock).run(&mut delays, reference, cables);
         }
         delays
     }
 }
 
-/// The arrivals of one frame, with what clocks say about them.
+/// The arrivals of one frame, with the times that the clocks measured.
 struct Walk<'a, C: Fn(usize) -> Option<PortTimes>> {
     segment: &'a Segment<'a>,
-    way: &'a [Arrival],
+    path: &'a [Arrival],
     clock: &'a C,
-    /// Place of each SubDevice's last arrival.
+    /// By position: index of the last arrival at the SubDevice.
     last: Vec<usize>,
-    /// Place of its next arrival, by place.
+    /// By index of an arrival: index of the next arrival at the same SubDevice.
     next: Vec<Option<usize>>,
 }
 
-/// From one arrival at a clock to the next, with nothing but cables and SubDevices without a clock in between.
+/// The path from one clock to the next, with only cables and SubDevices without a clock in between.
 #[derive(Clone, Copy, Debug)]
-struct Gap {
+struct Section {
     from: usize,
     to: usize,
-    /// What its cables are known to take.
+    /// Known time of its cables.
     known: Option<i64>,
-    /// What they take, as known or as follows.
+    /// Time of its cables, known or derived.
     time: Option<i64>,
-    /// What the SubDevice at its end takes for what lies behind it.
+    /// Time that the SubDevice at its end measured for the branches behind it.
     span: i64,
 }
 
-/// What is known of the cables of a branch.
+/// Result for the cables of a branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Found {
-    /// All, or what a fork without a clock does not hide.
+enum BranchTimes {
+    /// All times follow, except those that a fork without a clock hides.
     Exact,
-    /// Which of several cables of a ring takes what is not known.
+    /// Several cables of a ring share a time; the single times are unknown.
     Shared,
-    /// Each, and they do not take as long together.
-    Contradiction,
+    /// The known times of all cables contradict the measured sum.
+    Contradictory,
 }
 
-impl Gap {
+impl Section {
     const fn hops(&self) -> i64 {
         (self.to - self.from) as i64
     }
 }
 
 impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
-    fn new(segment: &'a Segment<'a>, way: &'a [Arrival], clock: &'a C) -> Walk<'a, C> {
+    fn new(segment: &'a Segment<'a>, path: &'a [Arrival], clock: &'a C) -> Walk<'a, C> {
         let count = segment.wiring.count();
         let mut last = vec![0; count];
         let mut seen: Vec<Option<usize>> = vec![None; count];
-        let mut next = vec![None; way.len()];
-        for (place, arrival) in way.iter().enumerate() {
+        let mut next = vec![None; path.len()];
+        for (place, arrival) in path.iter().enumerate() {
             if let Some(before) = seen[arrival.at.node].replace(place) {
                 next[before] = Some(place);
             }
             last[arrival.at.node] = place;
         }
-        Walk { segment, way, clock, last, next }
+        Walk { segment, path, clock, last, next }
     }
 
     fn run(&self, delays: &mut Delays, reference: usize, cables: &mut Cables) {
         let count = delays.units.len();
         let mut places = Places::new(count);
         let mut units: Vec<Option<Place>> = vec![None; count];
-        // What comes before the first clock, and between the branches in front of it, nobody measures.
+        // The path before the first clock, and between branches in front of it, is not measured.
         delays.is_guessed |= self.trunk(cables, &mut places);
-        for place in 0..self.way.len() {
-            let PortOf { node, port } = self.way[place].at;
+        for place in 0..self.path.len() {
+            let PortOf { node, port } = self.path[place].at;
             let (Some(entered), Some(times)) = (places.entered[node], (self.clock)(node)) else { continue };
             let is_first = units[node].is_none();
             if is_first {
@@ -154,46 +154,46 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
             if let Some(next) = self.next[place] {
                 let at = |port: u8| times.0[usize::from(port & 3)];
                 let from = if is_first { 0 } else { at(port) };
-                let took = at(self.way[next].at.port) - from;
+                let took = at(self.path[next].at.port) - from;
                 delays.is_implausible |= !(0..=MOST_NS << FRACTION).contains(&took);
                 let found = self.branch(place, next, took, entered.after(from), cables, &mut places);
-                delays.is_shared |= found != Found::Exact;
-                delays.is_contradictory |= found == Found::Contradiction;
+                delays.is_shared |= found != BranchTimes::Exact;
+                delays.is_contradictory |= found == BranchTimes::Contradictory;
             }
         }
         places.conclude(&units, reference, delays);
     }
 
-    /// From the port of entry to the processing unit.
+    /// Time from the entry port to the processing unit.
     fn to_unit(&self, first: usize, times: &PortTimes) -> i64 {
         let mut place = first;
-        while !self.way[place].processed {
+        while !self.path[place].processed {
             let Some(next) = self.next[place] else { break };
             place = next;
         }
-        if place == first { 0 } else { times.0[usize::from(self.way[place].at.port & 3)] }
+        if place == first { 0 } else { times.0[usize::from(self.path[place].at.port & 3)] }
     }
 
-    /// The way that nobody measures as a whole. Returns whether something in it is not known.
+    /// The path outside all branches, of which no clock measures the whole. Returns whether a time in it is not known.
     fn trunk(&self, cables: &Cables, places: &mut Places) -> bool {
         let (mut at, mut is_guessed) = (places.begin(), false);
-        for gap in self.gaps(0, self.way.len(), &|hops| cables.remembered(hops)) {
-            let first_clock = gap.from == 0 && (self.clock)(self.way[0].at.node).is_none();
-            if gap.known.is_none() && !first_clock {
+        for section in self.sections(0, self.path.len(), &|hops| cables.remembered(hops)) {
+            let first_clock = section.from == 0 && (self.clock)(self.path[0].at.node).is_none();
+            if section.known.is_none() && !first_clock {
                 is_guessed = true;
-                at = places.apart(self.fork(gap.from, gap.to), None);
+                at = places.apart(self.fork(section.from, section.to), None);
             }
-            at = at.after(gap.known.unwrap_or(0) + self.in_passages(&gap));
-            if let Some(arrival) = self.way.get(gap.to) {
+            at = at.after(section.known.unwrap_or(0) + self.in_passages(&section));
+            if let Some(arrival) = self.path.get(section.to) {
                 places.entered[arrival.at.node] = Some(at);
             }
-            at = at.after(gap.span);
+            at = at.after(section.span);
         }
         is_guessed
     }
 
-    /// Finds out which part of the time from one arrival at a SubDevice to its next one which cables of the branch
-    /// take. `begin` is the place of the first one.
+    /// Divides the time `took` between two arrivals at a SubDevice among the cables of the branch. `begin` is the place
+    /// of the first arrival.
     fn branch(
         &self,
         from: usize,
@@ -202,121 +202,128 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         begin: Place,
         cables: &mut Cables,
         places: &mut Places,
-    ) -> Found {
-        let mut gaps = self.gaps(from, to, &|hops| cables.measured(hops));
-        let in_passages: i64 = gaps.iter().map(|gap| self.in_passages(gap)).sum();
-        let total = (took - in_passages - gaps.iter().map(|gap| gap.span).sum::<i64>()).max(0);
-        let known = |gaps: &[Gap]| gaps.iter().filter_map(|gap| gap.known).sum::<i64>();
-        let fits = |gaps: &[Gap]| {
-            let all: Option<i64> = gaps.iter().map(|gap| gap.known).sum();
-            all.is_some_and(|all| (all - total).abs() <= SAME + gaps.len() as i64 * SAME_CABLE)
+    ) -> BranchTimes {
+        let mut sections = self.sections(from, to, &|hops| cables.measured(hops));
+        let in_passages: i64 = sections.iter().map(|section| self.in_passages(section)).sum();
+        let total = (took - in_passages - sections.iter().map(|section| section.span).sum::<i64>()).max(0);
+        let known = |sections: &[Section]| sections.iter().filter_map(|section| section.known).sum::<i64>();
+        let fits = |sections: &[Section]| {
+            let all: Option<i64> = sections.iter().map(|section| section.known).sum();
+            all.is_some_and(|all| (all - total).abs() <= SAME + sections.len() as i64 * SAME_CABLE)
         };
-        if gaps.iter().any(|gap| gap.known.is_none()) {
-            // Cables that were away are those from before where all of them take as long together.
-            let before = self.gaps(from, to, &|hops| cables.remembered(hops));
-            gaps = if fits(&before) { before } else { gaps };
+        if sections.iter().any(|section| section.known.is_none()) {
+            // Cables that were disconnected are the same as before if their remembered times match the measured sum.
+            let before = self.sections(from, to, &|hops| cables.remembered(hops));
+            sections = if fits(&before) { before } else { sections };
         }
-        let mut is_believed = true;
-        if known(&gaps) > total && gaps.iter().any(|gap| gap.known.is_none()) {
-            // What is known cannot be right.
-            gaps.iter_mut().for_each(|gap| gap.known = None);
-            is_believed = false;
+        let mut is_plausible = true;
+        if known(&sections) > total && sections.iter().any(|section| section.known.is_none()) {
+            // The known times exceed the measured sum: they are wrong.
+            sections.iter_mut().for_each(|section| section.known = None);
+            is_plausible = false;
         }
-        // Where all is known, the difference to what was measured now is shared by all.
-        let all_known = gaps.iter().all(|gap| gap.known.is_some());
-        let rest = total - known(&gaps);
-        let is_one_cable = gaps.len() == 2 && gaps.iter().all(|gap| gap.hops() == 1);
+        // If all times are known, the difference to the measured sum is distributed.
+        let all_known = sections.iter().all(|section| section.known.is_some());
+        let rest = total - known(&sections);
+        let is_one_cable = sections.len() == 2 && sections.iter().all(|section| section.hops() == 1);
         if all_known {
-            self.share(&mut gaps, rest);
+            self.share(&mut sections, rest);
         } else {
-            self.follow(&mut gaps, rest, is_believed.then_some(&*cables));
+            self.follow(&mut sections, rest, is_plausible.then_some(&*cables));
         }
-        let found = match gaps.iter().any(|gap| gap.time.is_none()) {
-            _ if all_known && !fits(&gaps) => Found::Contradiction,
-            true if self.are_several(&gaps) => Found::Shared,
-            _ => Found::Exact,
+        let found = match sections.iter().any(|section| section.time.is_none()) {
+            _ if all_known && !fits(&sections) => BranchTimes::Contradictory,
+            true if self.are_several(&sections) => BranchTimes::Shared,
+            _ => BranchTimes::Exact,
         };
-        self.enter(&gaps, (to, begin, begin.after(took)), rest, places);
-        for gap in &gaps {
-            if let Some(time) = gap.time.filter(|_| gap.known.is_none() || is_one_cable) {
-                cables.learn(&self.hops(gap.from, gap.to), time);
+        self.enter(&sections, (to, begin, begin.after(took)), rest, places);
+        for section in &sections {
+            if let Some(time) = section.time.filter(|_| section.known.is_none() || is_one_cable) {
+                cables.learn(&self.hops(section.from, section.to), time);
             }
         }
         found
     }
 
-    /// What all gaps take where each is known, and something is left over.
-    fn share(&self, gaps: &mut [Gap], rest: i64) {
-        let all: i64 = gaps.iter().map(Gap::hops).sum();
+    /// Sets the times of sections that are all known, and distributes the rest by number of hops.
+    fn share(&self, sections: &mut [Section], rest: i64) {
+        let all: i64 = sections.iter().map(Section::hops).sum();
         let (mut shared, mut done) = (0, 0);
-        for gap in gaps {
-            done += gap.hops();
+        for section in sections {
+            done += section.hops();
             let until = rest * done / all.max(1);
-            gap.time = gap.known.map(|known| known + until - shared);
+            section.time = section.known.map(|known| known + until - shared);
             shared = until;
         }
     }
 
-    /// What gaps take that are not known and have a time together: what follows from that, and from what is known of
-    /// cables.
-    fn follow(&self, gaps: &mut [Gap], rest: i64, cables: Option<&Cables>) {
-        let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
-        let together: Vec<Ends> = unknown().flat_map(|gap| self.hops(gap.from, gap.to)).collect();
+    /// Sets the times of sections that follow from the sum `rest` of all unknown sections and from the known cables.
+    fn follow(&self, sections: &mut [Section], rest: i64, cables: Option<&Cables>) {
+        let unknown = || sections.iter().filter(|section| section.known.is_none());
+        let together: Vec<Ends> = unknown().flat_map(|section| self.hops(section.from, section.to)).collect();
         let nothing = Cables::default();
         let cables = cables.unwrap_or(&nothing);
-        let time = |gap: &Gap| {
-            gap.known
-                .or_else(|| cables.measured_with(&self.hops(gap.from, gap.to), &together, rest))
+        let time = |section: &Section| {
+            section
+                .known
+                .or_else(|| cables.measured_with(&self.hops(section.from, section.to), &together, rest))
                 .filter(|time| *time >= 0)
         };
-        let times: Vec<Option<i64>> = gaps.iter().map(time).collect();
-        gaps.iter_mut().zip(times).for_each(|(gap, time)| gap.time = time);
+        let times: Vec<Option<i64>> = sections.iter().map(time).collect();
+        sections.iter_mut().zip(times).for_each(|(section, time)| section.time = time);
     }
 
-    /// Notes where the frame comes to clocks in a branch: from its beginning as far as is known, from its end as well,
-    /// and in between clocks are apart from both.
-    fn enter(&self, gaps: &[Gap], (to, begin, end): (usize, Place, Place), rest: i64, places: &mut Places) {
-        let first = gaps.iter().position(|gap| gap.time.is_none()).unwrap_or(gaps.len());
-        let last = gaps.iter().rposition(|gap| gap.time.is_none()).unwrap_or(0);
-        let took = |gap: &Gap| Some(gap.time? + self.in_passages(gap));
+    /// Records when the frame reaches the clocks of a branch: from its beginning as far as the times are known, and
+    /// from its end as well. Clocks in between form groups of their own.
+    fn enter(&self, sections: &[Section], (to, begin, end): (usize, Place, Place), rest: i64, places: &mut Places) {
+        let first = sections.iter().position(|section| section.time.is_none()).unwrap_or(sections.len());
+        let last = sections.iter().rposition(|section| section.time.is_none()).unwrap_or(0);
+        let took = |section: &Section| Some(section.time? + self.in_passages(section));
         let mut at = begin;
-        for (number, gap) in gaps.iter().enumerate().filter(|(_, gap)| gap.to < to) {
-            at = match took(gap) {
+        for (number, section) in sections.iter().enumerate().filter(|(_, section)| section.to < to) {
+            at = match took(section) {
                 Some(took) => at.after(took),
                 None if number == last && first < last => {
-                    // What follows is known.
-                    let behind = gaps[number + 1..].iter().map(|gap| took(gap).unwrap_or(0) + gap.span).sum::<i64>();
-                    end.after(-behind - gap.span)
+                    // All sections after this one are known.
+                    let behind = sections[number + 1..]
+                        .iter()
+                        .map(|section| took(section).unwrap_or(0) + section.span)
+                        .sum::<i64>();
+                    end.after(-behind - section.span)
                 }
                 None => {
-                    let range = self.range(&gaps[..=number], gaps, rest);
-                    places.apart(self.fork(gap.from, gap.to), Some((begin, range)))
+                    let range = self.range(&sections[..=number], sections, rest);
+                    places.apart(self.fork(section.from, section.to), Some((begin, range)))
                 }
             };
-            places.entered[self.way[gap.to].at.node] = Some(at);
-            at = at.after(gap.span);
+            places.entered[self.path[section.to].at.node] = Some(at);
+            at = at.after(section.span);
         }
     }
 
-    /// The least and the most that the way through the first gaps may take, of all whose unknown cables take `rest`
-    /// together.
-    fn range(&self, front: &[Gap], all: &[Gap], rest: i64) -> Range {
-        let unknown = |gaps: &[Gap]| -> Vec<Ends> {
-            gaps.iter().filter(|gap| gap.known.is_none()).flat_map(|gap| self.hops(gap.from, gap.to)).collect()
+    /// Range of the time through the sections `front`, if the unknown cables of all sections take `rest` together.
+    fn range(&self, front: &[Section], all: &[Section], rest: i64) -> Range {
+        let unknown = |sections: &[Section]| -> Vec<Ends> {
+            sections
+                .iter()
+                .filter(|section| section.known.is_none())
+                .flat_map(|section| self.hops(section.from, section.to))
+                .collect()
         };
         let (before, all) = (unknown(front), unknown(all));
         let count = |of: &[Ends], ends: &Ends| of.iter().filter(|other| *other == ends).count() as i64;
-        // All of it on that cable of which most is in front, or least.
+        // The extremes: one cable takes all of the rest, namely that with the largest or the smallest part in front.
         let shares = || all.iter().map(|ends| rest * count(&before, ends) / count(&all, ends).max(1));
         let (least, most) = (shares().min().unwrap_or(0), shares().max().unwrap_or(0));
-        let spans = front.split_last().map_or(0, |(_, before)| before.iter().map(|gap| gap.span).sum());
-        let fixed: i64 = front.iter().map(|gap| gap.known.unwrap_or(0) + self.in_passages(gap)).sum::<i64>() + spans;
+        let spans = front.split_last().map_or(0, |(_, before)| before.iter().map(|section| section.span).sum());
+        let fixed: i64 =
+            front.iter().map(|section| section.known.unwrap_or(0) + self.in_passages(section)).sum::<i64>() + spans;
         (fixed + least, fixed + most)
     }
 
-    /// The SubDevice without a clock between two places that has a branch there, if one has.
+    /// The first SubDevice without a clock but with a branch between two arrivals.
     fn fork(&self, from: usize, to: usize) -> Option<usize> {
-        let between = self.way.get(from..to.min(self.way.len()))?.iter().map(|arrival| arrival.at.node);
+        let between = self.path.get(from..to.min(self.path.len()))?.iter().map(|arrival| arrival.at.node);
         let is_fork = |node: &usize| {
             let at = |port: u8| PortOf { node: *node, port };
             let leads_on = |port: &u8| self.segment.wiring.far(at(*port)).is_some();
@@ -326,66 +333,65 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         between.filter(|node| (self.clock)(*node).is_none()).find(is_fork)
     }
 
-    /// Whether the gaps that are not known are several, and some of a cable on which the frame goes one way only: there
-    /// and back the same cable takes as long.
-    fn are_several(&self, gaps: &[Gap]) -> bool {
-        let unknown = || gaps.iter().filter(|gap| gap.known.is_none());
-        let mut cables: Vec<Ends> = unknown().flat_map(|gap| self.hops(gap.from, gap.to)).collect();
+    /// Whether several sections are unknown, and some of them contain a cable that the frame passes in one direction
+    /// only. (If it passes a cable in both directions, both times are equal.)
+    fn are_several(&self, sections: &[Section]) -> bool {
+        let unknown = || sections.iter().filter(|section| section.known.is_none());
+        let mut cables: Vec<Ends> = unknown().flat_map(|section| self.hops(section.from, section.to)).collect();
         cables.sort_unstable();
         unknown().count() > 1 && cables.chunk_by(|one, other| one == other).any(|same| same.len() == 1)
     }
 
-    /// What is known of the passage behind an arrival.
+    /// Known time of the passage after an arrival.
     fn passage(&self, place: usize) -> i64 {
-        let Arrival { at, processed } = self.way[place];
+        let Arrival { at, processed } = self.path[place];
         let passage = self.segment.passages.get(at.node).copied().unwrap_or_default();
         if processed { passage.processed } else { passage.forwarded }
     }
 
-    /// What is known of all passages on the way of a gap.
-    fn in_passages(&self, gap: &Gap) -> i64 {
-        (gap.from..gap.to).map(|hop| self.passage(hop)).sum()
+    /// Known time of all passages of a section.
+    fn in_passages(&self, section: &Section) -> i64 {
+        (section.from..section.to).map(|hop| self.passage(hop)).sum()
     }
 
-    /// The cables between two places, each as often as the frame takes it.
+    /// The cables between two arrivals, each as often as the frame passes it.
     fn hops(&self, from: usize, to: usize) -> Vec<Ends> {
         (from..to).filter_map(|hop| self.cable(hop)).map(ends).collect()
     }
 
-    /// Both ends of the cable behind an arrival.
+    /// Both ends of the cable after an arrival.
     fn cable(&self, place: usize) -> Option<(End, End)> {
-        let far = self.way.get(place + 1)?.at;
+        let far = self.path.get(place + 1)?.at;
         let near = self.segment.wiring.far(far)?;
         Some((self.segment.end(near)?, self.segment.end(far)?))
     }
 
-    /// The gaps between two places of which the first one counts only where it is the beginning of the way or a
-    /// SubDevice with a clock.
-    fn gaps(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Gap> {
-        let mut gaps = Vec::new();
+    /// The sections between two arrivals. `known` returns the known time of cables.
+    fn sections(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Section> {
+        let mut sections = Vec::new();
         let mut begin = from;
-        // The SubDevice at the beginning of a branch is not part of it; one at the beginning of the way is.
-        let mut place = if from == 0 && to == self.way.len() { from } else { from + 1 };
-        let gap = |from: usize, to: usize, span: i64| {
+        // The SubDevice in front of a branch is not part of it; the first SubDevice of the path is.
+        let mut place = if from == 0 && to == self.path.len() { from } else { from + 1 };
+        let section = |from: usize, to: usize, span: i64| {
             let hops = self.hops(from, to);
             let known = if hops.len() == to - from { known(&hops) } else { None };
-            Gap { from, to, known, time: None, span }
+            Section { from, to, known, time: None, span }
         };
         while place < to {
-            let node = self.way[place].at.node;
+            let node = self.path[place].at.node;
             let Some(times) = (self.clock)(node) else {
                 place += 1;
                 continue;
             };
             let last = self.last[node].min(to.saturating_sub(1)).max(place);
-            let span = if last == place { 0 } else { times.0[usize::from(self.way[last].at.port & 3)] };
-            gaps.push(gap(begin, place, span));
+            let span = if last == place { 0 } else { times.0[usize::from(self.path[last].at.port & 3)] };
+            sections.push(section(begin, place, span));
             (begin, place) = (last, last + 1);
         }
-        if to < self.way.len() {
-            gaps.push(gap(begin, to, 0));
+        if to < self.path.len() {
+            sections.push(section(begin, to, 0));
         }
-        gaps
+        sections
     }
 }
 

@@ -1,17 +1,17 @@
-//! A cycle of the host follows the reference clock (master shift, protocol 7.4).
-//!
-//! In: how far the next cycle of the host's grid is from where the reference clock wants it. Out: by how much to move
-//! it. The reference clock is read with every cyclic frame, and the host knows when that was sent, so neither wake-ups
-//! that come late nor the frame's way count.
+//! Adjusts the cycle of the host to the reference clock (master shift, protocol 7.4). Input: the system time at which
+//! the host's next cycle begins. Output: the correction of the cycle after it. Every cyclic frame reads the reference
+//! clock, and its send time on the host is known, so neither late wake-ups nor the propagation of the frame disturb the
+//! loop.
 
-/// Part of a phase error that one cycle takes back, as a shift.
+/// Part of a phase error that one cycle corrects, as a shift.
 const PROPORTIONAL: u32 = 4;
-/// Part of a phase error by which the length of all cycles changes, as a shift.
+/// Part of a phase error by which the cycle length changes, as a shift.
 const INTEGRAL: u32 = 9;
-/// Fractional bits of the length.
+/// Fractional bits of the cycle length.
 const FRACTION: u32 = 16;
 
-/// How far `time` is behind (positive) or ahead of the next place at which it is `phase_ns` modulo the period.
+/// Phase error of `time` in nanoseconds: its distance behind (positive) or ahead of the nearest time that is `phase_ns`
+/// modulo the period.
 pub const fn phase_error(time: u64, period_ns: u64, phase_ns: i64) -> i64 {
     if period_ns == 0 {
         return 0;
@@ -21,15 +21,15 @@ pub const fn phase_error(time: u64, period_ns: u64, phase_ns: i64) -> i64 {
     if behind > period / 2 { behind - period } else { behind }
 }
 
-/// The loop that keeps the phase.
+/// The control loop of the phase.
 #[derive(Clone, Copy, Debug)]
 pub struct Follower {
     period_ns: u64,
     phase_ns: i64,
-    /// What each cycle is longer than the host's period, with fraction.
+    /// Correction of each cycle's length relative to the host's period, with fraction.
     length: i64,
     error_ns: i64,
-    /// Cycles in a row that were near.
+    /// Consecutive cycles within a hundredth of the period.
     near: u32,
 }
 
@@ -39,13 +39,13 @@ impl Follower {
         Follower { period_ns, phase_ns, length: 0, error_ns: 0, near: 0 }
     }
 
-    /// `time` is the system time at which the host's grid has its next cycle. Returns by how many nanoseconds the one
-    /// after it moves.
+    /// Takes the system time at which the host's next cycle begins. Returns the correction of the cycle after it, in
+    /// nanoseconds.
     pub fn correction(&mut self, time: u64) -> i64 {
         self.error_ns = phase_error(time, self.period_ns, self.phase_ns);
         self.near = if self.error_ns.unsigned_abs() <= self.period_ns / 100 { self.near.saturating_add(1) } else { 0 };
         let scaled = self.error_ns << FRACTION;
-        // Clocks differ by 1,000 ppm at the most.
+        // Clocks differ by at most 1,000 ppm.
         let limit = ((self.period_ns as i64) << FRACTION) / 1_000;
         self.length = (self.length - (scaled >> (INTEGRAL + PROPORTIONAL / 2))).clamp(-limit, limit);
         let step = (self.length - (scaled >> PROPORTIONAL) + (1 << (FRACTION - 1))) >> FRACTION;
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_are_those_to_the_nearest_place() {
+    fn the_phase_error_is_the_distance_to_the_nearest_phase() {
         assert_eq!(phase_error(5_000_100, 1_000_000, 0), 100);
         assert_eq!(phase_error(4_999_900, 1_000_000, 0), -100);
         assert_eq!(phase_error(5_200_100, 1_000_000, 200_000), 100);
@@ -77,7 +77,8 @@ mod tests {
         assert_eq!(phase_error(1, 0, 0), 0);
     }
 
-    /// Follows a reference that runs `ppm` fast, from a phase; errors at the end of 5 s at 1 ms.
+    /// Follows a reference clock that is `ppm` fast, from a first phase error; returns the largest error in the last of
+    /// 5 s.
     fn settle(ppm: i64, first_error: i64) -> (Follower, i64) {
         let mut follower = Follower::new(1_000_000, 300_000);
         let (mut host, mut worst) = (first_error + 300_000, 0);

@@ -1,8 +1,7 @@
-//! The mean of several measurements of receive times, corrected for the drift of each clock (protocol 7.1).
-//!
-//! Receive times of a SubDevice are differences on its own clock. In a line of 200 SubDevices the first one waits for
-//! 200 us until the frame is back, in which clocks that differ by 100 ppm come apart by 20 ns. How much they differ
-//! shows in how far each got from the first measurement to the last.
+//! The mean of several measurements of receive times, corrected for the drift of each clock (protocol 7.1). A SubDevice
+//! measures times between its ports on its own clock. In a line of 200 SubDevices the frame returns to the first
+//! SubDevice after 200 us; two clocks that differ by 100 ppm differ by 20 ns after this time. The drift follows from
+//! the progress of each clock from the first measurement to the last.
 
 use alloc::vec::Vec;
 
@@ -10,7 +9,7 @@ use super::delay::MOST_NS;
 use super::wiring::Wiring;
 use super::{FRACTION, PortTimes};
 
-/// What one SubDevice has latched of one frame, on its local clock.
+/// Receive times that one SubDevice latched for one frame, on its local clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latched {
     /// Registers DC_RECEIVE_TIME of port 0..3.
@@ -19,27 +18,27 @@ pub struct Latched {
     pub unit: u64,
 }
 
-/// Times of one port that differ by more than this do not come of the same way: receive times are exact to some tens of
-/// nanoseconds, and frames follow each other by microseconds at least.
+/// Times of one port that differ by more than this are not from the same path: receive times are exact to some tens of
+/// nanoseconds, and frames are at least microseconds apart.
 const SAME_NS: i64 = 500;
-/// Clocks run apart by no more than this part of the time.
+/// Clocks differ by at most this part of the elapsed time (1/1,000).
 const MOST_DRIFT: i64 = 1_000;
 
-/// Something that was latched does not fit the other measurements.
+/// A latched time that does not fit the other measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Disagreement {
     /// Position of the SubDevice.
     pub node: usize,
-    /// The port; `None`: its clock, from frame to frame.
+    /// The port; `None` for the progress of its clock between measurements.
     pub port: Option<u8>,
-    /// What the others show, in nanoseconds.
+    /// Time by the other measurements, in nanoseconds.
     pub expected_ns: i64,
-    /// What it showed.
+    /// Latched time, in nanoseconds.
     pub got_ns: i64,
 }
 
 impl Disagreement {
-    /// Whether the others show what a frame may take.
+    /// Whether the expected time is possible for a frame.
     pub fn is_possible(&self) -> bool {
         (0..=MOST_NS).contains(&self.expected_ns) || self.port.is_none()
     }
@@ -51,12 +50,13 @@ pub struct Measurements {
     entries: Vec<u8>,
     /// Ports at which the frame comes in.
     arrivals: Vec<[bool; 4]>,
-    /// Which copy of the frame latches. Copies leave one after the other.
+    /// Copy of the frame that each SubDevice latches: 0 for the main link, 1 for the redundant link. The copies are
+    /// sent one after the other.
     trees: Vec<usize>,
     samples: Vec<Vec<Option<Latched>>>,
 }
 
-/// What a SubDevice has latched in all measurements, if it was there in each.
+/// The latched times of a SubDevice in all measurements, if no measurement lacks it.
 struct Series<'a> {
     of: &'a Measurements,
     node: usize,
@@ -67,7 +67,7 @@ impl Series<'_> {
         self.of.samples.iter().filter_map(|sample| sample.get(self.node).copied().flatten())
     }
 
-    /// How far its clock got since the first measurement.
+    /// Progress of its clock since the first measurement.
     fn advances(&self) -> impl Iterator<Item = i64> {
         let first = self.all().next().map_or(0, |latched| latched.unit as u32);
         self.all().map(move |latched| i64::from((latched.unit as u32).wrapping_sub(first)))
@@ -85,19 +85,20 @@ impl Series<'_> {
 }
 
 impl Measurements {
-    /// Of the SubDevices on these cables.
+    /// No measurements yet, of the SubDevices of this wiring.
     pub fn new(wiring: &Wiring) -> Measurements {
         let (arrivals, trees) = wiring.arrival_ports();
         Measurements { entries: wiring.entry_ports(), arrivals, trees, samples: Vec::new() }
     }
 
-    /// Adds a measurement: what each SubDevice has latched of the same frame. One that is missing in any counts as one
-    /// without a clock. All must be taken within two seconds.
+    /// Adds a measurement: the times that each SubDevice latched for the same frame. A SubDevice that is missing in any
+    /// measurement counts as without a clock. All measurements must be taken within two seconds (the 32-bit times
+    /// wrap).
     pub fn add(&mut self, latched: Vec<Option<Latched>>) {
         self.samples.push(latched);
     }
 
-    /// How many measurements there are.
+    /// Number of measurements.
     pub fn count(&self) -> u32 {
         self.samples.len() as u32
     }
@@ -107,8 +108,8 @@ impl Measurements {
         (!self.samples.is_empty() && self.samples.iter().all(is_there)).then_some(Series { of: self, node })
     }
 
-    /// What does not fit the other measurements, if anything: a port whose time is another one than usual, a clock that
-    /// has not gone on like that of the reference, so that it has not latched the same frame.
+    /// A latched time that does not fit the other measurements: a port with another time than usual, or a clock with
+    /// another progress than the reference clock, so that it has not latched the same frame.
     pub fn disagreement(&self, reference: usize) -> Option<Disagreement> {
         let nodes = || (0..self.entries.len()).filter_map(|node| self.series(node));
         nodes().find_map(|series| self.odd_port(&series)).or_else(|| {
@@ -122,7 +123,8 @@ impl Measurements {
         })
     }
 
-    /// Whose clock that of a SubDevice is compared with: the reference's, or the first one that latches the same copy.
+    /// The clock with which that of a SubDevice is compared: the reference clock, or the first clock that latches the
+    /// same copy.
     fn reference_for(&self, node: usize, reference: usize) -> Option<Series<'_>> {
         let tree = self.trees.get(node);
         let first =
@@ -143,7 +145,7 @@ impl Measurements {
         })
     }
 
-    /// How much faster than the reference's each clock runs, in parts per billion.
+    /// Drift of each clock relative to the reference clock, in parts per billion; positive: faster.
     pub fn drift_ppb(&self, reference: usize) -> Vec<Option<i64>> {
         let passed = self.passed(reference);
         let of = |series: Series<'_>| {
@@ -156,7 +158,7 @@ impl Measurements {
         Some(self.series(node)?.passed()).filter(|passed| *passed > 0)
     }
 
-    /// Mean times on the clock of the reference, or of the first one that latches the same copy, with [`FRACTION`].
+    /// Mean times in units of the reference clock, or of the first clock that latches the same copy, with [`FRACTION`].
     pub fn mean(&self, reference: usize) -> Vec<Option<PortTimes>> {
         let count = i128::from(self.count().max(1));
         let of = |series: Series<'_>| {
@@ -196,7 +198,7 @@ mod tests {
 
     // covers: 7.1, dc-delays
     #[test]
-    fn the_mean_is_on_the_clock_of_the_reference_and_survives_wraps() {
+    fn the_mean_is_in_units_of_the_reference_clock_across_wraps() {
         // The second clock runs 100 ppm fast and wraps between the measurements.
         let first = [latched(1_000, 200_000), latched(0xFFFF_FF00, 100_010)];
         let second = [latched(10_001_000, 200_001), latched(0x1_0000_0000 + 10_001_000 - 256, 100_010)];
@@ -209,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_subdevice_that_misses_one_measurement_counts_as_without_a_clock() {
+    fn a_subdevice_missing_in_one_measurement_counts_as_without_a_clock() {
         let measurements =
             of(3, [[latched(1_000, 5), None, latched(7, 5)], [latched(2_000, 5), latched(2_000, 5), None]]);
         assert_eq!(measurements.mean(0).iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, false]);
@@ -219,7 +221,7 @@ mod tests {
 
     // covers: 7.1, dc-remeasure
     #[test]
-    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_are_found() {
+    fn a_port_that_latched_another_frame_and_a_clock_that_latched_none_disagree() {
         let first = [latched(1_000, 700), latched(5_000, 300)];
         let mut measurements = of(2, [first, [latched(2_000_000, 690), latched(2_004_100, 320)]]);
         assert_eq!(measurements.disagreement(0), None);
@@ -227,7 +229,7 @@ mod tests {
         spoiled.add(vec![latched(4_000_000, 700), latched(4_004_200, 7_020)]);
         let odd = Disagreement { node: 1, port: Some(1), expected_ns: 320, got_ns: 7_020 };
         assert_eq!(spoiled.disagreement(0), Some(odd));
-        // Copies leave one after the other: what is on the other one has a clock of its own to be compared with.
+        // The copies are sent one after the other: SubDevices on the other link are compared with a clock on that link.
         let mut apart = Measurements { trees: vec![0, 1], ..measurements.clone() };
         apart.add(vec![latched(4_000_000, 700), latched(4_054_100, 320)]);
         assert_eq!(apart.disagreement(0), None);

@@ -1,17 +1,15 @@
-//! Where on its way a frame comes to clocks, as far as that is known.
-//!
-//! Clocks between which a time is known are a group; from group to group only a range is known, or nothing. Delays are
-//! those of the group of the reference.
+//! Times at which a frame reaches the clocks, as far as they are known. Clocks with known times between each other form
+//! a group; between groups only a range is known, or nothing. Delays are known for the group of the reference clock.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::delays::{Delays, Unknown};
 
-/// The least and the most, with fraction.
+/// Smallest and largest possible time, with fraction.
 pub(super) type Range = (i64, i64);
 
-/// On the way of a frame: the group, and the time since its beginning, with fraction.
+/// A place on the path of a frame: the group, and the time since the beginning of the group, with fraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     group: usize,
@@ -19,25 +17,25 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// So much later.
+    /// The place that the frame reaches `time` later.
     pub(super) const fn after(self, time: i64) -> Place {
         Place { at: self.at + time, ..self }
     }
 }
 
-/// Clocks between which all is known.
+/// Clocks with known times between each other.
 #[derive(Clone, Copy, Debug, Default)]
 struct Group {
-    /// The fork that hides where it begins.
+    /// The fork without a clock that hides the beginning of the group.
     fork: Option<usize>,
-    /// It begins so much after that.
+    /// The group begins within this range after a place of another group.
     begins: Option<(Place, Range)>,
 }
 
-/// What is known of one frame's way.
+/// The known times of one frame.
 #[derive(Clone, Debug)]
 pub(super) struct Places {
-    /// Where the frame comes to the SubDevices, by position.
+    /// By position: where the frame first enters the SubDevice.
     pub entered: Vec<Option<Place>>,
     groups: Vec<Group>,
 }
@@ -47,18 +45,19 @@ impl Places {
         Places { entered: vec![None; count], groups: vec![Group::default()] }
     }
 
-    /// Where the way begins.
+    /// The beginning of the path.
     pub(super) const fn begin(&self) -> Place {
         Place { group: 0, at: 0 }
     }
 
-    /// The beginning of a group, so much after a place, or of whose place nothing is known.
+    /// Adds a group and returns its beginning; `begins` is `None` if nothing is known about it.
     pub(super) fn apart(&mut self, fork: Option<usize>, begins: Option<(Place, Range)>) -> Place {
         self.groups.push(Group { fork, begins });
         Place { group: self.groups.len() - 1, at: 0 }
     }
 
-    /// Delays of the group of the reference, or else of the first clock; of the others, what is known of them.
+    /// Sets the delays of the clocks in the group of the reference (or, if this has no place, of the first clock), and
+    /// the ranges of all others.
     pub(super) fn conclude(&self, units: &[Option<Place>], reference: usize, delays: &mut Delays) {
         let first = || units.iter().flatten().min_by_key(|place| (place.group, place.at)).copied();
         let Some(chosen) = units.get(reference).copied().flatten().or_else(first) else { return };
@@ -72,15 +71,15 @@ impl Places {
         }
     }
 
-    /// What hides a place from another one: the innermost fork of either that the other does not have around it.
+    /// The fork that hides the time between two places: that of the group of `place`, otherwise that of `from`.
     fn fork(&self, place: Place, from: Place) -> Option<usize> {
         self.groups[place.group].fork.or(self.groups[from.group].fork)
     }
 
-    /// Where a place may be, since the beginning of a group.
+    /// Range of a place's time since the beginning of a group.
     fn range(&self, place: Place, group: usize) -> Option<Range> {
         let (mut place, mut least, mut most) = (place, 0, 0);
-        // A group begins after an earlier one.
+        // Each group begins after a place of an earlier group, so this ends.
         while place.group != group {
             let (begins, range) = self.groups[place.group].begins?;
             (least, most) = (least + range.0 + place.at, most + range.1 + place.at);

@@ -1,7 +1,7 @@
-//! When SYNC signals begin (protocol 7.3).
+//! Start time of SYNC signals (protocol 7.3).
 
-/// System time of the first pulse: at `earliest` or later, a multiple of the cycle plus the shift, so that SubDevices
-/// with one cycle pulse together whenever they were started. A cycle of zero is a single pulse.
+/// System time of the first pulse: the first multiple of the cycle plus the shift that is not before `earliest`. So
+/// SubDevices with the same cycle pulse simultaneously, whenever they were started. A cycle of zero is a single pulse.
 pub const fn first_pulse(earliest: u64, cycle_ns: u64, shift_ns: i64) -> u64 {
     if cycle_ns == 0 {
         return earliest.wrapping_add_signed(shift_ns);
@@ -12,7 +12,8 @@ pub const fn first_pulse(earliest: u64, cycle_ns: u64, shift_ns: i64) -> u64 {
     if passed == 0 { earliest } else { earliest + (cycle_ns - passed) }
 }
 
-/// From one pulse pattern to the next where SYNC1 is used: it divides SYNC0 where its time is longer than the cycle.
+/// Length of the pulse pattern of SYNC0 and SYNC1, in nanoseconds: if the SYNC1 time is longer than the SYNC0 cycle,
+/// SYNC1 pulses only with every n-th SYNC0 pulse.
 pub const fn whole_cycle(sync0_cycle_ns: u32, sync1_register_ns: u32) -> u64 {
     match sync1_register_ns.checked_div(sync0_cycle_ns) {
         None => 0,

@@ -1,24 +1,23 @@
-//! What follows from times that several cables take together: linear equations, solved exactly.
-//!
-//! In: sums of cables, each cable as often as it counts, with what they take. Out: what others take, where that follows
-//! and is no guess. Coefficients are small, since a frame passes a cable once there and once back.
+//! Times of cables from sums over several cables: linear equations, solved exactly. Input: sums of cables with their
+//! time; a cable is listed as often as it counts. Output: the time of other sums, if it follows exactly. Coefficients
+//! are small, because a frame passes a cable once in each direction.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::cable_ends::Ends;
 
-/// More cables than this are not solved for.
+/// Largest number of cables in a system of equations; more are not solved.
 const MOST_CABLES: usize = 512;
 
-/// Cables, as often as they are named, take a time together.
+/// The time that these cables take together; a cable counts as often as it is listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Sum {
     pub cables: Vec<Ends>,
     pub time: i64,
 }
 
-/// Coefficients by cable, and the time of all.
+/// An equation: coefficients by cable, and the time of the sum.
 #[derive(Clone, Debug)]
 struct Row {
     factors: Vec<i128>,
@@ -30,8 +29,8 @@ impl Row {
         self.factors.iter().position(|factor| *factor != 0)
     }
 
-    /// Takes another row out of this one, so that the factor of that one's pivot is zero. Returns what this one was
-    /// multiplied with; `None` where figures get too large.
+    /// Eliminates the pivot column of another row from this one. Returns the factor by which this row was multiplied;
+    /// `None` on overflow.
     fn reduce(&mut self, other: &Row, pivot: usize) -> Option<i128> {
         let (own, of_other) = (self.factors[pivot], other.factors[pivot]);
         let common = divisor(own, of_other);
@@ -45,12 +44,12 @@ impl Row {
     }
 }
 
-/// What these cables take together; `None` where that does not follow from the sums.
+/// The time that these cables take together; `None` if it does not follow from the sums.
 pub(super) fn solve(sums: &[Sum], wanted: &[Ends]) -> Option<i64> {
     let mut cables = wanted.to_vec();
     cables.sort_unstable();
     cables.dedup();
-    // Those that have cables in common with what is wanted, directly or by others.
+    // The sums that have cables in common with the wanted ones, directly or through other sums.
     let mut relevant: Vec<&Sum> = Vec::new();
     let mut others: Vec<&Sum> = sums.iter().filter(|sum| !sum.cables.is_empty()).collect();
     loop {
@@ -86,7 +85,7 @@ pub(super) fn solve(sums: &[Sum], wanted: &[Ends]) -> Option<i64> {
         scale = scale.checked_mul(left.reduce(other, *pivot)?)?;
     }
     let time = -left.time;
-    // To the nearest.
+    // Rounded to the nearest.
     let half = scale.abs() / 2;
     let rounded = (time * scale.signum() + half).div_euclid(scale.abs());
     left.pivot().is_none().then_some(i64::try_from(rounded).ok()?)
@@ -112,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_is_exact_and_what_does_not_is_none() {
+    fn a_time_that_follows_is_exact_and_any_other_is_none() {
         let sum = |cables: &[u16], time| Sum { cables: cables.iter().map(|number| cable(*number)).collect(), time };
         let of =
             |sums: &[Sum], cables: &[u16]| solve(sums, &cables.iter().map(|number| cable(*number)).collect::<Vec<_>>());
@@ -121,16 +120,16 @@ mod tests {
         assert_eq!(of(std::slice::from_ref(&round), &[3, 2, 1]), Some(500));
         let sums = [round, sum(&[3, 1], 301)];
         assert_eq!((of(&sums, &[2]), of(&sums, &[1, 2, 2, 3]), of(&sums, &[1])), (Some(199), Some(699), None));
-        // Twice the same is no contradiction, and something else does not help.
+        // A redundant sum is no contradiction, and a sum of other cables changes nothing.
         let sums = [sum(&[1, 1], 500), sum(&[1], 250), sum(&[7, 8], 9), sum(&[], 4)];
         assert_eq!((of(&sums, &[1, 1, 1]), of(&sums, &[7]), of(&[], &[1])), (Some(750), None, None));
     }
 
     proptest::proptest! {
-        /// What is solved fits any times of single cables that the sums were made of.
+        /// A solved time equals that of the single cables from which the sums were made.
         // covers: dc-delays
         #[test]
-        fn whatever_is_solved_is_the_truth(
+        fn every_solved_time_is_the_true_one(
             times in proptest::collection::vec(0i64..10_000, 6),
             sums in proptest::collection::vec(proptest::collection::vec(0u16..6, 1..8), 0..8),
             wanted in proptest::collection::vec(0u16..6, 1..6),
@@ -140,13 +139,13 @@ mod tests {
             let known: Vec<Sum> = sums.iter().map(|cables| Sum { cables: of(cables), time: time(cables) }).collect();
             let solved = solve(&known, &of(&wanted));
             proptest::prop_assert!(solved.is_none_or(|solved| solved == time(&wanted)));
-            let is_told = sums.iter().any(|cables| {
+            let is_given = sums.iter().any(|cables| {
                 let (mut one, mut other) = (cables.clone(), wanted.clone());
                 one.sort_unstable();
                 other.sort_unstable();
                 one == other
             });
-            proptest::prop_assert!(!is_told || solved.is_some());
+            proptest::prop_assert!(!is_given || solved.is_some());
         }
     }
 }

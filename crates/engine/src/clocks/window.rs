@@ -1,25 +1,24 @@
-//! Whether clocks are in their window, as it is told: results one by one in, changes worth telling out.
-//!
-//! A change counts when some results in a row show it. Clocks that leave their window soon after they came back have to
-//! be inside for longer each time, so that those at its edge are not told for ever.
+//! Whether clocks are within the sync window. Input: single results. Output: changes to report. A change counts after
+//! several consecutive results. Clocks that leave the window soon after they came back must stay inside for longer each
+//! time before this is reported, so that clocks at the edge of the window do not cause events for ever.
 
-/// Results in a row until a change is told.
+/// Consecutive results until a change is reported.
 const RESULTS: u32 = 3;
-/// Most of them, inside, until clocks that have left again and again count as back.
+/// Largest number of consecutive results inside until clocks that have left repeatedly count as back.
 const MOST_RESULTS: u32 = 20_000;
-/// So many results inside for each that was waited for make them count as calm.
+/// Clocks count as steady after this multiple of the results that were required.
 const CALM: u32 = 10;
 
-/// The state as it was told last.
+/// The reported state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SyncWindow {
-    /// `None`: they have never been inside, so that there is nothing to leave.
+    /// `None`: the clocks have never been inside.
     is_inside: Option<bool>,
-    /// Results in a row that contradict that.
+    /// Consecutive results that contradict the reported state.
     contrary: u32,
-    /// Results inside until that is told.
+    /// Consecutive results inside that are required for a report.
     waits: u32,
-    /// Results since they came back.
+    /// Results since the last report.
     since: u32,
 }
 
@@ -30,22 +29,22 @@ impl Default for SyncWindow {
 }
 
 impl SyncWindow {
-    /// Clocks are known to be inside.
+    /// The state of clocks that are inside.
     pub(crate) fn inside() -> SyncWindow {
         SyncWindow { is_inside: Some(true), ..SyncWindow::default() }
     }
 
-    /// Whether clocks are outside, as told last.
+    /// Whether clocks are outside, by the last report.
     pub(crate) fn is_outside(&self) -> bool {
         self.is_inside == Some(false)
     }
 
-    /// A result says nothing.
+    /// Takes a result without evidence.
     pub(crate) fn skip(&mut self) {
         self.contrary = 0;
     }
 
-    /// Takes a result; true where it is to be told that it is the state now.
+    /// Takes a result; true if it is a change to report.
     pub(crate) fn take(&mut self, inside: bool) -> bool {
         self.since = self.since.saturating_add(1);
         if self.is_inside.unwrap_or(false) == inside {
@@ -70,28 +69,28 @@ impl SyncWindow {
 mod tests {
     use super::*;
 
-    fn told(window: &mut SyncWindow, results: impl IntoIterator<Item = bool>) -> usize {
+    fn changes(window: &mut SyncWindow, results: impl IntoIterator<Item = bool>) -> usize {
         results.into_iter().filter(|inside| window.take(*inside)).count()
     }
 
     #[test]
-    fn three_results_in_a_row_are_a_change_and_the_first_one_is_to_the_inside() {
+    fn three_consecutive_results_are_a_change_and_the_first_change_is_to_inside() {
         let mut window = SyncWindow::default();
-        assert_eq!(told(&mut window, [false; 10]), 0);
-        assert_eq!(told(&mut window, [true, true, false, true, true]), 0);
-        assert_eq!(told(&mut window, [true]), 1);
-        assert_eq!(told(&mut window, [false, false, true, false, false]), 0);
+        assert_eq!(changes(&mut window, [false; 10]), 0);
+        assert_eq!(changes(&mut window, [true, true, false, true, true]), 0);
+        assert_eq!(changes(&mut window, [true]), 1);
+        assert_eq!(changes(&mut window, [false, false, true, false, false]), 0);
         assert!(window.take(false) && window.is_outside());
     }
 
     // covers: dc-late-host
     #[test]
-    fn clocks_at_the_edge_of_their_window_are_told_less_and_less_often() {
+    fn clocks_at_the_edge_of_the_window_are_reported_less_and_less_often() {
         let mut window = SyncWindow::default();
         let flaps = (0..100_000).map(|number| number % 20 < 10);
-        assert!(told(&mut window, flaps) < 12);
-        // After a calm time it begins anew.
-        told(&mut window, [true; 300_000]);
-        assert_eq!(told(&mut window, [false, false, false, true, true, true]), 2);
+        assert!(changes(&mut window, flaps) < 12);
+        // After a steady time three results are enough again.
+        changes(&mut window, [true; 300_000]);
+        assert_eq!(changes(&mut window, [false, false, false, true, true, true]), 2);
     }
 }

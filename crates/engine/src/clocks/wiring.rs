@@ -1,8 +1,7 @@
-//! Which port is connected to which, and the way of a frame through that (protocol 2.1, 7.1).
-//!
-//! In: a [`Topology`] and which ports are open now. A topology has local rings as branches; here their closing cables
-//! are what they are, cables. Out: the arrivals of a frame of either link, in order, and whether a processing unit
-//! meets it after each.
+//! The connections between ports, and the path of a frame over them (protocol 2.1, 7.1). Input: a [`Topology`], and
+//! which ports are open now. A topology contains local rings as branches; the wiring contains their closing cables too.
+//! Output: the arrivals of a frame of either link, in order, and whether it passes the processing unit after each
+//! arrival.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,32 +10,32 @@ use crate::topology::{PortOf, Topology};
 
 /// Order in which a frame passes the ports; the processing unit is behind port 0 (protocol 2.1).
 const TRAVEL: [u8; 4] = [0, 3, 1, 2];
-/// So many open ports are looked at for the one that leads to the redundant link; it is the last one.
+/// Number of open ports, from the last one, that are checked for the port of the redundant link.
 const OPEN_PORTS: usize = 16;
-/// Frames of the main and of the redundant link.
+/// Number of links: one tree for frames of the main link, one for those of the redundant link.
 pub const TREES: usize = 2;
 
-/// The cables on which frames run.
+/// The cables of a segment that frames use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Wiring {
-    /// By position and port, what is at the other end.
+    /// By position and port: the port at the other end of the cable.
     far: Vec<[Option<PortOf>; 4]>,
-    /// Where frames of the main and of the redundant link come in, and go out.
+    /// The ports at which frames of the main and of the redundant link enter and leave the segment.
     pub entries: [Option<PortOf>; TREES],
 }
 
-/// A frame comes in at a port.
+/// Arrival of a frame at a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arrival {
-    /// Where.
+    /// The port.
     pub at: PortOf,
-    /// The processing unit meets it before it goes on.
+    /// The frame passes the processing unit before it leaves the SubDevice.
     pub processed: bool,
 }
 
 impl Wiring {
-    /// Of a topology whose ring is closed or not. `is_open` says which ports are open: closing cables of local rings
-    /// with both ends open are in use.
+    /// The wiring of a topology; `ring_closed`: the ring of both links is closed. Closing cables of local rings are
+    /// included if `is_open` is true for both of their ports.
     pub fn new(topology: &Topology, ring_closed: bool, is_open: impl Fn(PortOf) -> bool) -> Wiring {
         let mut wiring = Wiring { far: vec![[None; 4]; topology.nodes.len()], entries: entries(topology, ring_closed) };
         for (node, here) in topology.nodes.iter().enumerate() {
@@ -64,7 +63,8 @@ impl Wiring {
         }
     }
 
-    /// Closes ports. Without its last port a ring of two links is a line.
+    /// Opens rings: removes the cables at these ports. At the port of the redundant link this makes the ring of both
+    /// links a line.
     pub fn open(&mut self, rings: &[PortOf]) {
         for at in rings {
             if let Some(far) = self.far(*at) {
@@ -77,7 +77,7 @@ impl Wiring {
         }
     }
 
-    /// SubDevices.
+    /// Number of SubDevices.
     pub fn count(&self) -> usize {
         self.far.len()
     }
@@ -93,8 +93,8 @@ impl Wiring {
         ports.filter_map(|near| Some((near, self.far(near)?))).filter(|(near, far)| near < far)
     }
 
-    /// Arrivals of a frame of a link, in order.
-    pub fn way(&self, tree: usize) -> Vec<Arrival> {
+    /// Arrivals of a frame that was sent on a link (0 or 1), in order.
+    pub fn path(&self, tree: usize) -> Vec<Arrival> {
         let limit = 4 * self.far.len() + 4;
         let mut arrivals = Vec::new();
         let mut next = self.entries[tree];
@@ -118,13 +118,13 @@ impl Wiring {
         arrivals
     }
 
-    /// The port at which the frame that a SubDevice processes comes in first, by position.
+    /// By position: the port at which the frame that the SubDevice processes first comes in.
     pub fn entry_ports(&self) -> Vec<u8> {
         let mut ports: Vec<Option<u8>> = vec![None; self.far.len()];
         for tree in 0..TREES {
-            let way = self.way(tree);
-            let processed = processed_in(&way, self.far.len());
-            for Arrival { at, .. } in way.iter().filter(|arrival| processed[arrival.at.node]) {
+            let path = self.path(tree);
+            let processed = processed_in(&path, self.far.len());
+            for Arrival { at, .. } in path.iter().filter(|arrival| processed[arrival.at.node]) {
                 ports[at.node].get_or_insert(at.port);
             }
         }
@@ -133,16 +133,16 @@ impl Wiring {
 }
 
 impl Wiring {
-    /// The ports at which the frame that a SubDevice processes comes in, by position, and of which link that is (0 or
-    /// 1).
+    /// By position: the ports at which the frame that the SubDevice processes comes in, and the link of this frame (0
+    /// or 1).
     pub fn arrival_ports(&self) -> (Vec<[bool; 4]>, Vec<usize>) {
         let mut ports = vec![[false; 4]; self.far.len()];
         let mut trees = vec![0; self.far.len()];
         let mut is_seen = vec![false; self.far.len()];
         for tree in 0..TREES {
-            let way = self.way(tree);
-            let here = processed_in(&way, self.far.len());
-            for Arrival { at, .. } in way.iter().filter(|arrival| here[arrival.at.node] && !is_seen[arrival.at.node]) {
+            let path = self.path(tree);
+            let here = processed_in(&path, self.far.len());
+            for Arrival { at, .. } in path.iter().filter(|arrival| here[arrival.at.node] && !is_seen[arrival.at.node]) {
                 ports[at.node][usize::from(at.port & 3)] = true;
                 trees[at.node] = tree;
             }
@@ -152,20 +152,20 @@ impl Wiring {
     }
 }
 
-/// Which SubDevices process the frame, by position.
-pub(super) fn processed_in(way: &[Arrival], count: usize) -> Vec<bool> {
+/// By position: whether the SubDevice processes the frame.
+pub(super) fn processed_in(path: &[Arrival], count: usize) -> Vec<bool> {
     let mut processed = vec![false; count];
-    way.iter().filter(|arrival| arrival.processed).for_each(|arrival| processed[arrival.at.node] = true);
+    path.iter().filter(|arrival| arrival.processed).for_each(|arrival| processed[arrival.at.node] = true);
     processed
 }
 
-/// Where frames come in.
+/// The ports at which frames of both links enter the segment.
 fn entries(topology: &Topology, ring_closed: bool) -> [Option<PortOf>; TREES] {
     let root = |mut range: core::ops::Range<usize>| range.find(|node| topology.nodes[*node].parent.is_none());
     let (count, main) = (topology.nodes.len(), topology.main_count.min(topology.nodes.len()));
     let first = root(0..main).or_else(|| root(0..count).filter(|_| main == 0 && topology.redundant_head.is_none()));
     let at_main = first.map(|node| PortOf { node, port: topology.nodes[node].entry_port });
-    // Frames of the redundant link come in where the trunk of its tree leads out of it.
+    // In an open ring, frames of the redundant link enter at the open port of the tree of the redundant head.
     let at_redundant = match topology.redundant_head {
         Some(head) => {
             let leads_out = |at: &&PortOf| at.node >= main && tree_root(topology, at.node) == head;
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use crate::topology::{Closing, LocalRing, Node};
 
-    /// A junction with three behind its port 3 and one behind its port 2; where the ring closes.
+    /// A junction with a local ring of three SubDevices from port 3 to port 1, and one SubDevice on port 2.
     fn junction() -> Topology {
         let mut nodes = vec![Node::default(); 5];
         for (parent, port, child) in [(0, 3, 1), (1, 1, 2), (2, 1, 3), (0, 2, 4)] {
@@ -203,21 +203,21 @@ mod tests {
         Topology { nodes, main_count: 5, local_rings, ..Topology::default() }
     }
 
-    fn ways(wiring: &Wiring, tree: usize) -> Vec<(usize, u8, bool)> {
-        wiring.way(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
+    fn paths(wiring: &Wiring, tree: usize) -> Vec<(usize, u8, bool)> {
+        wiring.path(tree).iter().map(|arrival| (arrival.at.node, arrival.at.port, arrival.processed)).collect()
     }
 
     // covers: 9.4, dc-delays
     #[test]
-    fn a_frame_goes_round_a_local_ring_once_and_back_and_forth_through_a_broken_one() {
+    fn a_frame_passes_a_local_ring_once_and_a_broken_one_there_and_back() {
         let whole = Wiring::new(&junction(), false, |_| true);
         let round =
             [(0, 0, true), (1, 0, true), (2, 0, true), (3, 0, true), (0, 1, false), (4, 0, true), (0, 2, false)];
-        assert_eq!(ways(&whole, 0), round);
+        assert_eq!(paths(&whole, 0), round);
         assert_eq!(whole.cables().count(), 5);
         let open = Wiring::new(&junction(), false, |at| at.node != 3);
-        assert_eq!(ways(&open, 0).len(), 9);
-        // Broken between 1 and 2: the second half is entered from behind.
+        assert_eq!(paths(&open, 0).len(), 9);
+        // Broken between 1 and 2: frames enter the second half at its other end.
         let mut topology = junction();
         (topology.nodes[2].parent, topology.nodes[1].children[1]) = (None, None);
         let broken = Wiring::new(&topology, false, |_| true);
@@ -232,13 +232,13 @@ mod tests {
             (4, 0, true),
             (0, 2, false),
         ];
-        assert_eq!(ways(&broken, 0), parts);
+        assert_eq!(paths(&broken, 0), parts);
         assert_eq!(broken.entry_ports(), [0, 0, 1, 1, 0]);
     }
 
     // covers: 2.9
     #[test]
-    fn frames_of_both_links_pass_a_closed_ring_and_a_branch_on_port_2_is_met_by_one() {
+    fn in_a_closed_ring_a_branch_on_port_2_processes_frames_of_one_link_only() {
         // S1, S2 with S5 on port 2, S3.
         let mut topology = Topology { nodes: vec![Node::default(); 4], main_count: 3, ..Topology::default() };
         for (parent, port, child) in [(0, 1, 1), (1, 1, 2), (1, 2, 3)] {
@@ -247,7 +247,7 @@ mod tests {
         }
         topology.open_ports = vec![PortOf { node: 2, port: 1 }];
         let wiring = Wiring::new(&topology, true, |_| true);
-        assert_eq!(ways(&wiring, 0), [(0, 0, true), (1, 0, true), (2, 0, true)]);
-        assert_eq!(ways(&wiring, 1), [(2, 1, false), (1, 1, false), (3, 0, true), (1, 2, false), (0, 1, false)]);
+        assert_eq!(paths(&wiring, 0), [(0, 0, true), (1, 0, true), (2, 0, true)]);
+        assert_eq!(paths(&wiring, 1), [(2, 1, false), (1, 1, false), (3, 0, true), (1, 2, false), (0, 1, false)]);
     }
 }

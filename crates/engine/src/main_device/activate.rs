@@ -93,7 +93,7 @@ impl MainDevice {
         bus.set_occupants(model.occupants());
         let segment = SharedSegment::new(bus.clone(), model, board.clone(), beside);
         self.supervisor.attach(board);
-        self.supervisor.hear(self.requests.bell().clone());
+        self.supervisor.attach_bell(self.requests.bell().clone());
         self.start_procedures(segment, clock_config.is_some());
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();

@@ -140,7 +140,7 @@ const fn with_station(command: Command) -> Option<Command> {
 
 async fn send(bus: Bus, (datagram, asked): (RawDatagram, Target)) -> Result<Reply, BusError> {
     let RawDatagram { command, target, data, resend } = datagram;
-    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.asked_of(asked))?;
+    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.with_target(asked))?;
     // FMMUs that the application wrote itself are not known here.
     let is_split = command == Command::Lrw && reply.main != Wkc(0) && reply.redundant != Wkc(0);
     if is_split { Err(BusError::Split { target: asked }) } else { Ok(reply) }

@@ -12,7 +12,7 @@ use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
-use crate::topology::{NodeStatus, PortOf, Topology, seam};
+use crate::topology::{NodeStatus, PortOf, Topology, ends_of_earlier_break};
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -113,5 +113,5 @@ fn broken(topology: &Topology, links: LinkSet, state: RingState, dl_status: &[Op
     if links != LinkSet::Ring || state != RingState::Open {
         return None;
     }
-    seam(topology, dl_status).map(|(near, far)| Cable { near, far })
+    ends_of_earlier_break(topology, dl_status).map(|(near, far)| Cable { near, far })
 }

@@ -1,11 +1,11 @@
-//! Largest number of datagrams in a frame, where fewer than fit are processed.
+//! Largest number of datagrams in a frame, for segments that process fewer than fit into it.
 
 use core::fmt;
 
 /// Smallest possible limit: the datagrams of the distributed clocks must stay in one frame.
 pub const MIN_DATAGRAMS_PER_FRAME: u16 = 3;
 
-/// Fewer datagrams are processed than fit a frame.
+/// The segment processes fewer datagrams than fit into a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameLimit {
     /// Largest number of datagrams in a frame.
@@ -37,16 +37,16 @@ mod tests {
 
     // covers: frame-limit
     #[test]
-    fn what_to_set_is_said_unless_nothing_helps() {
-        let said = |datagrams, returns| FrameLimit { datagrams, returns }.to_string();
+    fn the_message_names_the_option_unless_the_limit_is_too_small() {
+        let message = |datagrams, returns| FrameLimit { datagrams, returns }.to_string();
         assert_eq!(
-            said(15, true),
+            message(15, true),
             "of the datagrams of a frame only the first 15 are processed on this segment: set max_datagrams_per_frame \
              to 15 (option --max-datagrams 15 of the program)"
         );
         assert!(
-            said(40, false).starts_with("frames with more than 40 datagrams do not come back on this segment: set")
+            message(40, false).starts_with("frames with more than 40 datagrams do not come back on this segment: set")
         );
-        assert!(said(2, false).ends_with("do not come back on this segment; RingCAT needs 3"));
+        assert!(message(2, false).ends_with("do not come back on this segment; RingCAT needs 3"));
     }
 }

@@ -213,7 +213,7 @@ mod tests {
 
     // covers: CR-04, CR-24, SM-02, ring-merge
     #[test]
-    fn both_copies_of_a_frame_are_recognised_after_controllers_marked_them() {
+    fn both_copies_are_recognised_after_controllers_set_the_local_bit() {
         let mut sequence = Sequence::default();
         for _ in 0..70_000 {
             let mut bytes = frame(sequence, Class::Acyclic);
@@ -240,7 +240,7 @@ mod tests {
 
     // covers: SM-08, ring-merge
     #[test]
-    fn frames_of_others_are_foreign_and_short_ones_are_nothing() {
+    fn frames_of_other_maindevices_are_foreign_and_short_frames_are_other() {
         let mut bytes = frame(Sequence::default(), Class::Cyclic);
         bytes[11] ^= 0x40;
         assert_eq!(identity().classify(&bytes), Classified::Foreign);

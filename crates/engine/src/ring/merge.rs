@@ -9,20 +9,21 @@ use crate::link::Link;
 /// How to combine the data of two copies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MergeRule {
-    /// Nothing was read: the data is unchanged.
+    /// The command reads nothing: the data is unchanged.
     AsSent,
-    /// Broadcast and logical reads, sent as zeros: each bit belongs to one SubDevice, or is an OR of all.
+    /// Broadcast and logical reads, sent as zeros: one SubDevice sets each bit, or the bit is an OR of all.
     Or,
     /// One SubDevice answers: the copy whose working counter is not zero. An LRW on two links addresses one SubDevice
     /// (protocol 9.2.2).
     Answered,
-    /// The copy that was sent on this link, because the addressed SubDevice is visible there (ARMW, FRMW: every other
-    /// SubDevice also increments the working counter, which therefore does not show it).
+    /// The copy that was sent on this link, where the addressed SubDevice is reached. For ARMW and FRMW the working
+    /// counter does not show it, because every other SubDevice increments the counter too.
     SentOn(Link),
 }
 
 impl MergeRule {
-    /// The rule for a command; `visible` is the link on which an addressed SubDevice is reached, for ARMW and FRMW.
+    /// The rule for a command. `visible` counts for ARMW and FRMW: the link on which the addressed SubDevice is
+    /// reached.
     pub const fn of(command: Command, visible: Link) -> MergeRule {
         match command {
             Command::Nop | Command::Apwr | Command::Fpwr | Command::Bwr | Command::Lwr | Command::Reserved(_) => {
@@ -76,7 +77,7 @@ mod tests {
 
     // covers: CR-05, 9.3, ring-merge
     #[test]
-    fn reads_by_one_subdevice_come_from_the_copy_it_answered() {
+    fn reads_of_one_subdevice_come_from_the_copy_it_processed() {
         for command in [Command::Aprd, Command::Fprd, Command::Fprw, Command::Aprw, Command::Lrw] {
             assert_eq!(merged(command, (&[0, 0], 0), (&[1, 2], 1)), [1, 2]);
             assert_eq!(merged(command, (&[1, 2], 1), (&[0, 0], 0)), [1, 2]);
@@ -93,7 +94,7 @@ mod tests {
 
     // covers: ring-merge
     #[test]
-    fn a_distributed_time_comes_from_the_side_of_the_reference() {
+    fn a_distributed_time_comes_from_the_link_of_the_reference_clock() {
         assert_eq!(merged(Command::Frmw, (&[9, 9], 5), (&[1, 2], 7)), [1, 2]);
     }
 

@@ -1,17 +1,16 @@
-//! Whether the ring is closed, judged from where the copies of frames arrive (protocol 9.2.1).
-//!
-//! A copy that comes back on the link it was sent on proves an open ring, copies that crossed prove a closed one;
-//! missing copies prove nothing (a single loss, or a break that the controllers have not noticed yet).
+//! Whether the ring is closed, from the links on which the copies of frames arrive (protocol 9.2.1). A copy that
+//! arrives on the link it was sent on proves an open ring; two copies that both arrive on the other link prove a closed
+//! ring. A missing copy proves nothing: it may be a single loss, or a break that the controllers have not detected yet.
 
 use crate::link::Link;
 
 /// State of the ring.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RingState {
-    /// No frame has shown it yet.
+    /// No frame has proved it yet.
     #[default]
     Unknown,
-    /// MAIN copies arrive on RED and the other way round.
+    /// MAIN copies arrive on RED, and RED copies on MAIN.
     Closed,
     /// Copies return on the link they were sent on.
     Open,
@@ -47,15 +46,15 @@ impl Arrivals {
     }
 }
 
-/// Number of consecutive flights of which only the same copy came back, crossed, after which the other direction counts
-/// as dead. Fewer may be single losses.
+/// Number of consecutive frames of which only the copy of the same link arrived, on the other link, after which the
+/// other direction counts as dead. Fewer may be single losses.
 const ONE_WAY_AFTER: u16 = 50;
 
 /// Follows the state of the ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RingMonitor {
     state: RingState,
-    /// Consecutive flights of which exactly one copy came back, by the link on which it was sent.
+    /// Consecutive frames of which exactly one copy arrived, by the link on which that copy was sent.
     alone: [u16; 2],
 }
 
@@ -65,7 +64,8 @@ impl RingMonitor {
         self.state
     }
 
-    /// The link whose frames are lost: the copies of the other link come back, crossed, and these do not.
+    /// The link whose copies are lost while the copies of the other link arrive on this one: the ring passes frames in
+    /// one direction only.
     pub fn dead_way(&self) -> Option<Link> {
         match self.alone.map(|flights| flights >= ONE_WAY_AFTER) {
             [true, _] => Some(Link::Redundant),
@@ -74,8 +74,8 @@ impl RingMonitor {
         }
     }
 
-    /// Evaluates one frame; true where the state changed (protocol CR-12: once per change) or a direction died or
-    /// revived.
+    /// Evaluates one frame; true if the state changed (protocol CR-12: once per change), or if a direction failed or
+    /// recovered.
     pub fn observe(&mut self, arrivals: Arrivals) -> bool {
         let Some(verdict) = arrivals.verdict() else { return self.observe_alone(arrivals) };
         if verdict == self.state && self.alone == [0; 2] {
@@ -86,7 +86,7 @@ impl RingMonitor {
         core::mem::replace(&mut self.state, verdict) != verdict || revived
     }
 
-    /// One copy crossed, or none came back, which proves nothing about either state.
+    /// One copy arrived on the other link, or none arrived: this proves neither state.
     #[cold]
     fn observe_alone(&mut self, arrivals: Arrivals) -> bool {
         let before = self.dead_way();
@@ -135,7 +135,7 @@ mod tests {
 
     // covers: ring-merge
     #[test]
-    fn a_thousand_broken_cycles_are_one_change() {
+    fn a_thousand_frames_of_an_open_ring_are_one_change() {
         let mut monitor = RingMonitor::default();
         let broken = arrivals(&[(Link::Main, Link::Main), (Link::Redundant, Link::Redundant)]);
         let changes = (0..1000).filter(|_| monitor.observe(broken)).count();
@@ -147,7 +147,7 @@ mod tests {
 
     // covers: CR-11, 9.2.1, ring-merge
     #[test]
-    fn one_copy_that_keeps_coming_alone_shows_a_dead_direction_and_single_losses_do_not() {
+    fn fifty_frames_with_the_same_single_copy_prove_a_dead_direction() {
         let mut monitor = RingMonitor::default();
         let closed = arrivals(&[(Link::Main, Link::Redundant), (Link::Redundant, Link::Main)]);
         let main_alone = arrivals(&[(Link::Main, Link::Redundant)]);
@@ -157,7 +157,7 @@ mod tests {
         }
         let changes = (0..1000).filter(|_| monitor.observe(main_alone)).count();
         assert_eq!((changes, monitor.dead_way(), monitor.state()), (1, Some(Link::Redundant), RingState::Closed));
-        assert!(!monitor.observe(Arrivals::default()), "a total loss says nothing about the ways");
+        assert!(!monitor.observe(Arrivals::default()), "a total loss proves nothing about the directions");
         assert!(monitor.observe(closed));
         assert_eq!(monitor.dead_way(), None);
     }

@@ -1,7 +1,6 @@
-//! The cables of a segment, from its topology, and the error counters of the ports at their ends.
-//!
-//! A controller counts an invalid frame where it is detected first (protocol 2.5): at the receiving end of the cable
-//! that damaged it. The controllers after it count it as forwarded, which says nothing about their own cables.
+//! The cables of a segment, from its topology, and the error counters of the ports at their ends. The controller that
+//! first detects an invalid frame counts it (protocol 2.5), at the receiving end of the cable that damaged the frame.
+//! The following controllers count it as a forwarded error, which says nothing about their own cables.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -15,7 +14,7 @@ use crate::topology::{PortOf, Topology};
 /// Errors counted by the ports at both ends of a cable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CableErrors {
-    /// Frames that arrived damaged at either end and were damaged on this cable.
+    /// Damaged frames received at either end: damaged on this cable.
     pub invalid_frames: u64,
     /// Link losses at either end.
     pub lost_links: u64,
@@ -49,9 +48,9 @@ pub fn port_errors(counters: &ErrorCounters, port: u8) -> CableErrors {
     CableErrors { invalid_frames: counters.rx[at].invalid_frames.into(), lost_links: counters.lost_link[at].into() }
 }
 
-/// All cables: those that lead to the SubDevices, in their order, then those that close rings behind junctions, last
-/// that of the redundant link. Broken cables are included, except a broken cable of a ring behind a junction with an
-/// unknown end.
+/// All cables: first the cable to each SubDevice by position, then the closing cables of rings behind junctions, last
+/// the cable of the redundant link. Broken cables are included, except a broken cable of a local ring with an unknown
+/// end.
 pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     let port = |node: usize| PortOf { node, port: topology.nodes[node].entry_port };
     let mut cables = Vec::with_capacity(topology.nodes.len() + 1);
@@ -64,7 +63,7 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
                 let usual = || last_leaf(topology, topology.main_count).map(|last| loose_end(topology, last));
                 topology.main_end.or_else(usual)
             }
-            // The interfaces are swapped: frames of the redundant link reach all SubDevices.
+            // The interfaces are swapped: all SubDevices process frames of the redundant link.
             None if is_swapped => {
                 cables.push(Cable { near: Some(port(node)), far: None });
                 continue;
@@ -86,15 +85,15 @@ pub fn cables(topology: &Topology, links: LinkSet) -> Vec<Cable> {
     cables
 }
 
-/// End of the line of the first `count` SubDevices: the last one without a successor, since frames reach crossed
-/// SubDevices on their way back.
+/// End of the line of the first `count` SubDevices: the last one without a successor. It need not be the last by
+/// position, because crossed SubDevices process frames on the way back.
 fn last_leaf(topology: &Topology, count: usize) -> Option<usize> {
     let is_leaf = |node: &usize| topology.nodes[*node].children.iter().all(Option::is_none);
     (0..count).rev().find(is_leaf).or(count.checked_sub(1))
 }
 
-/// The port at which a line ends: of the ports without a neighbour the usual exit, port 1 or for a crossed SubDevice
-/// port 0, otherwise the next in the order of travel.
+/// The port at which a line ends, among the ports without a neighbour: the usual exit (port 1, for a crossed SubDevice
+/// port 0), otherwise the next port in the order of processing.
 fn loose_end(topology: &Topology, node: usize) -> PortOf {
     let it = &topology.nodes[node];
     let is_loose = |port: &u8| *port != it.entry_port && it.children[usize::from(*port)].is_none();
@@ -130,7 +129,7 @@ mod tests {
 
     // covers: ring-status
     #[test]
-    fn every_cable_of_a_closed_ring_is_named() {
+    fn a_closed_ring_lists_every_cable() {
         let expected = [
             "between the MAIN interface and SubDevice 0 port 0",
             "between SubDevice 0 port 1 and SubDevice 1 port 0",
@@ -141,7 +140,7 @@ mod tests {
 
     // covers: ring-status
     #[test]
-    fn a_broken_cable_is_among_them_wherever_it_is() {
+    fn a_broken_cable_is_listed_wherever_it_is() {
         let expected = [
             "between the MAIN interface and SubDevice 0 port 0",
             "between SubDevice 0 port 1 and SubDevice 1 port 0",
@@ -159,7 +158,7 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn errors_are_those_of_the_port() {
+    fn errors_are_read_from_the_counters_of_the_port() {
         let mut bytes = [0; ErrorCounters::LEN];
         (bytes[2], bytes[0x11]) = (7, 2);
         let counters = ErrorCounters::decode(&bytes);

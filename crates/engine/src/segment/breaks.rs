@@ -7,7 +7,7 @@ use ringcat_wire::register::DlStatus;
 
 use crate::ring::RingState;
 use crate::ring_status::Cable;
-use crate::topology::{PortOf, Topology, seam};
+use crate::topology::{PortOf, Topology, ends_of_earlier_break};
 
 /// What was told of breaks.
 #[derive(Debug, Default)]
@@ -34,7 +34,7 @@ pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>])
     let all = core::iter::once(first).chain(inner).chain(last);
     let mut broken: Vec<Cable> = all.filter(|cable| is_broken(dl_status, cable) == Some(true)).collect();
     if broken.is_empty() {
-        broken.extend(seam(topology, dl_status).map(|(near, far)| Cable { near, far }));
+        broken.extend(ends_of_earlier_break(topology, dl_status).map(|(near, far)| Cable { near, far }));
     }
     broken
 }

@@ -106,7 +106,7 @@ impl LocalRings {
     /// Puts cables that have become known since into the cabling.
     pub fn complete_cabling(&mut self, cabling: &mut Cabling) {
         for (near, node) in self.completed.drain(..) {
-            cabling.topology.hang_behind_break(near, node);
+            cabling.topology.attach_behind_break(near, node);
             let known = cabling.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
             if let Some(cable) = known.filter(|known| cabling.cables.iter().all(|(cable, _)| cable != known)) {
                 // Those that lead to SubDevices come first, in their order.

@@ -37,7 +37,7 @@ pub fn cabling(known: &Cabling, stations: &[StationAddress], status: &[NodeStatu
             continue;
         };
         if let Some(near) = last_before_break(known, stations, status, &topology, ring) {
-            topology.hang_behind_break(near, orphan);
+            topology.attach_behind_break(near, orphan);
         }
     }
     topology

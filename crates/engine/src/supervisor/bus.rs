@@ -76,13 +76,13 @@ impl Bus {
         shared.events.push(shared.now, event);
     }
 
-    /// Reports an event with its SubDevice.
-    pub(crate) fn report_of(&self, event: Event, who: Occupant) {
+    /// Reports an event of a SubDevice.
+    pub(crate) fn report_of(&self, event: Event, subdevice: Occupant) {
         let shared = &mut *self.shared.borrow_mut();
-        shared.events.push_of(shared.now, event, [Some(who), None]);
+        shared.events.push_of(shared.now, event, [Some(subdevice), None]);
     }
 
-    /// Sets the SubDevices at the cabling positions; events that name positions then contain them.
+    /// Sets the SubDevices by cabling position, for events that name positions.
     pub(crate) fn set_occupants(&self, occupants: Vec<Occupant>) {
         self.shared.borrow_mut().events.set_occupants(occupants);
     }
@@ -98,8 +98,8 @@ impl Bus {
     }
 
     /// Sends a datagram, with retries, and returns the reply, whatever its working counter. `expected` is the working
-    /// counter with which a second copy need not be awaited. Commands that read and write at once are sent once: a
-    /// retry would read the written value.
+    /// counter with which a second copy need not be awaited. Commands that both read and write are sent once: a retry
+    /// would read the value that the first attempt wrote.
     pub fn transfer(
         &self,
         command: Command,
@@ -155,7 +155,7 @@ impl Bus {
         self.submit(Request { resend, ..Request::once(command, target, data) })
     }
 
-    /// Exchanges a register value: each SubDevice with this station address passes its old value on in the datagram, so
+    /// Exchanges a register value: each SubDevice with this station address puts its old value into the datagram, so
     /// that only the first one on each link receives the sent data. Sent once.
     pub fn exchange(
         &self,
@@ -170,9 +170,9 @@ impl Bus {
         self.submit(Request { redundant, ..Request::once(command, target, data) })
     }
 
-    /// Distributes the time of one SubDevice's clock once, on each link that of a station of its own. Where no
-    /// SubDevice on a link has the station, or in front of it, SubDevices receive `time`, which is right at `at`,
-    /// adjusted to the departure of the frame. `expected` as for [`Bus::transfer`].
+    /// Distributes a system time once with FRMW; `stations` is the reference clock on each link. SubDevices in front of
+    /// the reference clock, or on a link without it, receive `time`, which is valid at `at` and adjusted to the
+    /// departure of the frame. `expected` as for [`Bus::transfer`].
     pub fn distribute_time(
         &self,
         stations: [StationAddress; 2],
@@ -189,15 +189,15 @@ impl Bus {
         })
     }
 
-    /// A signal from another procedure.
+    /// A signal between procedures.
     pub fn signal(&self) -> Signal {
         Signal::new(self.shared.clone())
     }
 
     pub(super) fn submit(&self, mut request: Request) -> TransferFuture {
-        // Clocks of both stubs are distributed on purpose: neither copy is preferred.
-        if self.links() == LinkSet::Ring && request.redundant_station.is_none() && request.lead.is_none() {
-            request.lead = request.witness();
+        // With a reference clock on each link, neither copy is preferred, so no witness is needed.
+        if self.links() == LinkSet::Ring && request.redundant_station.is_none() && request.preceding.is_none() {
+            request.preceding = request.witness();
         }
         TransferFuture::new(self.shared.clone(), request)
     }

@@ -16,16 +16,16 @@ use crate::time::Instant;
 
 /// A datagram in a frame.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct SentDatagram {
     pub transfer: TransferId,
     pub header_at: usize,
     pub length: usize,
     pub command: Command,
     pub expected: Option<Wkc>,
     pub mail: Option<StationAddress>,
-    /// The datagram before it shows which copy reaches the addressed SubDevice.
+    /// The datagram before it is its witness ([`Request::witness`]).
     pub witness: bool,
-    /// The link whose copy reached it.
+    /// The link on which the addressed SubDevice is reached, by the witness.
     pub visible: Link,
     pub wkc: [Wkc; 2],
     /// The reply was delivered to its procedure.
@@ -36,7 +36,7 @@ pub(super) struct Place {
 #[derive(Debug)]
 pub(super) struct Flight {
     pub sequence: Sequence,
-    pub places: Vec<Place>,
+    pub datagrams: Vec<SentDatagram>,
     /// The first copy, with later ones merged in; before the first copy, the frame as sent.
     pub bytes: Vec<u8>,
     pub arrivals: Arrivals,
@@ -46,11 +46,11 @@ pub(super) struct Flight {
     pub deadline: Instant,
     /// Bytes of its mailbox reads, while it is on the wire.
     pub reads: usize,
-    /// Already answered; kept to recognise the second copy.
+    /// All datagrams are answered; the flight is kept to recognise the second copy.
     pub answered: bool,
     /// Links on which copies are known not to return, a bit each.
-    pub deaf: u8,
-    /// No copy is awaited, because the link of the missing one is silent; it does not count against the window.
+    pub no_return: u8,
+    /// No further copy is awaited because its link is silent: the flight does not count against the window.
     pub released: bool,
 }
 
@@ -58,7 +58,7 @@ impl Default for Flight {
     fn default() -> Flight {
         Flight {
             sequence: Sequence::default(),
-            places: Vec::new(),
+            datagrams: Vec::new(),
             bytes: Vec::with_capacity(MAX_FRAME),
             arrivals: Arrivals::default(),
             sent_at: Instant::NEVER,
@@ -66,7 +66,7 @@ impl Default for Flight {
             deadline: Instant::NEVER,
             reads: 0,
             answered: false,
-            deaf: 0,
+            no_return: 0,
             released: false,
         }
     }
@@ -76,22 +76,22 @@ impl Flight {
     /// A new, empty flight in the same memory.
     pub fn begin(&mut self, sequence: Sequence) {
         self.sequence = sequence;
-        self.places.clear();
+        self.datagrams.clear();
         self.bytes.clear();
         self.arrivals = Arrivals::default();
         self.reads = 0;
         self.answered = false;
-        (self.released, self.deaf) = (false, 0);
+        (self.released, self.no_return) = (false, 0);
     }
 
-    /// All fields that controllers never change are as sent (protocol 1.5): command, Idx, length, M bit of every
-    /// datagram.
-    pub fn is_what_was_sent(&self, bytes: &[u8]) -> bool {
+    /// Whether all fields that controllers never change are as sent (protocol 1.5): command, Idx, length, M bit of
+    /// every datagram.
+    pub fn matches_sent(&self, bytes: &[u8]) -> bool {
         if bytes.len() < self.bytes.len() {
             return false;
         }
-        self.places.iter().all(|place| {
-            let at = place.header_at;
+        self.datagrams.iter().all(|datagram| {
+            let at = datagram.header_at;
             let (sent, got) = (&self.bytes[at..at + 8], &bytes[at..at + 8]);
             let circulating = (CIRCULATING >> 8) as u8;
             sent[..2] == got[..2] && sent[6] == got[6] && (sent[7] ^ got[7]) & !circulating == 0
@@ -101,39 +101,39 @@ impl Flight {
     /// Its mailbox reads.
     pub fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
         let Flight { sequence, sent_at, .. } = *self;
-        self.places.iter().filter_map(move |place| {
-            let Place { header_at, length, mail, .. } = *place;
+        self.datagrams.iter().filter_map(move |datagram| {
+            let SentDatagram { header_at, length, mail, .. } = *datagram;
             Some(Overdue { sequence, header_at, length, station: mail?, sent_at })
         })
     }
 
-    /// Its mailbox reads that an earlier copy has answered: a second copy brings another mail.
+    /// Its mailbox reads with a working counter from an earlier copy: the second copy contains another mail.
     pub fn second_reads(&self) -> Vec<Overdue> {
         let answered = |read: &Overdue| {
-            self.places.iter().any(|place| place.header_at == read.header_at && place.total() != Wkc(0))
+            self.datagrams.iter().any(|datagram| datagram.header_at == read.header_at && datagram.total() != Wkc(0))
         };
         self.mail_reads().filter(answered).collect()
     }
 
     /// Takes a copy that was identified as a frame of this MainDevice.
     pub fn take(&mut self, sent_on: Link, bytes: &[u8], first: bool) {
-        for place in &mut self.places {
-            let data_at = place.header_at + HEADER_LEN;
-            let data = data_at..data_at + place.length;
+        for datagram in &mut self.datagrams {
+            let data_at = datagram.header_at + HEADER_LEN;
+            let data = data_at..data_at + datagram.length;
             let wkc = Wkc(u16::from_le_bytes([bytes[data.end], bytes[data.end + 1]]));
-            let before = place.total();
-            place.wkc[sent_on.index()] = wkc;
-            let witnessed = place.witness && bytes[place.header_at - WKC_LEN..place.header_at] != [0; WKC_LEN];
+            let before = datagram.total();
+            datagram.wkc[sent_on.index()] = wkc;
+            let witnessed = datagram.witness && bytes[datagram.header_at - WKC_LEN..datagram.header_at] != [0; WKC_LEN];
             if witnessed {
-                place.visible = sent_on;
+                datagram.visible = sent_on;
             }
             // OR of the event requests (protocol 9.3); both copies have them after the length.
-            let irq = place.header_at + 8;
+            let irq = datagram.header_at + 8;
             if first {
                 self.bytes[data.clone()].copy_from_slice(&bytes[data]);
                 self.bytes[irq..irq + WKC_LEN].copy_from_slice(&bytes[irq..irq + WKC_LEN]);
             } else {
-                let rule = MergeRule::of(place.command, place.visible);
+                let rule = MergeRule::of(datagram.command, datagram.visible);
                 rule.merge(&mut self.bytes[data.clone()], before, &bytes[data], wkc, sent_on);
                 self.bytes[irq] |= bytes[irq];
                 self.bytes[irq + 1] |= bytes[irq + 1];
@@ -141,33 +141,33 @@ impl Flight {
         }
     }
 
-    /// All copies are in.
-    pub fn has_all(&self, links: LinkSet) -> bool {
+    /// Whether all copies are received.
+    pub fn has_all_copies(&self, links: LinkSet) -> bool {
         self.arrivals.arrived & links.mask() == links.mask()
     }
 
     /// The links whose copy has not returned, a bit each.
-    pub fn misses(&self, links: LinkSet) -> u8 {
+    pub fn missing_links(&self, links: LinkSet) -> u8 {
         links.mask() & !self.arrivals.arrived
     }
 
-    /// One copy crossed the ring and one returned: the ring opened or closed meanwhile, and SubDevices processed the
-    /// frame twice or not at all.
-    pub fn straddled_a_change(&self) -> bool {
+    /// Whether one copy arrived on the other link and one on its own: the ring opened or closed meanwhile, and
+    /// SubDevices processed the frame twice or not at all.
+    pub fn ring_changed_meanwhile(&self) -> bool {
         self.arrivals.arrived == LinkSet::Ring.mask() && self.arrivals.returned.count_ones() == 1
     }
 
-    /// A copy came back on its own link, so that it passed all SubDevices it can reach, and the missing copies were
+    /// Whether a copy returned on its own link, after all SubDevices that it can reach, and the missing copies were
     /// sent on silent links.
     pub fn has_all_but(&self, silent: u8, links: LinkSet) -> bool {
         self.arrivals.returned != 0 && (self.arrivals.arrived | silent) & links.mask() == links.mask()
     }
 }
 
-impl Place {
+impl SentDatagram {
     /// A request with its data at an offset in the frame.
-    pub fn new(transfer: TransferId, request: &Request, data_at: usize) -> Place {
-        Place {
+    pub fn new(transfer: TransferId, request: &Request, data_at: usize) -> SentDatagram {
+        SentDatagram {
             transfer,
             header_at: data_at - HEADER_LEN,
             length: request.data.len(),
@@ -185,7 +185,7 @@ impl Place {
         self.wkc[0].plus(self.wkc[1])
     }
 
-    /// It addresses one SubDevice, which executed the command.
+    /// Whether the datagram addresses one SubDevice, and its working counter shows that the command was executed.
     pub fn is_answered_by_one(&self) -> bool {
         match self.command {
             Command::Aprd | Command::Apwr | Command::Fprd | Command::Fpwr => self.total() == Wkc(1),
@@ -214,5 +214,5 @@ impl Place {
 
 /// Whether the datagram before a request's is its witness.
 fn witnesses(request: &Request) -> bool {
-    request.lead.is_some() && matches!(request.command, Command::Armw | Command::Frmw)
+    request.preceding.is_some() && matches!(request.command, Command::Armw | Command::Frmw)
 }

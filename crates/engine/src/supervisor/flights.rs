@@ -15,7 +15,7 @@ use crate::ring::{MAX_IN_FLIGHT, Sequence};
 use crate::time::Instant;
 
 /// Frames on the wire at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
-/// frame), few enough that no frame is given up because of a full transmit queue.
+/// frame), few enough that no frame times out in a full transmit queue.
 const WINDOW: usize = 32;
 /// Flights are indexed by the lower bits of their sequence number.
 const SLOTS: usize = 128;
@@ -64,7 +64,7 @@ impl Flights {
 
     /// Whether copies of frames on the wire may still return, those on silent links excepted.
     pub(super) fn are_under_way(&self, links: LinkSet, silent: u8) -> bool {
-        let is_waited_for = |flight: &Flight| !flight.released && flight.misses(links) & !silent != 0;
+        let is_waited_for = |flight: &Flight| !flight.released && flight.missing_links(links) & !silent != 0;
         self.in_flight > self.released && self.slots.iter().flatten().any(is_waited_for)
     }
 

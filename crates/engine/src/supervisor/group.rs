@@ -1,6 +1,5 @@
-//! Procedures that are started together and awaited together.
-//!
-//! They end with the procedure that waits: those of a dropped group stop, so that they do not disturb a new attempt.
+//! Procedures that are started together and awaited together. When the group is dropped, its procedures end, so that
+//! they do not disturb a new attempt.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -13,7 +12,7 @@ use core::time::Duration;
 use super::bus::Bus;
 use super::task::TaskId;
 
-/// SubDevices per step where there is no hurry: a frame of 32 us with four FMMUs of each.
+/// SubDevices per step of work without urgency: a frame of 32 us that reads four FMMUs of each.
 pub(crate) const TURN: usize = 5;
 /// Pause between two such steps.
 pub(crate) const TURN_PAUSE: Duration = Duration::from_micros(250);
@@ -40,8 +39,8 @@ impl Bus {
         results.take().into_iter().flatten().collect()
     }
 
-    /// As [`Bus::gather`], in small steps with pauses: for work without urgency, so that frames are short and cyclic
-    /// ones hardly ever wait for them.
+    /// As [`Bus::gather`], in small steps with pauses: for work without urgency. Its frames are short, so that cyclic
+    /// frames rarely wait for them.
     pub async fn gather_in_turns<I, T, F>(&self, items: Vec<I>, procedure: impl Fn(Bus, I) -> F) -> Vec<T>
     where
         T: 'static,

@@ -14,6 +14,6 @@ pub(crate) enum LinkOrder {
     Given { link: Link, disconnect: bool },
     /// It is being carried out.
     Fetched,
-    /// It was carried out or refused.
+    /// It was carried out (true) or refused.
     Answered(bool),
 }

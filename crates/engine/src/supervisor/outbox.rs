@@ -1,12 +1,9 @@
-//! Datagrams that wait to be sent: mailbox reads after all others, and few at a time.
-//!
-//! A SubDevice works while the MainDevice waits for its answer, and idles until its next request. So requests go before
-//! reads, which are long: those of a hundred SubDevices would occupy the wire for a millisecond, in which all
-//! SubDevices idle. Datagrams handed to the interface cannot be overtaken, so the number of reads on the wire is
-//! limited to those that keep the wire busy until the first of them is back.
-//!
-//! Requests go first as long as their SubDevice has not used more than its share of the wire ([`super::turns`]):
-//! otherwise continuous requests would delay the answers of all other SubDevices.
+//! Datagrams that wait to be sent: mailbox reads after all others, and few at a time. A SubDevice prepares its answer
+//! while the MainDevice waits, and idles until its next request. So requests are sent before reads, which are long: the
+//! reads of a hundred SubDevices occupy the wire for a millisecond, in which all SubDevices idle. Datagrams handed to
+//! the interface cannot be reordered, so the reads on the wire are limited to the number that keeps the wire busy until
+//! the first one returns. Requests are sent first as long as their SubDevice has not used more than its share of the
+//! wire ([`super::turns`]): otherwise continuous requests to one SubDevice would delay the answers of all others.
 
 use core::time::Duration;
 
@@ -19,9 +16,9 @@ use crate::time::Instant;
 
 /// Bytes of reads on the wire, beyond those that fill it for a round trip.
 const AHEAD: usize = 2 * MAX_FRAME;
-/// A read that waited for this time goes before all others.
-const PATIENCE: Duration = Duration::from_millis(5);
-/// A longer round trip is taken over by this part of it each time.
+/// A read that has waited for this time is sent before all requests.
+const MAX_READ_WAIT: Duration = Duration::from_millis(5);
+/// The shortest round trip may grow by this part of itself per measurement.
 const FADING_PART: u32 = 256;
 
 /// The two queues.
@@ -54,7 +51,7 @@ pub(crate) struct Outbox {
     /// When the interface finishes sending.
     free_at: Instant,
     /// The shortest recent round trip.
-    way: Option<Duration>,
+    round_trip: Option<Duration>,
 }
 
 impl Outbox {
@@ -72,13 +69,13 @@ impl Outbox {
         }
     }
 
-    /// The next datagram, for a frame that may hold reads or not. Later datagrams do not overtake it.
+    /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
             (Some((turn, id)), waiting) => {
                 let passes =
-                    |(other, read): &(Turn, &Read)| turn.round > other.round || now.since(read.since) >= PATIENCE;
+                    |(other, read): &(Turn, &Read)| turn.round > other.round || now.since(read.since) >= MAX_READ_WAIT;
                 if let Some((turn, read)) = waiting.filter(passes) {
                     self.reads.settle(turn);
                     return Some((read.id, Rank::Read));
@@ -94,7 +91,7 @@ impl Outbox {
         }
     }
 
-    /// It was packed, or its procedure gave it up.
+    /// Removes the next datagram: it was packed, or its procedure gave it up.
     pub(crate) fn pop(&mut self, rank: Rank) {
         match rank {
             Rank::First => _ = self.first.pop(),
@@ -105,30 +102,30 @@ impl Outbox {
         }
     }
 
-    /// Whether a datagram waits that may leave now.
+    /// Whether a waiting datagram may be sent now.
     pub(crate) fn is_ready(&self, now: Instant) -> bool {
         !self.first.is_empty() || (!self.reads.is_empty() && self.may_read(now))
     }
 
-    /// Time after which waiting reads no longer wait to share a frame.
+    /// Time at which waiting reads are sent even in a short frame.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         (!self.reads.is_empty() && self.has_room() && self.free_at > now).then_some(self.free_at)
     }
 
-    /// Whether the next frame may hold reads: a frame with room left, a full frame, or any frame as soon as the
-    /// interface is idle. Many short frames take more of the wire.
+    /// Whether the next frame may hold reads: beside requests, as a full frame, or in any frame as soon as the
+    /// interface is idle. Many short frames would waste bandwidth.
     pub(crate) fn may_read(&self, now: Instant) -> bool {
         let worthwhile = !self.first.is_empty() || self.waiting >= MAX_FRAME || self.free_at <= now;
         worthwhile && self.has_room()
     }
 
     fn has_room(&self) -> bool {
-        let way = self.way.unwrap_or_default().as_nanos() / u128::from(BYTE_TIME_NS);
-        let limit = AHEAD.saturating_add(usize::try_from(way).unwrap_or(usize::MAX));
+        let round_trip = self.round_trip.unwrap_or_default().as_nanos() / u128::from(BYTE_TIME_NS);
+        let limit = AHEAD.saturating_add(usize::try_from(round_trip).unwrap_or(usize::MAX));
         self.under_way + self.waiting.min(MAX_FRAME) <= limit
     }
 
-    /// A frame is handed to the interface. Returns its earliest start and end of sending.
+    /// A frame is handed to the interface. Returns the earliest start and end of its transmission.
     pub(crate) fn hand_over(&mut self, length: usize, now: Instant) -> (Instant, Instant) {
         let begins = self.free_at.max(now);
         self.free_at = begins + Duration::from_nanos(wire_time_ns(length));
@@ -136,18 +133,19 @@ impl Outbox {
     }
 
     /// Reads of this length were packed.
-    pub(crate) fn set_out(&mut self, bytes: usize) {
+    pub(crate) fn reads_sent(&mut self, bytes: usize) {
         self.under_way += bytes;
     }
 
     /// Reads of this length returned, or were lost.
-    pub(crate) fn came_back(&mut self, bytes: usize) {
+    pub(crate) fn reads_returned(&mut self, bytes: usize) {
         self.under_way = self.under_way.saturating_sub(bytes);
     }
 
-    /// A frame returned this long after it had left.
-    pub(crate) fn took(&mut self, way: Duration) {
-        self.way = Some(self.way.map_or(way, |shortest| way.min(shortest + shortest / FADING_PART)));
+    /// A frame returned this long after its transmission.
+    pub(crate) fn note_round_trip(&mut self, round_trip: Duration) {
+        self.round_trip =
+            Some(self.round_trip.map_or(round_trip, |shortest| round_trip.min(shortest + shortest / FADING_PART)));
     }
 }
 
@@ -170,13 +168,13 @@ mod tests {
 
     // covers: start-lists
     #[test]
-    fn requests_go_before_reads_unless_these_have_waited_for_long() {
+    fn requests_are_sent_before_reads_unless_a_read_has_waited_for_5_ms() {
         let [a, b, c] = ids();
         let mut outbox = Outbox::default();
         outbox.push(a, Rank::Read, Target::None, READ, Instant(0));
         outbox.push(b, Rank::First, Target::None, 40, Instant(10));
         assert_eq!(outbox.front(true, Instant(10)), Some((b, Rank::First)));
-        assert_eq!(outbox.front(true, Instant(0) + PATIENCE), Some((a, Rank::Read)));
+        assert_eq!(outbox.front(true, Instant(0) + MAX_READ_WAIT), Some((a, Rank::Read)));
         outbox.pop(Rank::Read);
         outbox.pop(Rank::First);
         assert_eq!(outbox.front(true, Instant(10)), None);
@@ -184,59 +182,60 @@ mod tests {
         assert_eq!(outbox.front(false, Instant(20)), None, "this frame holds no reads");
     }
 
-    /// Continuous load of a SubDevice: datagrams of this length, or a request followed by its answer.
+    /// Continuous load of a SubDevice: datagrams of this length, or a request and then the read of its answer.
     #[derive(Clone, Copy, Debug)]
-    enum Wish {
+    enum Load {
         Datagrams(usize),
         Mail { write: usize, read: usize },
     }
 
     // covers: byte-budget
     #[test]
-    fn subdevices_that_always_wait_get_equal_bytes_to_a_datagram_and_two_shares() {
-        const MAIL: Wish = Wish::Mail { write: 40, read: READ };
-        let wishes =
-            [MAIL, Wish::Datagrams(1490), MAIL, Wish::Datagrams(28), Wish::Datagrams(400), MAIL, Wish::Datagrams(800)];
+    fn continuous_loads_get_equal_bytes_to_within_a_datagram_each_and_two_shares() {
+        const MAIL: Load = Load::Mail { write: 40, read: READ };
+        let loads =
+            [MAIL, Load::Datagrams(1490), MAIL, Load::Datagrams(28), Load::Datagrams(400), MAIL, Load::Datagrams(800)];
         let mut transfers = Transfers::default();
         let mut outbox = Outbox::default();
         let mut owners: BTreeMap<TransferId, (usize, usize)> = BTreeMap::new();
-        let ask = |outbox: &mut Outbox, owners: &mut BTreeMap<_, _>, transfers: &mut Transfers, owner: usize, rank| {
-            let bytes = match (wishes[owner], rank) {
-                (Wish::Datagrams(bytes), _) => bytes,
-                (Wish::Mail { write, .. }, Rank::First) => write,
-                (Wish::Mail { read, .. }, Rank::Read) => read,
+        let enqueue =
+            |outbox: &mut Outbox, owners: &mut BTreeMap<_, _>, transfers: &mut Transfers, owner: usize, rank| {
+                let bytes = match (loads[owner], rank) {
+                    (Load::Datagrams(bytes), _) => bytes,
+                    (Load::Mail { write, .. }, Rank::First) => write,
+                    (Load::Mail { read, .. }, Rank::Read) => read,
+                };
+                let id = transfers.insert(Transfer::for_test());
+                let target = Target::Station(StationAddress(owner as u16), RegisterAddress(0));
+                outbox.push(id, rank, target, bytes, Instant(0));
+                owners.insert(id, (owner, bytes));
             };
-            let id = transfers.insert(Transfer::for_test());
-            let target = Target::Station(StationAddress(owner as u16), RegisterAddress(0));
-            outbox.push(id, rank, target, bytes, Instant(0));
-            owners.insert(id, (owner, bytes));
-        };
-        for (owner, wish) in wishes.iter().enumerate() {
-            // The sender of datagrams has queued a thousand at once.
-            let count = if matches!(wish, Wish::Datagrams(_)) { 1000 } else { 1 };
-            (0..count).for_each(|_| ask(&mut outbox, &mut owners, &mut transfers, owner, Rank::First));
+        for (owner, load) in loads.iter().enumerate() {
+            // A thousand datagrams are queued at once.
+            let count = if matches!(load, Load::Datagrams(_)) { 1000 } else { 1 };
+            (0..count).for_each(|_| enqueue(&mut outbox, &mut owners, &mut transfers, owner, Rank::First));
         }
         let mut had = [0i64; 7];
-        // Lead of one over the other at any time, smallest and largest.
+        // Difference in bytes between two SubDevices: smallest and largest at any time.
         let mut ahead = [[(0, 0); 7]; 7];
         for _ in 0..20_000 {
             let (id, rank) = outbox.front(true, Instant(0)).expect("plenty");
             outbox.pop(rank);
-            let (owner, bytes) = owners.remove(&id).expect("it was asked for");
+            let (owner, bytes) = owners.remove(&id).expect("it was queued");
             had[owner] += bytes as i64;
-            let asks = matches!(wishes[owner], Wish::Mail { .. }) && rank == Rank::First;
-            let next = if asks { Rank::Read } else { Rank::First };
-            ask(&mut outbox, &mut owners, &mut transfers, owner, next);
+            let is_request = matches!(loads[owner], Load::Mail { .. }) && rank == Rank::First;
+            let next = if is_request { Rank::Read } else { Rank::First };
+            enqueue(&mut outbox, &mut owners, &mut transfers, owner, next);
             for (one, other) in (0..7).flat_map(|one| (0..7).map(move |other| (one, other))) {
                 let (least, most) = &mut ahead[one][other];
                 let by = had[one] - had[other];
                 (*least, *most) = ((*least).min(by), (*most).max(by));
             }
         }
-        // In any window of time, the difference is at most that between two such times.
-        let longest = wishes.map(|wish| match wish {
-            Wish::Datagrams(bytes) => bytes as i64,
-            Wish::Mail { write, read } => (write + read) as i64,
+        // In any time window, the difference changes by at most the range of all differences.
+        let longest = loads.map(|load| match load {
+            Load::Datagrams(bytes) => bytes as i64,
+            Load::Mail { write, read } => (write + read) as i64,
         });
         for (one, other) in (0..7).flat_map(|one| (0..7).map(move |other| (one, other))) {
             let (least, most) = ahead[one][other];
@@ -247,30 +246,30 @@ mod tests {
 
     // covers: start-lists
     #[test]
-    fn reads_under_way_are_those_of_two_frames_and_of_the_way_through_the_segment() {
+    fn reads_on_the_wire_fill_two_frames_and_the_round_trip() {
         let mut outbox = Outbox::default();
         ids::<64>().into_iter().for_each(|id| outbox.push(id, Rank::Read, Target::None, READ, Instant(0)));
         assert!(outbox.is_ready(Instant(0)));
-        outbox.set_out(MAX_FRAME);
-        assert!(outbox.is_ready(Instant(0)), "a second frame may go");
-        outbox.set_out(MAX_FRAME);
+        outbox.reads_sent(MAX_FRAME);
+        assert!(outbox.is_ready(Instant(0)), "a second frame may be sent");
+        outbox.reads_sent(MAX_FRAME);
         assert!(!outbox.is_ready(Instant(0)));
-        outbox.took(Duration::from_nanos(MAX_FRAME as u64 * BYTE_TIME_NS));
-        assert!(outbox.is_ready(Instant(0)), "a third one fills the way");
-        outbox.set_out(MAX_FRAME);
+        outbox.note_round_trip(Duration::from_nanos(MAX_FRAME as u64 * BYTE_TIME_NS));
+        assert!(outbox.is_ready(Instant(0)), "a third frame fills the round trip");
+        outbox.reads_sent(MAX_FRAME);
         assert!(!outbox.is_ready(Instant(0)));
-        outbox.came_back(MAX_FRAME);
+        outbox.reads_returned(MAX_FRAME);
         assert!(outbox.is_ready(Instant(0)));
     }
 
     // covers: start-lists
     #[test]
-    fn a_few_reads_wait_for_others_while_the_interface_is_busy() {
+    fn a_short_frame_of_reads_waits_while_the_interface_is_busy() {
         let [a] = ids();
         let mut outbox = Outbox::default();
         let (begins, left) = outbox.hand_over(MAX_FRAME, Instant(100));
         assert_eq!((begins, left), (Instant(100), Instant(100 + wire_time_ns(MAX_FRAME))));
-        assert_eq!(outbox.hand_over(60, Instant(100)).0, left, "one frame leaves after the other");
+        assert_eq!(outbox.hand_over(60, Instant(100)).0, left, "the second frame is sent after the first");
         outbox.push(a, Rank::Read, Target::None, READ, Instant(100));
         assert!(!outbox.is_ready(Instant(100)));
         let until = outbox.next_deadline(Instant(100)).unwrap();

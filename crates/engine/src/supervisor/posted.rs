@@ -14,13 +14,13 @@ pub struct Posted {
     pub ring: RingWord,
     /// By [`crate::link::Link::index`].
     pub carriers: [Option<bool>; 2],
-    /// Number of requests of a cyclic thread that were started or cancelled.
+    /// Number of requests that a cyclic thread has started or cancelled.
     pub requests: u32,
     /// Number of stops of the time distribution after changes of ports.
     pub holds: u32,
 }
 
-/// Procedures that wait for a changed word, and the words of their last wake-up.
+/// Procedures that wait for a changed word.
 #[derive(Debug, Default)]
 pub(super) struct Watchers {
     /// Waiting procedures.

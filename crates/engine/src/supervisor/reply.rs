@@ -37,21 +37,21 @@ impl Reply {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BusError {
-    /// Its frame was lost, also when it was repeated.
+    /// The frame was lost, and so were all repetitions.
     Lost {
         /// Its target.
         target: Target,
         /// Number of retries.
         retries: u8,
     },
-    /// It is longer than a frame can carry.
+    /// The data is longer than a frame can carry.
     TooLong {
         /// Its target.
         target: Target,
         /// Bytes of data.
         length: usize,
     },
-    /// Another number of SubDevices answered than expected.
+    /// The working counter differs from the expected one.
     Wkc {
         /// Its target.
         target: Target,
@@ -60,17 +60,18 @@ pub enum BusError {
         /// Received.
         got: Wkc,
     },
-    /// It was to be alone on the wire, but the wire was never free.
+    /// The datagram had to be alone on the wire, but the wire was never free.
     Busy {
         /// Its target.
         target: Target,
     },
-    /// It was to be alone on the wire, but the cyclic half sent meanwhile.
+    /// The datagram had to be alone on the wire, but the cyclic half sent a frame meanwhile.
     Disturbed {
         /// Its target.
         target: Target,
     },
-    /// An LRW that SubDevices processed on both copies: neither copy has the data read into the other (protocol 9.2.2).
+    /// SubDevices processed both copies of an LRW: each copy contains only the inputs that were read into it (protocol
+    /// 9.2.2).
     Split {
         /// Its target.
         target: Target,
@@ -80,14 +81,14 @@ pub enum BusError {
 impl BusError {
     /// The same error for a datagram with another target.
     #[must_use]
-    pub(crate) fn asked_of(mut self, asked: Target) -> BusError {
+    pub(crate) fn with_target(mut self, addressed: Target) -> BusError {
         let (BusError::Lost { target, .. }
         | BusError::TooLong { target, .. }
         | BusError::Wkc { target, .. }
         | BusError::Busy { target }
         | BusError::Disturbed { target }
         | BusError::Split { target }) = &mut self;
-        *target = asked;
+        *target = addressed;
         self
     }
 }
@@ -96,7 +97,7 @@ impl fmt::Display for BusError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fn target(f: &mut fmt::Formatter<'_>, target: Target) -> fmt::Result {
             match target {
-                Target::None => f.write_str("nobody"),
+                Target::None => f.write_str("no SubDevice"),
                 Target::Position(position, register) => write!(f, "position {position}, register {register}"),
                 Target::Station(station, register) => write!(f, "station {station}, register {register}"),
                 Target::Broadcast(register) => write!(f, "all SubDevices, register {register}"),
@@ -104,31 +105,29 @@ impl fmt::Display for BusError {
             }
         }
         match self {
-            BusError::Lost { target: whom, retries } => {
-                target(f, *whom)?;
+            BusError::Lost { target: to, retries } => {
+                target(f, *to)?;
                 write!(f, ": the frame was lost, {} times", u16::from(*retries) + 1)
             }
-            BusError::TooLong { target: whom, length } => {
-                target(f, *whom)?;
+            BusError::TooLong { target: to, length } => {
+                target(f, *to)?;
                 write!(f, ": {length} bytes, a datagram carries at most {MAX_DATA}")
             }
-            BusError::Wkc { target: whom, expected, got } => {
-                target(f, *whom)?;
+            BusError::Wkc { target: to, expected, got } => {
+                target(f, *to)?;
                 write!(f, ": expected working counter {expected}, got {got}")
             }
-            BusError::Busy { target: whom } => {
-                target(f, *whom)?;
-                f.write_str(": other frames are on the wire all the time")
+            BusError::Busy { target: to } => {
+                target(f, *to)?;
+                f.write_str(": other frames were on the wire all the time")
             }
-            BusError::Disturbed { target: whom } => {
-                target(f, *whom)?;
-                f.write_str(": process data was on the wire beside the frame")
+            BusError::Disturbed { target: to } => {
+                target(f, *to)?;
+                f.write_str(": a cyclic frame was on the wire with the datagram")
             }
-            BusError::Split { target: whom } => {
-                target(f, *whom)?;
-                f.write_str(
-                    ": an LRW on two links met SubDevices with both copies, so that half of them is missing in each",
-                )
+            BusError::Split { target: to } => {
+                target(f, *to)?;
+                f.write_str(": SubDevices processed both copies of an LRW, so that each copy lacks inputs of the other")
             }
         }
     }

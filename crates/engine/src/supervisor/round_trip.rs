@@ -1,7 +1,6 @@
-//! Deadline of a frame's copies, learnt from received copies.
-//!
-//! A frame lost at the moment of a cut should cost only a few round trips; a frame delayed by a thousand SubDevices or
-//! by a busy host must not be taken for lost.
+//! Deadline of a frame's copies, learnt from received copies. The deadline follows the measured round trips: after a
+//! cut, a lost frame costs only a few round trips, and a frame that a thousand SubDevices or a busy host delay does not
+//! count as lost.
 
 use core::time::Duration;
 
@@ -15,7 +14,7 @@ const FACTOR: u32 = 4;
 /// Learns round-trip times.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RoundTrip {
-    /// The longest recent one; it decays.
+    /// The longest recent round trip; it decays.
     longest: Option<Duration>,
 }
 
@@ -33,7 +32,7 @@ impl RoundTrip {
         }
     }
 
-    /// Deadline of a frame whose datagrams were lost this number of times before. Each loss doubles it.
+    /// Time limit of a frame whose datagrams were lost this number of times before. Each loss doubles it.
     pub(crate) fn wait(&self, losses: u8) -> Duration {
         let Some(longest) = self.longest else { return LONGEST };
         let wait = longest * FACTOR + MARGIN;
@@ -46,9 +45,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waits_follow_the_round_trips_and_grow_with_each_loss() {
+    fn limits_follow_the_round_trips_and_double_with_each_loss() {
         let mut trips = RoundTrip::default();
-        assert_eq!(trips.wait(0), LONGEST, "nothing was learnt");
+        assert_eq!(trips.wait(0), LONGEST, "no round trip was measured");
         trips.took(Duration::from_micros(100));
         assert_eq!(trips.wait(0), Duration::from_micros(2_400));
         assert_eq!(trips.wait(1), Duration::from_micros(4_800));
@@ -58,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_round_trip_fades() {
+    fn the_longest_round_trip_decays() {
         let mut trips = RoundTrip::default();
         trips.took(Duration::from_millis(4));
         assert_eq!(trips.wait(0), Duration::from_millis(18));

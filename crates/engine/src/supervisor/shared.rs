@@ -38,13 +38,14 @@ pub(crate) struct Shared {
     pub(crate) alone: Alone,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
-    /// By link, where the links report it.
+    /// Carrier by link, if the links report it.
     pub(crate) carriers: [Option<bool>; 2],
     pub(crate) strays: Strays,
     pub(crate) round_trip: RoundTrip,
-    /// SubDevices that processed the main copy of the last broadcast: higher positions are on the redundant link.
+    /// Number of SubDevices that processed the main copy of the last broadcast: higher positions are on the redundant
+    /// link.
     pub(crate) main_count: u16,
-    /// The first datagram of the outbox while it is too long for the send window, and since when.
+    /// The first datagram of the outbox and since when it waits, if it is too long for the send window.
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
     pub(super) watchers: Watchers,
@@ -135,7 +136,7 @@ impl Shared {
         }
     }
 
-    /// Queues a datagram for the current task. One that fits no frame fails at once.
+    /// Queues a datagram for the current task. If it is longer than a frame, it fails at once.
     pub(crate) fn request(&mut self, request: Request) -> TransferId {
         let length = request.data.len();
         let fits = length <= MAX_DATA;
@@ -147,7 +148,7 @@ impl Shared {
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });
         match alone {
             _ if !fits => self.wake(self.current),
-            Some(deaf) => self.push_alone(id, deaf),
+            Some(no_return) => self.push_alone(id, no_return),
             None => self.outbox.push(id, rank, target, bytes, self.now),
         }
         id

@@ -10,7 +10,7 @@ use core::task::Poll;
 use super::shared::Shared;
 use super::task::TaskId;
 
-/// Wakes procedures that wait for a condition which other procedures fulfil.
+/// Wakes procedures that wait for a condition.
 #[derive(Clone)]
 pub struct Signal {
     shared: Rc<RefCell<Shared>>,

@@ -1,8 +1,7 @@
-//! Detects silent links, whose sent copies do not come back.
-//!
-//! A reply that needs both copies would wait for the one on a dead link (a cut host cable) until its deadline, each
-//! time. A copy is not awaited on a link that has been silent for long while the other one proves the ring open.
-//! Sending on it continues, to notice when copies come back.
+//! Detects silent links, whose sent copies do not come back. A reply that needs both copies would wait until its
+//! deadline for the copy on a dead link (a cut host cable), each time. A copy is not awaited on a link that has been
+//! silent for [`SILENCE`] while the copy on the other link proves the ring open. Frames are still sent on the silent
+//! link, to detect when copies come back.
 
 use core::time::Duration;
 
@@ -41,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn silence_begins_with_the_first_copy_without_answer_and_ends_with_any_answer() {
+    fn silence_begins_with_the_first_missing_copy_and_ends_with_any_copy() {
         let mut silence = Silence::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         assert_eq!(silence.mask(at(1000)), 0, "nothing was sent");

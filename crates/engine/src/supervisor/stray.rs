@@ -1,7 +1,6 @@
-//! Mail that came back after its read was given up (decision 0007).
-//!
-//! Reading a mailbox empties it, so the result must not be dropped: neither when both copies passed the SubDevice at
-//! the moment in which a ring closed and each read another mail, nor when the frame was given up before it came back.
+//! Mail that came back after its read was given up (decision 0007). A read empties the mailbox, so its result must not
+//! be dropped. A mail arrives without a waiting reader in two cases: the ring closed while a frame was on the wire, so
+//! that both copies passed the SubDevice and each read a mail; or the frame came back after it was given up.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -15,7 +14,7 @@ use crate::time::Instant;
 
 /// Stray mails that wait for their router; beyond this, the oldest is dropped and counted.
 const KEPT: usize = 64;
-/// Given-up reads that are remembered, in case they come back.
+/// Given-up reads that are remembered in case their frames come back.
 const REMEMBERED: usize = 64;
 
 /// A frame that comes back later than this counts as lost.
@@ -31,7 +30,7 @@ pub(crate) struct Overdue {
     pub sent_at: Instant,
 }
 
-/// A mail without a reader.
+/// A mail without a waiting reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stray {
     /// The content of the mailbox.
@@ -41,7 +40,7 @@ pub struct Stray {
 }
 
 impl Overdue {
-    /// Its data in a frame, if it was answered.
+    /// The mail in a frame, if the SubDevice answered the read.
     pub(crate) fn mail(&self, bytes: &[u8]) -> Option<Vec<u8>> {
         let start = self.header_at + HEADER_LEN;
         let data = bytes.get(start..start + self.length)?;
@@ -50,7 +49,7 @@ impl Overdue {
     }
 }
 
-/// Mail without a reader.
+/// Mails without a waiting reader, and given-up reads.
 #[derive(Debug, Default)]
 pub(crate) struct Strays {
     mails: VecDeque<(StationAddress, Stray)>,
@@ -67,7 +66,7 @@ impl Strays {
         self.overdue.push_back(read);
     }
 
-    /// A frame came back late: keeps its mail.
+    /// Keeps the mail of a frame that came back late.
     pub(crate) fn late(&mut self, sequence: Sequence, bytes: &[u8], now: Instant) {
         for at in (0..self.overdue.len()).rev() {
             let read = self.overdue[at];

@@ -1,4 +1,4 @@
-//! The acyclic half against hand-made answers: packing, pairing, retries, giving up, timers.
+//! Tests of the acyclic half with prepared answers: packing, pairing, retries, time limits, timers.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -61,12 +61,12 @@ fn answered(frame: &[u8], wkc: u16, fill: u8) -> Vec<u8> {
     let places: Vec<(usize, usize, bool)> = {
         let parsed = Frame::parse(&frame).unwrap();
         let mut at = parsed.payload_offset();
-        let place = |d: ringcat_wire::datagram::Datagram<'_>| {
+        let datagram = |d: ringcat_wire::datagram::Datagram<'_>| {
             let data = at + HEADER_LEN;
             at = data + d.data.len() + 2;
             (data, d.data.len(), d.header.command.reads())
         };
-        parsed.datagrams().map(place).collect()
+        parsed.datagrams().map(datagram).collect()
     };
     for (data, length, reads) in places {
         if reads && wkc > 0 {
@@ -104,7 +104,7 @@ fn a_reply_reaches_the_procedure_that_waits_for_it() {
 }
 
 #[test]
-fn a_silent_link_does_not_hold_room_for_what_is_answered() {
+fn answered_frames_do_not_wait_for_copies_on_a_silent_link() {
     let mut bench = Bench::new(LinkSet::Ring);
     let mut answered_on_main = |requests: usize, length: usize| {
         for _ in 0..requests {
@@ -127,11 +127,11 @@ fn a_silent_link_does_not_hold_room_for_what_is_answered() {
     for _ in 0..100 {
         answered_on_main(1, 2);
     }
-    assert_eq!(answered_on_main(60, 1400), 60, "at one moment");
+    assert_eq!(answered_on_main(60, 1400), 60, "without a pause");
 }
 
 #[test]
-fn nobody_answering_is_an_error_that_names_register_and_counter() {
+fn a_working_counter_of_0_is_an_error_that_names_station_and_register() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
@@ -148,7 +148,7 @@ fn nobody_answering_is_an_error_that_names_register_and_counter() {
 
 // covers: SM-04, ring-merge
 #[test]
-fn a_lost_frame_is_sent_again_with_the_retry_index_and_given_up_in_the_end() {
+fn a_lost_frame_is_repeated_seven_times_with_the_retry_index() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
@@ -168,7 +168,7 @@ fn a_lost_frame_is_sent_again_with_the_retry_index_and_given_up_in_the_end() {
 }
 
 #[test]
-fn what_must_not_happen_twice_is_not_sent_again() {
+fn a_datagram_that_must_not_be_repeated_is_sent_once() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let target = ringcat_wire::datagram::Target::Station(STATION, RegisterAddress(0x1000));
@@ -198,7 +198,7 @@ fn an_answer_that_comes_after_the_retry_is_late() {
 }
 
 #[test]
-fn both_copies_leave_with_one_id_and_the_redundant_bit_on_one() {
+fn copies_have_the_same_id_and_the_redundant_copy_has_its_bit() {
     // protocol CR-01, CR-24, SM-02.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
@@ -211,7 +211,7 @@ fn both_copies_leave_with_one_id_and_the_redundant_bit_on_one() {
 }
 
 #[test]
-fn in_an_open_ring_counts_are_added_and_reads_are_ored() {
+fn in_an_open_ring_working_counters_are_added_and_reads_are_ored() {
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.brd(map::AL_STATUS, 2).await });
@@ -232,7 +232,8 @@ fn in_an_open_ring_counts_are_added_and_reads_are_ored() {
 // covers: CR-09, CR-10, ring-merge
 #[test]
 fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
-    // protocol CR-09: three on the main link, so position 4 is position 1 on the redundant one: ADP -4 + 3 = -1.
+    // protocol CR-09: three SubDevices on the main link, so position 4 is position 1 on the redundant link: ADP -4 + 3
+    // = -1.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     bench.start(async move {
@@ -253,7 +254,7 @@ fn positions_behind_the_break_are_shifted_on_the_redundant_copy() {
 
 // covers: CR-06, ring-merge
 #[test]
-fn one_copy_is_enough_where_the_counter_is_as_expected() {
+fn one_copy_with_the_expected_working_counter_is_enough() {
     // protocol CR-06.
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
@@ -267,7 +268,7 @@ fn one_copy_is_enough_where_the_counter_is_as_expected() {
 }
 
 #[test]
-fn a_copy_nobody_answered_is_no_answer_while_the_other_is_missing() {
+fn a_copy_with_working_counter_0_does_not_replace_the_missing_copy() {
     let mut bench = Bench::new(LinkSet::Ring);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
@@ -293,7 +294,7 @@ fn a_frame_with_other_datagrams_than_sent_is_corrupt() {
 }
 
 #[test]
-fn an_abandoned_request_is_forgotten_and_its_answer_harms_nobody() {
+fn the_answer_to_an_abandoned_request_does_not_reach_another_request() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move {
@@ -326,7 +327,7 @@ fn a_request_abandoned_before_it_was_sent_is_never_sent() {
 
 // covers: byte-budget
 #[test]
-fn a_frame_that_is_filled_up_to_the_shortest_one_fits_the_budget_too() {
+fn the_budget_counts_the_padding_of_a_short_frame() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
@@ -355,7 +356,7 @@ fn the_byte_budget_and_the_window_are_kept() {
 }
 
 #[test]
-fn a_datagram_too_long_for_every_window_goes_out_after_ten_milliseconds() {
+fn a_datagram_too_long_for_every_window_is_sent_after_10_ms() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     bench.start(async move { bus.fprd(STATION, map::PROCESS_RAM, 1000).await });
@@ -371,7 +372,7 @@ fn a_datagram_too_long_for_every_window_goes_out_after_ten_milliseconds() {
 }
 
 #[test]
-fn what_no_frame_can_carry_fails_at_once() {
+fn a_datagram_longer_than_a_frame_fails_at_once() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::PROCESS_RAM, 1487).await });
@@ -382,7 +383,7 @@ fn what_no_frame_can_carry_fails_at_once() {
 }
 
 #[test]
-fn timers_fire_in_order_and_groups_wake_once() {
+fn timers_fire_in_order_and_a_group_wakes_its_waiter_once() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let woken = Rc::new(Cell::new(0));
@@ -435,9 +436,9 @@ proptest! {
 }
 
 #[test]
-fn a_datagram_that_was_given_up_does_not_make_a_later_one_starve() {
+fn an_abandoned_datagram_does_not_count_as_waiting_time_of_the_next() {
     let mut bench = Bench::new(LinkSet::Single);
-    let ask = |bench: &mut Bench| {
+    let request = |bench: &mut Bench| {
         let bus = bench.supervisor.bus();
         bench.start(async move {
             let long = bus.fprd(STATION, RegisterAddress(0x1000), 1_000);
@@ -446,22 +447,22 @@ fn a_datagram_that_was_given_up_does_not_make_a_later_one_starve() {
         bench.supervisor.poll(bench.now);
     };
     let offer = |bench: &mut Bench, budget: usize| bench.supervisor.transmit(bench.now, budget, &mut |_, _| ());
-    ask(&mut bench);
+    request(&mut bench);
     assert_eq!(offer(&mut bench, 100), 0, "it does not fit");
     bench.pass(Duration::from_millis(1));
     bench.supervisor.poll(bench.now);
-    assert_eq!(offer(&mut bench, 100), 0, "nobody waits for it any more");
+    assert_eq!(offer(&mut bench, 100), 0, "no procedure waits for it");
     assert!(!bench.supervisor.wants_to_send());
     bench.pass(Duration::from_millis(100));
-    ask(&mut bench);
-    assert_eq!(offer(&mut bench, 100), 0, "it has not waited yet");
+    request(&mut bench);
+    assert_eq!(offer(&mut bench, 100), 0, "its waiting time starts now");
     bench.pass(Duration::from_micros(500));
     assert!(offer(&mut bench, 1_500) > 1_000);
-    // Nor does a frame that takes its slot.
-    ask(&mut bench);
+    // The next datagram in the same table entry starts its own waiting time.
+    request(&mut bench);
     offer(&mut bench, 100);
     bench.pass(Duration::from_micros(900));
-    ask(&mut bench);
+    request(&mut bench);
     for _ in 0..2 {
         bench.pass(Duration::from_micros(100));
         bench.supervisor.poll(bench.now);

@@ -24,17 +24,18 @@ pub(crate) struct Request {
     pub redundant_station: Option<StationAddress>,
     /// The working counter with which a second copy need not be awaited.
     pub expected: Option<Wkc>,
-    /// Whether a lost datagram may be repeated: false where two accesses differ from one.
+    /// Whether a lost datagram may be repeated: false if a second access has another effect than one.
     pub resend: bool,
     /// A datagram that precedes it in the same frame: a part of the same mail, or its [`Request::witness`].
-    pub lead: Option<(Command, Target, Vec<u8>)>,
-    /// A read of this SubDevice's mailbox: the content of each copy counts, also when it comes late.
+    pub preceding: Option<(Command, Target, Vec<u8>)>,
+    /// Set for a read of this SubDevice's mailbox: the content of every copy is kept, also of a late one.
     pub mail: Option<StationAddress>,
     /// Number of further datagrams of the same kind before it, in a frame of their own.
     pub before: usize,
-    /// No other frame may be on the wire with it; the links on which copies are known not to return, a bit each.
+    /// Set if no other frame may be on the wire with it: the links on which copies are known not to return, a bit each.
     pub alone: Option<u8>,
-    /// The data is a system time of 32 bits that was right then; it is adjusted to the departure of the frame.
+    /// Set if the data is a system time of 32 bits: the host time at which it is valid. It is adjusted to the departure
+    /// of the frame.
     pub time_at: Option<Instant>,
 }
 
@@ -49,7 +50,7 @@ impl Request {
             redundant_station: None,
             expected: None,
             resend: false,
-            lead: None,
+            preceding: None,
             mail: None,
             before: 0,
             alone: None,
@@ -58,7 +59,7 @@ impl Request {
     }
 
     /// Advances a time in the data to now.
-    pub(super) fn let_run(&self, data: &mut [u8], now: Instant) {
+    pub(super) fn advance_time(&self, data: &mut [u8], now: Instant) {
         if let (Some(at), Some(bytes)) = (self.time_at, data.first_chunk_mut::<4>()) {
             *bytes = u32::from_le_bytes(*bytes).wrapping_add(now.0.wrapping_sub(at.0) as u32).to_le_bytes();
         }
@@ -66,13 +67,13 @@ impl Request {
 
     /// Number of its datagrams.
     pub(super) fn datagrams(&self) -> usize {
-        1 + usize::from(self.lead.is_some()) + self.before
+        1 + usize::from(self.preceding.is_some()) + self.before
     }
 
     /// Its length in a frame in bytes.
     pub(super) fn bytes(&self) -> usize {
-        let lead = self.lead.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
-        lead + (1 + self.before) * (OVERHEAD + self.data.len())
+        let preceding = self.preceding.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
+        preceding + (1 + self.before) * (OVERHEAD + self.data.len())
     }
 
     /// A read of the SubDevice that ARMW and FRMW address. It shows which copy reaches that SubDevice; the working
@@ -108,7 +109,7 @@ pub(crate) struct Transfer {
     pub stage: Stage,
     pub task: TaskId,
     pub retries: u8,
-    /// The procedure gave it up: freed as soon as it is in no frame.
+    /// The procedure gave it up: it is freed as soon as no frame contains it.
     pub abandoned: bool,
 }
 

@@ -1,11 +1,9 @@
-//! Datagrams that wait to be sent, in fair turns between SubDevices.
-//!
-//! Each addressed SubDevice has an account of the bytes sent to it, its mailbox reads included. Time is cut into
-//! rounds; in each round every SubDevice may use a share of bytes, in the order of requests. A SubDevice with more data
-//! waits for later rounds, and newly addressed ones go first: neither a long file transfer nor a thousand datagrams to
-//! one SubDevice at once keep the others from the wire. SubDevices that always have data waiting get the same number of
-//! bytes each, to within one datagram of each and one share. While no SubDevice needs more than its share, the order is
-//! that of requests.
+//! Waiting datagrams in an order that is fair between SubDevices. Each addressed SubDevice has an account of the bytes
+//! sent to it, its mailbox reads included. Bandwidth is divided into rounds; in each round every SubDevice may use a
+//! share of bytes, in the order of requests. Data beyond the share waits for later rounds, and datagrams to newly
+//! addressed SubDevices are sent first: neither a long file transfer nor a thousand datagrams to one SubDevice block
+//! the others. SubDevices with continuous data get the same number of bytes each, to within one datagram of each and
+//! one share. While no SubDevice needs more than its share, the order is that of requests.
 
 use alloc::collections::{BTreeMap, BinaryHeap};
 use core::cell::Cell;
@@ -14,10 +12,11 @@ use core::cmp::Reverse;
 use ringcat_wire::datagram::Target;
 
 /// Share of a SubDevice in a round, in bytes: a request and its answer with a small mailbox. With a larger share,
-/// SubDevices that wait for each answer would fall behind those with continuous data.
+/// SubDevices that wait for each answer would get less than those with continuous data.
 pub(super) const SHARE: u64 = 256;
-/// Number of accounts kept while datagrams wait; beyond it, accounts without debt are searched and dropped. Where most
-/// of them have debt, the next search waits until there are twice as many, which keeps its cost per datagram low.
+/// Number of accounts kept while datagrams wait; beyond it, accounts that are not ahead of the current round are
+/// dropped. The next search follows when the number of the remaining accounts has doubled, which keeps the cost per
+/// datagram low.
 const ACCOUNTS: usize = 4096;
 
 /// Target of a datagram.
@@ -26,7 +25,7 @@ enum Account {
     Station(u16),
     Position(u16),
     /// Broadcasts and datagrams without the address of one SubDevice.
-    Everybody,
+    Other,
 }
 
 impl Account {
@@ -34,7 +33,7 @@ impl Account {
         match target {
             Target::Station(station, _) => Account::Station(station.0),
             Target::Position(position, _) => Account::Position(position.0),
-            Target::None | Target::Broadcast(_) | Target::Logical(_) => Account::Everybody,
+            Target::None | Target::Broadcast(_) | Target::Logical(_) => Account::Other,
         }
     }
 }
@@ -52,14 +51,14 @@ pub(super) struct Turn {
 pub(super) struct Accounts {
     /// Bytes used by each account, on a scale on which a round has [`SHARE`] bytes.
     used: BTreeMap<Account, u64>,
-    /// Number of accounts at which those without debt are dropped; at least [`ACCOUNTS`].
+    /// Number of accounts at which those that are not ahead of the current round are dropped; at least [`ACCOUNTS`].
     limit: usize,
     order: u64,
 }
 
 impl Accounts {
-    /// The turn of a datagram of this length. `now` is the round of the oldest waiting datagram: a target without
-    /// traffic before has no claim to the unused rounds.
+    /// The turn of a datagram of this length. `now` is the round of the oldest waiting datagram: rounds that a target
+    /// did not use are lost.
     pub(super) fn turn(&mut self, target: Target, bytes: usize, now: u64) -> Turn {
         let begin = now * SHARE;
         if self.used.len() >= self.limit.max(ACCOUNTS) {
@@ -84,7 +83,7 @@ impl Accounts {
 #[derive(Debug)]
 pub(super) struct Turns<T> {
     waiting: BinaryHeap<Reverse<(Turn, T)>>,
-    /// The latest round of a datagram that was once next.
+    /// The latest round of a datagram that was next to be sent.
     settled: Cell<u64>,
 }
 
@@ -99,7 +98,7 @@ impl<T: Ord> Turns<T> {
         self.waiting.is_empty()
     }
 
-    /// Queues a datagram with its turn. It does not overtake a datagram that was once next.
+    /// Queues a datagram with its turn. It does not overtake a datagram that was next to be sent.
     pub(super) fn push(&mut self, turn: Turn, what: T) {
         let round = turn.round.max(self.settled.get());
         self.waiting.push(Reverse((Turn { round, ..turn }, what)));
@@ -110,7 +109,7 @@ impl<T: Ord> Turns<T> {
         self.waiting.peek().map(|Reverse((turn, what))| (*turn, what))
     }
 
-    /// The datagram with this turn is next.
+    /// The datagram with this turn is next to be sent: later ones do not overtake it.
     pub(super) fn settle(&self, turn: Turn) {
         self.settled.set(self.settled.get().max(turn.round));
     }
@@ -144,7 +143,7 @@ mod tests {
     }
 
     impl Bench {
-        fn ask(&mut self, station: u16, bytes: usize) {
+        fn request(&mut self, station: u16, bytes: usize) {
             let now = self.turns.front().map_or(0, |(turn, _)| turn.round);
             let turn = self.accounts.turn(target(station), bytes, now);
             self.turns.push(turn, station);
@@ -160,38 +159,38 @@ mod tests {
 
     // covers: byte-budget
     #[test]
-    fn who_asks_for_no_more_than_a_share_is_served_in_the_order_of_asking() {
+    fn datagrams_within_the_share_are_sent_in_the_order_of_requests() {
         let mut bench = Bench::default();
-        let asked = [3, 1, 1, 2, 3, 1, 2, 2];
-        asked.iter().for_each(|station| bench.ask(*station, 100));
-        let served: Vec<u16> = core::iter::from_fn(|| bench.next()).collect();
-        assert_eq!(served, asked);
+        let requested = [3, 1, 1, 2, 3, 1, 2, 2];
+        requested.iter().for_each(|station| bench.request(*station, 100));
+        let sent: Vec<u16> = core::iter::from_fn(|| bench.next()).collect();
+        assert_eq!(sent, requested);
         assert!(bench.turns.is_empty());
     }
 
     // covers: byte-budget
     #[test]
-    fn accounts_are_looked_through_seldom_however_many_owe_something() {
+    fn the_limit_of_accounts_doubles_while_all_are_ahead_of_the_round() {
         let mut accounts = Accounts::default();
         for station in 0..=u16::MAX {
             accounts.turn(target(station), 16, 0);
         }
-        // From 4,096 on, each search keeps all of them: 8,192, 16,384, and so on.
+        // Each search from 4,096 accounts on keeps all of them: the next follows at 8,192, 16,384, and so on.
         assert_eq!((accounts.used.len(), accounts.limit), (1 << 16, 1 << 16));
     }
 
     // covers: byte-budget
     #[test]
-    fn a_thousand_datagrams_to_one_subdevice_let_others_pass() {
+    fn a_thousand_datagrams_to_one_subdevice_do_not_block_others() {
         let mut bench = Bench::default();
-        (0..1000).for_each(|_| bench.ask(1, 100));
+        (0..1000).for_each(|_| bench.request(1, 100));
         (0..5).for_each(|_| assert_eq!(bench.next(), Some(1)));
-        bench.ask(2, 60);
+        bench.request(2, 60);
         let before = core::iter::from_fn(|| bench.next()).take_while(|station| *station == 1).count();
         assert!(before <= 3, "{before} datagrams of 100 bytes");
         // From here both request continuously: they share the bytes.
         let mut served = [0u32; 3];
-        (0..50).for_each(|_| bench.ask(2, 300));
+        (0..50).for_each(|_| bench.request(2, 300));
         for _ in 0..160 {
             served[usize::from(bench.next().expect("plenty"))] += 1;
         }
@@ -201,15 +200,15 @@ mod tests {
 
     // covers: byte-budget
     #[test]
-    fn a_datagram_that_was_next_once_is_not_overtaken() {
+    fn a_datagram_that_was_next_is_not_overtaken() {
         let mut bench = Bench::default();
-        (0..3).for_each(|_| bench.ask(1, 1500));
+        (0..3).for_each(|_| bench.request(1, 1500));
         bench.next();
         bench.next();
-        // It waits for a wider window; others are queued.
+        // It waits for a wider send window; others are queued meanwhile.
         let (turn, _) = bench.turns.front().expect("one is left");
         bench.turns.settle(turn);
-        (2..500).for_each(|station| bench.ask(station, 60));
+        (2..500).for_each(|station| bench.request(station, 60));
         assert_eq!(bench.next(), Some(1));
     }
 }

@@ -1,4 +1,4 @@
-//! Waits for words of the cyclic half and of the links, instead of polling them.
+//! Waits for words that the cyclic half and the links post, instead of polling them.
 
 use core::future::poll_fn;
 use core::task::Poll;
@@ -29,7 +29,7 @@ impl Shared {
         !self.watchers.waiting.is_empty() && self.posted() != self.watchers.seen
     }
 
-    /// Wakes the procedures that wait for another posted word.
+    /// Wakes the procedures that wait for a change, if a posted word has changed.
     pub(super) fn wake_watchers(&mut self) {
         if !self.is_posted() {
             return;

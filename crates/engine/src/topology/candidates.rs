@@ -1,7 +1,5 @@
-//! Rings behind junctions that could explain the open ports of a segment (protocol 9.4).
-//!
-//! Input: the port status of the SubDevices. Output: sets of closing cables that fit. Frames have to show which of them
-//! is right.
+//! Rings behind junctions that could explain the open ports of a segment (protocol 9.4). Input: the port status of the
+//! SubDevices. Output: sets of closing cables that fit. A test with frames must show which set is right.
 
 use alloc::vec::Vec;
 
@@ -11,16 +9,15 @@ use super::port::PortOf;
 use super::rings::unconnected;
 use super::tree::{NodeStatus, Topology};
 
-/// Sets of closing cables that could explain the open ports, those with early tails first; at most `most`.
-///
-/// Open ports alone do not show where a ring ends: any SubDevice after the junction could as well be connected to the
-/// ring's last member. The caller has to find out which set is right. Where the redundant link reaches SubDevices (a
-/// broken ring, or branches that only its frames pass), there is no search.
+/// Sets of closing cables that could explain the open ports, those with early tails first; at most `most`. Open ports
+/// alone do not show where a ring ends: any SubDevice after the junction could also be connected to the last member of
+/// the ring. The caller must find out which set is right. If the redundant link has SubDevices (a broken ring, or
+/// branches that only its frames pass), the result is empty.
 pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
     candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
 }
 
-/// As [`candidates`], with some that are known to be right, and without those known to be wrong.
+/// As [`candidates`]; every set contains the closing cables known to be right, and none contains one known to be wrong.
 pub(crate) fn candidates_with(
     nodes: &[NodeStatus],
     main_count: usize,
@@ -42,7 +39,7 @@ pub(crate) fn candidates_with(
     search.found
 }
 
-/// Number of rings behind junctions that the open ports show: each has two more than its members need.
+/// Number of rings behind junctions that the open ports show: each ring has two more open ports than its members need.
 pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
     let further = |node: &NodeStatus| (1..4).filter(|port| open(node, *port)).count();
     let open_ports: usize = nodes.iter().map(further).sum();
@@ -50,13 +47,14 @@ pub(crate) fn rings_shown(nodes: &[NodeStatus], ring_closed: bool) -> usize {
     open_ports.saturating_sub(usize::from(ring_closed) + hanging) / 2
 }
 
-/// The cabling with these rings, including one that was extended behind its known tail and is broken: then frames come
-/// from its closing end though a SubDevice behind the tail has no connection on port 0. Its unknown members are entered
-/// at another port than 0 then, and not crossed.
+/// The cabling with these rings. A ring may have been extended behind its known tail and be broken: then frames come in
+/// at its closing end although a SubDevice behind the tail has no connection on port 0. In this case frames enter the
+/// new members at another port than 0, but these are not crossed.
 pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
     let mut topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut closings = closings.to_vec();
-    // Broken at its known closing cable, it is a line that continues behind its known tail.
+    // A ring that is broken at its known closing cable, with an open port at its known tail, is a line that continues
+    // there.
     let is_line = |it: &Closing| {
         let head = nodes.get(it.head.node).map(|node| node.dl_status.ports[usize::from(it.head.port & 3)]);
         head.is_some_and(|port| !port.communication)
@@ -72,8 +70,8 @@ pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closing
     for at in 0..closings.len() {
         let Closing { head, tail } = closings[at];
         let Some(first) = nodes.get(head.node) else { continue };
-        let met = nodes.get(tail.node + 1..main_count.min(nodes.len())).unwrap_or_default();
-        let is_longer = open(first, head.port) && met.iter().any(unconnected);
+        let passed = nodes.get(tail.node + 1..main_count.min(nodes.len())).unwrap_or_default();
+        let is_longer = open(first, head.port) && passed.iter().any(unconnected);
         if !is_longer || crossed(&topology).next().is_none() {
             continue;
         }
@@ -83,7 +81,7 @@ pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closing
             closings[at].tail = tail;
             let longer = Topology::with_local_rings(nodes, main_count, &closings);
             let is_explained = crossed(&longer).all(|node| node <= head.node || node > tail.node);
-            // No port stays open but the one that leads to the redundant link.
+            // At most one port stays open: that of the redundant link.
             let is_explained = is_explained && longer.open_ports.len() <= 1;
             if is_explained && crossed(&longer).count() < crossed(&topology).count() {
                 topology = longer;
@@ -95,7 +93,7 @@ pub(crate) fn with_longer_rings(nodes: &[NodeStatus], main_count: usize, closing
     topology
 }
 
-/// SubDevices that seem to be entered at another port than 0.
+/// SubDevices that frames seem to enter at another port than 0.
 fn crossed(topology: &Topology) -> impl Iterator<Item = usize> + '_ {
     topology.findings.iter().filter_map(|finding| match finding {
         Finding::CrossedLine { node, .. } | Finding::UnconnectedPort0 { node } => Some(*node),
@@ -113,7 +111,7 @@ fn tail_of(topology: &Topology, head: PortOf) -> Option<PortOf> {
         .map(|closing| closing.tail)
 }
 
-/// SubDevices by which a ring may have been extended.
+/// Number of SubDevices by which a ring may have been extended.
 const MOST_LONGER: usize = 64;
 
 /// Steps of a search: enough for all possible closing ports of a ring of a thousand SubDevices.
@@ -166,7 +164,7 @@ impl Search<'_> {
 }
 
 impl Search<'_> {
-    /// Neither wrong nor in the place of a known ring.
+    /// Whether a closing cable is neither known to be wrong nor in conflict with a known ring.
     fn may_be(&self, closing: &Closing) -> bool {
         let takes_from =
             |right: &Closing| right != closing && (right.head == closing.head || right.tail == closing.tail);
@@ -177,7 +175,7 @@ impl Search<'_> {
 /// The cable of a frame that leaves through the next slot and returns through the one below it.
 fn closing_at(slots: &[PortOf], nodes: &[NodeStatus]) -> Option<Closing> {
     let [.., head, tail] = *slots else { return None };
-    // A ring begins at a port that frames pass before the one at which they come back.
+    // A ring begins at a port that frames pass before the port at which they return.
     let before: &[u8] = match head.port {
         1 => &[3],
         2 => &[3, 1],

@@ -1,5 +1,5 @@
-//! The ends of a broken cable from the port status: independent of the assumed neighbours, which are uncertain while
-//! SubDevices are crossed or connected to a port 2 (LC-02).
+//! The ends of a broken cable, from the port status. They do not depend on the assumed neighbours, which are uncertain
+//! while SubDevices are crossed or connected to a port 2 (LC-02).
 
 use alloc::vec::Vec;
 
@@ -7,11 +7,11 @@ use ringcat_wire::register::DlStatus;
 
 use super::{Finding, Node, PortOf, Topology};
 
-/// Both ends of a cable, the first nearer to MAIN as far as known. `None` is an interface: MAIN as the first, REDUNDANT
-/// as the second end.
+/// Both ends of a cable, the end nearer to MAIN first, as far as known. `None` is an interface of the host: MAIN as the
+/// first, REDUNDANT as the second end.
 pub type Ends = (Option<PortOf>, Option<PortOf>);
 
-/// Whether neighbours in a ring are an assumption: where SubDevices are or may be crossed, and in an open ring with
+/// Whether the neighbours in a ring are an assumption: SubDevices are or may be crossed, or the ring is open and has
 /// branches.
 pub fn are_doubtful(topology: &Topology) -> bool {
     let odd = |finding: &Finding| matches!(finding, Finding::CrossedLine { .. } | Finding::Inconsistent { .. });
@@ -22,31 +22,31 @@ pub fn are_doubtful(topology: &Topology) -> bool {
         || (was_open && (topology.nodes.iter().any(branches) || topology.open_ports.iter().any(|at| at.port > 1)))
 }
 
-/// The ends of the cable at which a ring is open, from the current ports of all SubDevices. `counts` are the current
-/// numbers of SubDevices on each link. Both ends and all SubDevices must be visible: the neighbours of a SubDevice
-/// without power are not the ends of one cable.
+/// The ends of the cable at which a ring is open, from the current port status of all SubDevices. `counts` are the
+/// current numbers of SubDevices on each link. All SubDevices must answer: the neighbours of a SubDevice without power
+/// are not the ends of one cable.
 pub fn ends_of_break(topology: &Topology, dl_status: &[Option<DlStatus>], counts: [u16; 2]) -> Option<Ends> {
     if dl_status.contains(&None) || dl_status.len() != topology.nodes.len() {
         return None;
     }
     let is_down =
         |at: &PortOf| dl_status[at.node].is_some_and(|status| !status.ports[usize::from(at.port & 3)].communication);
-    let lost: Vec<PortOf> = seen(topology).into_iter().filter(is_down).collect();
+    let lost: Vec<PortOf> = connected_ports(topology).into_iter().filter(is_down).collect();
     match (&lost[..], counts) {
         (&[end], [0, _]) => Some((None, Some(end))),
         (&[end], [_, 0]) => Some((Some(end), None)),
         (&[near, far], _) if near.node != far.node => Some((Some(near), Some(far))),
-        // It was already open there at the last look.
-        (&[], [main, _]) if usize::from(main) == topology.main_count => seam(topology, dl_status),
+        // The ring was already open there at the last scan.
+        (&[], [main, _]) if usize::from(main) == topology.main_count => ends_of_earlier_break(topology, dl_status),
         _ => None,
     }
 }
 
-/// Ports that were connected at the last look, those of rings behind junctions left out.
-fn seen(topology: &Topology) -> Vec<PortOf> {
+/// Ports that were connected at the last scan, without those of rings behind junctions.
+fn connected_ports(topology: &Topology) -> Vec<PortOf> {
     let mut seen = topology.open_ports.clone();
     for (node, it) in topology.nodes.iter().enumerate() {
-        // The head of a stub is entered from the break.
+        // The entry port of a stub's head is at the break.
         let entry = (topology.redundant_head != Some(node)).then_some(it.entry_port);
         let children = (0..4).filter(|port| it.children[usize::from(*port)].is_some());
         seen.extend(children.chain(entry).map(|port| PortOf { node, port }));
@@ -57,8 +57,8 @@ fn seen(topology: &Topology) -> Vec<PortOf> {
     seen
 }
 
-/// The ends of a cable that was already broken at the last look, as far as certain.
-pub fn seam(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Ends> {
+/// The ends of a cable that was already broken at the last scan, if they are certain.
+pub fn ends_of_earlier_break(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Option<Ends> {
     let is_down = |at: &PortOf| {
         let status = dl_status.get(at.node).copied().flatten();
         status.is_some_and(|status| !status.ports[usize::from(at.port & 3)].communication)

@@ -1,11 +1,11 @@
-//! Possible findings about the cabling.
+//! Findings about the cabling.
 
 use core::fmt;
 
 /// A finding about the cabling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Finding {
-    /// Port 0 is not connected: frames pass at most one such SubDevice (protocol 2.4).
+    /// Port 0 is not connected. A frame passes at most one such SubDevice (protocol 2.4).
     UnconnectedPort0 {
         /// Position of the SubDevice.
         node: usize,
@@ -24,7 +24,8 @@ pub enum Finding {
         /// The port.
         port: u8,
     },
-    /// A port is closed though there is communication on it: forced closed, or auto-close and not opened again.
+    /// A port is closed although there is communication on it: forced closed, or closed in mode auto-close and not
+    /// opened again.
     ClosedWithLink {
         /// Position of the SubDevice.
         node: usize,
@@ -38,7 +39,7 @@ pub enum Finding {
         /// The port.
         port: u8,
     },
-    /// Its status is inconsistent with the others; it is in the tree without a parent or with ports left over.
+    /// Its status is inconsistent with that of the others: no open port is left for it in the tree.
     Inconsistent {
         /// Position of the SubDevice.
         node: usize,

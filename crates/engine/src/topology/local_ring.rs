@@ -1,9 +1,7 @@
-//! Rings behind a junction (protocol 9.4): their place in the tree, and their cables.
-//!
-//! A local ring leaves its junction through one port, passes its members, and comes back through a later one; frames
-//! pass the members in the same order whether it is closed or broken at one place. So the tree contains it as a branch
-//! on the port where it begins, without the two ports of the closing cable: the same tree for a closed and a broken
-//! ring.
+//! Rings behind a junction (protocol 9.4): their place in the tree, and their cables. A local ring begins at one port
+//! of its junction, connects its members, and returns to a later port. Frames pass the members in the same order
+//! whether the ring is closed or broken at one cable. So the tree contains the ring as a branch on the port where it
+//! begins, without the two ports of the closing cable: the tree is the same for a closed and a broken ring.
 
 use alloc::vec::Vec;
 
@@ -14,14 +12,14 @@ use super::port::PortOf;
 pub struct Closing {
     /// The junction, and its port at which frames return.
     pub head: PortOf,
-    /// The last SubDevice of the ring, and the port through which they leave it.
+    /// The last SubDevice of the ring, and the port through which frames leave it.
     pub tail: PortOf,
 }
 
 /// A cable of a local ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct RingCable {
-    /// The port from which frames come. `None` where unknown: the ring was broken there at the last look.
+    /// The port from which frames come. `None` if unknown: the ring was broken there at the last scan.
     pub near: Option<PortOf>,
     /// The port that they reach.
     pub far: PortOf,
@@ -32,8 +30,8 @@ pub struct RingCable {
 pub struct LocalRing {
     /// Its closing cable.
     pub closing: Closing,
-    /// Its cables in the order of travel, the closing one last. Where it was broken at the last look, only those from
-    /// the break on.
+    /// Its cables in the order of processing, the closing cable last. If the ring was broken at the last scan: only
+    /// those from the break on.
     pub cables: Vec<RingCable>,
 }
 

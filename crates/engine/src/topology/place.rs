@@ -1,8 +1,8 @@
-//! Follows the path of a frame through the segment and attaches each SubDevice where the frame must have reached it.
-//!
-//! A SubDevice entered at port 0 is passed before those on its ports 3, 1, 2. One entered at another port is passed
-//! only when the frame is about to leave it through port 0 or has come back there (protocol 2.1): SubDevices on its
-//! ports before that were passed earlier and are taken over ([`Walk::take_over`]).
+//! Follows the path of a frame through the segment and attaches each SubDevice where the frame must have reached it. If
+//! frames enter a SubDevice at port 0, they pass its processing unit before the SubDevices on its ports 3, 1, 2. If
+//! they enter at another port, they pass the processing unit when they are about to leave through port 0 or have come
+//! back there (protocol 2.1): SubDevices on ports before that have earlier positions, and are attached to it afterwards
+//! ([`Walk::take_over`]).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -46,8 +46,9 @@ pub(super) struct Walk<'s> {
 
 /// See [`Topology::build`].
 pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> Topology {
-    // In a closed ring frames come in from both sides, and the earlier one need not be the one that the processing unit
-    // processes: receive times say nothing about crossed lines (LC-02). A closed ring leaves one slot over.
+    // In a closed ring frames come in from both sides, and the first frame need not be the one that the processing unit
+    // processes: receive times say nothing about crossed lines (LC-02). One slot remains in a closed ring: that of the
+    // redundant link.
     let mut walk = Walk::along_main(status, rings, main_count, false);
     if walk.slots.is_empty() {
         walk = Walk::along_main(status, rings, main_count, true);
@@ -68,8 +69,8 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
             Some(head)
         }
         (None, None) => {
-            // A closed ring: the frame of the main link left through the next slot; SubDevices behind it are passed by
-            // frames of the redundant link. Where the main link reached none, the redundant link has all of them.
+            // A closed ring: the frame of the main link left through the next slot, and frames of the redundant link
+            // pass the SubDevices behind it. If the main link has no SubDevices, the redundant link has all of them.
             if !rest.is_empty() && walk.slots.last() != Some(&None) {
                 walk.leave();
             }
@@ -117,12 +118,13 @@ impl<'s> Walk<'s> {
         self.exists(node, port) && state.communication && !state.loop_closed && !self.rings.closes(node, port)
     }
 
-    /// Whether it is a member of a broken local ring with port 0 unconnected.
+    /// Whether a SubDevice is a member of a broken local ring with port 0 unconnected.
     pub(super) fn is_orphan(&self, node: usize) -> bool {
         self.rings.orphans.contains(&node)
     }
 
-    /// End of a stub that takes the usual way from port to port: the only SubDevice with a single continuing port.
+    /// End of a stub whose SubDevices are all connected through ports 0 and 1: the only SubDevice with one of them
+    /// open.
     pub(super) fn loose_end(&self, stub: core::ops::Range<usize>) -> Option<PortOf> {
         let mut end = None;
         for node in stub {
@@ -137,9 +139,9 @@ impl<'s> Walk<'s> {
         end.filter(|at| self.exists(at.node, at.port))
     }
 
-    /// End of a stub: the end of its usual way, or a port without a link that this has passed, where the assumed line
-    /// is a branch, like the terminals of a coupler. Cables join ports of one kind, and `towards` is that of the other
-    /// end. `None` where several ports are possible.
+    /// End of a stub: the end of its line over ports 0 and 1, or a port without a link on that line, if the assumed
+    /// line is a branch like the terminals of a coupler. A cable connects two ports of one kind; `towards` is the kind
+    /// at the other end. `None` if several ports are possible.
     pub(super) fn certain_end(&self, stub: core::ops::Range<usize>, towards: PortKind) -> Option<PortOf> {
         let is_loose = |at: &PortOf| self.exists(at.node, at.port) && !self.is_open(at.node, at.port);
         let ports = |node: usize| (0..4).map(move |port| PortOf { node, port });
@@ -147,7 +149,7 @@ impl<'s> Walk<'s> {
         let usual = self.loose_end(stub.clone());
         let of_others = || stub.clone().filter(|node| usual.is_none_or(|end| end.node != *node)).flat_map(ports);
         if !self.joins_like_kinds() || (usual.is_some() && !of_others().any(|at| is_loose(&at))) {
-            // Kinds give no information, or only the ports of the last one are possible.
+            // The kinds of ports give no information, or only the ports of the last SubDevice are possible.
             return usual;
         }
         let own = usual.and_then(|end| [end].into_iter().chain(ports(end.node).filter(is_loose)).find(fits));
@@ -159,7 +161,7 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Whether all known cables join ports of one kind, as real ones do.
+    /// Whether all known cables connect ports of one kind, as real cables do.
     fn joins_like_kinds(&self) -> bool {
         let kind_above =
             |node: &Node| node.parent.map_or(PortKind::Mii, |(node, port)| self.kind(PortOf { node, port }));
@@ -171,7 +173,7 @@ impl<'s> Walk<'s> {
         self.status[at.node].ports[usize::from(at.port & 3)]
     }
 
-    /// Whether the controller has the port. A controller that claims to have none is not believed.
+    /// Whether the controller has the port. If a controller reports no port at all, its report is ignored.
     fn exists(&self, node: usize, port: u8) -> bool {
         let kinds = &self.status[node].ports;
         kinds[usize::from(port)] != PortKind::NotImplemented || *kinds == [PortKind::NotImplemented; 4]
@@ -183,7 +185,7 @@ impl<'s> Walk<'s> {
         (1..4).map(move |step| TRAVEL[(at + step) % 4]).filter(move |port| self.is_open(node, *port))
     }
 
-    /// The open port at which the frame came in first by its receive times (LC-05); `None` where they do not show it.
+    /// The open port at which the frame came in first, by the receive times (LC-05); `None` if they do not show it.
     pub(super) fn earliest(&self, node: usize) -> Option<u8> {
         let trusted = self.trust_times && !self.rings.untimed[node];
         let times = self.status[node].receive_times.filter(|_| trusted)?;
@@ -213,39 +215,40 @@ impl<'s> Walk<'s> {
             if entry != 0 {
                 self.findings.push(Finding::CrossedLine { node, entry_port: entry });
             }
-            self.hang(node, slot, entry);
+            self.attach(node, slot, entry);
             self.expect_children(node, entry);
             return;
         }
-        // No place left: only a SubDevice that was entered before its processing unit was passed can be here.
+        // No slot left: frames must have entered this SubDevice at another port before they passed its processing unit.
         let swapped = (1..4).rev().find(|port| self.is_open(node, *port));
         if !swapped.is_some_and(|entry| self.is_open(node, 0) && self.take_over(node, entry)) {
             self.findings.push(Finding::Inconsistent { node });
-            self.hang(node, None, entry);
+            self.attach(node, None, entry);
             self.expect_children(node, entry);
         }
     }
 
-    /// The port at which frames come in, by receive times or else by what is open.
+    /// The port at which frames come in, by receive times, otherwise by open ports.
     fn entry(&self, node: usize) -> u8 {
         let by_ports = || {
             if self.is_open(node, 0) {
                 return 0;
             }
-            // With only the last port on the way, no SubDevice was passed before this one.
+            // With the last open port in the order of processing as the entry, no other SubDevice needs to precede this
+            // one.
             TRAVEL.into_iter().rev().find(|port| self.is_open(node, *port)).unwrap_or(0)
         };
         self.earliest(node).unwrap_or_else(by_ports)
     }
 
-    /// Attaches a SubDevice that is entered at another port than 0 above those that the frame passed on its way through
-    /// it. False where there are none: then it is not entered there.
+    /// Attaches a SubDevice that frames enter at another port than 0, with the earlier SubDevices on its other ports as
+    /// children. False if there are none: then frames do not enter there.
     fn take_over(&mut self, node: usize, entry: u8) -> bool {
         let passed: Vec<u8> = self.passed_before(node, entry);
         let mut taken = Vec::new();
         for port in passed.iter().rev() {
             match self.last_complete(self.span(node)) {
-                Some(at) => taken.push((*port, self.unhang(at))),
+                Some(at) => taken.push((*port, self.detach(at))),
                 None => break,
             }
         }
@@ -257,7 +260,7 @@ impl<'s> Walk<'s> {
             }
         };
         self.findings.push(Finding::CrossedLine { node, entry_port: entry });
-        self.hang(node, slot, entry);
+        self.attach(node, slot, entry);
         for port in passed.iter().take(passed.len() - taken.len()) {
             self.open_ports.push(PortOf { node, port: *port });
         }
@@ -278,8 +281,8 @@ impl<'s> Walk<'s> {
         to_unit.filter(|port| self.is_open(node, *port)).collect()
     }
 
-    /// The smallest complete tree; or, with the time that the frame spent behind the SubDevice that takes it over, the
-    /// largest that fits.
+    /// The tree to attach as a child: the smallest complete one; or, if `span` is known, the largest complete one in
+    /// which the frame spent less time.
     fn last_complete(&self, span: Option<u32>) -> Option<usize> {
         let complete = |at: usize| self.placed.get(at).filter(|placed| self.slots.len() <= placed.level);
         let mut at = self.placed.len().checked_sub(1)?;
@@ -298,8 +301,8 @@ impl<'s> Walk<'s> {
         Some(at)
     }
 
-    /// Detaches a tree from its slot, which is free again.
-    fn unhang(&mut self, at: usize) -> usize {
+    /// Detaches a tree from its slot and frees the slot.
+    fn detach(&mut self, at: usize) -> usize {
         let Placed { node, slot, .. } = self.placed[at];
         self.placed.truncate(at);
         if let Some(PortOf { node, port }) = slot {
@@ -309,8 +312,8 @@ impl<'s> Walk<'s> {
         node
     }
 
-    /// Attaches a SubDevice to a slot that was popped.
-    pub(super) fn hang(&mut self, node: usize, slot: Slot, entry_port: u8) {
+    /// Attaches a SubDevice to a slot that was removed from the stack.
+    pub(super) fn attach(&mut self, node: usize, slot: Slot, entry_port: u8) {
         self.nodes[node].entry_port = entry_port;
         if let Some(parent) = slot {
             self.connect(parent, node);
@@ -336,7 +339,7 @@ impl<'s> Walk<'s> {
         self.open_ports.extend(self.slots.pop().flatten());
     }
 
-    /// The walk is over: the remaining slots lead to no SubDevice.
+    /// Ends the walk: the remaining slots have no SubDevice.
     pub(super) fn close(&mut self) {
         while !self.slots.is_empty() {
             self.leave();
@@ -360,9 +363,9 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Leaves a member of a broken ring with an unconnected port 0 unattached, as if it were entered there.
+    /// Adds a member of a broken ring with an unconnected port 0 without a parent, with port 0 as its entry port.
     pub(super) fn orphan(&mut self, node: usize) {
-        self.hang(node, None, 0);
+        self.attach(node, None, 0);
         self.expect_children(node, 0);
     }
 }

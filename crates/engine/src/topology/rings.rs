@@ -12,7 +12,8 @@ pub(super) struct Rings {
     closings: Vec<Closing>,
     /// Members of broken rings with port 0 unconnected.
     pub(super) orphans: Vec<usize>,
-    /// SubDevices whose receive times do not show their place: some port never receives, or frames pass twice.
+    /// By position: receive times do not show the place of the SubDevice, because some port never receives or frames
+    /// pass twice.
     pub(super) untimed: Vec<bool>,
 }
 
@@ -52,7 +53,7 @@ impl Rings {
     }
 }
 
-/// Port 0 is unconnected, though frames reach the SubDevice.
+/// Whether port 0 is unconnected, although frames reach the SubDevice.
 pub(super) fn unconnected(status: &NodeStatus) -> bool {
     let port = status.dl_status.ports[0];
     !port.communication || port.loop_closed
@@ -65,8 +66,8 @@ impl Topology {
         cables.any(|cable| cable.near.is_none() && cable.far.node == node)
     }
 
-    /// Attaches a member of a broken local ring where the broken cable begins: its place in the closed ring.
-    pub fn hang_behind_break(&mut self, near: PortOf, node: usize) {
+    /// Attaches a member of a broken local ring to the near end of the broken cable: its place in the closed ring.
+    pub fn attach_behind_break(&mut self, near: PortOf, node: usize) {
         let port = usize::from(near.port & 3);
         let is_free = self.nodes.get(near.node).is_some_and(|parent| parent.children[port].is_none());
         match self.nodes.get_mut(node).filter(|orphan| is_free && orphan.parent.is_none()) {

@@ -1,8 +1,7 @@
-//! The SubDevices of the redundant link in a broken ring, as a tree that is oriented like the intact ring.
-//!
-//! Frames of the redundant link run up the trunk from the link to the break without passing a processing unit, pass the
-//! branches behind the trunk's ports on that way, and pass the units of the trunk on the way back, the one next to the
-//! break first (protocol 2.9). So branches come before the head in the order, and the rest after it.
+//! The SubDevices of the redundant link in a broken ring, as a tree that is oriented like the intact ring. Frames of
+//! the redundant link run along the trunk to the break without passing a processing unit of the trunk, but pass the
+//! branches on its ports. On the way back they pass the processing units of the trunk, beginning next to the break
+//! (protocol 2.9). So, by position, these branches precede the head, and the rest follows it.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -34,13 +33,13 @@ impl Walk<'_> {
         }
     }
 
-    /// Attaches a SubDevice of the trunk and returns the port through which the trunk continues towards the link: the
-    /// one at which frames of the redundant link come in. Branches on ports behind it were passed before.
+    /// Attaches a SubDevice of the trunk. Sets `trunk` to the port through which the trunk continues towards the link:
+    /// frames of the redundant link come in there. Branches on the ports behind it precede this SubDevice by position.
     fn trunk(&mut self, node: usize, slot: Slot, branches: &mut Vec<usize>, trunk: &mut Slot) {
-        self.hang(node, slot, 0);
+        self.attach(node, slot, 0);
         let ports: Vec<u8> = TRAVEL[1..].iter().copied().filter(|port| self.is_open(node, *port)).collect();
         let by_time = self.earliest(node).and_then(|entry| ports.iter().position(|port| *port == entry));
-        // Without receive times the branches that were passed before are placed as near to the break as they fit.
+        // Without receive times, the branches that precede the head are placed as near to the break as they fit.
         let by_ports = || ports.len().checked_sub(1 + branches.len().min(ports.len().saturating_sub(1)));
         let Some(on) = by_time.or_else(by_ports) else {
             *trunk = None;
@@ -58,35 +57,36 @@ impl Walk<'_> {
     }
 }
 
-/// A SubDevice of a plain stub, from the break on.
-pub(super) struct Link {
+/// A SubDevice of a stub without branches.
+pub(super) struct ChainMember {
     pub(super) node: usize,
-    /// It is crossed: IN and OUT are swapped.
+    /// IN and OUT are swapped.
     crossed: bool,
 }
 
-/// Stubs without branches that contain crossed SubDevices. Frames of the redundant link pass these on their way to the
-/// break, and the others on their way back. So the place of the last one in the order shows the number of crossed ones;
-/// only receive times show how both kinds alternate.
+/// Stubs without branches that contain crossed SubDevices. Crossed SubDevices process frames of the redundant link on
+/// the way to the break, the others on the way back. So the position of the SubDevice next to the break shows the
+/// number of crossed SubDevices; only receive times show in which order both kinds are connected.
 impl Walk<'_> {
-    /// The SubDevices of the redundant link, from the break on, where the ring is open, has no branches, and some of
-    /// them are crossed. Not where all SubDevices are crossed and there are no others: that is a line on the redundant
-    /// link.
-    pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<Link>> {
+    /// The SubDevices of the redundant link, from the break on, if the ring is open, has no branches, and some of these
+    /// SubDevices are crossed. `None` if the redundant link has all SubDevices and all of them are crossed: this is a
+    /// line on the redundant link.
+    pub(super) fn crossed_stub(&mut self, main_count: usize) -> Option<Vec<ChainMember>> {
         let rest = main_count..self.nodes.len();
         if main_count > 0 {
             self.loose_end(0..main_count)?;
         }
         let PortOf { node: end, port } = self.loose_end(rest.clone())?;
         let crossed = port != 0;
-        // Those that were passed before the last one; including it where nothing is plugged in behind it.
-        let met_first = rest.start..end + usize::from(crossed);
-        if met_first.is_empty() || (main_count == 0 && met_first == rest) {
+        // The crossed SubDevices precede the one next to the break, by position; that one is crossed if its port 0 is
+        // connected.
+        let passed_first = rest.start..end + usize::from(crossed);
+        if passed_first.is_empty() || (main_count == 0 && passed_first == rest) {
             return None;
         }
-        let straight = met_first.end..rest.end;
-        let mut chain: Vec<Link> = met_first.rev().map(|node| Link { node, crossed: true }).collect();
-        chain.extend(straight.map(|node| Link { node, crossed: false }));
+        let straight = passed_first.end..rest.end;
+        let mut chain: Vec<ChainMember> = passed_first.rev().map(|node| ChainMember { node, crossed: true }).collect();
+        chain.extend(straight.map(|node| ChainMember { node, crossed: false }));
         self.trust_times = true;
         let spans: Option<Vec<u32>> = rest.clone().map(|node| self.span(node)).collect();
         if let Some(spans) = spans {
@@ -100,7 +100,7 @@ impl Walk<'_> {
     }
 
     /// Attaches the SubDevices of the redundant link in a row.
-    pub(super) fn chain(&mut self, chain: &[Link]) {
+    pub(super) fn chain(&mut self, chain: &[ChainMember]) {
         let mut slot = None;
         for link in chain {
             let node = link.node;
@@ -109,7 +109,7 @@ impl Walk<'_> {
             if link.crossed {
                 self.findings.push(Finding::CrossedLine { node, entry_port: entry });
             }
-            self.hang(node, slot, entry);
+            self.attach(node, slot, entry);
             slot = Some(PortOf { node, port: on });
         }
         self.open_ports.extend(slot);

@@ -11,7 +11,7 @@ use walk_model::{End, Segment};
 mod local_rings;
 mod walk_model;
 
-/// High byte of DL_STATUS as in protocol 2.3; a link wherever there is communication.
+/// A SubDevice with this high byte of DL_STATUS (protocol 2.3), and a link on each port with communication.
 fn status(high: u8) -> NodeStatus {
     let links = (0..4).filter(|port| high >> (2 * port + 1) & 1 != 0).map(|port| 0x10 << port).sum::<u16>();
     node(u16::from(high) << 8 | links)
@@ -34,7 +34,7 @@ fn parents(topology: &Topology) -> Vec<Option<(usize, u8)>> {
 }
 
 #[test]
-fn a_line_of_three_hangs_port_0_on_port_1() {
+fn a_line_of_three_connects_port_1_to_port_0() {
     let topology = Topology::build(&[status(PASS), status(PASS), status(END)], 3);
     assert_eq!(parents(&topology), [None, Some((0, 1)), Some((1, 1))]);
     assert_eq!(topology.nodes[1], Node { parent: Some((0, 1)), entry_port: 0, children: [None, Some(2), None, None] });
@@ -79,7 +79,7 @@ fn a_closed_port_with_link_is_a_finding() {
 }
 
 #[test]
-fn a_forced_open_port_and_a_mute_link_are_findings() {
+fn a_forced_open_port_and_a_link_without_communication_are_findings() {
     // Port 1 open without communication; link bit of port 2 without communication.
     let topology = Topology::build(&[node(0x5250 | 0x0040)], 1);
     let expected = [Finding::ForcedOpen { node: 0, port: 1 }, Finding::LinkWithoutCommunication { node: 0, port: 2 }];
@@ -95,7 +95,7 @@ fn a_junction_has_its_branches_in_the_order_3_1_2() {
 }
 
 #[test]
-fn a_branch_on_port_2_of_a_closed_ring_is_met_by_the_redundant_link() {
+fn a_branch_on_port_2_of_a_closed_ring_is_on_the_redundant_link() {
     // Protocol 2.9: S5 on port 2 of S2; the main copy visits 1 2 3 4 and leaves at S4 port 1, the other one visits S5.
     let nodes = [status(PASS), status(0x6A), status(PASS), status(PASS), status(END)];
     let topology = Topology::build(&nodes, 4);
@@ -105,7 +105,7 @@ fn a_branch_on_port_2_of_a_closed_ring_is_met_by_the_redundant_link() {
 }
 
 #[test]
-fn a_branch_on_port_2_of_a_stub_is_met_before_its_head() {
+fn a_branch_on_port_2_of_a_stub_precedes_its_head() {
     // Protocol 2.9, break between S1 and S2: main 1, redundant 5 2 3 4.
     let nodes = [status(END), status(END), status(0x69), status(PASS), status(PASS)];
     let topology = Topology::build(&nodes, 1);
@@ -115,7 +115,7 @@ fn a_branch_on_port_2_of_a_stub_is_met_before_its_head() {
 }
 
 #[test]
-fn a_crossed_subdevice_in_a_line_is_found_without_receive_times() {
+fn a_crossed_subdevice_in_a_line_is_a_finding_without_receive_times() {
     // LC-07: S3 crossed, the line visits 1 2 4 3.
     let topology = Topology::build(&[status(PASS), status(PASS), status(END), status(PASS)], 4);
     assert_eq!(parents(&topology), [None, Some((0, 1)), Some((3, 0)), Some((1, 1))]);
@@ -131,7 +131,7 @@ fn a_crossed_subdevice_in_a_closed_ring_is_found() {
 }
 
 #[test]
-fn an_unconnected_port_0_at_the_end_of_a_line_is_found() {
+fn an_unconnected_port_0_at_the_end_of_a_line_is_a_finding() {
     // Protocol 2.9: S2 and S3 entered at port 1, port 0 of S3 unconnected: visits 1 3 2.
     let topology = Topology::build(&[status(PASS), status(HEAD), status(PASS)], 3);
     assert_eq!(parents(&topology), [None, Some((2, 0)), Some((0, 1))]);
@@ -163,7 +163,7 @@ fn more_subdevices_than_open_ports_are_inconsistent() {
 }
 
 #[test]
-fn connections_are_named_by_subdevice_and_port() {
+fn connections_are_found_and_displayed_by_subdevice_and_port() {
     let topology = Topology::build(&[status(PASS), status(PASS), status(END)], 3);
     let connection = Connection { near: at(1, 1), far: at(2, 0) };
     assert_eq!(topology.connection_to(2), Some(connection));
@@ -174,7 +174,7 @@ fn connections_are_named_by_subdevice_and_port() {
     assert_eq!(connection.to_string(), "between SubDevice 1 port 1 and SubDevice 2 port 0");
 }
 
-/// A random tree with every port 0 towards the main link: each SubDevice on a free port of an earlier one.
+/// A random tree with every port 0 towards the main link: each SubDevice is connected to a free port of an earlier one.
 fn trees() -> impl Strategy<Value = Segment> {
     proptest::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 0..24).prop_map(|picks| {
         let mut segment = Segment::new();
@@ -193,7 +193,7 @@ fn trees() -> impl Strategy<Value = Segment> {
 proptest! {
     // covers: topology
     #[test]
-    fn any_tree_comes_back_from_its_dl_status(segment in trees(), times in any::<bool>()) {
+    fn any_tree_is_rebuilt_from_its_dl_status(segment in trees(), times in any::<bool>()) {
         let seen = segment.walk();
         prop_assert_eq!(seen.main_count, segment.len());
         let topology = Topology::build(&seen.status(times), seen.main_count);
@@ -204,7 +204,7 @@ proptest! {
 
     // covers: topology
     #[test]
-    fn any_closed_ring_comes_back_from_its_dl_status(
+    fn any_closed_ring_is_rebuilt_from_its_dl_status(
         mut segment in trees(), tail in any::<prop::sample::Index>(), times in any::<bool>()
     ) {
         let free = segment.free_ports();
@@ -219,7 +219,7 @@ proptest! {
 
     // covers: topology
     #[test]
-    fn any_ring_cut_anywhere_comes_back_with_receive_times(
+    fn any_ring_cut_anywhere_is_rebuilt_with_receive_times(
         mut segment in trees(), tail in any::<prop::sample::Index>(), cut in any::<prop::sample::Index>()
     ) {
         let free = segment.free_ports();
@@ -239,7 +239,7 @@ proptest! {
     // covers: topology
     #[test]
     fn any_one_crossed_subdevice_of_a_line_is_located(length in 2usize..20, crossed in any::<prop::sample::Index>()) {
-        // The last one would have an unconnected port 0 instead.
+        // A crossed last SubDevice would have an unconnected port 0 instead.
         let crossed = crossed.index(length - 1);
         let mut segment = Segment::new();
         let mut end = End::Main;
@@ -262,7 +262,7 @@ proptest! {
         times in any::<bool>()
     ) {
         let cut = cut.index(crossed.len() + 1);
-        // A line on the redundant link alone reads as a line.
+        // This is a line on the redundant link, without crossed SubDevices.
         prop_assume!(cut > 0 || !crossed.iter().all(|crossed| *crossed));
         let mut segment = Segment::new();
         let ports = |node: usize| if crossed[node] { (1, 0) } else { (0, 1) };
@@ -279,7 +279,7 @@ proptest! {
         let seen = segment.walk();
         prop_assert_eq!(seen.main_count, cut);
         let mut status = seen.status(times);
-        // With more ports, several could be the end of a stub.
+        // With more than two ports, several ports could be the end of a stub.
         let two = [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented];
         status.iter_mut().for_each(|status| status.ports = two);
         let topology = Topology::build(&status, cut);
@@ -291,7 +291,7 @@ proptest! {
             prop_assert_eq!(is_crossed(&node), crossed[*device], "device {}", device);
         }
         let dl_status: Vec<_> = status.iter().map(|status| Some(status.dl_status)).collect();
-        let place = |device: usize, port: u8| at(seen.order.iter().position(|met| *met == device).unwrap(), port);
+        let place = |device: usize, port: u8| at(seen.order.iter().position(|passed| *passed == device).unwrap(), port);
         let near = cut.checked_sub(1).map(|node| place(node, ports(node).1));
         let far = (cut < crossed.len()).then(|| place(cut, ports(cut).0));
         let counts = [cut as u16, (crossed.len() - cut) as u16];
@@ -319,7 +319,7 @@ proptest! {
             if let Some((parent, port)) = node.parent {
                 prop_assert_eq!(topology.nodes[parent].children[usize::from(port)], Some(index));
             }
-            // A walk to the top ends.
+            // The chain of parents ends.
             let mut at = index;
             let steps = core::iter::from_fn(|| { at = topology.nodes[at].parent?.0; Some(()) });
             prop_assert!(steps.take(nodes.len() + 1).count() <= nodes.len());

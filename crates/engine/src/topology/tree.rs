@@ -1,4 +1,4 @@
-//! The tree of a segment: which port connects each SubDevice to which other one, and queries on it.
+//! The tree of a segment: the connections between SubDevices, and queries on them.
 
 use alloc::vec::Vec;
 
@@ -46,35 +46,35 @@ pub struct Topology {
     pub main_count: usize,
     /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
     pub redundant_head: Option<usize>,
-    /// End of the main link's SubDevices in an open ring, or of all of them where only the redundant link reaches any
-    /// and enters each at port 0. `None` where branches leave several ports at which a cable of the ring could be
-    /// missing.
+    /// The open port at the end of the main link's SubDevices in an open ring; if frames of the redundant link alone
+    /// reach all SubDevices, each at port 0, the end of all of them. `None` if, because of branches, the cable of the
+    /// ring could be missing at several ports.
     pub main_end: Option<PortOf>,
-    /// Ports that are open but lead to no SubDevice: the redundant link, or a device that is no SubDevice. In the order
-    /// in which frames of the main link, then of the redundant link, pass them.
+    /// Ports that are open without a SubDevice behind them: the redundant link, or a device that is no SubDevice. In
+    /// the order in which frames of the main link, then of the redundant link, pass them.
     pub open_ports: Vec<PortOf>,
     /// Findings, by position.
     pub findings: Vec<Finding>,
-    /// Rings behind a junction, as far as they are known.
+    /// The known rings behind junctions.
     pub local_rings: Vec<LocalRing>,
 }
 
 impl Topology {
-    /// Whether neighbours are an assumption: frames of both links reach SubDevices though no break separates them.
-    /// Which of them are crossed, or connected to a port 2, cannot be seen as long as the ring is closed (LC-02).
+    /// Whether the neighbours are an assumption: both links have SubDevices although no break separates these. Which of
+    /// them are crossed, or connected to a port 2, is not visible while the ring is closed (LC-02).
     pub fn is_assumed(&self) -> bool {
         self.redundant_head.is_none() && self.main_count < self.nodes.len()
     }
 
-    /// Whether the cable that leads to a SubDevice from the one before it is part of a local ring.
+    /// Whether the cable between a SubDevice and its parent is part of a local ring.
     pub fn is_in_local_ring(&self, node: usize) -> bool {
         let Some(here) = self.nodes.get(node) else { return false };
         let far = PortOf { node, port: here.entry_port };
         self.local_rings.iter().flat_map(|ring| &ring.cables).any(|cable| cable.far == far)
     }
 
-    /// Whether a SubDevice is another one, or is reached through it.
-    pub(crate) fn hangs_behind(&self, node: usize, other: usize) -> bool {
+    /// Whether a SubDevice is `other` itself, or is reached through `other`.
+    pub(crate) fn is_behind(&self, node: usize, other: usize) -> bool {
         let mut at = node;
         for _ in 0..=self.nodes.len() {
             if at == other {
@@ -86,7 +86,7 @@ impl Topology {
         false
     }
 
-    /// The cable that leads to a SubDevice from the one before it.
+    /// The cable between a SubDevice and its parent.
     pub fn connection_to(&self, node: usize) -> Option<Connection> {
         let here = self.nodes.get(node)?;
         let (parent, port) = here.parent?;

@@ -1,4 +1,4 @@
-//! The vectors of protocol 7.1 and 7.5, and trees against a model of the wire that knows the truth.
+//! The vectors of protocol 7.1 and 7.5, and trees compared with a model of the wire with known delays.
 
 use super::*;
 use crate::clocks::FRACTION;
@@ -22,7 +22,7 @@ fn entry_ports(topology: &Topology) -> Vec<u8> {
     wiring(topology).entry_ports()
 }
 
-/// A tree from (parent, port, child), all entered at port 0; the child is named by its number.
+/// A tree from (parent, port, child); frames enter all SubDevices at port 0.
 fn tree(count: usize, links: &[(usize, u8, usize)]) -> Topology {
     let mut nodes = vec![Node::default(); count];
     for (parent, port, child) in links {
@@ -61,7 +61,7 @@ fn the_example_tree_has_its_delays() {
     let (topology, times) = vector();
     let delays = propagation(&topology, &times);
     assert_eq!(rounded(&delays, 0), [0, 400, 2_280, 2_670, 770, 1_130, 4_380].map(Some));
-    // Another reference only moves all of them.
+    // With another reference clock all delays shift by the same time.
     assert_eq!(delays.between(1, 0), Some(-400));
     assert_eq!(entry_ports(&topology), [0; 7]);
 }
@@ -69,11 +69,11 @@ fn the_example_tree_has_its_delays() {
 // covers: 7.1, dc-delays
 #[test]
 fn devices_without_a_clock_are_part_of_the_cable() {
-    // S1 - X - S2: 300 ns a pass, 100 ns a cable.
+    // S1 - X - S2: 300 ns per SubDevice, 100 ns per cable.
     let topology = tree(3, &[(0, 1, 1), (1, 1, 2)]);
     let delays = propagation(&topology, &[times([0, 1_600, 0, 0]), None, times([0; 4])]);
     assert_eq!(rounded(&delays, 0), [Some(0), None, Some(800)]);
-    // Nor does it matter that it has a branch with nothing in it but such devices, where that comes last.
+    // A fork with only SubDevices without a clock behind it hides no delay.
     let topology = tree(4, &[(0, 1, 1), (1, 3, 2), (1, 1, 3)]);
     let delays = propagation(&topology, &[times([0, 2_400, 0, 0]), None, None, None]);
     assert_eq!((rounded(&delays, 0), delays.unknown), (vec![Some(0), None, None, None], vec![]));
@@ -85,14 +85,14 @@ fn unknown(node: usize, fork: usize, range: Option<(i64, i64)>) -> Unknown {
 
 // covers: 7.1, dc-delays
 #[test]
-fn behind_forks_without_a_clock_delays_are_known_within_branches_only() {
-    // A junction without a clock in front: what it does to the frame nobody measures, its branches are.
+fn behind_forks_without_a_clock_delays_are_known_within_a_branch_only() {
+    // The junction in front has no clock: no clock measures the path through it, but the branches have clocks.
     let topology = tree(4, &[(0, 3, 1), (0, 1, 2), (2, 1, 3)]);
     let all = [None, times([0; 4]), times([0, 780, 0, 0]), times([0; 4])];
     let delays = propagation(&topology, &all);
     assert_eq!(rounded(&delays, 1), [None, Some(0), None, None]);
     assert_eq!(delays.unknown, [unknown(2, 0, None), unknown(3, 0, None)]);
-    // The branch of the reference counts.
+    // Delays are known in the branch of the reference clock.
     let (wiring, stations) = (wiring(&topology), stations(4));
     let segment = Segment { wiring: &wiring, stations: &stations, passages: &[] };
     let delays = segment.propagation(&all, 3, &mut Cables::default());
@@ -100,19 +100,21 @@ fn behind_forks_without_a_clock_delays_are_known_within_branches_only() {
         (rounded(&delays, 3), delays.unknown),
         (vec![None, None, Some(-390), Some(0)], vec![unknown(1, 0, None)])
     );
-    // One in between: out, back, out, back, home. The first is met within a half, the second from there to the end.
+    // A fork between clocks: into the first branch, back, into the second branch, back, to the first SubDevice. The
+    // frame reaches the first branch in the first half of the time, the second branch in the second half.
     let topology = tree(4, &[(0, 1, 1), (1, 3, 2), (1, 1, 3)]);
     let delays = propagation(&topology, &[times([0, 2_400, 0, 0]), None, times([0; 4]), times([0; 4])]);
     assert_eq!(rounded(&delays, 0), [Some(0), None, None, None]);
     assert_eq!(delays.unknown, [unknown(2, 1, Some((0, 1_200))), unknown(3, 1, Some((1_200, 2_400)))]);
 }
 
-/// A clock, a fork without one, its branches: two and one clocks, and behind it a fork without a clock with two more.
+/// Clock 0; fork 1 without a clock with the branches 2, 3 and 4 (clocks), and fork 5 without a clock with the clocks 6
+/// and 7.
 const FORKS: [(usize, u8, usize); 7] = [(0, 1, 1), (1, 3, 2), (2, 1, 3), (1, 1, 4), (1, 2, 5), (5, 3, 6), (5, 1, 7)];
 
 // covers: 7.1, dc-delays
 #[test]
-fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open() {
+fn delays_behind_forks_are_exact_after_each_branch_was_measured_alone() {
     let wiring = wiring(&tree(8, &FORKS));
     let stations = stations(8);
     let mut cables = Cables::default();
@@ -130,7 +132,7 @@ fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open() {
     };
     let behind = |nodes: &[usize], fork: usize| nodes.iter().map(|node| (*node, Some(fork))).collect::<Vec<_>>();
     assert_eq!(run(&[]), [behind(&[2, 3, 4, 6], 1), behind(&[7], 5)].concat());
-    // The way to the first fork, and with one branch of it each; of the second fork that leads there, too.
+    // The path to the first fork, then into one of its branches each; then the same for the second fork.
     run(&[(1, 3), (1, 1), (1, 2)]);
     run(&[(1, 1), (1, 2)]);
     run(&[(1, 3), (1, 2)]);
@@ -141,7 +143,7 @@ fn forks_without_a_clock_have_exact_delays_once_each_branch_was_open() {
 
 // covers: 7.5, dc-delays
 #[test]
-fn a_stub_that_is_entered_from_behind_keeps_its_differences() {
+fn a_stub_of_the_redundant_link_has_the_same_delay_differences() {
     // dc_delay.py: slaves 4 and 3 from the redundant link, the break in front of 3; the head is node 0.
     let mut topology = tree(2, &[(0, 1, 1)]);
     topology.main_count = 0;
@@ -164,7 +166,7 @@ fn trees_of_a_broken_ring_have_delays_of_their_own() {
 }
 
 #[test]
-fn nonsense_neither_panics_nor_hangs() {
+fn inconsistent_input_neither_panics_nor_loops() {
     let mut topology = tree(3, &[(0, 1, 1), (1, 1, 2)]);
     topology.nodes[0].parent = Some((2, 1));
     topology.nodes[2].children[1] = Some(0);
@@ -174,18 +176,19 @@ fn nonsense_neither_panics_nor_hangs() {
     assert_eq!(propagation(&Topology::default(), &[]), Delays::default());
 }
 
-/// A frame on its way with what each port's clock notes, and the truth at each unit. A cable is named by its far end.
+/// Simulates a frame: the times that each SubDevice latches, and the true time at each processing unit. `cable` returns
+/// the delay of a cable by its far end.
 fn walk(wiring: &Wiring, passages: &[Passage], cable: impl Fn(PortOf) -> i64) -> (Vec<Option<PortTimes>>, Vec<i64>) {
     let count = wiring.count();
     let (mut at, mut arrivals, mut units) = (0, vec![[0; 4]; count], vec![0; count]);
     let mut first: Vec<Option<i64>> = vec![None; count];
-    let way = wiring.way(0);
-    for (step, arrival) in way.iter().enumerate() {
+    let path = wiring.path(0);
+    for (step, arrival) in path.iter().enumerate() {
         let PortOf { node, port } = arrival.at;
         if step > 0 {
-            let near = wiring.far(arrival.at).expect("it came from somewhere");
+            let near = wiring.far(arrival.at).expect("every arrival but the first has a cable");
             let passage = passages.get(near.node).copied().unwrap_or_default();
-            at += if way[step - 1].processed { passage.processed } else { passage.forwarded };
+            at += if path[step - 1].processed { passage.processed } else { passage.forwarded };
             at += (300 + cable(near.max(arrival.at))) << FRACTION;
         }
         let begin = *first[node].get_or_insert(at);
@@ -197,7 +200,7 @@ fn walk(wiring: &Wiring, passages: &[Passage], cable: impl Fn(PortOf) -> i64) ->
     (arrivals.into_iter().map(|ports| Some(PortTimes(ports))).collect(), units)
 }
 
-/// A line of seven with a ring from port 3 of 1 over 2, 3, 4 back to port 1, 5 and 6 behind port 2.
+/// Seven SubDevices: a local ring from port 3 of SubDevice 1 over 2, 3, 4 to its port 1; 5 and 6 behind its port 2.
 fn local_ring(broken: Option<usize>) -> Wiring {
     let links = [(0, 1, 1), (1, 3, 2), (2, 1, 3), (3, 1, 4), (1, 2, 5), (5, 1, 6)];
     let there: Vec<_> = links.into_iter().filter(|(_, _, child)| broken != Some(*child)).collect();
@@ -207,31 +210,31 @@ fn local_ring(broken: Option<usize>) -> Wiring {
     Wiring::new(&topology, false, |_| broken != Some(7))
 }
 
-/// Errors of delays with this break, in nanoseconds, `None` where they are not known; what is learned of cables is
-/// kept.
+/// Errors of the delays with this break, in nanoseconds, `None` if a delay is not known; `cables` keeps the measured
+/// times.
 fn errors(broken: Option<usize>, passages: &[Passage], cables: &mut Cables) -> Vec<Option<i64>> {
     let wiring = local_ring(broken);
     // Each cable has a length of its own.
     let (times, truth) = walk(&wiring, passages, |at| 20 * (3 * at.node as i64 + i64::from(at.port)));
     let stations = stations(7);
     let segment = Segment { wiring: &wiring, stations: &stations, passages };
-    segment.see(cables);
+    segment.set_present(cables);
     let delays = segment.propagation(&times, 0, cables);
     (0..7).map(|node| Some((delays.units[node]? - truth[node]) >> FRACTION)).collect()
 }
 
 // covers: 7.5, 9.4, dc-delays
 #[test]
-fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
+fn delays_of_an_intact_local_ring_follow_from_measurements_of_the_open_ring() {
     let mixed: Vec<Passage> = (0..7).map(|node| passage(150 * (node % 3) + 40, 140 * (node % 3))).collect();
     for passages in [vec![], vec![passage(40, 0); 7], mixed] {
         let is_mixed = passages.iter().any(|other| *other != passages[0]);
         let mut cables = Cables::default();
-        // Nothing is known of a ring that is whole, behind it nothing is wrong.
+        // In an intact ring no delay is known; delays behind it are exact.
         let [right, none] = [Some(0), None];
         assert_eq!(errors(None, &passages, &mut cables), [right, right, none, none, none, right, right]);
         let mut cables = Cables::default();
-        // Open at its closing cable, as set-up makes it; then whole, and broken anywhere.
+        // Open at its closing cable, as at set-up; then intact, and broken anywhere.
         for broken in [Some(7), None, Some(3), None, Some(2), Some(4), None, Some(7), None] {
             assert_eq!(errors(broken, &passages, &mut cables), [Some(0); 7], "{broken:?}, mixed {is_mixed}");
         }
@@ -240,7 +243,7 @@ fn a_local_ring_is_known_whole_from_what_it_was_open_and_broken_by_itself() {
 
 // covers: dc-ring
 #[test]
-fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not() {
+fn delays_of_a_closed_ring_are_those_measured_as_a_line_or_guessed() {
     let mut topology = tree(4, &[(0, 1, 1), (1, 1, 2), (2, 1, 3)]);
     let (mut cables, stations) = (Cables::default(), stations(4));
     let mut run = |wiring: &Wiring, times: &[Option<PortTimes>]| {
@@ -258,12 +261,12 @@ fn a_closed_ring_is_what_was_measured_of_it_as_a_line_and_says_where_it_was_not(
     assert_eq!(run(&closed, &once), (truth, false));
 }
 
-/// Of so many nanoseconds.
+/// A passage from nanoseconds.
 fn passage(processed: i64, forwarded: i64) -> Passage {
     Passage { processed: processed << FRACTION, forwarded: forwarded << FRACTION }
 }
 
-/// Errors in a line of nine of such passages when these are known.
+/// Errors of the delays in a line of nine SubDevices with these passages, of which `known` are known.
 fn errors_of_line(passages: &[Passage], known: &[Passage]) -> Vec<i64> {
     let links: Vec<(usize, u8, usize)> = (1..9).map(|node| (node - 1, 1, node)).collect();
     let wiring = wiring(&tree(9, &links));
@@ -277,22 +280,22 @@ fn errors_of_line(passages: &[Passage], known: &[Passage]) -> Vec<i64> {
 #[test]
 fn longer_processing_than_forwarding_is_a_half_per_hop_unless_known() {
     let passages = [passage(40, 0); 9];
-    // The last one processes before the frame turns round: that is no passage of the way out.
+    // The last SubDevice processes the frame at its entry, so its passage is not part of its delay.
     assert_eq!(errors_of_line(&passages, &[]), [0, -20, -40, -60, -80, -100, -120, -140, -140]);
     assert_eq!(errors_of_line(&passages, &passages), [0; 9]);
 }
 
 // covers: 7.1, dc-delays
 #[test]
-fn types_side_by_side_are_off_by_half_their_difference_unless_it_is_known() {
-    // As coupler, terminals and drives may be.
+fn neighbours_of_two_types_are_off_by_half_of_an_unknown_difference() {
+    // A coupler, terminals and drives.
     let passages: Vec<Passage> = [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (150, 150)]
         .map(|(processed, forwarded)| passage(processed, forwarded))
         .to_vec();
     let passages = [passages, vec![passage(0, 0); 2]].concat();
     assert_eq!(errors_of_line(&passages, &[])[..4], [0, -200, -200, 75]);
     assert_eq!(errors_of_line(&passages, &passages), [0; 9]);
-    // What all have in common may be left out.
+    // A base time that all have in common may be omitted.
     let less: Vec<Passage> = passages
         .iter()
         .map(|known| Passage {

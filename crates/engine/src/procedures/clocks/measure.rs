@@ -138,7 +138,7 @@ async fn measure_open(
     wiring.open(branches);
     // An end of a ring in a branch that is left out needs no order, and would not hear the one that takes it back.
     let links = if survey.is_closed { 1 } else { TREES };
-    let met: Vec<usize> = (0..links).flat_map(|link| wiring.way(link)).map(|arrival| arrival.at.node).collect();
+    let met: Vec<usize> = (0..links).flat_map(|link| wiring.path(link)).map(|arrival| arrival.at.node).collect();
     let is_reached = |at: &&PortOf| branches.is_empty() || met.contains(&at.node);
     let all: Vec<PortOf> = rings.iter().chain(branches).filter(is_reached).copied().collect();
     let ports: Vec<(StationAddress, u8)> = all.iter().map(|at| (survey.stations[at.node], at.port)).collect();
@@ -314,7 +314,7 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
     // Cables of branches that are left out are where they were.
     if survey.is_whole {
-        segment.see(&mut access.cables);
+        segment.set_present(&mut access.cables);
     }
     let delays = segment.propagation(&measurements.mean(on_clock), on_clock, &mut access.cables);
     if delays.is_implausible {

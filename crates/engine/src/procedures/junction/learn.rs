@@ -92,7 +92,7 @@ async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: 
     let Closing { head, tail } = closing;
     let broken = first_behind_break(nodes, topology, closing);
     // Behind a break all is reached through the closing cable.
-    let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
+    let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
     let Some(answers) = with_closed(bus, &ports, nodes.len()).await? else { return Ok(Tried::NoFrame) };
     if answers.iter().enumerate().all(|(node, is)| *is != silent(node)) {

@@ -16,7 +16,7 @@ use ringcat_wire::register::{DlStatus, map};
 
 use super::super::scan::station_at;
 use super::learn::{first_behind_break, with_closed};
-use crate::junction::Shown;
+use crate::junction::ClosingEvidence;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -33,7 +33,7 @@ pub(crate) async fn refute(
     scanned: &[NodeStatus],
     main_count: usize,
     closings: &[Closing],
-) -> Option<(usize, Shown)> {
+) -> Option<(usize, ClosingEvidence)> {
     let mut last = None;
     for _ in 0..TRIES {
         let nodes = look(bus, scanned).await?;
@@ -45,7 +45,12 @@ pub(crate) async fn refute(
     last
 }
 
-async fn attempt(bus: &Bus, nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Option<(usize, Shown)> {
+async fn attempt(
+    bus: &Bus,
+    nodes: &[NodeStatus],
+    main_count: usize,
+    closings: &[Closing],
+) -> Option<(usize, ClosingEvidence)> {
     let topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut numbers: Vec<usize> = (0..closings.len()).collect();
     // Who is behind a break depends on the rings that are in it.
@@ -59,18 +64,18 @@ async fn attempt(bus: &Bus, nodes: &[NodeStatus], main_count: usize, closings: &
             continue;
         }
         let broken = if linked.len() == 2 { first_behind_break(nodes, &topology, closing) } else { None };
-        let silent = |node: usize| broken.is_some_and(|first| topology.hangs_behind(node, first));
+        let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
         let ports = if broken.is_some() { &linked[..1] } else { &linked[..] };
         let shown = match with_closed(bus, ports, nodes.len()).await.ok()? {
             Some(answers) => {
                 let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
                 match odd.map(|(node, answers)| (node, *answers)) {
-                    Some((position, false)) => Shown::CutOff { position },
-                    Some((position, true)) => Shown::StillThere { position },
+                    Some((position, false)) => ClosingEvidence::CutOff { position },
+                    Some((position, true)) => ClosingEvidence::StillThere { position },
                     None => continue,
                 }
             }
-            None => Shown::NoFrame,
+            None => ClosingEvidence::NoFrame,
         };
         return Some((number, shown));
     }

@@ -15,35 +15,33 @@ use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::Request;
 
-/// Pause between two checks whether another procedure has read its latched times.
-const TURN_LOOK: Duration = Duration::from_micros(100);
+/// Pause between two checks whether another procedure has released the right to latch.
+const TURN_CHECK_PAUSE: Duration = Duration::from_micros(100);
 
 impl Bus {
-    /// Sends a datagram once, alone on the wire, and returns the reply, whatever its working counter. Copies on the
-    /// link `deaf` are known not to return.
-    ///
-    /// The future fails with [`BusError::Busy`] where the wire was never free, with [`BusError::Disturbed`] where a
-    /// cyclic frame left while it was on the wire, with [`BusError::Lost`] where a copy of it, or of cyclic frames, did
-    /// not return.
+    /// Sends a datagram once, alone on the wire, and returns the reply, whatever its working counter. Copies sent on
+    /// the link `no_return` are known not to return. The future fails with [`BusError::Busy`] if the wire was never
+    /// free, with [`BusError::Disturbed`] if a cyclic frame was sent while this one was on the wire, with
+    /// [`BusError::Lost`] if a copy of this frame, or of a cyclic frame, did not return.
     pub(crate) fn alone(
         &self,
         command: Command,
         target: Target,
         data: Vec<u8>,
-        deaf: Option<Link>,
+        no_return: Option<Link>,
     ) -> impl Future<Output = Result<Reply, BusError>> {
-        self.submit(Request { alone: Some(deaf.map_or(0, Link::bit)), ..Request::once(command, target, data) })
+        self.submit(Request { alone: Some(no_return.map_or(0, Link::bit)), ..Request::once(command, target, data) })
     }
 
-    /// Waits for the exclusive right to latch.
+    /// Waits for the exclusive right to latch receive times.
     pub(crate) async fn latch_turn(&self) -> Turn {
         while core::mem::replace(&mut self.shared.borrow_mut().alone.is_taken, true) {
-            self.sleep(TURN_LOOK).await;
+            self.sleep(TURN_CHECK_PAUSE).await;
         }
         Turn { shared: self.shared.clone() }
     }
 
-    /// Asks the cyclic half to begin no cycle for a time.
+    /// Requests that the cyclic half begins no cycle for a time.
     pub(crate) fn ask_for_pause(&self, time: Duration) {
         let shared = self.shared.borrow();
         if let Some(board) = &shared.board {
@@ -52,7 +50,8 @@ impl Bus {
     }
 }
 
-/// The exclusive right to latch, until it is dropped: latched times hold until the next frame of this kind.
+/// The exclusive right to latch receive times, until it is dropped: SubDevices keep the latched times until the next
+/// latching datagram.
 pub(crate) struct Turn {
     shared: Rc<RefCell<Shared>>,
 }

@@ -1,4 +1,4 @@
-//! Decides when a datagram leaves alone, and evaluates the result.
+//! Decides when a datagram is sent alone, and evaluates the result.
 
 use core::time::Duration;
 
@@ -14,20 +14,20 @@ use crate::supervisor::transfer::TransferId;
 const LIMIT: Duration = Duration::from_millis(4);
 
 impl Shared {
-    /// The datagram that may leave alone now, if any, and the links on which copies are known not to return.
+    /// The datagram that may be sent alone now, if any, and the links on which copies are known not to return.
     pub(in crate::supervisor) fn next_alone(&mut self) -> Option<(TransferId, u8)> {
-        let (id, deaf) = loop {
-            let (id, deaf) = *self.alone.waiting.front()?;
+        let (id, no_return) = loop {
+            let (id, no_return) = *self.alone.waiting.front()?;
             if matches!(self.alone.stage, Stage::UnderWay { .. }) {
                 return None;
             }
             if self.transfers.find(id).is_some_and(|transfer| !transfer.abandoned) {
-                break (id, deaf);
+                break (id, no_return);
             }
             self.transfers.remove(id);
             self.end_alone();
         };
-        let silent = deaf | self.silence.mask(self.now);
+        let silent = no_return | self.silence.mask(self.now);
         if self.flights.are_under_way(self.links, silent) {
             return None;
         }
@@ -35,32 +35,35 @@ impl Shared {
             Some(board) => {
                 if !matches!(self.alone.stage, Stage::Waiting { .. }) {
                     self.alone.stage =
-                        Stage::Waiting { until: self.now + LIMIT, home: board.traffic.home(self.links, silent) };
+                        Stage::Waiting { until: self.now + LIMIT, returned: board.traffic.home(self.links, silent) };
                 }
                 self.alone.at_rest(board, self.links, silent, self.now)?
             }
             None => 0,
         };
         self.alone.stage = Stage::UnderWay { departures };
-        Some((id, deaf))
+        Some((id, no_return))
     }
 
-    /// Gives up a datagram that waits for the cyclic half for too long. Where cyclic frames keep returning, a pause is
-    /// needed; where some do not, they were lost.
+    /// Gives up a datagram that has waited too long for a free wire. If cyclic frames returned meanwhile on every link,
+    /// the wire is busy ([`BusError::Busy`]); otherwise cyclic frames were lost ([`BusError::Lost`]).
     pub(in crate::supervisor) fn expire_alone(&mut self) {
-        let Stage::Waiting { until, home: before } = self.alone.stage else { return };
-        let Some((id, deaf)) = self.alone.waiting.front().copied().filter(|_| self.now >= until) else { return };
+        let Stage::Waiting { until, returned: before } = self.alone.stage else { return };
+        let Some((id, no_return)) = self.alone.waiting.front().copied().filter(|_| self.now >= until) else { return };
         let target = self.transfers.find(id).map_or(Target::None, |transfer| transfer.request.target);
-        let silent = deaf | self.silence.mask(self.now);
-        let home = self.board.as_ref().map_or(before, |board| board.traffic.home(self.links, silent));
+        let silent = no_return | self.silence.mask(self.now);
+        let returned = self.board.as_ref().map_or(before, |board| board.traffic.home(self.links, silent));
         let waited_for = self.links.mask() & !silent;
         let links = Link::ALL.into_iter().filter(|link| waited_for & link.bit() != 0);
-        let come_home = links.map(|link| link.index()).all(|link| home[link] != before[link]);
-        self.finish(id, Err(if come_home { BusError::Busy { target } } else { BusError::Lost { target, retries: 0 } }));
+        let all_returned = links.map(|link| link.index()).all(|link| returned[link] != before[link]);
+        self.finish(
+            id,
+            Err(if all_returned { BusError::Busy { target } } else { BusError::Lost { target, retries: 0 } }),
+        );
     }
 
-    /// Result for a datagram that was to be alone, if it was not.
-    pub(in crate::supervisor) fn judge_alone(
+    /// Replaces the result of a datagram that had to be alone with an error if a cyclic frame was sent meanwhile.
+    pub(in crate::supervisor) fn check_alone(
         &mut self,
         id: TransferId,
         result: Result<Reply, BusError>,
@@ -82,8 +85,8 @@ impl Shared {
         self.alone.stage = Stage::Idle;
     }
 
-    /// Queues one.
-    pub(in crate::supervisor) fn push_alone(&mut self, id: TransferId, deaf: u8) {
-        self.alone.waiting.push_back((id, deaf));
+    /// Queues a datagram that must be alone.
+    pub(in crate::supervisor) fn push_alone(&mut self, id: TransferId, no_return: u8) {
+        self.alone.waiting.push_back((id, no_return));
     }
 }

@@ -12,8 +12,8 @@ const PAUSE: Duration = Duration::from_micros(100);
 const LIMIT: Duration = Duration::from_secs(1);
 
 impl Bus {
-    /// Disconnects or reconnects a link. False where the link layer cannot do that; the procedure that disconnected a
-    /// link must reconnect it. For one procedure at a time.
+    /// Disconnects or reconnects a link. False if the link layer cannot do that. The procedure that disconnected a link
+    /// must reconnect it. For one procedure at a time.
     pub async fn force_disconnect(&self, link: Link, disconnect: bool) -> bool {
         self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect };
         let until = self.now() + LIMIT;

@@ -26,14 +26,14 @@ impl Bus {
         let at = |offset: u16| Target::Station(station, register.offset(offset));
         let (command, expected) = (Command::Fpwr, Some(Wkc(1)));
         // A second datagram has overhead of its own.
-        let (lead, target, data) = if mail.len() + OVERHEAD < usize::from(size) {
+        let (preceding, target, data) = if mail.len() + OVERHEAD < usize::from(size) {
             (Some((command, at(0), mail)), at(size - 1), vec![0; 1])
         } else {
             let mut whole = mail;
             whole.resize(usize::from(size), 0);
             (None, at(0), whole)
         };
-        self.submit(Request { expected, lead, ..Request::once(command, target, data) })
+        self.submit(Request { expected, preceding, ..Request::once(command, target, data) })
     }
 
     /// Reads a mailbox, once. The mail of a second copy, and late mail, is kept for [`Bus::stray_mail`].

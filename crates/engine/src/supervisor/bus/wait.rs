@@ -40,7 +40,7 @@ impl Bus {
         .await;
     }
 
-    /// Runs a future with a time limit; after that it is dropped, and its datagrams are abandoned.
+    /// Runs a future with a time limit; after the limit it is dropped, and its datagrams are abandoned.
     pub async fn within<F: Future>(&self, limit: Duration, future: F) -> Result<F::Output, Elapsed> {
         let mut future = pin!(future);
         let until = self.now() + limit;
@@ -62,7 +62,7 @@ impl Bus {
         .await
     }
 
-    /// Runs two futures in parallel: their first datagrams leave in one frame, if they fit, in their order.
+    /// Runs two futures in parallel: their first datagrams are sent in one frame, if they fit, in their order.
     pub async fn both<A: Future, B: Future>(&self, first: A, second: B) -> (A::Output, B::Output) {
         let (mut first, mut second) = (pin!(first), pin!(second));
         let (mut a, mut b) = (None, None);

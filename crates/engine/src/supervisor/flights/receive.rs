@@ -1,4 +1,4 @@
-//! Received acyclic frames: pairs and merges the copies, answers procedures or gives up.
+//! Receives acyclic frames: pairs and merges the copies, passes replies to procedures, expires lost frames.
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
@@ -6,7 +6,7 @@ use ringcat_wire::command::Command;
 use super::{Flights, SLOTS};
 use crate::link::Link;
 use crate::ring::FrameCopy;
-use crate::supervisor::flight::{Flight, Place};
+use crate::supervisor::flight::{Flight, SentDatagram};
 use crate::supervisor::outbox::Rank;
 use crate::supervisor::received::Received;
 use crate::supervisor::reply::{BusError, Reply};
@@ -28,7 +28,7 @@ impl Shared {
             self.strays.late(copy.sequence, bytes, self.now);
             return Received::Late;
         };
-        if !flight.is_what_was_sent(bytes) {
+        if !flight.matches_sent(bytes) {
             self.counters.corrupt += 1;
             return Received::Corrupt;
         }
@@ -38,15 +38,15 @@ impl Shared {
             return Received::Late;
         }
         self.round_trip.took(self.now.since(flight.sent_at));
-        self.outbox.took(self.now.since(flight.left_at));
+        self.outbox.note_round_trip(self.now.since(flight.left_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
                 self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
             }
         }
         flight.take(copy.sent_on, bytes, first);
-        let finished = flight.has_all(self.links);
-        let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.deaf, self.links);
+        let finished = flight.has_all_copies(self.links);
+        let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.no_return, self.links);
         self.answer(slot, enough);
         if finished {
             self.end(slot);
@@ -60,39 +60,39 @@ impl Shared {
     /// is awaited. Replies of a frame that crossed a change of the ring count as lost.
     fn answer(&mut self, slot: usize, enough: bool) {
         let Some(mut flight) = self.flights.slots[slot].take() else { return };
-        let straddled = flight.straddled_a_change();
+        let ring_changed = flight.ring_changed_meanwhile();
         let stamp = (flight.sequence, flight.sent_at);
-        if enough && !straddled {
+        if enough && !ring_changed {
             self.learn_main_count(&flight);
         }
-        for place in flight.places.iter_mut().filter(|place| !place.answered) {
-            let satisfied = place.satisfied();
+        for datagram in flight.datagrams.iter_mut().filter(|datagram| !datagram.answered) {
+            let satisfied = datagram.satisfied();
             if !satisfied && !enough {
                 continue;
             }
-            place.answered = true;
-            if satisfied || !straddled {
-                let reply = place.reply(&flight.bytes, stamp);
-                self.finish(place.transfer, Ok(reply));
+            datagram.answered = true;
+            if satisfied || !ring_changed {
+                let reply = datagram.reply(&flight.bytes, stamp);
+                self.finish(datagram.transfer, Ok(reply));
             } else {
-                self.lost(place.transfer);
+                self.lost(datagram.transfer);
             }
         }
-        if !flight.answered && flight.places.iter().all(|place| place.answered) {
+        if !flight.answered && flight.datagrams.iter().all(|datagram| datagram.answered) {
             flight.answered = true;
             self.counters.received += 1;
-            self.outbox.came_back(core::mem::take(&mut flight.reads));
+            self.outbox.reads_returned(core::mem::take(&mut flight.reads));
         }
         self.flights.slots[slot] = Some(flight);
     }
 
-    /// A broadcast shows how many SubDevices process the main copy (protocol CR-09).
+    /// Takes the number of SubDevices that process the main copy from a broadcast (protocol CR-09).
     fn learn_main_count(&mut self, flight: &Flight) {
-        let is_broadcast = |place: &&Place| matches!(place.command, Command::Brd | Command::Bwr);
-        // A broadcast without any SubDevice shows nothing.
-        let met = |place: &&Place| place.total() != Wkc(0);
-        if let Some(place) = flight.places.iter().rfind(is_broadcast).filter(met) {
-            self.main_count = place.wkc[Link::Main.index()].0;
+        let is_broadcast = |datagram: &&SentDatagram| matches!(datagram.command, Command::Brd | Command::Bwr);
+        // A working counter of 0 says nothing about the links.
+        let answered = |datagram: &&SentDatagram| datagram.total() != Wkc(0);
+        if let Some(datagram) = flight.datagrams.iter().rfind(is_broadcast).filter(answered) {
+            self.main_count = datagram.wkc[Link::Main.index()].0;
         }
     }
 
@@ -103,7 +103,7 @@ impl Shared {
     }
 
     pub(in crate::supervisor) fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
-        let result = self.judge_alone(id, result);
+        let result = self.check_alone(id, result);
         let Some(transfer) = self.transfers.find(id) else { return };
         if transfer.abandoned {
             self.transfers.remove(id);
@@ -127,12 +127,12 @@ impl Shared {
         }
     }
 
-    /// Completes datagrams that one copy answered as expected, and those to one SubDevice that answered (CR-06). The
-    /// others count as lost: the missing copy may have been the one that reached the SubDevice.
+    /// Completes the datagrams to one SubDevice that was reached by the received copy (CR-06). All others count as
+    /// lost: the missing copy may be the one that the addressed SubDevice processed.
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
-        self.outbox.came_back(flight.reads);
+        self.outbox.reads_returned(flight.reads);
         flight.mail_reads().for_each(|read| self.strays.remember(read));
         if !flight.answered {
             if flight.arrivals.arrived == 0 {
@@ -144,12 +144,12 @@ impl Shared {
             if enough {
                 self.learn_main_count(&flight);
             }
-            for place in flight.places.iter().filter(|place| !place.answered) {
-                if enough || (place.is_answered_by_one() && !self.is_apart(place.transfer)) {
-                    let reply = place.reply(&flight.bytes, (flight.sequence, flight.sent_at));
-                    self.finish(place.transfer, Ok(reply));
+            for datagram in flight.datagrams.iter().filter(|datagram| !datagram.answered) {
+                if enough || (datagram.is_answered_by_one() && !self.copies_differ(datagram.transfer)) {
+                    let reply = datagram.reply(&flight.bytes, (flight.sequence, flight.sent_at));
+                    self.finish(datagram.transfer, Ok(reply));
                 } else {
-                    self.lost(place.transfer);
+                    self.lost(datagram.transfer);
                 }
             }
         }
@@ -157,7 +157,7 @@ impl Shared {
     }
 
     /// Whether the copies of a datagram differ, so that neither can replace the other.
-    fn is_apart(&mut self, id: TransferId) -> bool {
+    fn copies_differ(&mut self, id: TransferId) -> bool {
         let transfer = self.transfers.find(id);
         transfer.is_some_and(|it| it.request.redundant.is_some() || it.request.redundant_station.is_some())
     }

@@ -10,13 +10,13 @@ use super::Flights;
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
 use crate::ring::{Class, Identity};
-use crate::supervisor::flight::{Flight, Place};
+use crate::supervisor::flight::{Flight, SentDatagram};
 use crate::supervisor::outbox::Rank;
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
 use crate::time::Instant;
 
-/// A datagram that fits no send window is sent after this time all the same, and delays one cycle.
+/// A datagram that fits no send window is sent after this time nevertheless, and delays one cycle.
 const STARVED: Duration = Duration::from_millis(10);
 
 impl Shared {
@@ -26,7 +26,7 @@ impl Shared {
         while self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
             let flight = match self.alone.is_held() {
-                true => self.next_alone().and_then(|(id, deaf)| self.pack_alone(id, deaf)),
+                true => self.next_alone().and_then(|(id, no_return)| self.pack_alone(id, no_return)),
                 false if self.outbox.is_ready(self.now) => self.pack(limit),
                 false => None,
             };
@@ -35,7 +35,7 @@ impl Shared {
             used += flight.bytes.len();
             self.counters.sent += 1;
             self.counters.bytes += flight.bytes.len() as u64;
-            self.counters.datagrams += flight.places.len() as u64;
+            self.counters.datagrams += flight.datagrams.len() as u64;
             self.silence.sent(Link::Main, self.now);
             transmit(Link::Main, &flight.bytes);
             if self.links == LinkSet::Ring {
@@ -43,16 +43,16 @@ impl Shared {
                 let copy = &mut self.flights.redundant[..flight.bytes.len()];
                 copy.copy_from_slice(&flight.bytes);
                 Identity::mark_redundant(copy, true);
-                adjust_auto_increment(copy, &flight.places, self.main_count);
-                for place in &flight.places {
-                    let Some(transfer) = self.transfers.find(place.transfer) else { continue };
+                adjust_auto_increment(copy, &flight.datagrams, self.main_count);
+                for datagram in &flight.datagrams {
+                    let Some(transfer) = self.transfers.find(datagram.transfer) else { continue };
                     if let Some(station) = transfer.request.redundant_station {
-                        let at = place.header_at + 2;
+                        let at = datagram.header_at + 2;
                         copy[at..at + 2].copy_from_slice(&station.0.to_le_bytes());
                     }
                     if let Some(data) = &transfer.request.redundant {
-                        let at = place.header_at + HEADER_LEN;
-                        copy[at..at + place.length].copy_from_slice(data);
+                        let at = datagram.header_at + HEADER_LEN;
+                        copy[at..at + datagram.length].copy_from_slice(data);
                     }
                 }
                 transmit(Link::Redundant, copy);
@@ -64,8 +64,8 @@ impl Shared {
         used
     }
 
-    /// Whether a first datagram that is too long for the window has waited long enough to be sent all the same: it may
-    /// be too long for every window.
+    /// Whether the first datagram, which is too long for this send window, has waited for [`STARVED`]: it may be too
+    /// long for every window, and is then sent nevertheless.
     fn is_starved(blocked: &mut Option<(TransferId, Instant)>, first: TransferId, now: Instant) -> bool {
         let (_, since) = *blocked.insert(blocked.filter(|(id, _)| *id == first).unwrap_or((first, now)));
         now.since(since) >= STARVED
@@ -95,12 +95,12 @@ impl Shared {
                 let request = &transfer.request;
                 let bytes = request.bytes();
                 let fills_up = is_alone || request.before > 0 || datagrams + request.datagrams() > self.max_datagrams;
-                if fills_up && !flight.places.is_empty() {
+                if fills_up && !flight.datagrams.is_empty() {
                     break;
                 }
                 // Only the first datagram of a frame may be longer than the window.
                 if (total + bytes).max(MIN_FRAME) > limit
-                    && (!flight.places.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
+                    && (!flight.datagrams.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
                 {
                     break;
                 }
@@ -110,12 +110,12 @@ impl Shared {
                 total += bytes;
                 datagrams += request.datagrams();
                 retry = retry.max(transfer.retries);
-                flight.places.push(Place::new(id, request, data_at));
+                flight.datagrams.push(SentDatagram::new(id, request, data_at));
                 transfer.stage = Stage::InFlight;
                 self.outbox.pop(rank);
                 if rank == Rank::Read {
                     flight.reads += bytes;
-                    self.outbox.set_out(bytes);
+                    self.outbox.reads_sent(bytes);
                 }
             }
             builder.finish()
@@ -124,11 +124,11 @@ impl Shared {
     }
 
     /// Builds a frame that holds one datagram.
-    fn pack_alone(&mut self, id: TransferId, deaf: u8) -> Option<Flight> {
+    fn pack_alone(&mut self, id: TransferId, no_return: u8) -> Option<Flight> {
         let sequence = self.flights.sequence.next();
         let mut flight = self.flights.fresh(sequence);
         flight.bytes.resize(MAX_FRAME, 0);
-        flight.deaf = deaf;
+        flight.no_return = no_return;
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
@@ -136,19 +136,19 @@ impl Shared {
             let (request, index) = (&transfer.request, sequence.index(Class::Acyclic));
             let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
             builder.data_mut(data_at, request.data.len())?.copy_from_slice(&request.data);
-            flight.places.push(Place::new(id, request, data_at));
+            flight.datagrams.push(SentDatagram::new(id, request, data_at));
             transfer.stage = Stage::InFlight;
             builder.finish()
         };
         self.launch(flight, length, 0)
     }
 
-    /// Gives a frame of this length for sending; `None` where it is empty.
+    /// Completes a frame of this length for sending; `None` if it is empty.
     fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
         let sequence = flight.sequence;
         flight.bytes.truncate(length);
         self.identity.stamp(&mut flight.bytes, sequence, retry);
-        if flight.places.is_empty() {
+        if flight.datagrams.is_empty() {
             self.flights.spare.push(flight);
             return None;
         }
@@ -163,10 +163,10 @@ impl Shared {
 
 /// Appends the datagrams of a request. Returns the offset of its own data; `None` where they do not fit.
 fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instant) -> Option<usize> {
-    if let Some((command, target, lead)) = &request.lead {
-        let at = builder.datagram(*command, index, *target, lead.len())?;
-        if let Some(data) = builder.data_mut(at, lead.len()) {
-            data.copy_from_slice(lead);
+    if let Some((command, target, preceding)) = &request.preceding {
+        let at = builder.datagram(*command, index, *target, preceding.len())?;
+        if let Some(data) = builder.data_mut(at, preceding.len()) {
+            data.copy_from_slice(preceding);
         }
     }
     for _ in 0..request.before {
@@ -175,20 +175,20 @@ fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instan
     let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
     if let Some(data) = builder.data_mut(data_at, request.data.len()) {
         data.copy_from_slice(&request.data);
-        request.let_run(data, now);
+        request.advance_time(data, now);
     }
     Some(data_at)
 }
 
-/// In an open ring the SubDevice at position `p` behind the break is the one at `p - main_count` on the redundant link;
-/// in a closed one no SubDevice is addressed twice (protocol CR-09).
-fn adjust_auto_increment(frame: &mut [u8], places: &[Place], main_count: u16) {
-    for place in places {
-        if !matches!(place.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {
+/// Adjusts positions in the redundant copy: in an open ring, the SubDevice at position `p` behind the break is at `p -
+/// main_count` on the redundant link; in a closed ring, no SubDevice is addressed twice (protocol CR-09).
+fn adjust_auto_increment(frame: &mut [u8], datagrams: &[SentDatagram], main_count: u16) {
+    for datagram in datagrams {
+        if !matches!(datagram.command, Command::Aprd | Command::Apwr | Command::Aprw | Command::Armw) {
             continue;
         }
-        let witness = place.witness.then(|| place.header_at - WITNESS_BYTES);
-        for at in [Some(place.header_at), witness].into_iter().flatten() {
+        let witness = datagram.witness.then(|| datagram.header_at - WITNESS_BYTES);
+        for at in [Some(datagram.header_at), witness].into_iter().flatten() {
             let adp = at + 2;
             let shifted = u16::from_le_bytes([frame[adp], frame[adp + 1]]).wrapping_add(main_count);
             frame[adp..adp + 2].copy_from_slice(&shifted.to_le_bytes());

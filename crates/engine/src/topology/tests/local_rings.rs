@@ -1,4 +1,4 @@
-//! Rings behind junctions (protocol 9.4): vectors, and random trees with rings that are whole or broken at one place.
+//! Rings behind junctions (protocol 9.4): vectors, and random trees with rings that are intact or broken at one cable.
 
 use std::vec;
 use std::vec::Vec;
@@ -9,13 +9,13 @@ use super::walk_model::{End, Segment};
 use super::{END, HEAD, PASS, at, parents, status, trees};
 use crate::topology::{Closing, RingCable, Topology, candidates};
 
-/// J, 10, 11, 12 on J's port 3, closed from 12's port 1 to J's port 1, and 20 on J's port 2.
+/// Junction J with the ring 10, 11, 12 from its port 3 to its port 1 (closed from port 1 of 12), and 20 on port 2.
 const JUNCTION: u8 = 0xAA;
 const CLOSING: Closing = Closing { head: at(0, 1), tail: at(3, 1) };
 
 // covers: JR-01
 #[test]
-fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins() {
+fn an_intact_local_ring_is_a_branch_on_the_port_where_it_begins() {
     let nodes = [status(JUNCTION), status(PASS), status(PASS), status(PASS), status(END)];
     let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);
     assert_eq!(parents(&topology), [None, Some((0, 3)), Some((1, 1)), Some((2, 1)), Some((0, 2))]);
@@ -32,8 +32,8 @@ fn a_whole_ring_behind_a_junction_is_a_branch_on_the_port_where_it_begins() {
 
 // covers: LC-06, junctions
 #[test]
-fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line() {
-    // Between 10 and 11.
+fn a_broken_local_ring_keeps_its_order_and_is_no_crossed_line() {
+    // The cable between 10 and 11 is cut.
     let nodes = [status(JUNCTION), status(END), status(HEAD), status(PASS), status(END)];
     let topology = Topology::with_local_rings(&nodes, 5, &[CLOSING]);
     assert_eq!(parents(&topology), [None, Some((0, 3)), None, Some((2, 1)), Some((0, 2))]);
@@ -44,7 +44,7 @@ fn a_broken_ring_behind_a_junction_keeps_order_and_place_and_is_no_crossed_line(
 
 // covers: JR-04
 #[test]
-fn without_junction_redundancy_a_broken_ring_reads_as_a_crossed_line() {
+fn without_junction_redundancy_a_broken_ring_is_reported_as_a_crossed_line() {
     let nodes = [status(0x9A), status(END), status(HEAD), status(PASS)];
     let topology = Topology::build(&nodes, 4);
     assert!(topology.findings.contains(&super::Finding::CrossedLine { node: 2, entry_port: 1 }));
@@ -58,24 +58,25 @@ fn open_ports_allow_every_member_to_be_the_last_of_its_ring() {
     let tails = |found: Vec<Vec<Closing>>| found.iter().map(|set| (set[0].tail, set.len())).collect::<Vec<_>>();
     assert_eq!(tails(candidates(&nodes, 5, false, 9)), [(at(1, 1), 1), (at(2, 1), 1), (at(3, 1), 1)]);
     assert_eq!(tails(candidates(&nodes, 5, false, 2)).len(), 2);
-    // A plain line, and one whose last port leads to the redundant link.
+    // A line, and a closed ring without junctions.
     assert_eq!(candidates(&[status(PASS), status(PASS), status(END)], 3, false, 9), Vec::<Vec<_>>::new());
     assert_eq!(candidates(&[status(PASS), status(PASS), status(PASS)], 3, true, 9), Vec::<Vec<_>>::new());
 }
 
-/// A segment with a local ring: the segment, how it closes, and the port where it begins.
+/// A segment with a local ring, and the closing cable of the ring.
 #[derive(Clone, Debug)]
 struct WithRing {
     segment: Segment,
     closing: Closing,
 }
 
-/// All ways in which one more cable makes a local ring that keeps the order in which frames pass the SubDevices.
+/// All segments in which one more cable makes a local ring without a change of the order in which frames pass the
+/// SubDevices.
 fn rings_of(tree: &Segment) -> Vec<WithRing> {
     let before = tree.walk().order;
     let free = tree.free_ports();
     let pairs = free.iter().flat_map(|head| free.iter().map(move |tail| (*head, *tail)));
-    let place = |node: usize| before.iter().position(|met| *met == node).unwrap();
+    let place = |node: usize| before.iter().position(|passed| *passed == node).unwrap();
     pairs
         .filter(|((head, _), (tail, _))| tree.trunk(*tail).contains(head) && head != tail)
         .filter_map(|(head, tail)| {
@@ -88,7 +89,7 @@ fn rings_of(tree: &Segment) -> Vec<WithRing> {
 }
 
 fn with_ring() -> impl Strategy<Value = WithRing> {
-    (trees(), any::<prop::sample::Index>()).prop_filter_map("no place for a ring", |(tree, pick)| {
+    (trees(), any::<prop::sample::Index>()).prop_filter_map("no ports for a ring", |(tree, pick)| {
         let rings = rings_of(&tree);
         (!rings.is_empty()).then(|| rings[pick.index(rings.len())].clone())
     })
@@ -97,7 +98,7 @@ fn with_ring() -> impl Strategy<Value = WithRing> {
 proptest! {
     // covers: JR-02, junctions
     #[test]
-    fn any_ring_behind_a_junction_is_met_in_the_same_order_whole_and_broken(
+    fn frames_pass_any_local_ring_in_the_same_order_intact_and_broken(
         WithRing { segment, closing } in with_ring(), cut in any::<prop::sample::Index>(), times in any::<bool>()
     ) {
         let whole = segment.walk();

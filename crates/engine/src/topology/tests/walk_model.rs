@@ -1,5 +1,4 @@
-//! The walk of a frame over ports, as an oracle: protocol 2.1, 2.4 and 11.3 in a few lines, on wiring instead of
-//! status.
+//! Reference model of a frame's path over ports (protocol 2.1, 2.4, 11.3), on wiring instead of port status.
 
 use std::vec;
 use std::vec::Vec;
@@ -22,12 +21,12 @@ pub struct Segment {
     links: Vec<[Option<End>; 4]>,
     main: Option<(usize, u8)>,
     redundant: Option<(usize, u8)>,
-    /// As wired before any cut: parent of each SubDevice.
+    /// Parent of each SubDevice, without the cable that was cut.
     parents: Vec<Option<(usize, u8)>>,
 }
 
 /// SubDevices that the frames of both links pass.
-pub struct Seen {
+pub struct Walked {
     /// SubDevices in the order of the processing units.
     pub order: Vec<usize>,
     pub main_count: usize,
@@ -76,7 +75,7 @@ impl Segment {
         core::iter::successors(Some(tail), |node| self.parents[*node].map(|parent| parent.0)).collect()
     }
 
-    /// Pulls the cable out of both its ends.
+    /// Removes the cable at a port.
     pub fn cut(&mut self, node: usize, port: u8) {
         match self.links[node][usize::from(port)].take() {
             Some(End::Port(other, other_port)) => self.links[other][usize::from(other_port)] = None,
@@ -87,17 +86,17 @@ impl Segment {
         self.parents[node] = None;
     }
 
-    pub fn walk(&self) -> Seen {
+    pub fn walk(&self) -> Walked {
         let open = self.links.iter().map(|links| links.map(|end| end.is_some())).collect();
-        let mut seen = Seen { order: vec![], main_count: 0, times: vec![[None; 4]; self.len()], open };
+        let mut seen = Walked { order: vec![], main_count: 0, times: vec![[None; 4]; self.len()], open };
         self.send(self.main, &mut seen);
         seen.main_count = seen.order.len();
         self.send(self.redundant, &mut seen);
         seen
     }
 
-    /// Sends a frame into a port. Times of a SubDevice are those of the frame that its processing unit saw.
-    fn send(&self, start: Option<(usize, u8)>, seen: &mut Seen) {
+    /// Sends a frame into a port. A SubDevice keeps the times of the frame that its processing unit processed.
+    fn send(&self, start: Option<(usize, u8)>, seen: &mut Walked) {
         let Some((mut node, mut port)) = start else { return };
         let mut times = vec![[None; 4]; self.len()];
         let mut circulating = false;
@@ -126,14 +125,14 @@ impl Segment {
                 }
             }
         }
-        for met in &seen.order[first..] {
-            seen.times[*met] = times[*met];
+        for passed in &seen.order[first..] {
+            seen.times[*passed] = times[*passed];
         }
     }
 }
 
-impl Seen {
-    /// Reports of the SubDevices, in the order of the processing units.
+impl Walked {
+    /// Port registers of the SubDevices, in the order of the processing units.
     pub fn status(&self, times: bool) -> Vec<NodeStatus> {
         let of = |node: &usize| {
             let mut bits = 0;
@@ -148,7 +147,7 @@ impl Seen {
 
     /// Parents as wired, by place in the order.
     pub fn parents(&self, segment: &Segment) -> Vec<Option<(usize, u8)>> {
-        let place = |node| self.order.iter().position(|met| *met == node).unwrap();
+        let place = |node| self.order.iter().position(|passed| *passed == node).unwrap();
         self.order.iter().map(|node| segment.parents[*node].map(|(parent, port)| (place(parent), port))).collect()
     }
 }
