@@ -29,9 +29,10 @@ pub fn sleep_until_ns(ns: u64) {
     {}
 }
 
-/// A time or duration as the kernel takes it.
+/// A time or duration as the kernel takes it; the types of the fields differ between targets (`time_t` of musl is
+/// deprecated as a name).
 pub(crate) fn timespec(ns: u64) -> libc::timespec {
-    libc::timespec { tv_sec: (ns / 1_000_000_000) as libc::time_t, tv_nsec: (ns % 1_000_000_000) as libc::c_long }
+    libc::timespec { tv_sec: (ns / 1_000_000_000) as _, tv_nsec: (ns % 1_000_000_000) as _ }
 }
 
 #[cfg(test)]
