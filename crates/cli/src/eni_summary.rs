@@ -181,7 +181,7 @@ fn not_followed(configuration: &Configuration) -> Vec<String> {
 mod tests {
     use super::*;
 
-    const SMALL: &str = include_str!("../../config/tests/files/small.xml");
+    const SMALL: &str = include_str!("../files/small.eni.xml");
 
     fn small() -> (Eni, Configuration) {
         let EniFile { eni, configuration } = EniFile::from_bytes(SMALL.as_bytes()).unwrap();

@@ -29,9 +29,9 @@ pub fn sleep_until_ns(ns: u64) {
     {}
 }
 
-/// A time or duration in the kernel's type.
+/// A time or duration in the kernel's type. The types of the fields differ between targets.
 pub(crate) fn timespec(ns: u64) -> libc::timespec {
-    libc::timespec { tv_sec: (ns / 1_000_000_000) as libc::time_t, tv_nsec: (ns % 1_000_000_000) as libc::c_long }
+    libc::timespec { tv_sec: (ns / 1_000_000_000) as _, tv_nsec: (ns % 1_000_000_000) as _ }
 }
 
 #[cfg(test)]

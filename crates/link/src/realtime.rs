@@ -196,7 +196,7 @@ mod tests {
             let _ = fifo(1);
             leave();
             // SAFETY: no pointers are passed.
-            unsafe { libc::sched_getscheduler(0) & !libc::SCHED_RESET_ON_FORK }
+            unsafe { libc::syscall(libc::SYS_sched_getscheduler, 0) as libc::c_int & !libc::SCHED_RESET_ON_FORK }
         });
         assert_eq!(policy.join().expect("no panic"), libc::SCHED_OTHER);
     }

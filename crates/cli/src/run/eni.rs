@@ -290,7 +290,7 @@ mod tests {
 
     use super::*;
 
-    const MACHINE: &[u8] = include_bytes!("../../../ringcat/examples/machine.eni.xml");
+    const MACHINE: &[u8] = include_bytes!("../../files/machine.eni.xml");
 
     fn network(set: &[&str], watch: &[&str]) -> EniNetwork {
         let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
