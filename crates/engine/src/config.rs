@@ -1,5 +1,4 @@
-//! What the application declares about each SubDevice: expected place, identity, process data, watchdog, start-up
-//! commands and time limits.
+//! Declarations of SubDevices: expected place, identity, process data, watchdog, start-up commands and time limits.
 //!
 //! Everything not declared comes from the SII. [`resolve`] assigns declarations to the SubDevices of a scan;
 //! [`crate::plan`] derives the register values.
@@ -30,7 +29,7 @@ pub use crate::info::IdentityField;
 
 pub use address::ConfigAddress;
 pub use declared::{DeclaredSyncManager, SyncManagerRole};
-pub(crate) use groups::can_lead;
+pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
@@ -82,7 +81,7 @@ impl Expected {
 /// Whether writes to a SyncManager retrigger the process data watchdog.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Watchdog {
-    /// As the SII says.
+    /// As in the SII.
     #[default]
     Default,
     /// Enabled.
@@ -102,8 +101,8 @@ pub struct SyncManagerOverride {
     pub watchdog: Watchdog,
 }
 
-/// What the application declares about one SubDevice. The default expects a SubDevice of any identity at position 0,
-/// with everything else from the SII.
+/// Declaration of one SubDevice. The default expects a SubDevice of any identity at position 0, with everything else
+/// from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubDeviceConfig {
     /// Where it is expected.
@@ -116,14 +115,14 @@ pub struct SubDeviceConfig {
     pub group: Option<usize>,
     /// SyncManagers with settings that override the SII.
     pub sync_managers: Vec<SyncManagerOverride>,
-    /// PDOs of the SyncManagers named here; the others, and all where this is `None`, are as in the SII.
+    /// PDOs by SyncManager; SyncManagers without an assignment, or all if this is `None`, have the PDOs of the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
-    /// All its SyncManagers as a configuration file writes them; `None` takes them from the SII. When they are given,
-    /// `sync_managers` and `pdos` are ignored, nothing is assigned or mapped, and the file's mailboxes replace those of
-    /// the SII.
+    /// All its SyncManagers from a configuration file; `None` takes them from the SII. If they are given,
+    /// `sync_managers` and `pdos` are ignored, PDO assignment and mapping are not written, and the mailboxes of the
+    /// file replace those of the SII.
     pub declared: Option<Vec<DeclaredSyncManager>>,
-    /// Its mailboxes in BOOT as a configuration file writes them, the one that the MainDevice writes first; `None`
-    /// takes them from the SII.
+    /// Its mailboxes in BOOT from a configuration file, first the mailbox that the MainDevice writes; `None` takes them
+    /// from the SII.
     pub declared_bootstrap: Option<[DeclaredSyncManager; 2]>,
     /// Register WATCHDOG_DIVIDER.
     pub watchdog_divider: Option<u16>,
@@ -133,7 +132,7 @@ pub struct SubDeviceConfig {
     pub pdi_watchdog_intervals: Option<u16>,
     /// Start-up commands. Those of a transition are sent in this order, at each pass of the transition.
     pub startup: Vec<StartupCommand>,
-    /// The EEPROM is left to the PDI from the way to PREOP on. A later access by the MainDevice takes it back.
+    /// The EEPROM is assigned to the PDI before PREOP is requested. A later access by the MainDevice takes it back.
     pub sii_to_pdi: bool,
     /// Pause in PREOP before SAFEOP is requested, for SubDevices that need it.
     pub wait_before_safeop: Duration,

@@ -28,19 +28,19 @@ use crate::topology::{Closing, PortOf};
 /// An event with its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedEvent {
-    /// The `now` of the call in which the engine saw it.
+    /// The `now` of the call in which the engine detected it.
     pub at: Instant,
     /// What happened.
     pub event: Event,
-    /// The SubDevices at the cabling positions that the event names, where known, as of that time: for a cable the one
-    /// at its near end and the one at its far end.
-    pub whom: [Option<Occupant>; 2],
+    /// The SubDevices at the cabling positions that the event names, if known, at that time; for a cable: at its near
+    /// end, and at its far end.
+    pub occupants: [Option<Occupant>; 2],
 }
 
 impl TimedEvent {
-    /// An event that names no cabling position, or one with an unknown SubDevice.
+    /// An event without SubDevices at cabling positions.
     pub const fn new(at: Instant, event: Event) -> TimedEvent {
-        TimedEvent { at, event, whom: [None; 2] }
+        TimedEvent { at, event, occupants: [None; 2] }
     }
 }
 
@@ -48,7 +48,7 @@ impl TimedEvent {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
-    /// A scan counted the SubDevices on each link.
+    /// A scan has counted the SubDevices on each link.
     Counted {
         /// SubDevices that processed the main copy.
         main: u16,
@@ -79,20 +79,20 @@ pub enum Event {
         /// The fault.
         what: String,
     },
-    /// Port 0 of a SubDevice is not connected though frames reach it: the frame is looped there, and a second such
-    /// place destroys it (protocol 2.4).
+    /// Port 0 of a SubDevice is not connected although frames reach it: the SubDevice loops the frame there, and a
+    /// second such SubDevice destroys the frame (protocol 2.4).
     UnconnectedPort0 {
         /// Position.
         position: Position,
     },
-    /// A SubDevice is entered at a port other than 0: its cables are swapped (protocol LC-01).
+    /// Frames enter a SubDevice at another port than 0: its cables are swapped (protocol LC-01).
     LineCrossed {
-        /// Position; `None` where only the ring shows that there is one (protocol LC-02).
+        /// Position; `None` if the crossed line is detected but not located (protocol LC-02).
         position: Option<Position>,
         /// The port of entry, where known.
         entry_port: Option<u8>,
     },
-    /// All SubDevices of a ring are entered at another port than 0: the cables of the main and the redundant link are
+    /// Frames enter all SubDevices of a ring at another port than 0: the cables of the main and the redundant link are
     /// swapped (protocol LC-01). The ring works, as with any crossed line.
     InterfacesSwapped,
     /// A scan found a ring behind a junction (JR-03).
@@ -100,9 +100,9 @@ pub enum Event {
         /// Its closing cable, from the last SubDevice back to the junction; nodes are positions.
         closing: Closing,
     },
-    /// The ports show rings behind junctions whose closing cable a scan in mode automatic did not find: frames were
-    /// lost meanwhile, a junction does not close its ports on command, or there are more than 16 rings. Declared
-    /// connections ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no such test.
+    /// The port status shows rings behind junctions, but a scan in mode automatic did not find their closing cables:
+    /// frames were lost meanwhile, a junction does not close its ports on command, or there are more than 16 rings.
+    /// Declared connections ([`JunctionMode::Strict`](crate::junction::JunctionMode)) need no such test.
     JunctionsNotLearned {
         /// Number of rings.
         rings: usize,
@@ -110,38 +110,37 @@ pub enum Event {
     /// A cable of a ring behind a junction broke or is restored (JUNCTION_RED_CHANGE in Cable Redundancy). Nodes are
     /// positions of the cabling as it was last read.
     JunctionChanged {
-        /// The port from which frames come; `None` until the ring has been seen closed.
+        /// The port from which frames come; `None` until the ring was closed once.
         near: Option<PortOf>,
-        /// The port that they reach. Behind a break it is port 0 of the SubDevice that is entered at another port; at
-        /// the closing cable it is the junction's.
+        /// The port that frames reach: behind a break, the unconnected port 0 of a SubDevice; at the closing cable, the
+        /// port of the junction.
         far: PortOf,
-        /// Station address of the SubDevice that they reach; `None` where no SubDevice has one there.
+        /// Station address of the SubDevice with the port `far`; `None` if it is unknown.
         station: Option<StationAddress>,
         /// Indices in the declaration of the SubDevices at both ends, `near` first.
         declared: [Option<usize>; 2],
         /// The cable broke.
         broken: bool,
-        /// Broken cables of all such rings now. One is tolerated. With two in one ring the SubDevices between them are
-        /// isolated; with two in different rings no frame comes back (JR-02).
+        /// Number of broken cables of all such rings now. One is tolerated. With two in one ring, the SubDevices
+        /// between them are isolated; with two in different rings, no frame comes back (JR-02).
         breaks: usize,
     },
-    /// The ports show more rings behind junctions than are known: a ring was closed that was open at the scan (JR-03),
-    /// or is not declared. Until it is known, its breaks are reported as crossed lines (JR-04).
+    /// The port status shows more rings behind junctions than are known: a ring was open at the scan and is closed now
+    /// (JR-03), or it is not declared. Until it is known, its breaks are reported as crossed lines (JR-04).
     JunctionUnknown {
         /// Number of unknown rings.
         rings: usize,
     },
-    /// No frame comes back while a ring behind a junction is open: with a second unconnected port 0 in one path, frames
-    /// are destroyed (JR-02). Or the cable of the only link is broken too. With several such rings, each is then
-    /// examined while the junctions isolate the others for a moment, and [`Event::JunctionChanged`] reports the broken
-    /// cables.
+    /// No frame comes back while a ring behind a junction is open: a second unconnected port 0 on the path destroys
+    /// frames (JR-02), or the cable of the only link is broken too. With several such rings, each ring is then examined
+    /// while the junctions isolate the others for a moment, and [`Event::JunctionChanged`] reports the broken cables.
     JunctionsBlocked {
         /// True when it begins, false when frames come back.
         blocked: bool,
         /// Cables of such rings that are known to be broken.
         breaks: usize,
     },
-    /// The link layer cannot take a link down, so crossed lines in a closed ring cannot be located (LC-03).
+    /// The link layer cannot disconnect a link, so crossed lines in a closed ring cannot be located (LC-03).
     CannotDisconnect {
         /// The link.
         link: Link,
@@ -169,7 +168,7 @@ pub enum Event {
         /// SubDevices on the redundant link.
         redundant: u16,
     },
-    /// The break is located, from the topology.
+    /// The break is located by the port status.
     BreakLocated {
         /// The cable that is broken; its ends are ports of SubDevices by position, or interfaces of the host.
         cable: Cable,
@@ -180,28 +179,28 @@ pub enum Event {
         main: u16,
         /// SubDevices on the redundant link.
         redundant: u16,
-        /// The cable that is restored: where the break was last located, if it was.
+        /// The cable that is restored: the last located break, if any.
         place: Option<Cable>,
     },
-    /// The ring opens and closes so often that single changes are no longer reported: the next one is, when the ring
-    /// has been stable for a second.
+    /// The ring opens and closes so often that single changes are no longer reported. The next report follows when the
+    /// ring has been stable for a second.
     RingUnsteady {
         /// Number of changes since activation.
         changes: u32,
     },
-    /// The ring tolerates no further break: the next one isolates SubDevices. This is no fault of the bus: all
-    /// SubDevices are still reached.
+    /// The ring tolerates no further break: the next one isolates SubDevices. This is no fault of the bus: frames still
+    /// reach all SubDevices.
     RedundancyLost {
         /// Reason.
         cause: RedundancyLoss,
     },
-    /// The ring is closed again and passes frames both ways.
+    /// The ring is closed again and passes frames in both directions.
     RedundancyRegained,
-    /// Frames are damaged repeatedly on a cable. Reported for each cable once in ten seconds at most.
+    /// Frames are damaged repeatedly on a cable. Reported for each cable at most once in ten seconds.
     CableErrors {
         /// The cable.
         cable: Cable,
-        /// Errors that its ends counted since the last report.
+        /// Errors counted at both ends since the last report.
         errors: CableErrors,
     },
     /// An interface has lost its carrier.
@@ -221,11 +220,11 @@ pub enum Event {
         /// The state.
         state: AlState,
     },
-    /// A SubDevice refused a state or left one by itself.
+    /// A SubDevice refused a requested state, or left its state without a request.
     StateError {
         /// Index in the declaration.
         subdevice: usize,
-        /// The requested state; `None` where it changed by itself.
+        /// The requested state; `None` if there was no request.
         requested: Option<AlState>,
         /// Its AL status.
         status: AlStatus,
@@ -266,7 +265,7 @@ pub enum Event {
         index: u16,
         /// Subindex of the object.
         sub_index: u8,
-        /// Purpose of the command, as its declaration words it.
+        /// Purpose of the command, from its declaration.
         comment: Option<String>,
         /// The value read.
         data: Vec<u8>,
@@ -285,13 +284,13 @@ pub enum Event {
         /// Its identity.
         identity: Identity,
     },
-    /// A rescan found a declared SubDevice at another place in the order than the scan did.
+    /// A rescan found a declared SubDevice at another position than the scan.
     Moved {
         /// Index in the declaration.
         subdevice: usize,
-        /// Its place at the scan.
+        /// Its position at the scan.
         from: Position,
-        /// Its place now.
+        /// Its position now.
         to: Position,
     },
     /// A SubDevice of another identity is where a declared one is expected. It is not configured.
@@ -307,12 +306,12 @@ pub enum Event {
         /// Value found.
         got: u32,
     },
-    /// All SubDevices of a hot connect group are in the states that were declared.
+    /// All SubDevices of a hot connect group are in their declared target states.
     GroupJoined {
         /// Its number.
         group: usize,
     },
-    /// Not all SubDevices of a hot connect group that had joined are in the declared states any more.
+    /// SubDevices of a hot connect group that had joined left their declared target states.
     GroupLeft {
         /// Its number.
         group: usize,
@@ -324,15 +323,14 @@ pub enum Event {
         /// Whether the declaration allows its absence.
         optional: bool,
     },
-    /// A frame of another MainDevice arrived (protocol MR-10). The first few are kept, all are counted.
+    /// A frame of another MainDevice arrived (protocol MR-10). Only the first few are reported; all are counted.
     ForeignFrame {
         /// The link on which it arrived.
         arrived_on: Link,
         /// Its bytes without FCS.
         bytes: Vec<u8>,
     },
-    /// Frames with more datagrams than this come back unprocessed: a gateway or simulator processes fewer than fit.
-    /// Reported once.
+    /// A gateway or simulator processes fewer datagrams than fit into a frame. Reported once.
     FrameLimit {
         /// The limit, and what happens to further datagrams.
         limit: FrameLimit,
@@ -354,12 +352,12 @@ pub enum Event {
         /// Largest |0x092C| in nanoseconds.
         largest_ns: u32,
     },
-    /// The clock of another SubDevice is the reference now.
+    /// The clock of another SubDevice is the reference clock now.
     ReferenceClock {
-        /// Position in the scan; `None` where no clock is left.
+        /// Position in the scan; `None` if no clock is left.
         position: Option<Position>,
     },
-    /// The segment has changed, and with it the propagation delays (protocol 7.1).
+    /// Propagation delays changed with the segment (protocol 7.1).
     DelaysChanged {
         /// Clocks with a new delay.
         clocks: usize,
@@ -371,14 +369,14 @@ pub enum Event {
     DelayUnknown {
         /// Position in the scan.
         position: Position,
-        /// Position of the fork; `None` where the way from the reference to this SubDevice is unknown.
+        /// Position of the fork; `None` if the path from the reference clock to this SubDevice is unknown.
         fork: Option<Position>,
-        /// Lower and upper limit of the delay in nanoseconds; `None` where nothing is known.
+        /// Lower and upper limit of the delay in nanoseconds; `None` if they are unknown.
         range_ns: Option<(i64, i64)>,
-        /// The middle of the range was written. Otherwise no delay was.
+        /// The middle of the range was written. Otherwise no delay was written.
         is_estimated: bool,
     },
-    /// Distributed clocks could not be set up or measured; this is retried.
+    /// The set-up or measurement of distributed clocks failed; it is retried.
     ClocksFailed {
         /// Step and reason.
         reason: String,
@@ -393,8 +391,8 @@ pub enum Event {
 }
 
 impl Event {
-    /// Cabling positions that the event names; positions of the scan differ from those of a later reading of the
-    /// cabling.
+    /// Cabling positions that the event names. Positions of the scan are not included: they may differ from those of a
+    /// later rescan.
     fn positions(&self) -> [Option<usize>; 2] {
         match self {
             Event::BreakLocated { cable }

@@ -1,9 +1,9 @@
-//! What a scan found about one SubDevice, in owned types (protocol 3.1, 4).
+//! Information about one SubDevice from a scan, in owned types (protocol 3.1, 4).
 //!
 //! Input: the controller's registers ([`Readout`]), the fixed area of the SII and the categories that the scan read.
-//! Output: a [`SubDeviceInfo`]. No fault of an SII keeps a SubDevice from being listed: valid parts are used, faults
-//! are listed in [`SubDeviceInfo::warnings`], with category and offset. [`crate::plan`] refuses an SII that is unfit
-//! for process data.
+//! Output: a [`SubDeviceInfo`]. A SubDevice with a faulty SII is listed too: valid parts are used, and faults are
+//! listed in [`SubDeviceInfo::warnings`], with category and offset. [`crate::plan`] refuses an SII that is unfit for
+//! process data.
 
 mod collect;
 mod identity_field;
@@ -20,8 +20,8 @@ pub use subdevice::{ControllerInfo, PdoEntryInfo, PdoInfo, Readout, SubDeviceInf
 pub use warning::{InfoWarning, SiiProblem};
 
 impl SubDeviceInfo {
-    /// Combines what was read. `categories` are those that the scan read, in any order; a category that the image does
-    /// not have is left out. Invalid bytes become warnings.
+    /// Combines registers and SII. `categories` are those that the scan read, in any order. Invalid bytes become
+    /// warnings.
     pub fn from_parts<'a>(
         readout: Readout,
         header: &SiiHeader,

@@ -17,7 +17,7 @@ pub use slot::{Request, RequestFailure, RequestRefused, RequestState};
 pub use soe::SoeRequest;
 pub use voe::VoeHandler;
 
-pub(crate) use slot::{Access, Order, Served, Subject};
+pub(crate) use slot::{Access, AcyclicSide, Order, Subject};
 
 /// Adds the common methods to a kind of request.
 macro_rules! requests {

@@ -7,8 +7,8 @@ use crate::info::SubDeviceInfo;
 /// Where a SubDevice is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ConfigAddress {
-    /// Position in the configured order, from 0. Where an optional SubDevice is absent, the following ones move one
-    /// position towards the start of the segment. Members of [groups](super::Group) are not counted.
+    /// Position in the configured order, from 0. If an optional SubDevice is absent, the following ones are expected
+    /// one position nearer to the start of the segment. Members of [groups](super::Group) are not counted.
     Position(u16),
     /// `offset` SubDevices behind the one with this alias; alias 0 counts from the start of the segment.
     Alias {
@@ -45,7 +45,7 @@ impl ConfigAddress {
     }
 
     /// Whether a SubDevice has the alias or identification from which the address counts.
-    pub(crate) fn is_borne_by(self, info: &SubDeviceInfo) -> bool {
+    pub(crate) fn is_mark_of(self, info: &SubDeviceInfo) -> bool {
         match self {
             ConfigAddress::Alias { alias, .. } => alias != 0 && alias == info.alias,
             ConfigAddress::Identification { value, .. } => info.identification == Some(value),

@@ -94,7 +94,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Declares the PDOs that a SubDevice of this type has, so that they have a place in the image while it is absent.
+    /// Declares the PDOs of a SubDevice of this type, so that they have a place in the image while it is absent.
     #[must_use]
     pub fn pdos_of(mut self, info: &SubDeviceInfo) -> SubDeviceConfig {
         for sync_manager in 0..info.controller.sync_manager_count {
@@ -156,7 +156,7 @@ impl SubDeviceConfig {
         self.startup(transition, StartupAction::Idn(IdnWrite { drive, idn, data: data.into() }))
     }
 
-    /// Appends the setting of the IP parameters behind EoE, before SAFEOP is requested.
+    /// Appends a set IP parameter request (EoE), before SAFEOP is requested.
     #[must_use]
     pub fn ip(self, settings: IpSettings) -> SubDeviceConfig {
         self.startup(Transition::Ps, StartupAction::Ip(settings))
@@ -169,7 +169,7 @@ impl SubDeviceConfig {
         self
     }
 
-    /// Leaves the EEPROM to the PDI from the way to PREOP on.
+    /// Assigns the EEPROM to the PDI before PREOP is requested.
     #[must_use]
     pub fn sii_to_pdi(mut self) -> SubDeviceConfig {
         self.sii_to_pdi = true;

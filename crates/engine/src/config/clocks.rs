@@ -10,21 +10,21 @@ pub enum ReferenceClock {
     FirstWithClock,
     /// The first SubDevice with a clock among those for which SYNC signals are declared.
     FirstConfigured,
-    /// The SubDevice with this index in the declaration. SubDevices that frames pass before it receive the time that
-    /// the host predicts, not the reference time itself: a reference in front of all others is more exact.
+    /// The SubDevice with this index in the declaration. SubDevices that frames pass before it receive a time that the
+    /// host predicts instead of the reference time: a reference clock in front of all others is more exact.
     Declared(usize),
 }
 
-/// Time that a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register gives it, and
-/// receive times show only the sum of both ways. Only differences count, between both ways and between SubDevices: a
-/// part common to all SubDevices is measured together with the cables. A part that is missing for some of them makes
-/// the delay to the next SubDevice wrong by half of it.
+/// Time that a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register contains it,
+/// and receive times show only the sum of both directions. Only differences between both directions and between
+/// SubDevices count: a part that all SubDevices have in common is measured with the cables. A missing part of single
+/// SubDevices makes the delay to the next SubDevice wrong by half of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Passage {
-    /// Nanoseconds of a pass through the processing unit.
+    /// Nanoseconds through the processing unit.
     pub processing_ns: u16,
-    /// Nanoseconds of a pass on which the frame is only forwarded: on the way back, or through a SubDevice that is
-    /// entered at another port than 0.
+    /// Nanoseconds without the processing unit: on the way back, or through a SubDevice that the frame enters at
+    /// another port than 0.
     pub forwarding_ns: u16,
 }
 
@@ -35,7 +35,7 @@ pub struct ClockConfig {
     pub reference: ReferenceClock,
     /// System time when the host's monotonic time is zero, in nanoseconds (protocol 3.12: since 2000).
     pub epoch: u64,
-    /// The reference clock follows the host (bus shift). Otherwise it runs free.
+    /// The reference clock follows the host (bus shift). Otherwise it is free-running.
     pub bus_shift: bool,
     /// Number of measurements of the propagation delays; their mean is used.
     pub measurements: u32,
@@ -44,21 +44,22 @@ pub struct ClockConfig {
     /// Number of distributions of the reference time that the static drift compensation sends as fast as the segment
     /// allows, in addition to the cyclic ones (protocol 7.2: about 15,000).
     pub drift_distributions: u32,
-    /// A clock is locked when |0x092C| stayed at or below this for [`ClockConfig::lock_samples`] samples.
+    /// A clock is locked if |0x092C| was at or below this for [`ClockConfig::lock_samples`] samples.
     pub lock_window_ns: u32,
     /// See [`ClockConfig::lock_window_ns`].
     pub lock_samples: u32,
-    /// How long a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
+    /// Longest time that a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
     pub lock_limit: Duration,
-    /// Limit of the broadcast read of 0x092C beyond which the clocks are out of the sync window. The read is the OR of
+    /// Limit of the broadcast read of 0x092C; beyond it the clocks are out of the sync window. The read is the OR of
     /// all magnitudes: at most twice the largest.
     pub sync_window_ns: u32,
-    /// Permits delayed cycles. Where process data is on the wire all the time, the acyclic half may ask for a later
-    /// start of a cycle while propagation delays are measured: once per measurement ([`ClockConfig::measurements`]), by
-    /// about two round trips. Otherwise the delays are not measured there, and an event reports it.
+    /// Permits delayed cycles. If process data is on the wire all the time, the acyclic half may request a later start
+    /// of a cycle to measure propagation delays: once per measurement ([`ClockConfig::measurements`]), by about two
+    /// round trips. Without this permission the delays are not measured then, and an event reports it.
     pub pauses: bool,
-    /// Where a fork without a clock hides the delay of a SubDevice, the middle of the possible range is written, and an
-    /// event reports the range. Otherwise no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    /// If a fork without a clock hides the delay of a SubDevice, the middle of the possible range is written, and an
+    /// event reports the range. Without this option no delay is written to it, and with SYNC signals it stays in
+    /// SAFEOP.
     pub estimated_delays: bool,
 }
 
@@ -84,7 +85,7 @@ impl Default for ClockConfig {
 /// SYNC signals of one SubDevice (protocol 7.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SyncSignals {
-    /// Registers 0x0980 (low byte) and 0x0981 (high byte), as ESI and SII give them: 0x0300, 0x0700.
+    /// Registers 0x0980 (low byte) and 0x0981 (high byte), as AssignActivate in ESI and SII: 0x0300, 0x0700.
     pub assign_activate: u16,
     /// Cycle of SYNC0 in nanoseconds; 0 is a single pulse.
     pub sync0_cycle_ns: u32,
@@ -108,7 +109,7 @@ impl SyncSignals {
         }
     }
 
-    /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1; from a whole cycle on it divides SYNC0.
+    /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1; a whole cycle or more divides the rate of SYNC1.
     pub const fn sync1_register_ns(&self) -> u32 {
         let longer = self.sync1_cycle_ns.saturating_sub(self.sync0_cycle_ns);
         let shift = match self.sync0_cycle_ns {

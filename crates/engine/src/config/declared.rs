@@ -1,4 +1,4 @@
-//! SyncManagers as a network configuration file writes them (ETG.2100, protocol 8.1). Such a file overrides the SII.
+//! SyncManagers from a network configuration file (ETG.2100, protocol 8.1). Such a file overrides the SII.
 
 use alloc::vec::Vec;
 
@@ -31,21 +31,21 @@ impl SyncManagerRole {
     }
 }
 
-/// A SyncManager as a configuration file writes it. Its registers are written as given; PDO assignment and mapping are
-/// done by the file's own start-up commands.
+/// A SyncManager from a configuration file. Its registers are written as given; PDO assignment and mapping are part of
+/// the start-up commands of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredSyncManager {
     /// Its number.
     pub index: u8,
     /// Its purpose.
     pub role: SyncManagerRole,
-    /// Start, length, control and activate byte; the other two are left 0. A disabled SyncManager has no place in the
-    /// process image.
+    /// Start, length, control and activate byte; status and PDI control are written as 0. A disabled SyncManager has no
+    /// place in the process image.
     pub register: SyncManager,
-    /// It is enabled on the way to OP only, and disabled when OP is left (commands of SO and OS in the file).
+    /// It is enabled before OP is requested, and disabled when OP is left (commands of SO and OS in the file).
     pub op_only: bool,
-    /// PDOs in its area, in order; they give the places of the entries. May be empty. The entries may need less than
-    /// its length.
+    /// PDOs in its area, in order: they determine the places of the entries. May be empty; the entries may be shorter
+    /// than its length.
     pub pdos: Vec<PdoMapping>,
 }
 

@@ -6,7 +6,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::matching::{at_place, bearer, missing};
+use super::matching::{at_place, find_marked, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
@@ -62,7 +62,7 @@ pub(super) fn find(
     infos: &[SubDeviceInfo],
     resolutions: &mut [Option<Resolution>],
 ) {
-    let head = members.first().map_or(Ok(None), |head| bearer(configs[*head].address, infos));
+    let head = members.first().map_or(Ok(None), |head| find_marked(configs[*head].address, infos));
     let mut intact = true;
     for (offset, config) in members.iter().enumerate() {
         let resolution = match head {
@@ -75,7 +75,7 @@ pub(super) fn find(
 }
 
 /// Whether a declaration can be the head of a group.
-pub(crate) fn can_lead(config: &SubDeviceConfig) -> bool {
+pub(crate) fn can_be_head(config: &SubDeviceConfig) -> bool {
     match config.address {
         ConfigAddress::Alias { alias, offset: 0 } => alias != 0,
         ConfigAddress::Identification { offset: 0, .. } => true,

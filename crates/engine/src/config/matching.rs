@@ -1,10 +1,10 @@
-//! Whether the SubDevice at a place matches its declaration, and where an alias or identification is.
+//! Whether the SubDevice at a place matches its declaration; finds an alias or identification.
 
 use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
-/// The SubDevice with this index, if it is the expected one.
+/// Resolution of a declaration with the SubDevice at `place`, an index in `infos`.
 pub(super) fn at_place(
     configs: &[SubDeviceConfig],
     infos: &[SubDeviceInfo],
@@ -13,7 +13,7 @@ pub(super) fn at_place(
 ) -> Resolution {
     let declared = &configs[config];
     let Some((index, info)) = place.and_then(|place| Some((place, infos.get(place)?))) else {
-        return missing(declared, config, nobody(declared, infos));
+        return missing(declared, config, missing_error(declared, infos));
     };
     match declared.expected.mismatch(info) {
         None => Resolution::Found { config, info: index },
@@ -24,8 +24,8 @@ pub(super) fn at_place(
     }
 }
 
-/// No SubDevice is at the place.
-pub(super) fn nobody(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
+/// The error that no SubDevice is at the place.
+pub(super) fn missing_error(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
     ConfigError::Missing { address: declared.address, present: infos.len() }
 }
 
@@ -34,9 +34,9 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
 }
 
 /// The only SubDevice with the alias or identification of an address.
-pub(super) fn bearer(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
-    let mut bearers = infos.iter().enumerate().filter(|(_, info)| address.is_borne_by(info));
-    match (bearers.next(), bearers.next()) {
+pub(super) fn find_marked(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+    let mut marked = infos.iter().enumerate().filter(|(_, info)| address.is_mark_of(info));
+    match (marked.next(), marked.next()) {
         (Some((_, first)), Some((_, second))) => {
             Err(ConfigError::Ambiguous { address, first: first.position, second: second.position })
         }

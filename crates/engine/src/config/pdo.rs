@@ -1,4 +1,4 @@
-//! PDOs that the application declares: what is assigned to a SyncManager, and what a PDO maps.
+//! PDOs that the application declares: assignments to SyncManagers, and mappings.
 
 use alloc::vec::Vec;
 
@@ -36,7 +36,7 @@ pub struct PdoAssignment {
 }
 
 impl PdoMapping {
-    /// A PDO with the entries that the SII gives it.
+    /// A PDO with the entries of the SII.
     pub fn from_sii(index: u16) -> PdoMapping {
         PdoMapping { index, entries: None }
     }

@@ -10,15 +10,15 @@ use ringcat_wire::datagram::MAX_DATA;
 /// Action of a command on a register.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RegisterAccess {
-    /// Writes it.
+    /// Writes data.
     Write(Vec<u8>),
-    /// Reads it until the masked data is as expected.
+    /// Reads until the masked data is as expected.
     Check {
-        /// What is expected.
+        /// Expected data.
         data: Vec<u8>,
-        /// Mask of the bits that count; without one all of them count. As long as the data.
+        /// Mask of the compared bits, as long as the data; without a mask all bits are compared.
         mask: Option<Vec<u8>>,
-        /// Time limit for the value to come; zero reads once.
+        /// Time limit until the data is as expected; zero reads once.
         limit: Duration,
     },
 }
@@ -32,8 +32,8 @@ pub struct RegisterCommand {
     pub access: RegisterAccess,
     /// Number of retries for a command that the SubDevice did not process.
     pub retries: u8,
-    /// The SubDevice must process it. Otherwise a write without a response is ignored (no `Cnt` in the file). A check
-    /// always needs a response.
+    /// The SubDevice must process the write. Otherwise a write that it did not process is ignored (no `Cnt` in the
+    /// file). A check always needs a response.
     pub required: bool,
 }
 

@@ -11,7 +11,7 @@ use crate::info::IdentityField;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// Another SubDevice is at its place.
+    /// A SubDevice of another identity is at its place.
     Mismatch {
         /// Position of the SubDevice.
         position: Position,
@@ -68,7 +68,7 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// Result for a declaration, or for a SubDevice without a declaration. Both are named by their index in the slices
+/// Result for a declaration, or for a SubDevice without a declaration; `config` and `info` are indices in the slices
 /// given to `resolve`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resolution {
@@ -83,7 +83,7 @@ pub enum Resolution {
     Absent {
         /// The declaration.
         config: usize,
-        /// The SubDevice found in its place, if any.
+        /// Mismatch with the SubDevice at its place, or that it is missing.
         error: ConfigError,
     },
     /// A declaration that requires a SubDevice has none.

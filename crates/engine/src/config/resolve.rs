@@ -7,12 +7,12 @@ use core::fmt;
 use ringcat_wire::address::Position;
 
 use super::groups::{self, groups};
-use super::matching::{at_place, bearer, nobody};
+use super::matching::{at_place, find_marked, missing_error};
 use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
-/// Two SubDevices with one alias.
+/// Two SubDevices with the same alias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DuplicateAlias {
     /// The alias.
@@ -46,11 +46,9 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 }
 
 /// Finds the SubDevice of each declaration: one [`Resolution`] per declaration in their order, then the SubDevices
-/// without a declaration.
-///
-/// Groups are found first, at any place; positions count the SubDevices that belong to no group. Where an optional
-/// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
-/// ways to leave optional ones out, the one with the fewest errors is taken.
+/// without a declaration. Groups are found first, at any place; positions count the SubDevices that belong to no group.
+/// If an optional SubDevice is absent, the following declarations by position are searched one place nearer to the
+/// start. Of several combinations of absent optional SubDevices, that with the fewest errors is taken.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Resolution> {
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {
@@ -61,13 +59,13 @@ pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Reso
     let places = (0..infos.len()).filter(|at| !grouped(*at)).collect();
     let segment = Segment { infos, places };
     let by_position = by_position(configs);
-    let skips = Skips::new(&by_position, configs, &segment);
+    let costs = AbsenceCosts::new(&by_position, configs, &segment);
     let mut absent = 0;
     for (n, (position, config)) in by_position.iter().enumerate() {
-        let skip = configs[*config].optional && skips.better_absent(n, absent);
-        resolutions[*config] = Some(if skip {
+        let is_absent = configs[*config].optional && costs.better_absent(n, absent);
+        resolutions[*config] = Some(if is_absent {
             absent += 1;
-            Resolution::Absent { config: *config, error: nobody(&configs[*config], infos) }
+            Resolution::Absent { config: *config, error: missing_error(&configs[*config], infos) }
         } else {
             at_place(configs, infos, *config, position.checked_sub(absent).and_then(|place| segment.at(place)))
         });
@@ -108,16 +106,16 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     found
 }
 
-/// For declaration n of those by position, with `absent` optional ones left out before it: the fewest errors in the
-/// rest.
-struct Skips {
-    /// Cost of taking declaration n as present, and as absent.
+/// Smallest number of errors from declaration n (of those by position) on, by the number of absent optional SubDevices
+/// before it.
+struct AbsenceCosts {
+    /// Errors if declaration n counts as present, and if it counts as absent.
     costs: Vec<[u32; 2]>,
     width: usize,
 }
 
-impl Skips {
-    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], segment: &Segment<'_>) -> Skips {
+impl AbsenceCosts {
+    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], segment: &Segment<'_>) -> AbsenceCosts {
         let optional = by_position.iter().filter(|(_, config)| configs[*config].optional).count();
         let width = optional + 1;
         let mut costs = vec![[0, u32::MAX]; by_position.len() * width];
@@ -128,29 +126,29 @@ impl Skips {
             for absent in 0..width {
                 let info = position.checked_sub(absent).and_then(|place| segment.infos.get(segment.at(place)?));
                 let fits = info.is_some_and(|info| config.expected.mismatch(info).is_none());
-                let present = behind[absent].saturating_add(u32::from(!fits));
-                let skipped = match behind.get(absent + 1) {
+                let present_cost = behind[absent].saturating_add(u32::from(!fits));
+                let absent_cost = match behind.get(absent + 1) {
                     Some(cost) if config.optional => *cost,
                     _ => u32::MAX,
                 };
-                costs[n * width + absent] = [present, skipped];
-                here[absent] = present.min(skipped);
+                costs[n * width + absent] = [present_cost, absent_cost];
+                here[absent] = present_cost.min(absent_cost);
             }
             behind = here;
         }
-        Skips { costs, width }
+        AbsenceCosts { costs, width }
     }
 
     fn better_absent(&self, n: usize, absent: usize) -> bool {
-        let [present, skipped] = self.costs[n * self.width + absent];
-        skipped < present
+        let [present_cost, absent_cost] = self.costs[n * self.width + absent];
+        absent_cost < present_cost
     }
 }
 
 /// Finds a SubDevice by alias or identification.
 fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) -> Resolution {
     let address = configs[config].address;
-    match bearer(address, infos) {
+    match find_marked(address, infos) {
         Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
         Err(error) => Resolution::Failed { config, error },
     }

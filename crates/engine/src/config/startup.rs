@@ -12,9 +12,9 @@ use ringcat_wire::mailbox::soe::Idn;
 use super::ip::IpSettings;
 use super::register::RegisterCommand;
 
-/// A transition at which start-up commands are sent. Towards OP they are sent before the upper state is requested, on
-/// the way back before the lower one is. INIT has no mailbox: of the commands of IP, those to registers are sent in
-/// INIT before the mailbox is set up, the others as soon as PREOP is reached.
+/// A transition at which start-up commands are sent, before the new state is requested. INIT has no mailbox: of the
+/// commands of IP, register commands are sent in INIT before the mailbox is set up, all others as soon as PREOP is
+/// reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.
@@ -25,7 +25,7 @@ pub enum Transition {
     So,
     /// OP to SAFEOP.
     Os,
-    /// SAFEOP to PREOP. OP is left through SAFEOP.
+    /// SAFEOP to PREOP; a change from OP to PREOP passes SAFEOP.
     Sp,
 }
 
@@ -71,7 +71,8 @@ pub struct SdoUpload {
     pub sub_index: u8,
     /// Complete access.
     pub complete_access: bool,
-    /// Required value, little-endian; another value fails the configuration. With `None` an event reports the value.
+    /// Required value, little-endian; with another value the configuration fails. With `None` an event reports the
+    /// value.
     pub expected: Option<Vec<u8>>,
 }
 
@@ -110,7 +111,7 @@ pub struct StartupCommand {
     pub action: StartupAction,
     /// Time limit of one message of a mailbox command; `None`: that of the SubDevice's time limits.
     pub limit: Option<Duration>,
-    /// Purpose as its author wrote it, for messages.
+    /// Purpose, as the author of the declaration wrote it; for messages.
     pub comment: Option<String>,
 }
 

@@ -12,7 +12,7 @@ const UNIT: u16 = 0x0100;
 const SYNC0: u16 = 0x0200;
 const SYNC1: u16 = 0x0400;
 
-/// Why an operation mode gives no SYNC signals.
+/// Why no SYNC signals follow from an operation mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ModeError {
@@ -40,9 +40,11 @@ impl fmt::Display for ModeError {
                 write!(f, "AssignActivate {assign_activate:#06x} activates no SYNC signal")
             }
             ModeError::Sync0Cycle { factor } => {
-                write!(f, "SYNC0 cannot have a cycle of {factor} of the MainDevice's in nanoseconds")
+                write!(f, "no SYNC0 cycle in whole nanoseconds follows from factor {factor} and the MainDevice's cycle")
             }
-            ModeError::Sync1Cycle { factor } => write!(f, "SYNC1 cannot have a cycle of {factor} of SYNC0's"),
+            ModeError::Sync1Cycle { factor } => {
+                write!(f, "no SYNC1 cycle follows from factor {factor} and the cycle of SYNC0")
+            }
         }
     }
 }
@@ -55,10 +57,9 @@ impl SyncSignals {
         mode.assign_activate & UNIT != 0 && mode.assign_activate & (SYNC0 | SYNC1) != 0
     }
 
-    /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
-    ///
-    /// The cycle of SYNC0 is that of the mode, or the MainDevice's times the factor; a negative factor divides, 0
-    /// counts as 1. The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
+    /// The signals of an operation mode of the SII, for a MainDevice with this cycle. The cycle of SYNC0 is that of the
+    /// mode if it has one; otherwise the cycle of the MainDevice times the factor (a negative factor divides, 0 counts
+    /// as 1). The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
     ///
     /// # Errors
     /// A mode without signals, or with impossible cycles.
@@ -130,7 +131,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn modes_without_signals_or_with_cycles_that_do_not_exist_are_refused() {
+    fn modes_without_signals_or_with_impossible_cycles_are_refused() {
         let error = |mode: &DcMode| SyncSignals::from_mode(mode, CYCLE).expect_err("it must be refused");
         for none in [0x0000, 0x0100, 0x0600, 0x0001] {
             assert_eq!(error(&mode(none, (1, 0))), ModeError::NoSignals { assign_activate: none });

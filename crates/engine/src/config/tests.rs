@@ -34,14 +34,14 @@ fn absent(config: usize, position: u16, present: usize) -> Resolution {
 
 // covers: declaration
 #[test]
-fn each_declaration_finds_its_position_in_any_order() {
+fn declarations_are_resolved_by_position_in_any_order() {
     let configs = [config(1, 11), config(0, 10), SubDeviceConfig::at_position(2)];
     assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 1), found(1, 0), found(2, 2)]);
 }
 
 // covers: declaration
 #[test]
-fn a_wrong_product_is_named_with_position_expected_and_got() {
+fn a_wrong_product_is_an_error_with_position_expected_and_got() {
     let resolutions = resolve(&[config(0, 10)], &infos(&[11]));
     let [Resolution::Failed { config: 0, error }, Resolution::Extra { info: 0 }] = resolutions[..] else {
         panic!("{resolutions:?}")
@@ -50,7 +50,7 @@ fn a_wrong_product_is_named_with_position_expected_and_got() {
 }
 
 #[test]
-fn revision_and_serial_count_where_declared() {
+fn revision_and_serial_number_are_compared_if_declared() {
     let right = config(0, 10).expect_revision(3).expect_serial(4);
     assert_eq!(resolve(&[right], &infos(&[10])), [found(0, 0)]);
     let wrong = config(0, 10).expect_revision(9);
@@ -69,21 +69,21 @@ fn a_missing_subdevice_is_an_error_and_an_undeclared_one_is_extra() {
 
 // covers: declaration
 #[test]
-fn an_absent_optional_subdevice_moves_those_behind_it_forward() {
+fn after_an_absent_optional_subdevice_positions_are_one_lower() {
     let configs = [config(0, 10), config(1, 11).optional(), config(2, 12)];
     assert_eq!(resolve(&configs, &infos(&[10, 12])), [found(0, 0), absent(1, 1, 2), found(2, 1)]);
     assert_eq!(resolve(&configs, &infos(&[10, 11, 12])), [found(0, 0), found(1, 1), found(2, 2)]);
 }
 
 #[test]
-fn a_mandatory_subdevice_goes_before_an_optional_one_of_the_same_product() {
+fn a_single_subdevice_resolves_the_mandatory_declaration_of_its_product() {
     let configs = [config(0, 10).optional(), config(1, 10)];
     assert_eq!(resolve(&configs, &infos(&[10])), [absent(0, 0, 1), found(1, 0)]);
 }
 
 // covers: declaration
 #[test]
-fn an_alias_counts_from_its_bearer_and_alias_0_from_the_start() {
+fn an_alias_counts_from_its_subdevice_and_alias_0_from_the_start() {
     let mut infos = infos(&[10, 11, 12]);
     infos[1].alias = 5;
     let configs = [SubDeviceConfig::at_alias(5, 0), SubDeviceConfig::at_alias(5, 1), SubDeviceConfig::at_alias(0, 0)];
@@ -95,7 +95,7 @@ fn an_alias_counts_from_its_bearer_and_alias_0_from_the_start() {
 }
 
 #[test]
-fn two_subdevices_with_one_alias_are_ambiguous_and_named() {
+fn two_subdevices_with_the_same_alias_are_an_ambiguous_address() {
     let mut infos = infos(&[10, 11, 12, 13]);
     (infos[0].alias, infos[2].alias, infos[3].alias) = (7, 7, 8);
     let error = ConfigError::Ambiguous {
@@ -144,14 +144,14 @@ fn default_time_limits_are_those_of_the_esi_schema() {
 }
 
 #[test]
-fn a_declaration_from_a_scan_finds_its_subdevice_again() {
+fn a_declaration_from_a_scan_is_resolved_to_the_same_subdevice() {
     let infos = infos(&[10, 11]);
     let configs: Vec<_> = infos.iter().map(SubDeviceConfig::from_info).collect();
     assert_eq!(resolve(&configs, &infos), [found(0, 0), found(1, 1)]);
 }
 
 #[test]
-fn a_revision_may_be_a_lowest_one_and_an_identification_counts_where_declared() {
+fn a_lowest_revision_and_an_identification_are_compared_if_declared() {
     let mut infos = infos(&[10]);
     assert_eq!(resolve(&[config(0, 10).expect_revision_from(3)], &infos), [found(0, 0)]);
     let Resolution::Failed { error, .. } = resolve(&[config(0, 10).expect_revision_from(4)], &infos)[0] else {
@@ -204,7 +204,7 @@ fn a_group_is_found_at_any_place_and_positions_do_not_count_it() {
 }
 
 #[test]
-fn a_group_that_is_not_there_or_broken_off_leaves_the_others_where_they_are() {
+fn an_absent_or_incomplete_group_does_not_move_other_positions() {
     let missing = |config, offset, present| {
         let address = ConfigAddress::Alias { alias: 5, offset };
         Resolution::Absent { config, error: ConfigError::Missing { address, present } }

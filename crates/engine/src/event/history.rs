@@ -1,8 +1,6 @@
 //! Diagnosis history: events of SubDevices and cables, the content of object 0x10F3 of the MainDevice (protocol 6.3,
-//! 10.2).
-//!
-//! Input: the events of the acyclic half. Output: messages in slots that are used in turn, oldest first. Like the
-//! history of a SubDevice it is bounded, and shows when messages were lost.
+//! 10.2). Input: the events of the acyclic half. Output: messages in slots; a new message overwrites the oldest one. As
+//! in the history of a SubDevice, a flag shows that messages were lost.
 
 use alloc::vec::Vec;
 
@@ -72,7 +70,7 @@ pub struct History {
     incidents: Vec<Incident>,
     /// Slot of the newest message.
     newest: Option<u8>,
-    /// Subindex that was acknowledged last; 0 for none.
+    /// Last acknowledged subindex; 0 for none.
     acknowledged: u8,
     /// Number of the newest messages that were not acknowledged.
     unacknowledged: u8,
@@ -80,7 +78,7 @@ pub struct History {
 }
 
 impl History {
-    /// Takes in an event, if it is kept.
+    /// Adds the message for an event, if there is one.
     pub(super) fn note(&mut self, at: Instant, event: &Event) {
         if let Some(incident) = Incident::new(at, event) {
             self.keep(incident);
@@ -108,7 +106,7 @@ impl History {
             None => self.incidents.push(incident),
         }
         if self.acknowledged == place + DiagnosisHistory::FIRST_MESSAGE {
-            // That message has been overwritten.
+            // The acknowledged message is overwritten.
             self.acknowledged = 0;
         }
         self.newest = Some(place);
@@ -121,18 +119,18 @@ impl History {
         self.incidents.get(usize::from(place)).copied()
     }
 
-    /// Subindex of the newest message; 0 where there is none.
+    /// Subindex of the newest message; 0 if there is none.
     pub fn newest(&self) -> u8 {
         self.newest.map_or(0, |place| place + DiagnosisHistory::FIRST_MESSAGE)
     }
 
-    /// Subindex of the message that was acknowledged last; 0 where there is none, or where it has been overwritten.
+    /// Subindex of the last acknowledged message; 0 if there is none or it was overwritten.
     pub fn acknowledged(&self) -> u8 {
         self.acknowledged
     }
 
     /// Whether there are messages that were not acknowledged.
-    pub fn has_news(&self) -> bool {
+    pub fn has_unacknowledged(&self) -> bool {
         self.unacknowledged > 0
     }
 
@@ -180,9 +178,9 @@ mod tests {
 
     // covers: 6.3, own-objects
     #[test]
-    fn places_are_used_in_turns_and_what_is_lost_is_told() {
+    fn a_full_history_overwrites_the_oldest_message_and_sets_the_lost_flag() {
         let mut history = history(50);
-        assert_eq!((history.newest(), history.flags().0, history.has_news()), (55, 0, true));
+        assert_eq!((history.newest(), history.flags().0, history.has_unacknowledged()), (55, 0, true));
         history.note(Instant(50), &Event::Returned { subdevice: 50 });
         assert_eq!((history.newest(), history.flags().0), (6, DiagnosisFlags::LOST));
         assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(50)));
@@ -192,18 +190,18 @@ mod tests {
 
     // covers: 6.3
     #[test]
-    fn acknowledged_messages_make_room_and_zero_forgets_all() {
+    fn messages_are_acknowledged_by_subindex_and_zero_deletes_all() {
         let mut history = history(10);
-        assert_eq!(history.acknowledge(16), Err(AbortCode::VALUE_TOO_HIGH), "there is none");
+        assert_eq!(history.acknowledge(16), Err(AbortCode::VALUE_TOO_HIGH), "no such message");
         assert_eq!(history.acknowledge(5), Err(AbortCode::VALUE_TOO_LOW));
-        assert_eq!((history.acknowledge(14), history.acknowledged(), history.has_news()), (Ok(()), 14, true));
-        assert_eq!((history.acknowledge(15), history.has_news()), (Ok(()), false));
+        assert_eq!((history.acknowledge(14), history.acknowledged(), history.has_unacknowledged()), (Ok(()), 14, true));
+        assert_eq!((history.acknowledge(15), history.has_unacknowledged()), (Ok(()), false));
         assert_eq!((history.acknowledge(0), history.newest(), history.incident(6)), (Ok(()), 0, None));
     }
 
     // covers: 6.3
     #[test]
-    fn flags_keep_kinds_out_and_a_full_history_may_keep_what_it_has() {
+    fn flags_exclude_severities_and_protect_unacknowledged_messages() {
         let mut history = History::default();
         assert_eq!(history.set_flags(DiagnosisFlags::EMERGENCY), Err(AbortCode::VALUE_RANGE));
         assert_eq!(history.set_flags(DiagnosisFlags::NO_INFORMATION | DiagnosisFlags::ACKNOWLEDGE), Ok(()));

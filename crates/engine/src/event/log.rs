@@ -1,4 +1,4 @@
-//! The events of one half until the application fetches them: bounded; the oldest are dropped and counted.
+//! Events of one half until the application fetches them. The queue is bounded: the oldest are dropped and counted.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -7,7 +7,7 @@ use super::history::History;
 use super::{Event, Occupant, TimedEvent};
 use crate::time::Instant;
 
-/// Frames of other MainDevices among them: enough to notice a collision, not to archive it.
+/// Largest number of frames of other MainDevices among them: enough to detect a second MainDevice.
 const FOREIGN_KEPT: usize = 8;
 /// Events kept until the application fetches them; beyond, the oldest is dropped and counted.
 const KEPT: usize = 4096;
@@ -23,7 +23,7 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// Sets the SubDevices at the cabling positions, in their order.
+    /// Sets the SubDevices by cabling position.
     pub fn set_occupants(&mut self, occupants: Vec<Occupant>) {
         self.occupants = occupants;
     }
@@ -35,12 +35,12 @@ impl EventLog {
 
     /// Appends an event, with the SubDevices at the cabling positions that it names.
     pub fn push(&mut self, at: Instant, event: Event) {
-        let whom = self.occupants(event.positions());
-        self.push_of(at, event, whom);
+        let occupants = self.occupants(event.positions());
+        self.push_of(at, event, occupants);
     }
 
     /// Appends an event with given SubDevices.
-    pub fn push_of(&mut self, at: Instant, event: Event, whom: [Option<Occupant>; 2]) {
+    pub fn push_of(&mut self, at: Instant, event: Event, occupants: [Option<Occupant>; 2]) {
         self.history.note(at, &event);
         if matches!(event, Event::ForeignFrame { .. }) {
             if self.foreign >= FOREIGN_KEPT {
@@ -53,10 +53,10 @@ impl EventLog {
             self.pop();
             self.dropped += 1;
         }
-        self.events.push_back(TimedEvent { at, event, whom });
+        self.events.push_back(TimedEvent { at, event, occupants });
     }
 
-    /// The diagnosis history, which keeps its messages independently of the events fetched.
+    /// The diagnosis history; its messages do not depend on fetched events.
     pub fn history(&mut self) -> &mut History {
         &mut self.history
     }

@@ -1,4 +1,4 @@
-//! From the bytes of an SII to a [`SubDeviceInfo`], leniently (protocol 4.1 to 4.6).
+//! Decodes an SII into a [`SubDeviceInfo`] and tolerates faults (protocol 4.1 to 4.6).
 
 mod mailboxes;
 mod parts;
@@ -26,7 +26,7 @@ const READ_BYTES: usize = 2 * 0x24;
 /// See [`SubDeviceInfo::from_parts`].
 pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_>]) -> SubDeviceInfo {
     let parts = Parts { parts };
-    // The high byte of the first word is what the controller loads into ESC_CONFIGURATION.
+    // The controller loads the high byte of the first word into ESC_CONFIGURATION.
     let esc_configuration = (header.pdi_control >> 8) as u8;
     let mut info = SubDeviceInfo {
         position: readout.position,
@@ -39,7 +39,7 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
         receive_times: readout.receive_times,
         ..SubDeviceInfo::default()
     };
-    // The reserved words that follow are not read.
+    // The reserved words behind them are not read.
     let bytes = &header.encode()[..READ_BYTES];
     if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
         info.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
@@ -77,13 +77,13 @@ fn collect_header(info: &mut SubDeviceInfo, header: &SiiHeader) {
 fn collect_general(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>, strings: &Strings<'_>) {
     let kind = CategoryKind::General;
     let Some(category) = parts.first(kind, &mut info.warnings) else {
-        // An image without any category is reported as such.
+        // An image without any category has a warning of its own.
         if !parts.parts.is_empty() {
             info.warnings.push(InfoWarning { category: Some(kind), offset: None, problem: SiiProblem::Missing });
         }
         return;
     };
-    // A short category is used as far as it goes; the rest is zero.
+    // Of a short category, the existing bytes are used; the rest is zero.
     let mut bytes = [0; General::LEN];
     let got = category.data.len().min(General::LEN);
     bytes[..got].copy_from_slice(&category.data[..got]);
@@ -120,7 +120,7 @@ fn collect_pdos(info: &mut SubDeviceInfo, direction: PdoDirection, category: &Ca
     if rest.iter().all(|byte| *byte == 0xFF) {
         return;
     }
-    // Entries beyond the end of the category: those within it are used.
+    // The PDO announces entries beyond the end of the category: the entries within it are used.
     let got = (rest.len() - Pdo::HEADER_LEN) / PdoEntry::LEN;
     let mut cut = Vec::from(rest);
     let expected = usize::from(core::mem::replace(&mut cut[2], got as u8));

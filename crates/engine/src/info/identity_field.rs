@@ -1,4 +1,4 @@
-//! The fields of a SubDevice's identity by which it may be expected.
+//! The fields of a SubDevice's identity that are compared with a declaration.
 
 use core::fmt;
 

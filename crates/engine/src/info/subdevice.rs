@@ -49,18 +49,18 @@ impl From<Information> for ControllerInfo {
     }
 }
 
-/// One entry of a PDO as the SII describes it.
+/// An entry of a PDO in the SII.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PdoEntryInfo {
     /// Index of the object; 0 is a gap.
     pub index: u16,
     /// Subindex of the object.
     pub sub_index: u8,
-    /// Bits.
+    /// Length in bits.
     pub bit_length: u8,
     /// CoE data type (protocol 6.3).
     pub data_type: u8,
-    /// Name; empty where the SII gives none.
+    /// Name; empty if the SII contains none.
     pub name: String,
 }
 
@@ -73,7 +73,7 @@ pub struct PdoInfo {
     pub direction: Direction,
     /// SyncManager to which it is assigned by default.
     pub sync_manager: Option<u8>,
-    /// Name; empty where the SII gives none.
+    /// Name; empty if the SII contains none.
     pub name: String,
     /// Flags, raw.
     pub flags: u16,
@@ -88,10 +88,10 @@ impl PdoInfo {
     }
 }
 
-/// What a scan read from the registers of a controller.
+/// Registers of a controller that a scan reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readout {
-    /// Position in the scan's order, that of the processing units.
+    /// Position in the scan: the order of the processing units.
     pub position: Position,
     /// Station address that the scan gave.
     pub station: StationAddress,
@@ -101,14 +101,14 @@ pub struct Readout {
     pub information: Information,
     /// Register DL_STATUS.
     pub dl_status: DlStatus,
-    /// Registers DC_RECEIVE_TIME of port 0..3, in nanoseconds of the local clock, where there is one.
+    /// Registers DC_RECEIVE_TIME of port 0..3, in nanoseconds of the local clock; `None` without a clock.
     pub receive_times: Option<[u32; 4]>,
 }
 
-/// What a scan found about one SubDevice.
+/// Information about one SubDevice from a scan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SubDeviceInfo {
-    /// Position in the scan's order, that of the processing units.
+    /// Position in the scan: the order of the processing units.
     pub position: Position,
     /// Station address that the scan gave.
     pub station: StationAddress,
@@ -116,11 +116,11 @@ pub struct SubDeviceInfo {
     pub alias: u16,
     /// Vendor, product, revision, serial number.
     pub identity: Identity,
-    /// Explicit device identification, as set at its switches; `None` where it has none (protocol 5.3, 4.3).
+    /// Explicit device identification, as set at its switches; `None` if it has none (protocol 5.3, 4.3).
     pub identification: Option<u16>,
     /// The controller.
     pub controller: ControllerInfo,
-    /// The controller copies AL control into AL status by itself (device emulation): no application, and no acknowledge
+    /// The controller copies AL control into AL status (device emulation): there is no application, and no acknowledge
     /// bit (protocol 3.4).
     pub device_emulation: bool,
     /// Register DL_STATUS at the time of the scan.
@@ -135,9 +135,9 @@ pub struct SubDeviceInfo {
     pub group: String,
     /// Image.
     pub image: String,
-    /// Mailboxes in PREOP, SAFEOP and OP; `None` where it has none.
+    /// Mailboxes in PREOP, SAFEOP and OP; `None` if it has none.
     pub mailbox: Option<MailboxLayout>,
-    /// Mailboxes in BOOT; `None` where it has none.
+    /// Mailboxes in BOOT; `None` if it has none.
     pub bootstrap: Option<MailboxLayout>,
     /// Mailbox protocols that it supports.
     pub protocols: MailboxProtocols,
@@ -145,19 +145,19 @@ pub struct SubDeviceInfo {
     pub coe: CoeDetails,
     /// Flags of the general category.
     pub flags: GeneralFlags,
-    /// Physical address of the ID switch, valid where the flags name identification in memory.
+    /// Physical address of the ID switch, valid if the flags announce identification in memory.
     pub id_switch_address: u16,
-    /// Kind of port 0..3 as the SII gives it, a nibble per port, raw (protocol 4.3).
+    /// Kind of port 0..3 in the SII, a nibble per port, raw (protocol 4.3).
     pub physical_ports: u16,
-    /// Current from the EBUS in milliamperes; negative where it supplies current.
+    /// Current from the EBUS in milliamperes; negative: it supplies current.
     pub ebus_current_ma: i16,
-    /// SyncManagers, SM 0 first. Without a type in the SII, the type comes from its PDOs or its control byte.
+    /// SyncManagers, SM 0 first. If the SII contains no type, the type follows from the PDOs or the control byte.
     pub sync_managers: Vec<SiiSyncManager>,
     /// Purpose of each FMMU, FMMU 0 first.
     pub fmmu_usages: Vec<FmmuUsage>,
     /// PDOs of both directions: outputs first, each direction in the order of the SII.
     pub pdos: Vec<PdoInfo>,
-    /// SyncManagers with PDOs that were read online from the dictionary.
+    /// SyncManagers with PDOs that were read from the object dictionary.
     pub read_online: Vec<u8>,
     /// Operation modes of the distributed clock.
     pub dc_modes: Vec<DcMode>,
@@ -166,17 +166,17 @@ pub struct SubDeviceInfo {
 }
 
 impl SubDeviceInfo {
-    /// The EEPROM was never written, or cannot be read: nothing is known of the SubDevice.
+    /// Whether the EEPROM was never written or cannot be read: nothing is known about the SubDevice.
     pub fn is_blank(&self) -> bool {
         self.warnings.iter().any(|it| matches!(it.problem, SiiProblem::Blank | SiiProblem::Unreadable))
     }
 
-    /// The SII cannot be trusted: it is blank, cut short, or its checksum is wrong.
+    /// Whether the SII is damaged: blank, truncated, or with a wrong checksum.
     pub fn is_doubtful(&self) -> bool {
         self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
-    /// Takes over the PDOs that were read online at an earlier scan of the same SubDevice.
+    /// Takes over the PDOs that an earlier scan read from the object dictionary of the same SubDevice.
     pub(crate) fn keep_read_online(&mut self, known: &SubDeviceInfo) {
         if !known.read_online.is_empty() {
             self.pdos.clone_from(&known.pdos);
@@ -194,14 +194,14 @@ impl SubDeviceInfo {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
     }
 
-    /// SyncManagers of the mailboxes: the one that the MainDevice writes, the one that it reads. As the SII says where
-    /// it names both, else 0 and 1 (protocol 3.11).
+    /// SyncManagers of the mailboxes: of the mailbox that the MainDevice writes, and of the mailbox that it reads. From
+    /// the SII if it contains both, otherwise 0 and 1 (protocol 3.11).
     pub fn mailbox_sync_managers(&self) -> (u8, u8) {
         self.sync_managers_of(self.mailbox.as_ref())
     }
 
-    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. Those that cover the mailboxes' addresses
-    /// where the SII names some, else the same as in PREOP.
+    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. If SyncManagers in the SII start at the
+    /// addresses of these mailboxes, they are used, otherwise those of PREOP.
     pub fn boot_sync_managers(&self) -> (u8, u8) {
         self.sync_managers_of(self.bootstrap.as_ref())
     }
@@ -215,7 +215,7 @@ impl SubDeviceInfo {
         out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset))).unwrap_or((0, 1))
     }
 
-    /// Whether it supports LRW: neither controller nor SII denies it.
+    /// Whether it supports LRW, by the features of the controller and by the SII.
     pub fn lrw_supported(&self) -> bool {
         !self.controller.features.lrw_unsupported && !self.flags.not_lrw()
     }

@@ -1,4 +1,4 @@
-//! Faults of an SII, and their place (protocol 4; all of them occur in real devices).
+//! Faults of an SII, and their offset (protocol 4; all of them occur in real devices).
 
 use core::fmt;
 
@@ -12,7 +12,7 @@ pub(super) const MAILBOX_HEADER: u16 = 6;
 pub struct InfoWarning {
     /// Category; `None` for the fixed area.
     pub category: Option<CategoryKind>,
-    /// Byte of the EEPROM at which the fault begins; `None` where it has no single place.
+    /// Byte of the EEPROM at which the fault begins; `None` if it has no single offset.
     pub offset: Option<usize>,
     /// The fault.
     pub problem: SiiProblem,
@@ -28,42 +28,42 @@ pub enum SiiProblem {
     Unreadable,
     /// No category follows the fixed area.
     NoCategories,
-    /// A category is missing that every device has.
+    /// A category is missing that is required in every image.
     Missing,
-    /// A category goes on beyond the end of the EEPROM; it is left out.
+    /// A category extends beyond the end of the EEPROM; it is ignored.
     Beyond {
         /// Announced length in bytes.
         announced: usize,
-        /// Bytes that are left.
+        /// Remaining bytes of the EEPROM.
         left: usize,
     },
     /// The categories extend beyond the size that the EEPROM announces; they are used.
     Size {
         /// Announced bytes.
         size: usize,
-        /// Where the categories end.
+        /// First byte behind the categories.
         end: usize,
     },
-    /// The end of a category is erased (0xFF): the image was cut short. Entries that are erased are left out.
+    /// The end of a category is erased (0xFF): the image is truncated. Erased entries are ignored.
     Erased {
         /// Erased bytes.
         bytes: usize,
     },
-    /// The mailboxes cannot be at the place that the SII gives; they are not used.
+    /// The SII contains impossible addresses or sizes of the mailboxes; they are not used.
     Mailbox {
-        /// Place that the SII gives.
+        /// Addresses and sizes in the SII.
         layout: MailboxLayout,
         /// First byte behind the memory of the controller.
         memory_end: u32,
     },
-    /// SyncManagers are needed, and the SII describes none.
+    /// SyncManagers are needed, but the SII describes none.
     NoSyncManagers,
-    /// Process data without a mailbox in which a dictionary could describe it, and without PDOs.
+    /// Process data without PDOs in the SII, and without a mailbox to read them from a dictionary.
     NoPdos {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// A SyncManager without a type; its type comes from its PDOs or its control byte.
+    /// A SyncManager without a type; its type follows from its PDOs or its control byte.
     NoType {
         /// The SyncManager.
         sync_manager: u8,
@@ -88,9 +88,9 @@ pub enum SiiProblem {
         /// Bytes present.
         got: usize,
     },
-    /// A category that may occur only once occurs again; the first one is used.
+    /// A category occurs more than once; the first one is used.
     Repeated,
-    /// One mailbox of a pair has no size; both are left unused.
+    /// One mailbox of a pair has no size; both are ignored.
     HalfMailbox {
         /// Bytes of the mailbox that the MainDevice writes.
         receive_size: u16,
@@ -107,14 +107,14 @@ pub enum SiiProblem {
         /// The index.
         index: u8,
     },
-    /// The SII describes more SyncManagers than the controller has; the rest is left out.
+    /// The SII describes more SyncManagers than the controller has; the rest is ignored.
     SyncManagers {
         /// SyncManagers of the controller.
         expected: usize,
         /// Entries in the SII.
         got: usize,
     },
-    /// A PDO announces more entries than the category holds; those within it are used.
+    /// A PDO announces more entries than the category contains; those within it are used.
     PdoEntries {
         /// Index of the PDO.
         pdo: u16,
@@ -137,7 +137,7 @@ pub enum SiiProblem {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// The dictionary of the SubDevice has other PDOs for a SyncManager than the SII; the dictionary is used.
+    /// The object dictionary contains other PDOs for a SyncManager than the SII; the dictionary is used.
     Dictionary {
         /// The SyncManager.
         sync_manager: u8,
@@ -156,7 +156,7 @@ pub enum SiiProblem {
 }
 
 impl SiiProblem {
-    /// The image is not as its vendor wrote it: it is damaged.
+    /// Whether the fault shows that the image is damaged.
     pub(super) const fn is_grave(&self) -> bool {
         match self {
             SiiProblem::Blank
@@ -188,7 +188,7 @@ impl SiiProblem {
 }
 
 impl InfoWarning {
-    /// The place in the EEPROM.
+    /// Writes the offset and the category.
     fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.category, self.offset) {
             (Some(category), Some(offset)) => write!(f, "byte {offset:#06x}, category {category}: "),
@@ -204,7 +204,7 @@ fn fmt_mailboxes(f: &mut fmt::Formatter<'_>, layout: &MailboxLayout, memory_end:
     write!(
         f,
         "mailboxes of {receive_size} bytes at {receive_offset:#06x} and {send_size} bytes at {send_offset:#06x} are \
-         not believed: expected at least {MAILBOX_HEADER} bytes each, apart from each other, between 0x1000 and \
+          ignored: expected at least {MAILBOX_HEADER} bytes each, apart from each other, between 0x1000 and \
          {memory_end:#06x}"
     )
 }
@@ -225,32 +225,32 @@ impl fmt::Display for InfoWarning {
         self.fmt_place(f)?;
         match self.problem {
             SiiProblem::Blank => f.write_str("the EEPROM is blank"),
-            SiiProblem::Unreadable => f.write_str("the EEPROM cannot be read: nothing is known of this SubDevice"),
-            SiiProblem::NoCategories => f.write_str("nothing follows the fixed area: the image is cut short"),
-            SiiProblem::Missing => f.write_str("expected in every image, there is none: is the image cut short?"),
+            SiiProblem::Unreadable => f.write_str("the EEPROM cannot be read: nothing is known about this SubDevice"),
+            SiiProblem::NoCategories => f.write_str("no category follows the fixed area: the image is truncated"),
+            SiiProblem::Missing => f.write_str("required in every image, but missing: is the image truncated?"),
             SiiProblem::Beyond { announced, left } => {
-                write!(f, "announces {announced} bytes, {left} are left: it is left out, no end marker follows")
+                write!(f, "announces {announced} bytes, but only {left} remain: it is ignored, no end marker follows")
             }
             SiiProblem::Size { size, end } => {
-                write!(f, "the EEPROM says that it has {size} bytes, its categories end at byte {end:#06x}")
+                write!(f, "the EEPROM announces a size of {size} bytes, but its categories end at byte {end:#06x}")
             }
             SiiProblem::Erased { bytes } => {
-                write!(f, "its last {bytes} bytes are erased (0xff): the image is cut short")
+                write!(f, "its last {bytes} bytes are erased (0xff): the image is truncated")
             }
             SiiProblem::Mailbox { layout, memory_end } => fmt_mailboxes(f, &layout, memory_end),
-            SiiProblem::NoSyncManagers => f.write_str("no SyncManager is described: is the image cut short?"),
+            SiiProblem::NoSyncManagers => f.write_str("no SyncManager is described: is the image truncated?"),
             SiiProblem::NoPdos { sync_manager } => {
-                write!(f, "SM {sync_manager} is for process data, and no PDO describes it")
+                write!(f, "SM {sync_manager} is for process data, but no PDO describes it")
             }
             SiiProblem::NoType { sync_manager, got, taken } => {
-                write!(f, "SM {sync_manager} has type {got}, taken for {}", purpose(taken))
+                write!(f, "SM {sync_manager} has type {got}, assumed to be for {}", purpose(taken))
             }
             SiiProblem::Checksum { expected, got } => {
                 write!(f, "checksum: expected {expected:#04x}, word 7 is {got:#06x}")
             }
             SiiProblem::NoEndMarker => f.write_str("no end marker"),
             SiiProblem::Short { expected, got } => write!(f, "expected {expected} bytes, got {got}"),
-            SiiProblem::Repeated => f.write_str("comes again, the first one counts"),
+            SiiProblem::Repeated => f.write_str("occurs more than once, the first one is used"),
             SiiProblem::HalfMailbox { receive_size, send_size } => {
                 write!(f, "mailbox sizes are {receive_size} and {send_size}, expected both or none")
             }
@@ -262,7 +262,7 @@ impl fmt::Display for InfoWarning {
                 write!(f, "{got} SyncManagers, the controller has {expected}")
             }
             SiiProblem::PdoEntries { pdo, expected, got } => {
-                write!(f, "PDO {pdo:#06x} announces {expected} entries, {got} are there")
+                write!(f, "PDO {pdo:#06x} announces {expected} entries, but contains {got}")
             }
             SiiProblem::PdoSyncManager { pdo, sync_manager } => {
                 write!(f, "PDO {pdo:#06x} is assigned to SM {sync_manager}, which the SII does not describe")
@@ -272,11 +272,11 @@ impl fmt::Display for InfoWarning {
             }
             SiiProblem::Dictionary { sync_manager, sii, dictionary } => write!(
                 f,
-                "SM {sync_manager}: {sii} bits of process data, the dictionary has other PDOs with {dictionary} \
-                 bits, which count"
+                "SM {sync_manager}: {sii} bits of process data in the SII, but {dictionary} bits in other PDOs of the \
+                 dictionary, which is used"
             ),
             SiiProblem::Control { sync_manager, control } => {
-                write!(f, "SM {sync_manager}: control byte {control:#04x} is not one of its type, which counts")
+                write!(f, "SM {sync_manager}: control byte {control:#04x} does not match its type, which is used")
             }
         }
     }

@@ -15,7 +15,7 @@ use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 use super::activate_error::ActivateError;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
-use crate::config::{ConfigError, Resolution, can_lead, groups, resolve};
+use crate::config::{ConfigError, Resolution, can_be_head, groups, resolve};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
@@ -128,7 +128,7 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     }
     let headless = groups(&declaration.subdevices).into_iter().find_map(|members| {
         let head = *members.first()?;
-        (!can_lead(&declaration.subdevices[head])).then_some(head)
+        (!can_be_head(&declaration.subdevices[head])).then_some(head)
     });
     if let Some(subdevice) = headless {
         return Err(ActivateError::Headless { subdevice });

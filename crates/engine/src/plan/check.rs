@@ -45,18 +45,18 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
 
 /// Start-up commands that a SubDevice supports.
 #[derive(Clone, Copy)]
-pub(super) struct Speaks {
+pub(super) struct SupportedProtocols {
     coe: bool,
     soe: bool,
     eoe: bool,
 }
 
-impl Speaks {
+impl SupportedProtocols {
     /// From its SII; a configuration file that declares its mailboxes overrides it.
-    pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> Speaks {
+    pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> SupportedProtocols {
         let declared = config.declared.is_some();
         let protocols = info.protocols;
-        Speaks {
+        SupportedProtocols {
             coe: mailbox && (declared || protocols.coe()),
             soe: mailbox && (declared || protocols.soe()),
             eoe: mailbox && (declared || protocols.eoe()),
@@ -65,18 +65,18 @@ impl Speaks {
 }
 
 /// Whether a SubDevice supports a start-up command.
-pub(super) fn command(speaks: Speaks, action: &StartupAction) -> Result<(), PlanProblem> {
+pub(super) fn command(supported: SupportedProtocols, action: &StartupAction) -> Result<(), PlanProblem> {
     match action {
         StartupAction::Sdo(SdoDownload { index, sub_index, .. })
         | StartupAction::Upload(SdoUpload { index, sub_index, .. })
-            if !speaks.coe =>
+            if !supported.coe =>
         {
             Err(PlanProblem::NoCoe { index: *index, sub_index: *sub_index })
         }
-        StartupAction::Idn(IdnWrite { drive, idn, .. }) if !speaks.soe => {
+        StartupAction::Idn(IdnWrite { drive, idn, .. }) if !supported.soe => {
             Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
         }
-        StartupAction::Ip(_) if !speaks.eoe => Err(PlanProblem::NoEoe),
+        StartupAction::Ip(_) if !supported.eoe => Err(PlanProblem::NoEoe),
         StartupAction::Register(command) if !command.is_sound() => {
             let (data, mask) = command.lengths();
             Err(PlanProblem::RegisterCommand { register: command.address, data, mask })

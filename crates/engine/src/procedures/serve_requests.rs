@@ -17,19 +17,19 @@ use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Limits, Mailbox, MailboxError};
-use crate::request::{Access, Order, RequestFailure, Served, Subject};
+use crate::request::{Access, AcyclicSide, Order, RequestFailure, Subject};
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
 /// The requests that exist. A request whose other side is gone is forgotten.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Requests {
-    all: Rc<RefCell<Vec<Served>>>,
+    all: Rc<RefCell<Vec<AcyclicSide>>>,
     bell: Bell,
 }
 
 impl Requests {
-    pub(crate) fn add(&self, served: Served) {
+    pub(crate) fn add(&self, served: AcyclicSide) {
         let mut all = self.all.borrow_mut();
         all.retain(|served| !served.is_abandoned());
         all.push(served);
@@ -42,17 +42,17 @@ impl Requests {
 
     /// Nobody serves them any more.
     pub(crate) fn end(&self) {
-        self.all.borrow().iter().for_each(Served::end);
+        self.all.borrow().iter().for_each(AcyclicSide::end);
     }
 
-    fn asked(&self) -> Vec<(Served, Order)> {
+    fn asked(&self) -> Vec<(AcyclicSide, Order)> {
         let mut all = self.all.borrow_mut();
         all.retain(|served| !served.is_abandoned());
         all.iter().filter_map(|served| Some((served.clone(), served.take()?))).collect()
     }
 
     fn any_cancelled(&self) -> bool {
-        self.all.borrow().iter().any(Served::is_cancelled)
+        self.all.borrow().iter().any(AcyclicSide::is_cancelled)
     }
 }
 
@@ -84,7 +84,7 @@ type Done = (Option<Vec<u8>>, Option<Subject>);
 async fn serve(
     bus: Bus,
     segment: SharedSegment,
-    served: Served,
+    served: AcyclicSide,
     order: Order,
     target: (StationAddress, Mailbox),
     cancelled: Signal,
@@ -139,7 +139,7 @@ async fn object(
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
     let result = match &order.access {
         Access::Write(data) => coe::write(mailbox, object, data, limits).await.map(|()| None),
-        Access::Read | Access::ReadDirectly => coe::read(mailbox, object, limits, order.room).await.map(Some),
+        Access::Read | Access::ReadDirectly => coe::read(mailbox, object, limits, order.capacity).await.map(Some),
     };
     result.map_err(|error| of_object(&error))
 }
@@ -167,7 +167,7 @@ async fn element(
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
     let result = match &order.access {
         Access::Write(data) => soe::write(mailbox, address, data, limits).await.map(|()| None),
-        Access::Read | Access::ReadDirectly => soe::read(mailbox, address, limits, order.room).await.map(Some),
+        Access::Read | Access::ReadDirectly => soe::read(mailbox, address, limits, order.capacity).await.map(Some),
     };
     result.map_err(|error| of_element(&error))
 }

@@ -2,7 +2,7 @@
 
 use ringcat_wire::address::RegisterAddress;
 
-use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
 
 /// A request for registers of one SubDevice. It may be moved to the cyclic thread.
@@ -17,7 +17,7 @@ pub struct RegisterRequest {
 
 impl RegisterRequest {
     /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (RegisterRequest, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (RegisterRequest, AcyclicSide) {
         let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, bell);
         (RegisterRequest { request }, served)
     }
@@ -41,7 +41,7 @@ impl RegisterRequest {
     }
 
     fn turn(&mut self, address: RegisterAddress, length: usize) -> Result<(), RequestRefused> {
-        let limit = self.request.room().min(usize::from(u16::MAX));
+        let limit = self.request.capacity().min(usize::from(u16::MAX));
         if length > limit {
             return Err(RequestRefused::TooLong { bytes: length, limit });
         }

@@ -1,6 +1,6 @@
 //! SDO requests of a cyclic thread.
 
-use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
 
 /// A request for objects of one SubDevice. It may be moved to the cyclic thread.
@@ -11,7 +11,7 @@ pub struct SdoRequest {
 
 impl SdoRequest {
     /// A request of `size` bytes for an object of a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SdoRequest, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SdoRequest, AcyclicSide) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SdoRequest { request }, served)
@@ -54,7 +54,7 @@ mod tests {
         assert_eq!(request.state(), RequestState::Busy);
         let order = served.take().unwrap();
         assert_eq!(order.subject, Subject::Object { index: 0x2000, sub_index: 7, complete_access: true });
-        assert_eq!((order.subdevice, order.timeout, order.room), (3, Duration::from_millis(5), 8));
+        assert_eq!((order.subdevice, order.timeout, order.capacity), (3, Duration::from_millis(5), 8));
         assert_eq!((order.access, served.take()), (Access::Read, None));
         assert_eq!(request.set_object(1, 1, false), Err(RequestRefused::Busy));
         assert_eq!(request.read(), Err(RequestRefused::Busy));

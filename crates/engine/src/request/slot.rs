@@ -12,9 +12,9 @@ use crate::bell::Bell;
 use ringcat_wire::mailbox::soe::SoeErrorCode;
 
 const UNUSED: u8 = 0;
-const READ_ASKED: u8 = 1;
-const DIRECT_READ_ASKED: u8 = 2;
-const WRITE_ASKED: u8 = 3;
+const READ_REQUESTED: u8 = 1;
+const DIRECT_READ_REQUESTED: u8 = 2;
+const WRITE_REQUESTED: u8 = 3;
 const RUNNING: u8 = 4;
 const SUCCESS: u8 = 5;
 const ERROR: u8 = 6;
@@ -126,7 +126,7 @@ pub(crate) struct Order {
     pub access: Access,
     pub timeout: Duration,
     /// Size of the memory in bytes.
-    pub room: usize,
+    pub capacity: usize,
 }
 
 #[derive(Debug)]
@@ -153,7 +153,7 @@ pub struct Request {
 
 /// Acyclic side of a request.
 #[derive(Clone, Debug)]
-pub(crate) struct Served {
+pub(crate) struct AcyclicSide {
     slot: Arc<Slot>,
 }
 
@@ -161,7 +161,7 @@ pub(crate) struct Served {
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A request with `size` bytes of memory to a declared SubDevice, and its acyclic side.
-pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell) -> (Request, Served) {
+pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell) -> (Request, AcyclicSide) {
     let slot = Arc::new(Slot {
         subdevice,
         state: AtomicU8::new(UNUSED),
@@ -174,7 +174,7 @@ pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell)
         data: (0..size).map(|_| AtomicU8::new(0)).collect(),
         bell: bell.clone(),
     });
-    (Request { slot: slot.clone() }, Served { slot })
+    (Request { slot: slot.clone() }, AcyclicSide { slot })
 }
 
 impl Request {
@@ -210,28 +210,28 @@ impl Request {
         Ok(())
     }
 
-    fn start(&mut self, asked: u8) {
+    fn start(&mut self, requested: u8) {
         self.slot.cancelled.store(false, Ordering::Relaxed);
-        self.slot.state.store(asked, Ordering::Release);
+        self.slot.state.store(requested, Ordering::Release);
         self.slot.bell.ring();
     }
 
     pub(super) fn start_read(&mut self) -> Result<(), RequestRefused> {
         self.check()?;
-        self.start(READ_ASKED);
+        self.start(READ_REQUESTED);
         Ok(())
     }
 
     pub(super) fn start_read_directly(&mut self) -> Result<(), RequestRefused> {
         self.check()?;
-        self.start(DIRECT_READ_ASKED);
+        self.start(DIRECT_READ_REQUESTED);
         Ok(())
     }
 
     pub(super) fn start_write(&mut self, data: &[u8]) -> Result<(), RequestRefused> {
         self.check()?;
         self.slot.put(data)?;
-        self.start(WRITE_ASKED);
+        self.start(WRITE_REQUESTED);
         Ok(())
     }
 
@@ -243,7 +243,7 @@ impl Request {
         }
     }
 
-    pub(super) fn room(&self) -> usize {
+    pub(super) fn capacity(&self) -> usize {
         self.slot.data.len()
     }
 
@@ -305,7 +305,7 @@ impl Slot {
     }
 }
 
-impl Served {
+impl AcyclicSide {
     /// Whether the application side was dropped.
     pub(crate) fn is_abandoned(&self) -> bool {
         Arc::strong_count(&self.slot) == 1
@@ -321,9 +321,11 @@ impl Served {
         let slot = &*self.slot;
         let length = slot.length.load(Ordering::Relaxed) as usize;
         let access = match slot.state.load(Ordering::Acquire) {
-            READ_ASKED => Access::Read,
-            DIRECT_READ_ASKED => Access::ReadDirectly,
-            WRITE_ASKED => Access::Write(slot.data[..length].iter().map(|byte| byte.load(Ordering::Relaxed)).collect()),
+            READ_REQUESTED => Access::Read,
+            DIRECT_READ_REQUESTED => Access::ReadDirectly,
+            WRITE_REQUESTED => {
+                Access::Write(slot.data[..length].iter().map(|byte| byte.load(Ordering::Relaxed)).collect())
+            }
             _ => return None,
         };
         slot.state.store(RUNNING, Ordering::Relaxed);
@@ -332,7 +334,7 @@ impl Served {
             subject: Subject::unpack(slot.subject.load(Ordering::Relaxed)),
             access,
             timeout: Duration::from_micros(slot.timeout_us.load(Ordering::Relaxed).into()),
-            room: slot.data.len(),
+            capacity: slot.data.len(),
         })
     }
 
@@ -364,7 +366,7 @@ impl Served {
     /// Returns the request where it waits or runs: it will not be served any more.
     pub(crate) fn end(&self) {
         let state = self.slot.state.load(Ordering::Acquire);
-        if matches!(state, READ_ASKED | DIRECT_READ_ASKED | WRITE_ASKED | RUNNING) {
+        if matches!(state, READ_REQUESTED | DIRECT_READ_REQUESTED | WRITE_REQUESTED | RUNNING) {
             self.fail(RequestFailure::Failed);
         }
     }

@@ -2,7 +2,7 @@
 
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
-use super::slot::{Request, RequestRefused, Served, Subject, pair};
+use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
 
 /// A request for elements of IDNs of one SubDevice. It may be moved to the cyclic thread.
@@ -13,7 +13,7 @@ pub struct SoeRequest {
 
 impl SoeRequest {
     /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SoeRequest, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SoeRequest, AcyclicSide) {
         let subject = Subject::Idn { drive: 0, idn: 0, elements: SoeElements::VALUE.0 };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SoeRequest { request }, served)

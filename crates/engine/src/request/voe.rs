@@ -1,6 +1,6 @@
 //! VoE handlers of a cyclic thread (IgH manual: VoE handlers).
 
-use super::slot::{Request, RequestRefused, RequestState, Served, Subject, pair};
+use super::slot::{AcyclicSide, Request, RequestRefused, RequestState, Subject, pair};
 use crate::bell::Bell;
 
 /// Vendor messages to and from one SubDevice. It may be moved to the cyclic thread.
@@ -11,7 +11,7 @@ pub struct VoeHandler {
 
 impl VoeHandler {
     /// A handler of messages of up to `size` bytes, without their header, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (VoeHandler, Served) {
+    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (VoeHandler, AcyclicSide) {
         let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, bell);
         (VoeHandler { request }, served)
     }

@@ -64,7 +64,7 @@ fn positions_of_which_it_is_not_known_who_is_there_have_no_names() {
     assert_eq!(told(crossed.clone()), "position 1: line crossed, frames enter at port 1");
     let who = ringcat::Occupant { station: ringcat_wire::address::StationAddress(0x1002), declared: Some(0) };
     let timed =
-        ringcat::TimedEvent { whom: [Some(who), None], ..ringcat::TimedEvent::new(ringcat::Instant(0), crossed) };
+        ringcat::TimedEvent { occupants: [Some(who), None], ..ringcat::TimedEvent::new(ringcat::Instant(0), crossed) };
     assert_eq!(describe(&timed, &names), "position 1 \"pump\" (0x1002): line crossed, frames enter at port 1");
 }
 

@@ -1,4 +1,4 @@
-//! Place of the mailboxes: from the fixed area, otherwise from the SyncManagers (protocol 4.1, 4.4).
+//! Addresses and sizes of the mailboxes: from the fixed area, otherwise from the SyncManagers (protocol 4.1, 4.4).
 
 use alloc::vec::Vec;
 
@@ -15,10 +15,10 @@ const PROTOCOLS_AT: usize = 2 * 0x1C;
 /// Mailboxes lie in process RAM.
 const PROCESS_RAM: u32 = 0x1000;
 
-/// The SyncManagers must have been collected before.
+/// Requires that the SyncManagers are collected.
 pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     let memory_end = match info.controller.ram_kib {
-        // A controller that does not give its RAM size.
+        // The controller does not report its RAM size.
         0 => 0x1_0000,
         kib => PROCESS_RAM + 1024 * u32::from(kib),
     };
@@ -28,7 +28,7 @@ pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     if protocols == 0 || info.mailbox.is_some() {
         return;
     }
-    // A SubDevice with mailbox protocols has mailboxes: its SyncManagers may give their place.
+    // A SubDevice with mailbox protocols has mailboxes: its SyncManagers may contain their addresses.
     let described = of_sync_managers(info).filter(|layout| is_possible(layout, memory_end));
     info.mailbox = described;
     if described.is_none() {
@@ -36,7 +36,7 @@ pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
     }
 }
 
-/// A mailbox pair, `None` where it has no size. Vendors leave 0xFFFF in unused fields.
+/// A pair of mailboxes, `None` if it has no size. Vendors leave 0xFFFF in unused fields.
 fn pair(
     layout: &MailboxLayout,
     offset: usize,
@@ -55,7 +55,7 @@ fn pair(
     None
 }
 
-/// They are long enough for messages, lie in the process RAM, and do not overlap.
+/// Whether the mailboxes are long enough for messages, lie in the process RAM, and do not overlap.
 fn is_possible(layout: &MailboxLayout, memory_end: u32) -> bool {
     let span = |offset: u16, size: u16| (u32::from(offset), u32::from(offset) + u32::from(size));
     let (out, inward) = (span(layout.receive_offset, layout.receive_size), span(layout.send_offset, layout.send_size));

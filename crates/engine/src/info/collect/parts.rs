@@ -1,4 +1,4 @@
-//! Categories of an SII that were read, and warnings with their place.
+//! The categories that were read from an SII, and warnings with their offset.
 
 use alloc::vec::Vec;
 
@@ -33,7 +33,7 @@ impl<'a> Parts<'_, 'a> {
         first
     }
 
-    /// Categories with an erased end: an image that was cut short ends like this, followed by an empty EEPROM.
+    /// Categories with an erased end: a truncated image in an otherwise empty EEPROM ends like this.
     pub(super) fn erased(&self) -> impl Iterator<Item = InfoWarning> {
         let has_text = |kind| {
             matches!(kind, CategoryKind::Strings | CategoryKind::General | CategoryKind::SyncManager | CategoryKind::Dc)

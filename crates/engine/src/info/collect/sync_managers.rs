@@ -1,4 +1,4 @@
-//! Purpose of each SyncManager, and what it lacks (protocol 4.4, 3.11).
+//! Purpose of each SyncManager, and faults of their description (protocol 4.4, 3.11).
 
 use ringcat_wire::sii::{
     CategoryKind, FmmuUsage, PdoDirection, Pdos, SiiSyncManager, SiiSyncManagers, SyncManagerKind,
@@ -38,8 +38,8 @@ pub(super) fn collect(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     }
 }
 
-/// As its type says; without a type as its PDOs say (like SOEM), otherwise as its control byte says (like IgH). A
-/// SyncManager that is unused or has no length has no purpose.
+/// Purpose by the type in the SII; without a type by its PDOs (as in SOEM), otherwise by its control byte (as in IgH).
+/// A SyncManager that is unused or has no length has no purpose.
 fn kind(parts: &Parts<'_, '_>, number: usize, manager: &SiiSyncManager) -> SyncManagerKind {
     match manager.kind {
         SyncManagerKind::MailboxOut
@@ -63,7 +63,7 @@ fn kind(parts: &Parts<'_, '_>, number: usize, manager: &SiiSyncManager) -> SyncM
     }
 }
 
-/// Fault of one.
+/// Fault of a SyncManager.
 fn check(info: &SubDeviceInfo, number: usize, manager: &SiiSyncManager, taken: &SiiSyncManager) -> Option<SiiProblem> {
     let sync_manager = u8::try_from(number).unwrap_or(u8::MAX);
     let beyond = number >= usize::from(info.controller.sync_manager_count);
@@ -79,7 +79,7 @@ fn check(info: &SubDeviceInfo, number: usize, manager: &SiiSyncManager, taken: &
     wrong.then_some(SiiProblem::Control { sync_manager, control: manager.control })
 }
 
-/// Typical for an image without its end, though each of its categories is sound.
+/// Detects a truncated image in which every remaining category is valid: SyncManagers or PDOs are missing.
 pub(super) fn check_completeness(info: &mut SubDeviceInfo, parts: &Parts<'_, '_>) {
     let exchanges = info.fmmu_usages.iter().any(|usage| matches!(usage, FmmuUsage::Outputs | FmmuUsage::Inputs));
     let needed = exchanges || info.mailbox.is_some() || !info.pdos.is_empty();

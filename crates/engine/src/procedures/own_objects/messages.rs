@@ -23,7 +23,7 @@ pub(super) fn read(bus: &Bus, segment: Option<&SharedSegment>) -> Values {
             (DiagnosisHistory::MAXIMUM_MESSAGES, vec![MESSAGES]),
             (DiagnosisHistory::NEWEST_MESSAGE, vec![history.newest()]),
             (DiagnosisHistory::NEWEST_ACKNOWLEDGED, vec![history.acknowledged()]),
-            (DiagnosisHistory::NEW_AVAILABLE, vec![u8::from(history.has_news())]),
+            (DiagnosisHistory::NEW_AVAILABLE, vec![u8::from(history.has_unacknowledged())]),
             (DiagnosisHistory::FLAGS, history.flags().0.to_le_bytes().to_vec()),
         ];
         values.extend((DiagnosisHistory::FIRST_MESSAGE..).take(MESSAGES.into()).map(|sub_index| {

@@ -12,7 +12,7 @@ pub(super) fn fit(segment: &Segment, it: &UnassignedSubDevice, index: usize) -> 
     let identity = &info.identity;
     let mark_fits = match member.config.address {
         address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
-            matches!(address, ConfigAddress::Alias { alias: 0, .. }) || address.is_borne_by(info)
+            matches!(address, ConfigAddress::Alias { alias: 0, .. }) || address.is_mark_of(info)
         }
         ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => true,
     };

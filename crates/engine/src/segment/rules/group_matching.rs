@@ -67,7 +67,7 @@ fn is_alone(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) ->
     let address = segment.members[index].config.address;
     let others = segment.unassigned.iter().filter(|other| other.station != candidate.station);
     others.into_iter().all(|other| match &other.knowledge {
-        Knowledge::Known(info) => !address.is_borne_by(info),
+        Knowledge::Known(info) => !address.is_mark_of(info),
         Knowledge::Reading(_) | Knowledge::Unreadable(_) => true,
     })
 }

@@ -188,8 +188,8 @@ fn names_fit(world: &World, mark: Mark) -> bool {
         }
         Event::BreakLocated { cable } | Event::RingClosed { place: Some(cable), .. } => {
             let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(it), stations[it]));
-            let whom = timed.whom.map(|who| who.map(|who| (who.declared, who.station)));
-            whom == cable.positions().map(|node| expected(node?))
+            let occupants = timed.occupants.map(|who| who.map(|who| (who.declared, who.station)));
+            occupants == cable.positions().map(|node| expected(node?))
         }
         _ => true,
     })
@@ -239,7 +239,7 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
                 // The cable behind the junction, of the ring of two links.
                 let mark = edge(&mut world, &what, |world| world.cut(CableId(7)));
                 edge(&mut world, &what, |world| world.heal(CableId(7)));
-                let places = |timed: &&TimedEvent| timed.whom.iter().all(Option::is_some);
+                let places = |timed: &&TimedEvent| timed.occupants.iter().all(Option::is_some);
                 assert_eq!(world.events(mark).iter().filter(places).count(), 2, "{what}: broken, and whole");
                 assert!(names_fit(&world, mark), "{what}");
             }
