@@ -1,10 +1,9 @@
-//! Declaration and scan result to register values: what has to be written to a SubDevice on its way to OP
-//! (protocol 3.10, 3.11, 5.2).
+//! From declaration and scan result to the register values that bring a SubDevice to OP (protocol 3.10, 3.11, 5.2).
 //!
 //! Input: a [`SubDeviceConfig`] and its [`SubDeviceInfo`]. Output: a [`SubDevicePlan`]: mailbox and process data
 //! SyncManagers, the layout of each process data area, watchdog registers, SDO downloads for PDO assignment and
 //! mapping. SyncManagers that a configuration file declares override the SII. Logical addresses are assigned later,
-//! when domains are laid out: [`fmmu`]. The procedures write all this, in the required order and states.
+//! with the layout of the domains: [`fmmu`]. The procedures write these values, in the required order and states.
 
 mod areas;
 mod check;
@@ -27,9 +26,9 @@ pub use subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan, SubDevicePlan};
 
 use areas::sync_manager;
 
-/// Control byte of the mailbox that the MainDevice writes, where the SII gives none (protocol 3.11).
+/// Control byte of the mailbox that the MainDevice writes, if the SII contains none (protocol 3.11).
 const MAILBOX_OUT_CONTROL: u8 = 0x26;
-/// Control byte of the mailbox that the MainDevice reads, where the SII gives none (protocol 3.11).
+/// Control byte of the mailbox that the MainDevice reads, if the SII contains none (protocol 3.11).
 const MAILBOX_IN_CONTROL: u8 = 0x22;
 
 /// Plans one SubDevice. The error names SubDevice, SyncManager, PDO or object, the expected and the found value, and
@@ -41,8 +40,8 @@ pub fn plan(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDeviceP
     })
 }
 
-/// Where a file declares the SyncManagers, the SII is not at fault. Otherwise it is, where it cannot be planned without
-/// a declaration either, or is damaged.
+/// The SII is at fault if it is damaged, or if a plan without declarations fails too; not if a file declares the
+/// SyncManagers.
 fn fault(config: &SubDeviceConfig, info: &SubDeviceInfo) -> PlanFault {
     let is_unfit = || plan_inner(&SubDeviceConfig::from_info(info), info).is_err();
     if config.declared.is_none() && (info.is_doubtful() || is_unfit()) {
@@ -107,7 +106,8 @@ pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
     }
 }
 
-/// Unless the SII names others, SM 0 and 1 belong to the mailbox, except one that the SII uses for process data.
+/// Whether the mailbox has SyncManagers: without a description in the SII these are SM 0 and 1, unless the SII uses one
+/// of them for process data.
 fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
     let (out, inward) = info.mailbox_sync_managers();
     let managers = [out, inward].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));

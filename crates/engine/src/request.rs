@@ -1,9 +1,7 @@
-//! Requests that a cyclic thread makes and reuses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
-//! waiting.
-//!
-//! A request has memory of its own, with a size given at its creation. The cyclic side owns it while it is not busy: it
-//! may change target and timeout, put in data, and start it. The acyclic half takes it up, and returns it with a
-//! result. One file per kind; the common part is in `slot`.
+//! Requests that a cyclic thread starts and reuses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
+//! waiting. A request has memory of its own, with the size given at its creation. The cyclic side owns a request that
+//! is not busy: it may change target, timeout and data, and start it. The acyclic half executes the request and returns
+//! it with a result. One file per kind; the common part is in `slot`.
 
 mod register;
 mod sdo;

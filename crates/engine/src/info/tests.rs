@@ -66,7 +66,7 @@ fn general() -> Vec<u8> {
     general
 }
 
-/// Categories in a row, from the end of the fixed area on.
+/// Consecutive categories behind the fixed area.
 fn placed<'a>(categories: &[(CategoryKind, &'a [u8])]) -> Vec<Category<'a>> {
     let mut offset = SiiHeader::LEN;
     let mut place = |(kind, data): &(CategoryKind, &'a [u8])| {
@@ -92,7 +92,7 @@ fn warning(category: CategoryKind, offset: usize, problem: SiiProblem) -> InfoWa
 
 // covers: scan
 #[test]
-fn every_category_finds_its_place() {
+fn every_category_is_decoded() {
     let general = general();
     let info = info(&[
         (CategoryKind::TxPdo, TX_PDO),
@@ -123,7 +123,7 @@ fn every_category_finds_its_place() {
 
 // covers: odd-sii
 #[test]
-fn mailboxes_that_cannot_be_there_are_not_believed() {
+fn impossible_mailboxes_are_ignored_with_a_warning() {
     let spoil: [fn(&mut MailboxLayout); 5] = [
         |layout| (layout.receive_offset, layout.receive_size) = (0x7878, 10_616),
         |layout| layout.send_offset = 0x0F80,
@@ -140,13 +140,13 @@ fn mailboxes_that_cannot_be_there_are_not_believed() {
         let problem = SiiProblem::Mailbox { layout, memory_end: 0x3000 };
         assert_eq!(alone.warnings[0], InfoWarning { category: None, offset: Some(0x30), problem });
         assert_eq!(alone.mailbox, None);
-        let told = read(&[(CategoryKind::SyncManager, SYNC_MANAGERS)]);
-        assert_eq!(told.mailbox.map(|it| (it.receive_offset, it.send_offset)), Some((0x1000, 0x1080)));
+        let described = read(&[(CategoryKind::SyncManager, SYNC_MANAGERS)]);
+        assert_eq!(described.mailbox.map(|it| (it.receive_offset, it.send_offset)), Some((0x1000, 0x1080)));
     }
 }
 
 #[test]
-fn a_sync_manager_without_a_type_is_for_what_its_pdos_or_its_control_byte_say() {
+fn the_type_of_a_sync_manager_follows_from_its_pdos_or_its_control_byte() {
     let mut data = SYNC_MANAGERS.to_vec();
     (8..32).step_by(8).for_each(|at| data[at + 7] = 0);
     // PDOs override the control byte.
@@ -155,14 +155,14 @@ fn a_sync_manager_without_a_type_is_for_what_its_pdos_or_its_control_byte_say() 
     use SyncManagerKind::{Inputs, MailboxIn, MailboxOut, Outputs};
     let kinds: Vec<_> = info.sync_managers.iter().map(|manager| manager.kind).collect();
     assert_eq!(kinds, [MailboxOut, MailboxIn, Outputs, Inputs]);
-    let told: Vec<_> = info.warnings.iter().map(ToString::to_string).filter(|words| words.contains("type")).collect();
-    assert_eq!(told[1], "byte 0x0094, category SYNCM: SM 2 has type 0, taken for outputs");
-    assert_eq!(told.len(), 3);
+    let texts: Vec<_> = info.warnings.iter().map(ToString::to_string).filter(|text| text.contains("type")).collect();
+    assert_eq!(texts[1], "byte 0x0094, category SYNCM: SM 2 has type 0, assumed to be for outputs");
+    assert_eq!(texts.len(), 3);
 }
 
 // covers: odd-sii
 #[test]
-fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
+fn a_truncated_image_is_a_warning_wherever_it_ends() {
     let whole = SYNC_MANAGERS.to_vec();
     let cut = |bytes: usize| [&whole[..bytes], &vec![0xFF; whole.len() - bytes]].concat();
     for bytes in [0, 8, 12, 28] {
@@ -177,7 +177,7 @@ fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
     let without = SubDeviceInfo::from_parts(readout(), &header(), placed(&[(CategoryKind::Strings, STRINGS)]));
     assert_eq!(
         without.warnings[0].to_string(),
-        "category GENERAL: expected in every image, there is none: is the image cut short?"
+        "category GENERAL: required in every image, but missing: is the image truncated?"
     );
     let ends = info(&[(CategoryKind::Strings, STRINGS), (CategoryKind::General, &general)]);
     assert_eq!(ends.warnings.len(), 1, "{:?}", ends.warnings);
@@ -186,7 +186,7 @@ fn an_image_that_was_cut_short_is_told_wherever_it_ends() {
 
 // covers: eni-read
 #[test]
-fn what_is_not_printable_in_a_name_is_a_space() {
+fn a_character_of_a_name_that_is_not_printable_becomes_a_space() {
     let strings = [1, 9, b'T', b'w', b'o', b'\n', b'l', 0x1B, b'n', b'e', b's', 0];
     let mut general = general();
     general[..4].copy_from_slice(&[0, 0, 1, 1]);
@@ -217,7 +217,7 @@ fn a_wrong_checksum_is_a_warning() {
 }
 
 #[test]
-fn half_a_mailbox_is_no_mailbox() {
+fn one_mailbox_without_the_other_is_ignored() {
     let mut header = header();
     header.standard_mailbox.send_size = 0;
     let info = SubDeviceInfo::from_parts(readout(), &header, []);
@@ -228,7 +228,7 @@ fn half_a_mailbox_is_no_mailbox() {
 }
 
 #[test]
-fn a_pdo_with_more_entries_than_the_category_holds_keeps_those_there() {
+fn a_pdo_with_too_many_entries_keeps_those_within_the_category() {
     let mut data = TX_PDO.to_vec();
     data[2] = 3;
     let info = info(&[(CategoryKind::SyncManager, SYNC_MANAGERS), (CategoryKind::TxPdo, &data)]);
@@ -238,12 +238,12 @@ fn a_pdo_with_more_entries_than_the_category_holds_keeps_those_there() {
     assert!(info.warnings.contains(&warning(CategoryKind::TxPdo, 168, problem)));
     assert_eq!(
         warning(CategoryKind::TxPdo, 168, problem).to_string(),
-        "byte 0x00a8, category TXPDO: PDO 0x1a00 announces 3 entries, 1 are there"
+        "byte 0x00a8, category TXPDO: PDO 0x1a00 announces 3 entries, but contains 1"
     );
 }
 
 #[test]
-fn a_pdo_of_the_wrong_sync_manager_is_a_warning() {
+fn a_pdo_with_an_impossible_sync_manager_is_a_warning() {
     let mut outputs = TX_PDO.to_vec();
     outputs[3] = 2;
     outputs[5] = 0;
@@ -255,11 +255,11 @@ fn a_pdo_of_the_wrong_sync_manager_is_a_warning() {
         warning(CategoryKind::TxPdo, 184, SiiProblem::PdoSyncManager { pdo: 0x1A00, sync_manager: 7 }),
     ];
     assert_eq!(info.warnings, expected);
-    assert!(info.pdos.iter().all(|pdo| pdo.sync_manager.is_none()), "they are assigned nowhere");
+    assert!(info.pdos.iter().all(|pdo| pdo.sync_manager.is_none()), "they are not assigned");
 }
 
 #[test]
-fn an_unassigned_pdo_is_nothing_odd() {
+fn an_unassigned_pdo_is_no_fault() {
     let mut data = TX_PDO.to_vec();
     (data[3], data[5]) = (0xFF, 0);
     let info = info(&[(CategoryKind::SyncManager, SYNC_MANAGERS), (CategoryKind::TxPdo, &data)]);
@@ -276,7 +276,7 @@ fn missing_strings_and_a_short_general_category_are_warnings() {
 }
 
 #[test]
-fn sync_managers_beyond_those_of_the_controller_are_left_out() {
+fn sync_managers_beyond_those_of_the_controller_are_ignored() {
     let info = info(&[(CategoryKind::SyncManager, &SYNC_MANAGERS.repeat(3))]);
     assert_eq!(info.sync_managers.len(), 8);
     let problem = SiiProblem::SyncManagers { expected: 8, got: 12 };
@@ -293,7 +293,7 @@ fn a_sync_manager_with_the_wrong_direction_is_a_warning() {
 }
 
 #[test]
-fn what_a_writer_wrote_is_found_without_warnings() {
+fn an_image_of_the_sii_writer_has_no_warnings() {
     let mut image = vec![0; 1024];
     let mut writer = SiiWriter::new(&mut image, &header()).unwrap();
     writer.strings(&["Group", "Order", "Name"]).unwrap();
@@ -306,7 +306,7 @@ fn what_a_writer_wrote_is_found_without_warnings() {
     assert_eq!((info.name.as_str(), info.warnings), ("Name", vec![]));
 }
 
-/// Every real image gives an info with a name and as many PDOs as the reader of whole images finds.
+/// Every real image gives at least as many PDOs as the parser of whole images.
 // covers: scan
 #[test]
 fn real_images_are_listed() {

@@ -69,7 +69,7 @@ impl Directory {
 }
 
 /// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there or its
-/// SII cannot be followed.
+/// SII cannot be used.
 pub(super) enum Areas {
     /// Planned; `None` where its target state exchanges nothing.
     Planned(Option<SubDevicePlan>),

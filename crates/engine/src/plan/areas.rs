@@ -38,12 +38,12 @@ pub(super) fn areas(
 fn numbers(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: &[SmPlan]) -> BTreeSet<u8> {
     let declared = config.sync_managers.iter().map(|sm| sm.index);
     let assigned = config.pdos.iter().flatten().map(|assignment| assignment.sync_manager);
-    // An SII that assigns a PDO to a mailbox is wrong; the scan gave a warning.
+    // An SII that assigns a PDO to a mailbox is faulty; the scan gave a warning.
     let of_mailbox = |index: &u8| mailbox.iter().any(|sm| sm.index == *index);
     let by_pdo = info.pdos.iter().filter_map(|pdo| pdo.sync_manager).filter(move |index| !of_mailbox(index));
     let by_kind = (0..).zip(&info.sync_managers).filter(|(_, sm)| kind_direction(sm).is_some()).map(|(index, _)| index);
     let described = by_pdo.chain(by_kind);
-    // An SII that assigns to a missing SyncManager is wrong too; such a declaration is an error.
+    // An SII that assigns a PDO to a missing SyncManager is faulty too; such a declaration is an error.
     let exists = |index: &u8| usize::from(*index) < info.sync_managers.len();
     declared.chain(assigned).chain(described.filter(exists)).collect()
 }
@@ -59,7 +59,7 @@ fn kind_direction(sm: &SiiSyncManager) -> Option<Direction> {
     }
 }
 
-/// Plans one SyncManager; `None` for a virtual one, which has no hardware.
+/// Plans one SyncManager; `None` for a virtual SyncManager, which has no hardware.
 fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Option<AreaPlan>, PlanProblem> {
     let available = info.controller.sync_manager_count;
     if index >= available {
@@ -77,7 +77,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
         None => sii_pdos(info.assigned_pdos(index).filter(|pdo| pdo.direction == direction)),
     };
     let bits: u64 = pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
-    // The dictionary was read and assigns no PDO: then the default length of the SII does not apply.
+    // The default length of the SII does not apply if the dictionary was read and assigns no PDO.
     let is_known = assignment.is_some() || !pdos.is_empty() || info.read_online.contains(&index);
     let length = if is_known {
         let too_long = PlanProblem::TooLong { sync_manager: index, bits };
@@ -89,7 +89,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     };
     let override_ = config.sync_managers.iter().find(|declared| declared.index == index);
     let mut register = sync_manager(sii.start, length, sii.control);
-    // Process data has three buffers, whatever mode the control byte gives.
+    // Process data has three buffers, whatever the mode in the control byte.
     register.control.mode = SyncManagerMode::Buffered;
     register.control.direction = match direction {
         Direction::Outputs => SyncManagerDirection::Write,
@@ -111,7 +111,8 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     }))
 }
 
-/// In order of precedence: declarations, the type in the SII, its PDOs, its control byte.
+/// Direction of a SyncManager, in order of precedence: from declarations, the type in the SII, the PDOs, the control
+/// byte.
 fn direction(
     config: &SubDeviceConfig,
     info: &SubDeviceInfo,
@@ -132,7 +133,7 @@ fn direction(
     Ok(directions.0.or(directions.1).unwrap_or_else(described))
 }
 
-/// PDOs as the SII describes them.
+/// PDOs of the SII.
 fn sii_pdos<'i>(pdos: impl Iterator<Item = &'i PdoInfo>) -> Vec<MappedPdo> {
     let mut bit = 0;
     pdos.map(|pdo| MappedPdo {
@@ -188,7 +189,7 @@ fn limit(object: u16, got: usize) -> Result<(), PlanProblem> {
     Err(PlanProblem::TooMany { object, expected: MAX_OBJECT_ENTRIES, got })
 }
 
-/// A PDO can be assigned once.
+/// Refuses a PDO that is assigned twice.
 fn pdo_twice(areas: &[AreaPlan]) -> Result<(), PlanProblem> {
     let mut all: Vec<(u16, u8)> =
         areas.iter().flat_map(|area| area.pdos.iter().map(|pdo| (pdo.index, area.sync_manager))).collect();

@@ -1,4 +1,5 @@
-//! Whether the planned SyncManagers fit into the controller (protocol 3.1, 3.11, 5.2).
+//! Whether the controller has the SyncManagers, FMMUs and memory of a plan (protocol 3.1, 3.11, 5.2), and the SubDevice
+//! the mailbox protocols.
 
 use alloc::vec::Vec;
 
@@ -43,7 +44,7 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
     }
 }
 
-/// Start-up commands that a SubDevice supports.
+/// Mailbox protocols that a SubDevice supports.
 #[derive(Clone, Copy)]
 pub(super) struct SupportedProtocols {
     coe: bool,
@@ -52,7 +53,7 @@ pub(super) struct SupportedProtocols {
 }
 
 impl SupportedProtocols {
-    /// From its SII; a configuration file that declares its mailboxes overrides it.
+    /// From the SII; a configuration file that declares the mailboxes overrides it.
     pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> SupportedProtocols {
         let declared = config.declared.is_some();
         let protocols = info.protocols;
@@ -89,7 +90,7 @@ pub(super) fn command(supported: SupportedProtocols, action: &StartupAction) -> 
     }
 }
 
-/// Memory below the process RAM, and the direction possible there.
+/// Memory below the process RAM, and the possible directions.
 struct Memory {
     start: u32,
     end: u32,
@@ -100,7 +101,7 @@ const WRITTEN: &[SyncManagerDirection] = &[SyncManagerDirection::Write];
 const READ: &[SyncManagerDirection] = &[SyncManagerDirection::Read];
 const BOTH: &[SyncManagerDirection] = &[SyncManagerDirection::Write, SyncManagerDirection::Read];
 
-/// Digital outputs, general purpose outputs and inputs, user RAM (protocol 3.13). The rest is registers.
+/// Digital outputs, general purpose outputs and inputs, user RAM (protocol 3.13). The rest is register space.
 const BELOW_PROCESS_RAM: [Memory; 4] = [
     Memory { start: 0x0F00, end: 0x0F04, directions: WRITTEN },
     Memory { start: 0x0F10, end: 0x0F18, directions: WRITTEN },
@@ -133,7 +134,7 @@ fn inside(info: &SubDeviceInfo, span: &Span) -> Result<(), PlanProblem> {
             let no_memory = PlanProblem::NoMemory { sync_manager: span.index, start: span.start };
             BELOW_PROCESS_RAM.iter().find(holds).ok_or(no_memory)?.end
         }
-        // A controller that does not give its RAM size.
+        // The controller does not report its RAM size.
         (false, 0) => 0x1_0000,
         (false, kib) => u32::from(PROCESS_RAM) + 1024 * u32::from(kib),
     };

@@ -10,7 +10,7 @@ use super::subdevice::{AreaPlan, MappedPdo, SmPlan};
 use crate::config::{DeclaredSyncManager, SyncManagerRole};
 use crate::info::{Direction, SubDeviceInfo};
 
-/// Mailboxes, the one that the MainDevice writes first, and process data by SyncManager number.
+/// Mailboxes (first the mailbox that the MainDevice writes), and process data by SyncManager number.
 pub(super) fn areas(
     declared: &[DeclaredSyncManager],
     info: &SubDeviceInfo,
@@ -38,7 +38,7 @@ pub(super) fn areas(
     Ok((managers(out.chain(inward)).collect(), process_data))
 }
 
-/// As declared.
+/// SyncManagers as declared.
 pub(super) fn managers<'d>(
     declared: impl IntoIterator<Item = &'d DeclaredSyncManager>,
 ) -> impl Iterator<Item = SmPlan> {
@@ -58,7 +58,7 @@ fn area(sm: &DeclaredSyncManager, info: &SubDeviceInfo) -> Result<Option<AreaPla
         pdos.push(MappedPdo { index: pdo.index, entries });
     }
     let (expected, got) = (u64::from(bit), 8 * u64::from(length));
-    // Without a place in the image, its entries have none either.
+    // A disabled SyncManager has no place in the image, so its entries have none.
     if length == 0 {
         pdos.clear();
     } else if expected > got {
@@ -68,7 +68,7 @@ fn area(sm: &DeclaredSyncManager, info: &SubDeviceInfo) -> Result<Option<AreaPla
     Ok(Some(AreaPlan { sync_manager, direction, physical: register.start, length, register, op_only, pdos }))
 }
 
-/// Refuses the wrong direction, with which no data would be exchanged and no error shown.
+/// Refuses a control byte with the wrong direction: no data would be exchanged, without any error.
 fn check_control(sm: &DeclaredSyncManager) -> Result<(), PlanProblem> {
     let expected = match sm.role {
         SyncManagerRole::MailboxOut | SyncManagerRole::Outputs => Direction::Outputs,

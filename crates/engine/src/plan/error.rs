@@ -18,16 +18,16 @@ pub struct PlanError {
     pub station: StationAddress,
     /// The problem.
     pub problem: PlanProblem,
-    /// Where the fault is.
+    /// Part that must be corrected.
     pub fault: PlanFault,
 }
 
-/// What must be corrected.
+/// Part that must be corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFault {
     /// The declaration.
     Declaration,
-    /// The SII: the SubDevice cannot be set up without any declaration either, or its image is damaged.
+    /// The SII: it is damaged, or the SubDevice cannot be set up without a declaration either.
     Sii,
 }
 
@@ -92,7 +92,7 @@ pub enum PlanProblem {
         /// The SyncManager of the second assignment.
         second: u8,
     },
-    /// More PDOs in an assignment, or entries in a PDO, than their object can hold.
+    /// More PDOs in an assignment, or entries in a PDO, than the object can contain.
     TooMany {
         /// The object: 0x1C10 + n for the assignment of SM n, or the PDO.
         object: u16,
@@ -119,7 +119,7 @@ pub enum PlanProblem {
         /// First byte behind the memory.
         memory_end: u32,
     },
-    /// An area among the registers, without memory for its direction.
+    /// An area in the register space, without memory for its direction.
     NoMemory {
         /// The SyncManager.
         sync_manager: u8,
@@ -144,7 +144,7 @@ pub enum PlanProblem {
         /// FMMUs of the controller.
         got: u8,
     },
-    /// The requested process data differs from the SII, and without CoE the SubDevice cannot be informed.
+    /// The declared process data differs from the SII, and without CoE it cannot be written to the SubDevice.
     FixedProcessData {
         /// The SyncManager.
         sync_manager: u8,
@@ -174,7 +174,7 @@ pub enum PlanProblem {
         /// Its number.
         sync_manager: u8,
     },
-    /// A configuration file declares neither no mailbox nor one of each direction.
+    /// A configuration file declares mailboxes, but not one of each direction.
     DeclaredMailboxes {
         /// Mailboxes that the MainDevice writes.
         out: usize,
@@ -211,15 +211,15 @@ pub enum PlanProblem {
     },
 }
 
-/// A request of the application that the SubDevice may not follow. The plan contains it as requested.
+/// A declaration that the SII does not permit. The process data is planned as declared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanWarning {
-    /// The PDO assignment differs from the SII, which says that it is fixed. It is not written.
+    /// The declared PDO assignment differs from the SII, which marks it as fixed. It is not written.
     FixedAssignment {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// The mapping differs from the SII, which says that it is fixed. It is not written.
+    /// The declared mapping differs from the SII, which marks it as fixed. It is not written.
     FixedMapping {
         /// Index of the PDO.
         pdo: u16,
@@ -231,7 +231,7 @@ impl fmt::Display for PlanError {
         write!(f, "SubDevice {} ({}): ", self.position, self.station)?;
         match self.fault {
             PlanFault::Declaration => self.problem.fmt(f),
-            PlanFault::Sii => write!(f, "its SII cannot be followed: {}", self.problem),
+            PlanFault::Sii => write!(f, "its SII cannot be used: {}", self.problem),
         }
     }
 }
@@ -270,10 +270,10 @@ impl fmt::Display for PlanProblem {
                 write!(f, "SM {sync_manager}: {bits} bits of process data, expected at most 524280")
             }
             Self::NoMemory { sync_manager, start } => {
-                write!(f, "SM {sync_manager}: there is no memory of its direction at {start:#06x}")
+                write!(f, "SM {sync_manager}: no memory for its direction at {start:#06x}")
             }
             Self::OutsideMemory { sync_manager, start, bytes, memory_end } => {
-                write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} leave the memory, ")?;
+                write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} exceed the memory, ")?;
                 write!(f, "which ends at {memory_end:#06x}")
             }
             Self::Overlap { first, first_bytes, second, second_bytes } => {
@@ -288,12 +288,12 @@ impl fmt::Display for PlanProblem {
                 f.write_str("and without CoE it cannot be changed")
             }
             Self::NoCoe { index, sub_index } => {
-                write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but there is no CoE")
+                write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but the SubDevice has no CoE")
             }
             Self::NoSoe { drive, idn } => {
-                write!(f, "{idn} of drive {drive} is to be written, but there is no SoE")
+                write!(f, "{idn} of drive {drive} is to be written, but the SubDevice has no SoE")
             }
-            Self::NoEoe => f.write_str("addresses are to be set, but there is no EoE"),
+            Self::NoEoe => f.write_str("IP parameters are to be set, but the SubDevice has no EoE"),
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
@@ -316,10 +316,13 @@ impl fmt::Display for PlanWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PlanWarning::FixedAssignment { sync_manager } => {
-                write!(f, "SM {sync_manager}: another PDO assignment is declared, the SII says it cannot be changed")
+                write!(
+                    f,
+                    "SM {sync_manager}: the declared PDO assignment differs from the SII, which marks it as fixed"
+                )
             }
             PlanWarning::FixedMapping { pdo } => {
-                write!(f, "PDO {pdo:#06x}: another mapping is declared, the SII says it cannot be changed")
+                write!(f, "PDO {pdo:#06x}: the declared mapping differs from the SII, which marks it as fixed")
             }
         }
     }

@@ -1,7 +1,6 @@
-//! SDO downloads of PDO assignment and mapping, where they differ from the SII (protocol 5.2, 6.3).
-//!
-//! Per SyncManager: the assignment is emptied; the mapping of each changed PDO is emptied, written and counted; the
-//! assignment is written and counted.
+//! SDO downloads of PDO assignment and mapping, if they differ from the SII (protocol 5.2, 6.3). Per SyncManager:
+//! subindex 0 of the assignment is set to 0; for each changed PDO, subindex 0 of the mapping is set to 0, then its
+//! entries and their number are written; then the entries of the assignment and their number are written.
 
 use alloc::vec::Vec;
 
@@ -21,7 +20,8 @@ pub(super) fn assign_sdos(
     let mut sdos = Vec::new();
     for area in areas {
         let declared = config.pdos.iter().flatten().any(|assignment| assignment.sync_manager == area.sync_manager);
-        // The assignment that was read may be volatile, written by another program, and lost at the next power failure.
+        // The assignment that was read may be volatile: another program may have written it, and the next power failure
+        // would clear it.
         let read = info.read_online.contains(&area.sync_manager) && info.coe.pdo_assign();
         if !declared && !read {
             continue;
@@ -53,7 +53,7 @@ fn assignment_differs(info: &SubDeviceInfo, area: &AreaPlan) -> bool {
     !area.pdos.iter().map(|pdo| pdo.index).eq(theirs)
 }
 
-/// Without CoE, other names for the same number of bits do no harm.
+/// Without CoE, only the number of bits must match; other names of the entries do no harm.
 fn fixed(info: &SubDeviceInfo, area: &AreaPlan) -> Result<(), PlanProblem> {
     let described: u64 = info.assigned_pdos(area.sync_manager).map(|pdo| u64::from(pdo.bit_length())).sum();
     let declared: u64 = area.pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
@@ -72,13 +72,13 @@ fn of_area(
     sdos: &mut Vec<SdoDownload>,
     warnings: &mut Vec<PlanWarning>,
 ) {
-    // An SII without CoE details gives no information about them.
+    // An SII without CoE details contains no information about them.
     let unknown = info.coe.0 == 0;
     let can_assign = unknown || info.coe.pdo_assign();
     let can_map = unknown || info.coe.pdo_configuration();
     let object = ASSIGNMENT_BASE + u16::from(area.sync_manager);
     let map = can_map && !changed.is_empty();
-    // An assigned PDO cannot be mapped.
+    // The mapping of an assigned PDO cannot be changed.
     let assign = can_assign && (reassigned || map);
     if reassigned && !can_assign {
         warnings.push(PlanWarning::FixedAssignment { sync_manager: area.sync_manager });

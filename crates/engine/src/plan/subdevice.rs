@@ -50,13 +50,13 @@ pub struct AreaPlan {
     pub direction: Direction,
     /// First physical byte.
     pub physical: u16,
-    /// Length in bytes; 0 where the SyncManager is disabled and needs no FMMU.
+    /// Length in bytes; 0 if the SyncManager is disabled and needs no FMMU.
     pub length: u16,
     /// Registers of the SyncManager.
     pub register: SyncManager,
-    /// Enabled on the way to OP only, not for SAFEOP (protocol 4.4).
+    /// Enabled before OP is requested, not before SAFEOP (protocol 4.4).
     pub op_only: bool,
-    /// Its PDOs; none where the SII gives only a length.
+    /// Its PDOs; none if the SII contains only a length.
     pub pdos: Vec<MappedPdo>,
 }
 
@@ -65,11 +65,11 @@ pub struct AreaPlan {
 pub struct SubDevicePlan {
     /// Its station address.
     pub station: StationAddress,
-    /// Mailbox SyncManagers for PREOP, the one that the MainDevice writes first. None or two.
+    /// Mailbox SyncManagers for PREOP, first that of the mailbox that the MainDevice writes. None or two.
     pub mailbox: Vec<SmPlan>,
     /// Mailbox SyncManagers for BOOT. None or two.
     pub bootstrap: Vec<SmPlan>,
-    /// Process data areas by SyncManager number. Each of them gets an FMMU unless its length is 0.
+    /// Process data areas by SyncManager number. Each area has an FMMU unless its length is 0.
     pub process_data: Vec<AreaPlan>,
     /// SyncManagers of the controller to disable before SAFEOP: neither mailbox nor process data.
     pub unused: Vec<u8>,
@@ -79,7 +79,7 @@ pub struct SubDevicePlan {
     pub lrw_supported: bool,
     /// Watchdog registers to write before SAFEOP.
     pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
-    /// Requests of the application that the SubDevice may not follow.
+    /// Declarations that the SII does not permit.
     pub warnings: Vec<PlanWarning>,
 }
 
@@ -89,17 +89,17 @@ impl SubDevicePlan {
         (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
     }
 
-    /// Some of its SyncManagers are for OP only: then no process data is exchanged before.
+    /// Whether some of its SyncManagers are for OP only: then no process data is exchanged before OP.
     pub fn is_op_only(&self) -> bool {
         self.mapped_areas().any(|(_, area)| area.op_only)
     }
 
-    /// Mailboxes from PREOP on; `None` where there are none.
+    /// Mailboxes from PREOP on; `None` if there are none.
     pub fn mailbox_layout(&self) -> Option<MailboxLayout> {
         layout_of(&self.mailbox)
     }
 
-    /// Mailboxes in BOOT; `None` where there are none.
+    /// Mailboxes in BOOT; `None` if there are none.
     pub fn bootstrap_layout(&self) -> Option<MailboxLayout> {
         layout_of(&self.bootstrap)
     }

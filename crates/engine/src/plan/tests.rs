@@ -57,7 +57,7 @@ fn device() -> SubDeviceInfo {
     }
 }
 
-/// A terminal without a mailbox: digital outputs at 0x0F00, no SyncManager type, no PDO names.
+/// A terminal without a mailbox: digital outputs at 0x0F00, no PDO names.
 fn terminal() -> SubDeviceInfo {
     SubDeviceInfo {
         controller: Information::decode(&INFORMATION).into(),
@@ -99,7 +99,7 @@ fn the_sii_alone_gives_mailbox_areas_and_unused_sync_managers() {
 }
 
 #[test]
-fn entries_lie_back_to_back_across_pdos() {
+fn entries_are_adjacent_across_pdos() {
     let plan = plan(&any(), &device()).unwrap();
     let places: Vec<_> = plan.process_data[0]
         .pdos
@@ -120,7 +120,7 @@ fn a_mailbox_without_sync_manager_category_gets_the_usual_control_bytes() {
 }
 
 #[test]
-fn the_bootstrap_mailbox_has_its_own_place() {
+fn the_bootstrap_mailbox_has_its_own_addresses() {
     let layout = MailboxLayout { receive_offset: 0x1000, receive_size: 0x100, send_offset: 0x1200, send_size: 0x100 };
     let plan = plan(&any(), &SubDeviceInfo { bootstrap: Some(layout), ..device() }).unwrap();
     assert_eq!(plan.bootstrap[1].register.encode(), [0x00, 0x12, 0x00, 0x01, 0x32, 0, 1, 0]);
@@ -146,7 +146,7 @@ fn a_sync_manager_without_pdos_has_the_length_of_the_sii() {
 }
 
 #[test]
-fn a_sync_manager_that_the_sii_does_not_enable_stays_off_without_pdos() {
+fn a_sync_manager_without_enable_bit_and_pdos_stays_disabled() {
     let mut info = SubDeviceInfo { pdos: vec![], ..device() };
     info.sync_managers[2].enable = 0;
     let plan = plan(&any(), &info).unwrap();
@@ -163,7 +163,7 @@ fn a_virtual_sync_manager_is_no_area() {
 }
 
 #[test]
-fn the_direction_of_the_pdos_goes_before_the_control_byte() {
+fn the_direction_of_the_pdos_overrides_the_control_byte() {
     let mut info = device();
     info.sync_managers[2].control = 0x20;
     assert_eq!(plan(&any(), &info).unwrap().process_data[0].register.control.bits(), 0x24);
@@ -179,7 +179,7 @@ fn an_fmmu_maps_an_area_byte_by_byte() {
 }
 
 #[test]
-fn another_assignment_is_emptied_written_and_counted() {
+fn a_changed_assignment_is_cleared_written_and_counted() {
     let config = any().assign(3, Direction::Inputs, vec![PdoMapping::from_sii(0x1A01), PdoMapping::from_sii(0x1A00)]);
     let plan = plan(&config, &device()).unwrap();
     let expected =
@@ -193,7 +193,7 @@ fn another_assignment_is_emptied_written_and_counted() {
 
 // covers: plan
 #[test]
-fn another_mapping_is_written_while_the_pdo_is_not_assigned() {
+fn a_changed_mapping_is_written_while_the_pdo_is_not_assigned() {
     let mapping = PdoMapping::of(0x1A00, [PdoEntry::new(0x6000, 1, 16), PdoEntry::new(0, 0, 8)]);
     let plan = plan(&any().assign(3, Direction::Inputs, vec![mapping]), &device()).unwrap();
     let expected = [
@@ -210,14 +210,14 @@ fn another_mapping_is_written_while_the_pdo_is_not_assigned() {
 }
 
 #[test]
-fn what_the_sii_describes_already_is_not_written() {
+fn a_declaration_equal_to_the_sii_writes_nothing() {
     let entries = [PdoEntry::new(0x6000, 1, 16), PdoEntry::new(0x6000, 2, 16)];
     let config = any().assign(3, Direction::Inputs, vec![PdoMapping::of(0x1A00, entries)]);
     assert_eq!(plan(&config, &device()).unwrap().assign_sdos, []);
 }
 
 #[test]
-fn no_pdos_switch_a_sync_manager_off() {
+fn an_assignment_without_pdos_disables_the_sync_manager() {
     let plan = plan(&any().assign(3, Direction::Inputs, vec![]), &device()).unwrap();
     assert_eq!(sdos(&plan), [(0x1C13, 0, vec![0]), (0x1C13, 0, vec![0])]);
     let area = &plan.process_data[1];
@@ -226,7 +226,7 @@ fn no_pdos_switch_a_sync_manager_off() {
 }
 
 #[test]
-fn an_sii_that_says_fixed_is_a_warning_and_nothing_is_written() {
+fn a_change_that_the_sii_does_not_permit_is_a_warning_and_not_written() {
     let info = SubDeviceInfo { coe: CoeDetails(CoeDetails::SDO), ..device() };
     let mapping = PdoMapping::of(0x1A02, [PdoEntry::new(0x6020, 1, 8)]);
     let plan = plan(&any().assign(3, Direction::Inputs, vec![mapping]), &info).unwrap();
@@ -260,7 +260,7 @@ fn watchdogs_are_declared_per_sync_manager_and_for_the_controller() {
 }
 
 #[test]
-fn lrw_is_ruled_out_by_controller_or_sii() {
+fn controller_or_sii_exclude_lrw() {
     let mut info = device();
     info.flags = GeneralFlags(GeneralFlags::NOT_LRW);
     assert!(!plan(&any(), &info).unwrap().lrw_supported);
@@ -317,7 +317,7 @@ fn too_many_or_too_long_is_an_error() {
 }
 
 #[test]
-fn three_buffers_must_not_run_into_the_next_area() {
+fn three_buffers_must_not_overlap_the_next_area() {
     let mut info = device();
     // Three times 3 bytes from 0x1100 end at 0x1109.
     info.sync_managers[3].start = 0x1109;
@@ -352,7 +352,7 @@ fn an_sdo_needs_coe() {
 }
 
 #[test]
-fn a_dictionary_that_names_no_pdos_counts_before_the_default_length() {
+fn a_dictionary_without_pdos_overrides_the_default_length() {
     let mut info = device();
     info.pdos.retain(|pdo| pdo.sync_manager != Some(2));
     assert_eq!(plan(&any(), &info).unwrap().process_data[0].length, 3);
@@ -361,7 +361,7 @@ fn a_dictionary_that_names_no_pdos_counts_before_the_default_length() {
 }
 
 #[test]
-fn the_type_of_a_sync_manager_goes_before_its_pdos() {
+fn the_type_of_a_sync_manager_overrides_its_pdos() {
     let mut info = device();
     info.pdos.retain(|pdo| pdo.sync_manager != Some(3));
     info.pdos[0].sync_manager = Some(3);
@@ -371,7 +371,7 @@ fn the_type_of_a_sync_manager_goes_before_its_pdos() {
 
 // covers: odd-sii
 #[test]
-fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
+fn an_error_names_declaration_or_sii_as_the_part_to_correct() {
     let fault = |config: &SubDeviceConfig, info: &SubDeviceInfo| plan(config, info).unwrap_err().fault;
     let wrong = any().assign(9, Direction::Inputs, vec![]);
     assert_eq!(fault(&wrong, &device()), PlanFault::Declaration);
@@ -380,7 +380,7 @@ fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
     assert_eq!(fault(&any(), &unfit), PlanFault::Sii);
     assert_eq!(
         plan(&any(), &unfit).unwrap_err().to_string(),
-        "SubDevice 4 (0x1005): its SII cannot be followed: SM 2: 9 bytes (all buffers) at 0x2fff leave the memory, \
+        "SubDevice 4 (0x1005): its SII cannot be used: SM 2: 9 bytes (all buffers) at 0x2fff exceed the memory, \
          which ends at 0x3000"
     );
     let problem = SiiProblem::Checksum { expected: 1, got: 2 };
@@ -391,7 +391,7 @@ fn an_error_says_whether_declaration_or_sii_have_to_be_mended() {
 }
 
 #[test]
-fn nothing_is_made_of_a_blank_eeprom_unless_process_data_is_declared() {
+fn a_blank_eeprom_is_an_error_unless_sync_managers_are_declared() {
     let mut blank = SubDeviceInfo { sync_managers: vec![], pdos: vec![], mailbox: None, ..device() };
     blank.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
     assert_eq!(problem(&any(), &blank), PlanProblem::NoSii);

@@ -5,11 +5,9 @@ use ringcat_wire::address::RegisterAddress;
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
 
-/// A request for registers of one SubDevice. It may be moved to the cyclic thread.
-///
-/// It travels in a frame of the acyclic half, within about a millisecond. Cyclic frames are built once at activation,
-/// are compared with what was sent, and are expected back at a known time; a register datagram in them would make the
-/// length of each cycle depend on requests.
+/// A request for registers of one SubDevice. It may be moved to the cyclic thread. The acyclic half sends it in a frame
+/// of its own, within about a millisecond. Cyclic frames are built once at activation, compared with what was sent, and
+/// expected back at a known time; with a register datagram in them, the length of a cycle would depend on requests.
 #[derive(Debug)]
 pub struct RegisterRequest {
     pub(super) request: Request,
@@ -25,7 +23,7 @@ impl RegisterRequest {
     /// Starts to read `length` bytes from an address on.
     ///
     /// # Errors
-    /// It is under way, or its memory is shorter.
+    /// It is in progress, or its memory is shorter.
     pub fn read(&mut self, address: RegisterAddress, length: usize) -> Result<(), RequestRefused> {
         self.turn(address, length)?;
         self.request.start_read()
@@ -34,7 +32,7 @@ impl RegisterRequest {
     /// Starts to write from an address on.
     ///
     /// # Errors
-    /// It is under way, or its memory is shorter than the data.
+    /// It is in progress, or its memory is shorter than the data.
     pub fn write(&mut self, address: RegisterAddress, data: &[u8]) -> Result<(), RequestRefused> {
         self.turn(address, data.len())?;
         self.request.start_write(data)

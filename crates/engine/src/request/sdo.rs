@@ -45,7 +45,7 @@ mod tests {
 
     // covers: jobs, sdo
     #[test]
-    fn a_request_goes_to_the_other_side_and_comes_back_with_what_was_read() {
+    fn a_request_is_executed_by_the_acyclic_side_and_returns_the_read_data() {
         let (mut request, served) = SdoRequest::new(3, 8, &Bell::default());
         assert_eq!((request.state(), served.take()), (RequestState::Unused, None));
         request.set_object(0x2000, 7, true).unwrap();
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn data_that_has_no_room_is_refused_and_failures_are_named() {
+    fn data_beyond_the_capacity_is_refused_and_failures_are_returned() {
         let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
         assert_eq!(request.write(&[1, 2, 3]), Err(RequestRefused::TooLong { bytes: 3, limit: 2 }));
         request.write(&[1, 2]).unwrap();
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_request_that_is_under_way_is_cancelled() {
+    fn only_a_request_in_progress_is_cancelled() {
         let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
         request.cancel();
         assert!(!served.is_cancelled());
@@ -97,6 +97,6 @@ mod tests {
         assert!(served.is_cancelled());
         served.fail(RequestFailure::Cancelled);
         request.read().unwrap();
-        assert!(!served.is_cancelled(), "the next one is not");
+        assert!(!served.is_cancelled(), "the next request is not cancelled");
     }
 }

@@ -1,4 +1,5 @@
-//! Memory of a request and the words with which both sides communicate; its state shows which side owns it.
+//! Memory of a request, and the words through which both sides communicate; the state shows which side owns the
+//! request.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -29,7 +30,7 @@ const CANCELLED: u64 = 6;
 /// State of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestState {
-    /// It was not started, or was changed since.
+    /// It was not started, or was changed after its last use.
     Unused,
     /// It is in progress: it cannot be changed.
     Busy,
@@ -43,9 +44,9 @@ pub enum RequestState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RequestFailure {
-    /// The SubDevice aborted an SDO.
+    /// The SubDevice aborted the SDO transfer.
     Aborted(AbortCode),
-    /// The drive refused an IDN.
+    /// The drive refused the access to the IDN.
     Refused(SoeErrorCode),
     /// It took longer than its timeout.
     Timeout,
@@ -135,7 +136,7 @@ struct Slot {
     state: AtomicU8,
     cancelled: AtomicBool,
     subject: AtomicU64,
-    /// Header data of an answer.
+    /// Header data of the answer.
     answered: AtomicU64,
     timeout_us: AtomicU32,
     length: AtomicU32,
@@ -316,7 +317,7 @@ impl AcyclicSide {
         self.slot.cancelled.load(Ordering::Acquire)
     }
 
-    /// Takes the request up, if it was started.
+    /// Takes the request for execution, if it was started.
     pub(crate) fn take(&self) -> Option<Order> {
         let slot = &*self.slot;
         let length = slot.length.load(Ordering::Relaxed) as usize;
@@ -338,7 +339,7 @@ impl AcyclicSide {
         })
     }
 
-    /// Returns the request: with the read data, `None` for a write, and the header data of the answer.
+    /// Returns the request as successful, with the read data (`None` for a write) and the header data of the answer.
     pub(crate) fn succeed(&self, read: Option<&[u8]>, answered: Option<Subject>) {
         let fits = read.is_none_or(|data| self.slot.put(data).is_ok());
         if fits {
@@ -349,7 +350,7 @@ impl AcyclicSide {
         }
     }
 
-    /// Returns the request.
+    /// Returns the request as failed.
     pub(crate) fn fail(&self, failure: RequestFailure) {
         let word = match failure {
             RequestFailure::Aborted(code) => ABORTED << 32 | u64::from(code.0),
@@ -363,7 +364,7 @@ impl AcyclicSide {
         self.slot.state.store(ERROR, Ordering::Release);
     }
 
-    /// Returns the request where it waits or runs: it will not be served any more.
+    /// Returns a waiting or running request as failed: it will not be executed any more.
     pub(crate) fn end(&self) {
         let state = self.slot.state.load(Ordering::Acquire);
         if matches!(state, READ_REQUESTED | DIRECT_READ_REQUESTED | WRITE_REQUESTED | RUNNING) {
@@ -377,7 +378,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_request_is_about_fits_a_word() {
+    fn the_target_of_a_request_fits_into_a_word() {
         for subject in [
             Subject::Object { index: 0x1C12, sub_index: 0xFE, complete_access: true },
             Subject::Object { index: 0, sub_index: 0, complete_access: false },

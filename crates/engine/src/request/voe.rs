@@ -32,8 +32,8 @@ impl VoeHandler {
         }
     }
 
-    /// Starts to read the oldest message that the SubDevice has sent, or its next one. The status of its mailbox shows
-    /// whether there is one.
+    /// Starts to read the oldest kept message of the SubDevice, otherwise its next one. The status of its mailbox is
+    /// polled for messages.
     ///
     /// # Errors
     /// It is in progress.
@@ -42,7 +42,7 @@ impl VoeHandler {
     }
 
     /// As [`VoeHandler::read`], but reads the mailbox at once and repeatedly, without polling its status: for
-    /// SubDevices that answer at once, or with an unreliable status.
+    /// SubDevices that answer at once, or whose mailbox status is unreliable.
     ///
     /// # Errors
     /// It is in progress.
@@ -59,7 +59,7 @@ impl VoeHandler {
         self.request.start_write(data)
     }
 
-    /// Call this once per cycle while it is busy. The acyclic half does the work.
+    /// Returns the state; call this once per cycle while it is busy. The acyclic half executes the request.
     pub fn execute(&mut self) -> RequestState {
         self.state()
     }

@@ -296,5 +296,5 @@ fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told() {
     };
     assert!(world.saw(mark, told), "{:?}", world.events(mark));
     let without = start(&settings, 1).expect_err("a terminal without a mailbox");
-    assert!(without.to_string().contains("addresses are to be set, but there is no EoE"), "{without}");
+    assert!(without.to_string().contains("IP parameters are to be set, but the SubDevice has no EoE"), "{without}");
 }

@@ -83,7 +83,7 @@ fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
     let mut asked = world(devices(), ReadPdos::Always);
     asked.settle();
     asked.run_cycles(50);
-    assert!(told(&asked, "SM 3: 16 bits of process data, the dictionary has other PDOs with 32 bits, which count"));
+    assert!(told(&asked, "SM 3: 16 bits of process data in the SII, but 32 bits in other PDOs of the dictionary"));
     let areas = asked.application().directory().areas(ODD);
     assert_eq!(areas.iter().map(|area| area.placed.area.length).collect::<Vec<_>>(), [4, 4]);
     let mut trusting = world(devices(), ReadPdos::Missing);
@@ -251,10 +251,7 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
     image[14] ^= 0xFF;
     devices[ODD].sii_image = Some(image);
     let mut garbage = world(devices, ReadPdos::Missing);
-    assert!(told(
-        &garbage,
-        "byte 0x0030: mailboxes of 10616 bytes at 0x7878 and 12876 bytes at 0x4521 are not believed"
-    ));
+    assert!(told(&garbage, "byte 0x0030: mailboxes of 10616 bytes at 0x7878 and 12876 bytes at 0x4521 are ignored"));
     garbage.run_cycles(100);
     // Process data where there is no memory.
     let mut devices = descriptions(&KINDS);
@@ -262,12 +259,12 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
     beyond.sync_managers[3].start = 0x2FFE;
     devices[ODD].sii_image = Some(sii_image::build(&beyond));
     let reason =
-        "its SII cannot be followed: SM 3: 12 bytes (all buffers) at 0x2ffe leave the memory, which ends at 0x3000";
+        "its SII cannot be used: SM 3: 12 bytes (all buffers) at 0x2ffe exceed the memory, which ends at 0x3000";
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
     // Nothing at all.
     let mut devices = descriptions(&KINDS);
     devices[ODD].sii_image = Some(Vec::new());
-    let reason = "its SII cannot be followed: the EEPROM is blank or cannot be read, and nothing is declared";
+    let reason = "its SII cannot be used: the EEPROM is blank or cannot be read, and nothing is declared";
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
 }
 
@@ -323,7 +320,7 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
         declaration
     });
     let mut world = started.expect("one bad EEPROM stops nobody");
-    assert!(told(&world, "nothing follows the fixed area: the image is cut short"));
+    assert!(told(&world, "no category follows the fixed area: the image is truncated"));
     assert!(world.application().entry(ODD, 0x7000, 1).is_some());
     world.run_cycles(300);
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
@@ -402,7 +399,7 @@ fn sync_managers_without_a_type_mean_one_thing_to_scan_run_and_simulator() {
             let world = in_op_as_it_says(&described, &format!("{kind}, without PDOs: {without_pdos}"));
             let found: Vec<_> = odd(&world).sync_managers.iter().map(|manager| manager.kind).collect();
             assert_eq!(found, kinds, "{kind}");
-            assert!(told(&world, "has type 0, taken for"));
+            assert!(told(&world, "has type 0, assumed to be for"));
         }
     }
 }

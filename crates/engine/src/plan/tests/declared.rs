@@ -29,8 +29,8 @@ fn with(change: impl FnOnce(&mut Vec<DeclaredSyncManager>)) -> SubDeviceConfig {
 }
 
 #[test]
-fn declared_sync_managers_take_the_place_of_the_sii_and_nothing_is_assigned() {
-    // Other declarations are ignored beside them.
+fn declared_sync_managers_replace_the_sii_without_assignments() {
+    // The declared assignment is ignored.
     let config = with(|_| ()).assign(2, Direction::Outputs, vec![PdoMapping::from_sii(0x1601)]);
     let plan = plan(&config, &device()).unwrap();
     let mailbox: Vec<_> = plan.mailbox.iter().map(|sm| (sm.index, sm.register.encode())).collect();
@@ -45,7 +45,7 @@ fn declared_sync_managers_take_the_place_of_the_sii_and_nothing_is_assigned() {
 
 // covers: sync-managers-declared
 #[test]
-fn declared_bootstrap_mailboxes_take_the_place_of_the_sii() {
+fn declared_bootstrap_mailboxes_replace_those_of_the_sii() {
     let pair = [
         manager(0, SyncManagerRole::MailboxOut, 0x1000, 0x80, 0x26),
         manager(1, SyncManagerRole::MailboxIn, 0x1200, 0x80, 0x22),
@@ -56,7 +56,7 @@ fn declared_bootstrap_mailboxes_take_the_place_of_the_sii() {
 }
 
 #[test]
-fn entries_of_a_declared_sync_manager_lie_where_the_file_places_them() {
+fn entries_of_a_declared_sync_manager_have_the_places_of_the_file() {
     let entries = [PdoEntry::new(0x7000, 1, 12), PdoEntry::new(0, 0, 4), PdoEntry::new(0x7000, 2, 16)];
     let planned = plan(&with(|declared| declared[3].pdos = vec![PdoMapping::of(0x1600, entries)]), &device()).unwrap();
     let places: Vec<_> = planned.process_data[0].pdos[0].entries.iter().map(|e| (e.index, e.bit_offset)).collect();
@@ -67,12 +67,12 @@ fn entries_of_a_declared_sync_manager_lie_where_the_file_places_them() {
     });
     let planned = plan(&off, &device()).unwrap();
     assert_eq!((planned.process_data[0].length, planned.mapped_areas().count()), (0, 1));
-    assert_eq!(planned.process_data[0].register.length, 4, "written as the file has it");
+    assert_eq!(planned.process_data[0].register.length, 4, "written as declared");
 }
 
 // covers: sync-managers-declared
 #[test]
-fn what_a_file_cannot_mean_is_refused() {
+fn contradictory_declared_sync_managers_are_refused() {
     let problem = |change: fn(&mut Vec<DeclaredSyncManager>)| problem(&with(change), &device());
     let twice = PlanProblem::DeclaredTwice { sync_manager: 2 };
     assert_eq!(problem(|declared| declared[0].index = 2), twice);
@@ -93,7 +93,7 @@ fn what_a_file_cannot_mean_is_refused() {
 
 // covers: sync-managers-declared
 #[test]
-fn protocols_are_those_of_the_file_where_it_declares_mailboxes() {
+fn declared_mailboxes_override_the_protocols_of_the_sii() {
     let silent = SubDeviceInfo { protocols: MailboxProtocols(0), ..device() };
     assert_eq!(problem(&any().sdo(0x8000, 1, [0]), &silent), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
     assert!(plan(&with(|_| ()).sdo(0x8000, 1, [0]), &silent).is_ok());
