@@ -1,13 +1,12 @@
-//! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007).
-//!
-//! A [`Mailbox`] is the handle to a SubDevice's router. Procedures hold a [`Lane`] of it, one per protocol, and
-//! exchange messages: a request is written with the next counter, and a received mail is delivered to its lane. All
-//! lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is kept in bounded rings. The
-//! parts:
+//! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007). A [`Mailbox`] is
+//! the handle to a SubDevice's router. Each protocol has a [`Lane`]; a procedure that exchanges messages holds the lane
+//! as a [`Conversation`]. A request is written with the next counter, and a received mail is delivered to its lane. All
+//! lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is kept in bounded queues.
+//! The parts:
 //!
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
-//! * `delivery`: the lane of a mail; `recent`: duplicate mail;
-//! * `conversation`: a conversation that holds a lane; `answer_time`: when to poll for an answer;
+//! * `delivery`: assigns mail to its lane; `recent`: detects duplicate mail;
+//! * `conversation`: holds a lane, sends and waits for answers; `answer_time`: when to poll for an answer;
 //! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of gateway clients;
 //!   [`raw`]: messages that the application composes.
 

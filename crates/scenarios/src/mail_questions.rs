@@ -243,7 +243,7 @@ impl Asker {
                 aoe::read(mailbox, Self::route(), (MEMORY, 16), length, limits).await.map_err(said)
             }
             Kind::Address => {
-                let settings = eoe::ask_ip(mailbox, 0, limits).await.map_err(said)?;
+                let settings = eoe::read_ip(mailbox, 0, limits).await.map_err(said)?;
                 Ok(settings.address.map_or(Vec::new(), |address| address.octets().to_vec()))
             }
             Kind::Description | Kind::Vendor => Ok(Vec::new()),

@@ -1,9 +1,8 @@
-//! When to poll for an answer, learnt from earlier answers.
-//!
-//! Reading too early costs a datagram as long as the mailbox, reading late costs time. So the first poll is at the
-//! expected time; it reads at once where that was right last time, and polls the status byte otherwise. After a series
-//! of good polls an earlier one is tried. Times are those without queueing: how long datagrams wait for a busy wire
-//! does not depend on the SubDevice.
+//! When to poll for an answer, estimated from earlier answers. A read that is too early costs a datagram as long as the
+//! mailbox; a late read costs time. So the first poll is at the expected time. If the last answer was available then,
+//! it reads the mailbox at once, otherwise it polls the status byte. After several answers at the expected time, an
+//! earlier poll is tried. Times exclude queueing: how long datagrams wait for a busy wire does not depend on the
+//! SubDevice.
 
 use core::time::Duration;
 
@@ -13,22 +12,22 @@ const SHORTEST_PAUSE: Duration = Duration::from_micros(100);
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
 /// The pause is this part of the time waited so far.
 const PAUSE_PART: u32 = 8;
-/// An earlier poll is earlier by half of the uncertainty, and by this part at least.
+/// An earlier poll is earlier by half of the uncertainty, and at least by this part.
 const EARLIER_PART: u32 = 16;
-/// After an earlier poll in vain, the number of answers at the usual time before the next attempt; four times as many
-/// after each further failure.
+/// After an earlier poll without an answer, the number of answers at the usual time before the next attempt; four times
+/// as many after each further failure.
 const FIRST_PATIENCE: u32 = 4;
-/// Largest such number: it limits how long a SubDevice that becomes faster stays unnoticed.
+/// Largest such number: it limits the time until a faster response of the SubDevice is detected.
 const LONGEST_PATIENCE: u32 = 32;
-/// A longer round trip is taken over by this part of it each time.
+/// The shortest round trip may grow by this part of itself per measurement.
 const FADING_PART: u32 = 32;
 
-/// Learns the response times.
+/// Estimates the response time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AnswerTime {
-    /// Answers were available after this time.
+    /// Time after which answers were available.
     usual: Duration,
-    /// After this time an answer was not available yet.
+    /// Time after which an answer was not available yet.
     empty_poll: Duration,
     /// The last answer was available at the first poll.
     hit: bool,
@@ -57,7 +56,7 @@ impl AnswerTime {
         self.usual.saturating_sub(self.empty_poll)
     }
 
-    /// Twice the minimum by which an earlier poll is earlier.
+    /// Twice the smallest amount by which an earlier poll is earlier.
     fn step(&self) -> Duration {
         self.usual / EARLIER_PART * 2
     }
@@ -110,7 +109,7 @@ mod tests {
     use super::*;
 
     /// Polls as the reader does; returns the polls that found nothing.
-    fn ask(time: &mut AnswerTime, real: Duration) -> u32 {
+    fn poll(time: &mut AnswerTime, real: Duration) -> u32 {
         let (mut at, mut empty_poll, mut polls) = (time.first_poll(), None, 0);
         while at < real {
             empty_poll = Some(at);
@@ -123,12 +122,12 @@ mod tests {
 
     // covers: mailbox, start-lists
     #[test]
-    fn looks_come_when_answers_do() {
+    fn the_first_poll_is_at_the_time_of_the_answer() {
         let real = Duration::from_micros(1000);
         let mut time = AnswerTime::default();
-        let learning: u32 = (0..10).map(|_| ask(&mut time, real)).sum();
-        assert!(learning < 16, "{learning} polls in empty_poll for the first ten answers");
-        let later: u32 = (0..200).map(|_| ask(&mut time, real)).sum();
+        let learning: u32 = (0..10).map(|_| poll(&mut time, real)).sum();
+        assert!(learning < 16, "{learning} polls without an answer for the first ten answers");
+        let later: u32 = (0..200).map(|_| poll(&mut time, real)).sum();
         let usual = time.first_poll();
         assert!((Duration::from_micros(940)..Duration::from_micros(1070)).contains(&usual), "{usual:?}");
         assert!(later < 12, "{later} of 200 polls came too early");
@@ -136,10 +135,10 @@ mod tests {
 
     // covers: start-lists
     #[test]
-    fn answers_that_become_quicker_or_slower_are_followed() {
+    fn the_estimate_follows_faster_and_slower_answers() {
         let mut time = AnswerTime::default();
         for real in [1000, 300, 4000, 200].map(Duration::from_micros) {
-            (0..100).for_each(|_| _ = ask(&mut time, real));
+            (0..100).for_each(|_| _ = poll(&mut time, real));
             let usual = time.first_poll();
             assert!(usual > real * 9 / 10 && usual < real * 5 / 4, "{usual:?} for {real:?}");
         }
@@ -154,13 +153,13 @@ mod tests {
 
     // covers: start-lists
     #[test]
-    fn waiting_for_a_turn_is_no_part_of_a_trip() {
+    fn time_in_the_send_queue_is_not_part_of_a_round_trip() {
         let us = Duration::from_micros;
         let mut trip = ShortestTrip::default();
         assert_eq!(trip.took(us(320)), us(320));
         assert_eq!(trip.took(us(160)), us(160));
         assert_eq!(trip.took(us(900)), us(165));
         (0..100).for_each(|_| _ = trip.took(us(640)));
-        assert_eq!(trip.took(us(640)), us(640), "a longer way is believed in the end");
+        assert_eq!(trip.took(us(640)), us(640), "a longer round trip is accepted in the end");
     }
 }

@@ -27,7 +27,7 @@ pub struct AoeRoute {
 pub enum AoeError {
     /// The mailbox failed.
     Mailbox(MailboxError),
-    /// It did not reach its ADS port.
+    /// The request did not reach its ADS port.
     Undelivered(AdsErrorCode),
     /// The ADS port refused.
     Refused(AdsErrorCode),
@@ -144,28 +144,28 @@ pub async fn read_device_info(mailbox: &Mailbox, route: AoeRoute, limits: Limits
     request(mailbox, route, &AdsRequest::ReadDeviceInfo, limits, info).await
 }
 
-async fn data(mailbox: &Mailbox, route: AoeRoute, asked: &AdsRequest<'_>, limits: Limits) -> Result<Vec<u8>, AoeError> {
+async fn data(mailbox: &Mailbox, route: AoeRoute, ads: &AdsRequest<'_>, limits: Limits) -> Result<Vec<u8>, AoeError> {
     let data = |response: AdsResponse<'_>| match response {
         AdsResponse::Data { data, .. } => Some(data.to_vec()),
         AdsResponse::DeviceInfo { .. } | AdsResponse::State { .. } | AdsResponse::Done { .. } => None,
     };
-    request(mailbox, route, asked, limits, data).await
+    request(mailbox, route, ads, limits, data).await
 }
 
 /// Sends a request and waits for the response with its invoke id.
 async fn request<T>(
     mailbox: &Mailbox,
     route: AoeRoute,
-    asked: &AdsRequest<'_>,
+    ads: &AdsRequest<'_>,
     limits: Limits,
     take: impl Fn(AdsResponse<'_>) -> Option<T>,
 ) -> Result<T, AoeError> {
     let mut conversation = mailbox.conversation(Lane::Aoe).await?;
-    let (command, invoke_id) = (asked.command(), conversation.number());
+    let (command, invoke_id) = (ads.command(), conversation.number());
     let mut payload = vec![0; conversation.request_capacity().max(AmsHeader::LEN)];
     let limit = payload.len();
     let too_long = MailboxError::TooLong { bytes: limit + 1, limit };
-    let length = asked.encode(&mut payload[AmsHeader::LEN..]).ok_or(too_long)?;
+    let length = ads.encode(&mut payload[AmsHeader::LEN..]).ok_or(too_long)?;
     let AoeRoute { target, source } = route;
     let (flags, error) = (AmsHeader::REQUEST, AdsErrorCode::NO_ERROR);
     let header = AmsHeader { target, source, command, flags, length: length as u32, error, invoke_id };

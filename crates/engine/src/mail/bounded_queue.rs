@@ -41,10 +41,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_full_ring_keeps_what_it_has_and_counts_the_rest() {
-        let mut ring = BoundedQueue::new(2);
-        (0..5).for_each(|n| ring.push(n));
-        assert_eq!(ring.overruns(), 3);
-        assert_eq!([ring.pop(), ring.pop(), ring.pop()], [Some(0), Some(1), None]);
+    fn a_full_queue_keeps_the_oldest_items_and_counts_the_dropped_ones() {
+        let mut queue = BoundedQueue::new(2);
+        (0..5).for_each(|n| queue.push(n));
+        assert_eq!(queue.overruns(), 3);
+        assert_eq!([queue.pop(), queue.pop(), queue.pop()], [Some(0), Some(1), None]);
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! [`upload`] and [`download`] move objects of any size, expedited, normal or in segments, between the SubDevice and a
 //! [`Sink`](super::stream::Sink) or [`Source`](super::stream::Source); [`read`] and [`write()`] do so with bytes in
-//! memory. [`information`] asks which objects there are, [`pdo`] reads and writes assignment and mapping, [`history`]
-//! the diagnosis history; [`pdo_mail`] moves PDOs by mailbox.
+//! memory. [`information`] reads lists and descriptions of objects, [`pdo`] reads and writes assignment and mapping,
+//! [`history`] reads the diagnosis history; [`pdo_mail`] transfers PDOs by mailbox.
 
 mod address;
 mod download;

@@ -24,8 +24,9 @@ const PARTS_LIMIT: Duration = Duration::from_secs(1);
 /// Largest number of parts of a late answer: they are counted with 16 bits (protocol 6.3, 6.6).
 const LATE_PARTS: usize = 1 << 16;
 
-/// A lane of a mailbox, held by one conversation. When it is dropped, the lane is free for the next; a request without
-/// its answer is remembered, so that this answer is not taken for that to another request.
+/// A conversation with a SubDevice, which holds a lane of its mailbox. When it is dropped, the lane is free for the
+/// next. A request without an answer is remembered, so that its late answer does not count as the answer to another
+/// request.
 #[derive(Debug)]
 pub struct Conversation {
     shared: Rc<SharedMailbox>,
@@ -38,7 +39,7 @@ pub struct Conversation {
     open: bool,
 }
 
-/// A place in the queue for a lane; dropped while waiting, it leaves the queue.
+/// A place in the queue for a lane; when it is dropped before its turn, the place is removed.
 struct Turn {
     shared: Rc<SharedMailbox>,
     lane: Lane,
@@ -60,7 +61,7 @@ fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
 }
 
 impl Conversation {
-    /// Waits for the lane to be free.
+    /// Waits until the lane is free, and takes it.
     pub(super) async fn take(shared: &Rc<SharedMailbox>, lane: Lane) -> Result<Conversation, MailboxError> {
         let (mut turn, epoch) = {
             let state = &mut *shared.state_mut();
@@ -117,7 +118,7 @@ impl Conversation {
         self.with(|lane| lane.turns.len() > 1).unwrap_or(true)
     }
 
-    /// A number that no other recent request of this mailbox has.
+    /// A number that is unique among the recent requests of this mailbox.
     pub fn number(&mut self) -> u32 {
         let state = &mut *self.shared.state_mut();
         state.next_id = state.next_id.wrapping_add(1);
@@ -129,7 +130,7 @@ impl Conversation {
         self.shared.bus.now()
     }
 
-    /// Waits, until the mailbox is closed at the latest.
+    /// Waits; ends early with an error if the mailbox is closed.
     pub async fn pause(&self, pause: Duration) -> Result<(), MailboxError> {
         let closed = || self.with(|_| ()).err();
         match self.shared.bus.within(pause, self.shared.changed.until(closed)).await {
@@ -138,17 +139,17 @@ impl Conversation {
         }
     }
 
-    /// Mark of the next request: a number by which [`Conversation::late_mark`] distinguishes requests.
+    /// Sets the mark of the next request: a number by which [`Conversation::late_mark`] identifies it.
     pub fn mark(&mut self, mark: u16) {
         let _ = self.with(|lane| lane.mark = mark);
     }
 
-    /// The next request asks for a PDO with this CoE header; other PDOs are kept as unsolicited mail.
+    /// The answer to the next request is a PDO with this CoE header; other PDOs are kept as unsolicited mail.
     pub(super) fn expect_pdo(&mut self, header: Option<[u8; 2]>) {
         let _ = self.with(|lane| lane.pdo = header);
     }
 
-    /// Any mail of the lane's protocol is taken for the answer to the next request, except certainly unsolicited mail.
+    /// Any mail of the lane's protocol counts as the answer to the next request, except certainly unsolicited mail.
     pub(super) fn expect_any(&mut self, any: bool) {
         let _ = self.with(|lane| lane.any = any);
     }
@@ -158,19 +159,19 @@ impl Conversation {
         self.with(|lane| lane.late_until.map(|_| lane.mark)).ok().flatten()
     }
 
-    /// The late answer was received, or cannot come any more.
+    /// The late answer was received, or can no longer arrive.
     pub fn forget_late(&mut self) {
         let _ = self.with(|lane| lane.late_until = None);
     }
 
-    /// The answer to a request that was given up may come within a time.
+    /// The answer to a request that was given up may arrive within a time.
     pub(super) fn expect_late(&mut self, limit: Duration) {
         let now = self.shared.bus.now();
         let _ = self.with(|lane| lane.late_from(now, limit));
     }
 
-    /// Waits until all parts of the answer to an earlier request that was given up are received or cannot come any
-    /// more, in protocols whose answers do not name their request.
+    /// Waits until all parts of the answer to an earlier request that was given up are received or can no longer
+    /// arrive. For protocols in which an answer does not name its request.
     pub async fn settle(&mut self) -> Result<(), MailboxError> {
         for _ in 0..LATE_PARTS {
             let now = self.shared.bus.now();
@@ -178,7 +179,7 @@ impl Conversation {
             self.limit = until.since(now);
             self.with(|lane| lane.settling = true)?;
             self.poll_for_more()?;
-            // The time limit of a request that is written only now starts then.
+            // If the late request is written only now, its time limit starts now.
             let ready = || {
                 let heard = |lane: &mut LaneState| match lane.take() {
                     Some(arrival) => Some(Some(arrival)),
@@ -207,7 +208,7 @@ impl Conversation {
         Ok(())
     }
 
-    /// Begins a message in parts with an answer to the last one only: an error reply meanwhile may belong to one of
+    /// Begins a message in parts, of which only the last has an answer: an error reply before it may belong to one of
     /// them.
     pub(super) fn begin_parts(&mut self) {
         let _ = self.with(|lane| (lane.parts_until, lane.refusal) = (Some(Instant::NEVER), None));
@@ -222,7 +223,7 @@ impl Conversation {
         self.with(|lane| lane.parts_until = None)
     }
 
-    /// Whether all parts so far were accepted, as far as known.
+    /// Fails if an error reply was received since the first part.
     pub(super) fn check_parts(&self) -> Result<(), MailboxError> {
         self.with(|lane| lane.refusal)?.map_or(Ok(()), |reply| Err(MailboxError::Error(reply)))
     }
@@ -245,8 +246,8 @@ impl Conversation {
         self.write(payload, limit, None).await
     }
 
-    /// Sends a request and waits for the mail that `accept` recognises as its answer; other mail of the lane is dropped
-    /// and counted.
+    /// Sends a request and waits for the mail that `accept` recognises as its answer; other mail of the lane is kept as
+    /// unsolicited mail and counted.
     pub async fn request<T>(
         &mut self,
         payload: &[u8],
@@ -258,7 +259,8 @@ impl Conversation {
         Ok(answer)
     }
 
-    /// As [`Conversation::request`], where further parts of the answer may follow: [`Conversation::more`], until [`Conversation::complete`].
+    /// As [`Conversation::request`], for an answer in several parts: call [`Conversation::more`] for further parts,
+    /// then [`Conversation::complete`].
     pub async fn begin<T>(
         &mut self,
         payload: &[u8],
@@ -267,7 +269,7 @@ impl Conversation {
     ) -> Result<T, MailboxError> {
         self.limit = limits.1;
         self.keep_unclaimed();
-        // Its answer may begin before the write is confirmed.
+        // The answer may arrive before the write is confirmed.
         self.open = true;
         self.write(payload, limits.0, Some(limits.1)).await.inspect_err(|_| self.open = false)?;
         self.answer(limits.1, accept).await
@@ -284,7 +286,7 @@ impl Conversation {
         self.answer(limit, accept).await
     }
 
-    /// Makes the reader poll for more.
+    /// Makes the reader poll for a further mail.
     fn poll_for_more(&mut self) -> Result<(), MailboxError> {
         let (now, limit) = (self.shared.bus.now(), self.limit);
         self.with(|lane| {
@@ -352,7 +354,7 @@ impl Conversation {
         }
     }
 
-    /// The request is given up; its answer may come late.
+    /// Gives up the request; its answer may arrive late.
     fn give_up(&mut self) {
         let (now, limit, turn) = (self.shared.bus.now(), self.limit, self.turn);
         let open = core::mem::take(&mut self.open);
@@ -360,7 +362,7 @@ impl Conversation {
         self.keep_unclaimed();
     }
 
-    /// Received mail that was not taken becomes unsolicited mail.
+    /// Keeps received mail that the conversation did not take as unsolicited mail.
     fn keep_unclaimed(&self) {
         let state = &mut *self.shared.state_mut();
         if state.epoch != self.epoch {
@@ -371,7 +373,7 @@ impl Conversation {
         }
     }
 
-    /// Written parts may still be refused.
+    /// An error reply to the written parts may still arrive.
     fn leave_parts(&mut self) {
         let now = self.shared.bus.now();
         let _ = self.with(|lane| {
@@ -381,8 +383,7 @@ impl Conversation {
         });
     }
 
-    /// A message that was queued and not written yet when the conversation ends is withdrawn, unless it needs no
-    /// answer.
+    /// Withdraws queued messages when the conversation ends, except those without an answer.
     fn withdraw(&mut self) {
         let withdraw = |lane: &mut LaneState| {
             let queued = lane.outbox.len();

@@ -16,13 +16,13 @@ pub struct MailCounters {
     pub empty_reads: u64,
     /// Polls of the status of the send mailbox.
     pub polls: u64,
-    /// Mails that came twice and were dropped.
+    /// Duplicate mails that were dropped.
     pub duplicates: u64,
     /// Mails received only with the second copy of a read, or after their read was given up.
     pub strays: u64,
     /// Mails without a readable header.
     pub malformed: u64,
-    /// Answers without a waiting request: too late, or to no request.
+    /// Mails without a waiting request: late answers, or answers to no request.
     pub unclaimed: u64,
     /// Messages that were not queued because their lane was full.
     pub refused: u64,

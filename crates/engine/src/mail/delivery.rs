@@ -22,7 +22,7 @@ const AOE_RESPONSE: u8 = 0x01;
 /// EoE types that are answers: set IP, set filter, get IP, get filter (protocol 6.5).
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
-/// Takes the content of the send mailbox. Any bytes are allowed. True where a conversation waited for it.
+/// Takes the content of the send mailbox. Any bytes are allowed. True if a conversation waited for it.
 pub(super) fn deliver(shared: &Rc<SharedMailbox>, mail: &[u8], kind: ReadKind, sent: Instant) -> bool {
     let wanted = {
         let state = &mut *shared.state_mut();
@@ -44,7 +44,7 @@ pub(super) fn deliver(shared: &Rc<SharedMailbox>, mail: &[u8], kind: ReadKind, s
 }
 
 fn is_duplicate(state: &mut MailboxState, message: &Message<'_>, kind: ReadKind, sent: Instant) -> bool {
-    // A repeat may bring the mail before the lost one.
+    // A repeat may return the mail before the lost one.
     let kind = if state.repeated && kind == ReadKind::Expected { ReadKind::Repeat } else { kind };
     let duplicate = state.recent.is_duplicate(message.header.counter, message.payload, kind, sent);
     state.repeated &= duplicate || kind != ReadKind::Repeat;
@@ -54,7 +54,7 @@ fn is_duplicate(state: &mut MailboxState, message: &Message<'_>, kind: ReadKind,
 fn sort(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'_>) -> bool {
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
-    // Frames have no answer, but the sender of frames knows EoE.
+    // Ethernet frames have no answer, but a SubDevice that sends frames supports EoE.
     state.lanes[Lane::Frames.index()].proven |= message.header.protocol == Protocol::Eoe;
     match message.header.protocol {
         Protocol::Error => refused(state, message, shared.bus.now()),
@@ -112,11 +112,11 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
     }
 }
 
-/// To the conversation in the lane; without one, into a ring.
+/// Passes a mail to the conversation in the lane; without a waiting conversation it is kept as unsolicited mail.
 fn answer(state: &mut MailboxState, lane: Lane, message: &Message<'_>) -> bool {
     let arrival = Arrival::Payload(message.payload.to_vec());
     let own = &mut state.lanes[lane.index()];
-    // A conversation takes one answer at a time; the oldest in the queue is not the expected one.
+    // A conversation takes one answer at a time; if the queue is full, the oldest one is not the expected answer.
     let oldest = if own.is_full() { own.take() } else { None };
     let wanted = own.arrive(arrival, state.available_at, is_last(lane, message.payload));
     if let Some(oldest) = oldest {
@@ -137,7 +137,7 @@ pub(super) fn is_last(lane: Lane, payload: &[u8]) -> bool {
     }
 }
 
-/// A mail for a lane without a conversation that waits for it: unsolicited mail, or a late answer.
+/// Keeps a mail that no conversation waits for: unsolicited mail, or a late answer.
 pub(super) fn keep_unclaimed(state: &mut MailboxState, lane: Lane, arrival: Arrival) {
     let (kind, protocol, payload) = match arrival {
         Arrival::Payload(payload) => (lane.unclaimed_kind(), lane.protocol(), payload),
@@ -155,10 +155,10 @@ fn keep(state: &mut MailboxState, message: &Message<'_>, kind: Unsolicited) -> b
     false
 }
 
-/// An error reply does not name its request. It goes to the waiting request; of several, first to one of a protocol
-/// that the SubDevice has not shown to support, then to the oldest. A sender of a message in parts is informed, too.
-/// The cause is certain only where the reply can belong to nothing else: neither to a request that was given up nor to
-/// a message without an answer. Otherwise the answer to the ended request may still come.
+/// Delivers an error reply. It does not name its request: it goes to the waiting request; of several, first to one of a
+/// protocol that the SubDevice has not proven to support, then to the oldest. A sender of a message in parts receives
+/// it, too. The assignment is certain only if the reply can belong to no other message: neither to a request that was
+/// given up nor to a message without an answer. Otherwise the answer to the ended request may still arrive.
 fn refused(state: &mut MailboxState, message: &Message<'_>, now: Instant) -> bool {
     let Some(bytes) = message.payload.first_chunk() else {
         state.counters.malformed += 1;
@@ -173,7 +173,7 @@ fn refused(state: &mut MailboxState, message: &Message<'_>, now: Instant) -> boo
     let is_waiting = |lane: &LaneState| lane.waiting().is_some();
     let is_late = |lane: &LaneState| !lane.settling && lane.late_until.is_some_and(|until| now < until);
     let may_be_to = |lane: &LaneState| is_waiting(lane) || is_late(lane) || lane.is_unanswered(now);
-    // Only an unknown protocol is refused as such.
+    // A protocol that the SubDevice has proven to support is not refused as unsupported.
     let unknown = reply.detail == ErrorReply::UNSUPPORTED_PROTOCOL
         && state.lanes.iter().any(|lane| !lane.proven && may_be_to(lane));
     let in_question = |lane: &LaneState| !(unknown && lane.proven);

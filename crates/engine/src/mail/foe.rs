@@ -64,14 +64,14 @@ struct Transfer<P> {
     progress: P,
     /// Payload of a message.
     payload: alloc::vec::Vec<u8>,
-    /// The SubDevice waits for a message of the MainDevice, or the reverse.
+    /// The transfer is in progress in the SubDevice.
     busy: bool,
-    /// Start of BUSY without progress, and the progress then.
+    /// Start of BUSY without progress, and the reported progress.
     since: Option<(crate::time::Instant, u16)>,
 }
 
 /// Response of the SubDevice to a message.
-enum Said<T> {
+enum Response<T> {
     Answer(T),
     Busy,
 }
@@ -85,7 +85,7 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
     }
 
     /// Sends a message, repeats it while the SubDevice is busy, and returns what `accept` recognises as the answer.
-    async fn ask<T>(
+    async fn request<T>(
         &mut self,
         message: &FoeMessage<'_>,
         mut accept: impl FnMut(FoeMessage<'_>) -> Option<T>,
@@ -93,8 +93,8 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
         self.since = None;
         loop {
             match self.try_once(message, &mut accept).await? {
-                Said::Answer(answer) => return Ok(answer),
-                Said::Busy => {
+                Response::Answer(answer) => return Ok(answer),
+                Response::Busy => {
                     let pause = self.options.busy_pause;
                     self.conversation.pause(pause).await?;
                 }
@@ -106,38 +106,39 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
         &mut self,
         message: &FoeMessage<'_>,
         accept: &mut impl FnMut(FoeMessage<'_>) -> Option<T>,
-    ) -> Result<Said<T>, FoeFailure> {
+    ) -> Result<Response<T>, FoeFailure> {
         let Some(length) = message.encode(&mut self.payload) else {
             let bytes = FoeMessage::OVERHEAD + name_of(message).len();
             return Err(MailboxError::TooLong { bytes, limit: self.payload.len() }.into());
         };
-        enum Heard<T> {
+        enum Reply<T> {
             Answer(T),
             Busy { done: u16, entire: u16, text: String },
             Error(FoeErrorCode, String),
         }
-        let heard = |payload: &[u8]| match FoeMessage::decode(payload).ok()? {
-            FoeMessage::Error { code, text } => Some(Heard::Error(code, to_text(text))),
-            FoeMessage::Busy { done, entire, text } => Some(Heard::Busy { done, entire, text: to_text(text) }),
-            other => accept(other).map(Heard::Answer),
+        let recognise = |payload: &[u8]| match FoeMessage::decode(payload).ok()? {
+            FoeMessage::Error { code, text } => Some(Reply::Error(code, to_text(text))),
+            FoeMessage::Busy { done, entire, text } => Some(Reply::Busy { done, entire, text: to_text(text) }),
+            other => accept(other).map(Reply::Answer),
         };
         self.busy = true;
-        let answer = self.conversation.request(&self.payload[..length], self.options.limits, heard).await.inspect_err(
-            |error| {
-                // A file that the SubDevice certainly did not open needs no abort.
-                let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
-                if opens && matches!(error, MailboxError::Error(_)) && self.conversation.late_mark().is_none() {
-                    self.busy = false;
-                }
-            },
-        )?;
+        let answer =
+            self.conversation.request(&self.payload[..length], self.options.limits, recognise).await.inspect_err(
+                |error| {
+                    // If the SubDevice certainly did not open the file, no abort is needed.
+                    let opens = matches!(message, FoeMessage::Read { .. } | FoeMessage::Write { .. });
+                    if opens && matches!(error, MailboxError::Error(_)) && self.conversation.late_mark().is_none() {
+                        self.busy = false;
+                    }
+                },
+            )?;
         match answer {
-            Heard::Answer(answer) => Ok(Said::Answer(answer)),
-            Heard::Error(code, text) => {
+            Reply::Answer(answer) => Ok(Response::Answer(answer)),
+            Reply::Error(code, text) => {
                 self.busy = false;
                 Err(FoeFailure::Refused { code, text })
             }
-            Heard::Busy { done, entire, text } => {
+            Reply::Busy { done, entire, text } => {
                 let now = self.conversation.now();
                 let (since, before) = self.since.unwrap_or((now, done));
                 let since = if before == done { since } else { now };
@@ -146,12 +147,12 @@ impl<P: FnMut(FoeProgress)> Transfer<P> {
                     return Err(FoeFailure::BusyForTooLong { limit: self.options.busy_limit });
                 }
                 (self.progress)(FoeProgress::Busy { done, entire, text });
-                Ok(Said::Busy)
+                Ok(Response::Busy)
             }
         }
     }
 
-    /// Tells the SubDevice that the transfer is over.
+    /// Ends the transfer with an FoE error message.
     fn give_up(&mut self, code: FoeErrorCode, text: &[u8]) {
         if !core::mem::take(&mut self.busy) {
             return;

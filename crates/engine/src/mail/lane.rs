@@ -1,4 +1,4 @@
-//! Lanes: the parallel conversations of one mailbox, one per protocol.
+//! Lanes of one mailbox: one per protocol, each with at most one conversation at a time.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -18,7 +18,7 @@ const OUTBOX: usize = 64;
 /// Time in which an error reply may still belong to a message without an answer.
 const UNANSWERED_LIMIT: Duration = Duration::from_secs(1);
 
-/// One conversation at a time; different lanes run side by side.
+/// A lane holds one conversation at a time; the lanes work in parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lane {
     /// SDO and SDO information.
@@ -31,9 +31,9 @@ pub enum Lane {
     Aoe,
     /// Vendor protocol.
     Voe,
-    /// Ethernet: the settings of its addresses.
+    /// Ethernet: IP parameters and address filter.
     Eoe,
-    /// Ethernet: its frames, which have no answer.
+    /// Ethernet: frames, which have no answer.
     Frames,
     /// Mail of a type without a lane of its own: the lower four bits of the type byte. All such types share one lane.
     Other(u8),
@@ -73,7 +73,7 @@ impl Lane {
         }
     }
 
-    /// Its index among all lanes.
+    /// Index among all lanes.
     pub(super) const fn index(self) -> usize {
         match self {
             Lane::Coe => 0,
@@ -87,7 +87,7 @@ impl Lane {
         }
     }
 
-    /// Ring for its mail without a waiting conversation.
+    /// Kind of its mail without a waiting conversation.
     pub(super) const fn unclaimed_kind(self) -> Unsolicited {
         match self {
             Lane::Voe => Unsolicited::Voe,
@@ -104,9 +104,9 @@ pub(super) struct Outgoing {
     pub id: u32,
     pub lane: Lane,
     pub payload: Vec<u8>,
-    /// How long the SubDevice may leave the mailbox full.
+    /// Longest time that the receive mailbox may stay full.
     pub limit: Duration,
-    /// The sender: turn of a conversation.
+    /// Turn of the conversation that sends it.
     pub turn: u32,
     /// Time limit of the answer, if there is one.
     pub answer_limit: Option<Duration>,
@@ -115,15 +115,15 @@ pub(super) struct Outgoing {
 /// A request that was written.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingRequest {
-    /// When it was written, or when the last part of its answer was received.
+    /// Time at which it was written, or at which the last part of its answer was received.
     pub at: Instant,
     /// Time limit of the answer, or of its next part.
     pub limit: Duration,
     /// Whether the reader has polled for it.
     pub polled: bool,
-    /// Time after that at which the last poll found nothing.
+    /// Time from `at` to the last poll without mail.
     pub empty_poll: Option<Duration>,
-    /// A part of the answer is received, and the conversation has not asked for more.
+    /// A part of the answer is received, and the conversation has not requested the next one.
     pub answered: bool,
 }
 
@@ -138,28 +138,28 @@ impl PendingRequest {
 pub(super) enum Arrival {
     /// Payload of a message of its protocol.
     Payload(Vec<u8>),
-    /// The SubDevice refused a message. The flag says whether it may have been another message, so that an answer may
-    /// still come.
+    /// The SubDevice refused a message. If the flag is set, it may have been another message, and the answer may still
+    /// arrive.
     Refused(ErrorReply, bool),
 }
 
 /// State of one lane.
 #[derive(Debug, Default)]
 pub(super) struct LaneState {
-    /// Queue for the lane; the first one holds it.
+    /// Queue for the lane; the first entry holds it.
     pub turns: VecDeque<u32>,
     pub outbox: VecDeque<Outgoing>,
     inbox: VecDeque<Arrival>,
     /// The last message to be written, written or not.
     pub written: Option<(u32, Result<(), MailboxError>)>,
     pub pending: Option<PendingRequest>,
-    /// Until when the answer to a request that was given up, or its next part, may still come.
+    /// Until when the answer to a request that was given up, or its next part, may still arrive.
     pub late_until: Option<Instant>,
-    /// Time limit of each part of it.
+    /// Time limit of each part of that answer.
     late_limit: Duration,
-    /// Time it may still take, while no mail can be read.
+    /// Remaining time of that answer, while no mail can be read.
     late_for: Option<Duration>,
-    /// The conversation waits for that answer and has sent no request.
+    /// The conversation waits for that answer before its first request.
     pub settling: bool,
     /// A request is being written, with its turn.
     writing: Option<u32>,
@@ -171,13 +171,13 @@ pub(super) struct LaneState {
     pub pdo: Option<[u8; 2]>,
     /// The answer to the last message written has this mail type.
     pub expected: Option<Protocol>,
-    /// Any mail of the lane's protocol is taken for the answer, unless it is certainly unsolicited.
+    /// Any mail of the lane's protocol counts as the answer, unless it is certainly unsolicited.
     pub any: bool,
     pub answer_time: AnswerTime,
-    /// A message is written in parts with an answer to the last one only, or was until recently: until then an error
-    /// reply may belong to one of them.
+    /// Until when an error reply may belong to a part of a message that is written in parts, of which only the last has
+    /// an answer.
     pub parts_until: Option<Instant>,
-    /// An error reply that was received meanwhile.
+    /// An error reply that was received since the first part.
     pub refusal: Option<ErrorReply>,
     /// The SubDevice has answered in this lane: it supports the protocol.
     pub proven: bool,
@@ -190,7 +190,7 @@ impl LaneState {
         *self = LaneState { turns, answer_time, ..LaneState::default() };
     }
 
-    /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may come when it is reachable again.
+    /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may arrive when it is reachable again.
     pub(super) fn suspend(&mut self, now: Instant) {
         let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
         let late_for = self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max();
@@ -209,25 +209,25 @@ impl LaneState {
         self.unanswered_until = self.unanswered_until.map(|_| now + UNANSWERED_LIMIT);
     }
 
-    /// The answer to a request that was given up may still come, each part of it within a time limit.
+    /// The answer to a request that was given up may still arrive, each part within a time limit.
     pub(super) fn late_from(&mut self, now: Instant, limit: Duration) {
         (self.late_until, self.late_limit) = (Some(now + limit), limit);
     }
 
-    /// A part of that answer was received: the next one may take as long again.
+    /// A part of that answer was received: its time limit starts again for the next part.
     pub(super) fn late_goes_on(&mut self, now: Instant) {
         self.late_until = self.late_until.map(|until| until.max(now + self.late_limit));
     }
 
-    /// The conversation of a turn gives its request up; `open` where the answer is incomplete.
+    /// The conversation of a turn gives up its request; `open`: the answer is incomplete.
     pub(super) fn give_up(&mut self, turn: u32, open: bool, now: Instant, limit: Duration) {
         let unanswered = self.pending.take().is_some_and(|pending| !pending.answered);
-        // A conversation that only waited for the answer to an earlier one's request leaves that as it is.
+        // The conversation only waited for a late answer: the time limit of that answer is unchanged.
         if core::mem::take(&mut self.settling) {
             return;
         }
         if self.writing == Some(turn) {
-            // The time limit of its answer starts when it is written.
+            // The time limit of the answer starts when the request is written.
             (self.late_until, self.late_limit) = (Some(Instant::NEVER), limit);
         } else if unanswered || open {
             self.late_from(now, limit);
@@ -243,11 +243,11 @@ impl LaneState {
         self.turns.is_empty() && self.outbox.is_empty() && self.inbox.is_empty() && self.pending.is_none()
     }
 
-    pub(super) fn has_room(&self) -> bool {
+    pub(super) fn has_space(&self) -> bool {
         self.outbox.len() < OUTBOX
     }
 
-    /// A message of a conversation is about to be written. Its answer may come before the write is confirmed.
+    /// A message is about to be written. Its answer may arrive before the write is confirmed.
     pub(super) fn writing(&mut self, message: &Outgoing, now: Instant) {
         match message.answer_limit {
             Some(_) => self.writing = Some(message.turn),
@@ -259,11 +259,11 @@ impl LaneState {
         }
     }
 
-    /// A message of a conversation was written to the SubDevice, or may have been.
+    /// The write of a message ended; even if it failed, the message may have reached the SubDevice.
     pub(super) fn wrote(&mut self, message: &Outgoing, result: Result<(), MailboxError>, now: Instant) {
         let arrived = match result {
             Ok(()) => true,
-            // Lost frames may have been lost on the way back.
+            // The frame may have been lost after the SubDevice processed it.
             Err(MailboxError::Bus(_)) => true,
             Err(_) => false,
         };
@@ -279,7 +279,7 @@ impl LaneState {
                     self.late_from(now, limit);
                 }
             } else if self.late_until.is_some() {
-                // It was given up meanwhile, and its answer has not come yet.
+                // The request was given up meanwhile, and its answer has not arrived yet.
                 self.late_from(now, limit);
             }
             self.writing = None;
@@ -294,21 +294,20 @@ impl LaneState {
         self.waiting().map(|pending| pending.at + self.answer_time.first_poll())
     }
 
-    /// A poll that presumably began then found nothing.
+    /// A poll that presumably began at `seen` found no mail.
     pub(super) fn polled_empty(&mut self, seen: Instant) {
         if let Some(pending) = self.pending.as_mut().filter(|pending| pending.polled) {
             pending.empty_poll = Some(seen.since(pending.at));
         }
     }
 
-    /// The request of the answer that the reader polls for.
+    /// The request with an answer that the reader polls for.
     pub(super) fn waiting(&self) -> Option<&PendingRequest> {
         self.pending.as_ref().filter(|pending| !pending.answered)
     }
 
-    /// Takes an answer, or a possible one, for the conversation. False where none waits.
-    ///
-    /// `seen` is its presumed time of availability; `last`: no further part of it follows.
+    /// Takes a possible answer for the conversation. False if no conversation waits. `seen` is the presumed time at
+    /// which it became available; `last`: no further part follows.
     pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant, last: bool) -> bool {
         let Some(pending) = &mut self.pending else {
             if last {

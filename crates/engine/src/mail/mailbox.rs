@@ -16,15 +16,15 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
-/// The handle to a SubDevice's mailbox and its router; copies of it are the same mailbox. It outlives the absence of
-/// the SubDevice: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
+/// The handle to a SubDevice's mailbox and its router; copies are handles to the same mailbox. It stays valid while the
+/// SubDevice is absent: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
 #[derive(Clone, Debug)]
 pub struct Mailbox {
     shared: Rc<SharedMailbox>,
 }
 
 impl Mailbox {
-    /// A mailbox that is not in use yet. `subdevice` names it in events.
+    /// A mailbox that is not in use yet. `subdevice` is its number in events.
     pub fn new(bus: &Bus, subdevice: usize) -> Mailbox {
         Mailbox { shared: SharedMailbox::new(bus, subdevice) }
     }
@@ -56,7 +56,7 @@ impl Mailbox {
         self.shared.mail_available();
     }
 
-    /// Makes the reader poll once whether the SubDevice has mail.
+    /// Makes the reader poll the status of the send mailbox once.
     pub(super) fn poll_once(&self) {
         self.shared.poll_once();
     }
@@ -65,7 +65,7 @@ impl Mailbox {
         &self.shared
     }
 
-    /// Whether it may be used.
+    /// Whether the mailbox may be used.
     pub fn is_open(&self) -> bool {
         self.shared.state().open
     }
@@ -84,20 +84,20 @@ impl Mailbox {
         state.session.filter(|_| state.open).map(|session| session.station)
     }
 
-    /// Station address of the SubDevice and the register that shows whether it has mail, while the mailbox may be used.
+    /// Station address of the SubDevice and status register of its send mailbox, while the mailbox may be used.
     pub(crate) fn send_status(&self) -> Option<(StationAddress, RegisterAddress)> {
         let state = self.shared.state();
         state.session.filter(|_| state.open).map(|session| (session.station, session.send_status()))
     }
 
-    /// Waits for a lane to be free, and takes it.
+    /// Waits until a lane is free, and takes it.
     pub async fn conversation(&self, lane: Lane) -> Result<Conversation, MailboxError> {
         // Types with a lane of their own use only that.
         let lane = if let Lane::Other(code) = lane { Lane::of(code) } else { lane };
         Conversation::take(&self.shared, lane).await
     }
 
-    /// The bus on which it works.
+    /// The bus.
     pub fn bus(&self) -> &Bus {
         &self.shared.bus
     }
@@ -113,12 +113,12 @@ impl Mailbox {
         self.shared.state().last_error
     }
 
-    /// Clears that error; `before` is the previous one.
+    /// Sets the last error back to `before`.
     pub(crate) fn forget_protocol_error(&self, before: u32) {
         self.shared.state_mut().last_error = before;
     }
 
-    /// Takes the oldest kept emergency, with the time at which it was read. Each was an event, too.
+    /// Takes the oldest kept emergency, with the time at which it was read. Each emergency is also an event.
     pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
         self.shared.state_mut().unsolicited.emergencies().pop()
     }
@@ -128,7 +128,7 @@ impl Mailbox {
         self.shared.state_mut().unsolicited.emergencies().clear();
     }
 
-    /// Number of emergencies that were not kept because there were too many.
+    /// Number of emergencies that were not kept because the queue was full.
     pub fn emergency_overruns(&self) -> u64 {
         self.shared.state_mut().unsolicited.emergencies().overruns()
     }
@@ -138,12 +138,12 @@ impl Mailbox {
         self.shared.state_mut().unsolicited.of_kind(kind).pop()
     }
 
-    /// Mails of a kind that were not kept because the ring was full.
+    /// Number of mails of a kind that were not kept because the queue was full.
     pub fn unsolicited_overruns(&self, kind: Unsolicited) -> u64 {
         self.shared.state_mut().unsolicited.of_kind(kind).overruns()
     }
 
-    /// Waits for unsolicited mail of a kind; `None` where none came within the time.
+    /// Waits for unsolicited mail of a kind; `None` if none is received within the time.
     pub(super) async fn unsolicited_within(
         &self,
         kind: Unsolicited,

@@ -1,4 +1,4 @@
-//! Errors in the mail of SubDevices, in the numbers of each protocol (protocol 6.1, 6.3, 6.4, 6.6, 6.7).
+//! Error codes in the mail of SubDevices, as defined by each protocol (protocol 6.1, 6.3, 6.4, 6.6, 6.7).
 
 use ringcat_wire::mailbox::aoe::{AdsErrorCode, AdsResponse, AmsHeader};
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, InformationOpcode, SdoInformation};
@@ -66,7 +66,7 @@ mod tests {
 
     // covers: 6, own-objects
     #[test]
-    fn errors_of_all_protocols_are_found_and_nothing_else_is_one() {
+    fn errors_of_all_protocols_are_detected_and_other_mail_is_no_error() {
         let abort = [0x00, 0x30, 0x80, 0x00, 0x20, 0x01, 0x11, 0x00, 0x09, 0x06];
         assert_eq!(error_of(Protocol::Coe, &abort), Some(0x0609_0011));
         let from_a_device = [0x00, 0x20, 0x80, 0x00, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06];
@@ -84,7 +84,7 @@ mod tests {
         (ads[16], ads[18], ads[20], ads[32]) = (3, 5, 4, 7);
         assert_eq!(error_of(Protocol::Aoe, &ads), Some(7));
         ads[18] = 4;
-        assert_eq!(error_of(Protocol::Aoe, &ads), None, "a request of the device tells no error");
+        assert_eq!(error_of(Protocol::Aoe, &ads), None, "a request of the SubDevice contains no error");
         for protocol in [Protocol::Coe, Protocol::Error, Protocol::Foe, Protocol::Soe, Protocol::Aoe, Protocol::Voe] {
             assert_eq!(error_of(protocol, &[]), None);
         }

@@ -1,7 +1,5 @@
-//! Messages that the application composes: any payload, in the lane of a protocol or of any other mail type
-//! ([`Lane::of`]).
-//!
-//! The router sets header and counter, so that other conversations are not disturbed.
+//! Messages with any payload from the application, in the lane of a protocol or of any other mail type ([`Lane::of`]).
+//! The router sets header and counter, so that these messages do not disturb other conversations.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -10,7 +8,7 @@ use super::conversation::Limits;
 use super::lane::Lane;
 use super::{Mailbox, MailboxError};
 
-/// Sends a message and waits until the SubDevice accepted it. An answer to it is kept as unsolicited mail.
+/// Sends a message and waits until the SubDevice has accepted it. An answer is kept as unsolicited mail.
 pub async fn send(mailbox: &Mailbox, lane: Lane, payload: &[u8], limit: Duration) -> Result<(), MailboxError> {
     mailbox.conversation(lane).await?.send(payload, limit).await
 }

@@ -1,4 +1,4 @@
-//! Reads mail when there is some, or while a conversation waits for an answer (protocol 6.1, 6.2).
+//! Reads the send mailbox when it is full, and polls it while a conversation waits for an answer (protocol 6.1, 6.2).
 //!
 //! A lost read is recovered with the repeat request. Received mail is passed to `delivery`.
 
@@ -16,11 +16,11 @@ use super::shared::{Session, SharedMailbox};
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// Time limit for a SubDevice to repeat its last mail.
+/// Time limit of the repeat acknowledge.
 const REPEAT_LIMIT: Duration = Duration::from_millis(100);
-/// Pause between two polls for that.
+/// Pause between two polls for it.
 const REPEAT_PAUSE: Duration = Duration::from_micros(200);
-/// Pause after a failed access, so that a SubDevice that is unreachable does not cause continuous traffic.
+/// Pause after a failed access, so that an unreachable SubDevice does not cause continuous traffic.
 const FAILURE_PAUSE: Duration = Duration::from_millis(5);
 
 /// Kinds of accesses.
@@ -62,7 +62,7 @@ enum Step {
 }
 
 async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
-    // Times of the next poll, after one in vain, and of the next access of any kind, after a failed one.
+    // Earliest times of the next poll, after an empty poll, and of the next access, after a failed access.
     let (mut next_poll, mut hold) = (Instant::default(), Instant::default());
     while let Some(session) = shared.session(epoch) {
         while let Some(stray) = shared.bus.stray_mail(session.station) {
@@ -71,7 +71,7 @@ async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
                 state.counters.strays += 1;
                 state.available_at = shared.bus.now();
             }
-            // Content read from a mailbox of an earlier session is dropped when it arrives in this one.
+            // Mail that was read in an earlier session is dropped.
             if stray.sent_at >= session.since {
                 delivery::deliver(&shared, &stray.mail, ReadKind::Stray, stray.sent_at);
             }
@@ -83,7 +83,7 @@ async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
                 let tasks = shared.state().tasks;
                 let more = || (shared.session(epoch).is_none() || shared.state().tasks != tasks).then_some(());
                 if shared.bus.within(limit, shared.work.until(more)).await.is_ok() {
-                    // The answer of another lane may come sooner.
+                    // The answer of another lane may be available earlier.
                     next_poll = shared.bus.now();
                 }
                 continue;
@@ -138,8 +138,8 @@ fn step(shared: &Rc<SharedMailbox>, next_poll: Instant, hold: Instant) -> Step {
     if sure { Step::Read } else { Step::Poll }
 }
 
-/// When to poll for the first of the expected answers, and whether it will certainly be available then. The reader
-/// polls for fragments of Ethernet frames while some were transferred recently.
+/// When to poll for the first of the expected answers, and whether to read the mailbox at once. The reader also polls
+/// for fragments of Ethernet frames while fragments were transferred recently.
 fn first_poll(state: &super::shared::MailboxState, now: Instant) -> Option<(Instant, bool)> {
     if state.blocked || (state.ethernet.recently_active(now).is_some() && !state.waiting()) {
         return Some((Instant::default(), false));
@@ -148,13 +148,13 @@ fn first_poll(state: &super::shared::MailboxState, now: Instant) -> Option<(Inst
         let pending = lane.waiting()?;
         Some((lane.due()?, !pending.polled && lane.answer_time.is_sure()))
     });
-    // An answer due now comes first: the poll may read it at once.
+    // An answer that is due now precedes Ethernet: the mailbox may be read at once.
     let ethernet = state.ethernet.recently_active(now).map(|_| (now, false));
     polls.chain(ethernet).min_by_key(|(due, _)| *due)
 }
 
-/// Pause after a poll in vain: a part of the time that the oldest answer was waited for, or of the time since the last
-/// fragment of an Ethernet frame.
+/// Pause after an empty poll: a part of the waiting time of the oldest request, or of the time since the last fragment
+/// of an Ethernet frame.
 fn pause(shared: &Rc<SharedMailbox>, now: Instant) -> Duration {
     let state = shared.state();
     let waited = state.lanes.iter().filter_map(|lane| lane.waiting()).map(|pending| now.since(pending.at)).max();
@@ -162,13 +162,13 @@ fn pause(shared: &Rc<SharedMailbox>, now: Instant) -> Duration {
     pause.unwrap_or(AnswerTime::pause(Duration::ZERO))
 }
 
-/// Presumed start of an access that began then and has just ended, had it not been queued.
+/// Presumed time at which an access left the send queue: it was requested at `begun` and has just ended.
 fn started_at(bus: &Bus, begun: Instant, trip: &mut ShortestTrip) -> Instant {
     let took = bus.now().since(begun);
     begun + (took - trip.took(took).min(took))
 }
 
-/// Polls the status of the send mailbox; records where it is full.
+/// Polls the status of the send mailbox; records that it is full.
 async fn poll(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, MailboxError> {
     shared.state_mut().counters.polls += 1;
     let begun = shared.bus.now();
@@ -185,14 +185,14 @@ async fn poll(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, Mai
     Ok(full)
 }
 
-/// Reads the whole send mailbox; false where it is empty.
+/// Reads the whole send mailbox; false if it is empty.
 async fn read(shared: &Rc<SharedMailbox>, epoch: u32, session: &Session) -> Result<bool, MailboxError> {
     let register = RegisterAddress(session.layout.send_offset);
     let begun = shared.bus.now();
     shared.state_mut().reading = true;
     let reply = shared.bus.read_mail(session.station, register, usize::from(session.layout.send_size)).await;
     if shared.session(epoch).is_none() {
-        // The mailbox may be the same after a time in which it was unusable.
+        // After an interruption the session may be the same: then the mail is still valid.
         let lasts = shared.state().session.is_some_and(|now| now.since == session.since);
         if let Ok(reply) = reply
             && lasts
@@ -222,7 +222,7 @@ async fn read(shared: &Rc<SharedMailbox>, epoch: u32, session: &Session) -> Resu
                 state.counters.read += 1;
             }
             let wanted = delivery::deliver(shared, &reply.data, ReadKind::Expected, begun);
-            // Unsolicited mail rarely comes alone.
+            // Further unsolicited mail often follows.
             if !wanted
                 && !shared.state().waiting()
                 && shared.state().ethernet.recently_active(shared.bus.now()).is_none()
@@ -238,7 +238,7 @@ async fn read(shared: &Rc<SharedMailbox>, epoch: u32, session: &Session) -> Resu
     }
 }
 
-/// Requests the last mail again; it is in the mailbox then.
+/// Requests the last mail again; then the send mailbox contains it.
 async fn repeat(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, MailboxError> {
     request_repeat(&shared.bus, session).await?;
     let state = &mut *shared.state_mut();
@@ -249,8 +249,8 @@ async fn repeat(shared: &Rc<SharedMailbox>, session: &Session) -> Result<bool, M
     Ok(true)
 }
 
-/// Requests the last mail again: toggles the repeat request and waits for its acknowledgement (protocol 6.2). A missing
-/// acknowledgement does no harm: the next read brings the mail that would have come next.
+/// Toggles the repeat request and waits for its acknowledgement (protocol 6.2). A missing acknowledgement does no harm:
+/// the next read returns the next mail.
 async fn request_repeat(bus: &Bus, session: &Session) -> Result<(), BusError> {
     let register = map::sync_manager(session.send_manager);
     let at = register.offset(SyncManager::ACTIVATE);

@@ -1,40 +1,39 @@
-//! Duplicate mail (protocol 6.1, 6.2).
-//!
-//! A repeat brings a mail with its old counter, and so does a frame that comes back late; some SubDevices send an
-//! answer twice. A mail is a duplicate when its counter is not zero, and counter and content are those of a recent
-//! mail. The content is compared because some SubDevices never change their counter.
+//! Duplicate mail (protocol 6.1, 6.2). A repeat, or a frame that comes back late, returns a mail with its old counter;
+//! some SubDevices send an answer twice. A mail is a duplicate if its counter is not zero, and counter and content
+//! equal those of a recent mail. The content is compared because some SubDevices never change their counter.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
 
 use crate::time::Instant;
 
-/// Without a disturbance, only a SubDevice that sends its mail twice causes duplicates: of the last mail.
+/// Candidates of an expected read: without a disturbance only the last mail can be a duplicate, if the SubDevice sends
+/// it twice.
 const AFTER_EXPECTED: usize = 1;
-/// A repeat brings the last mail or the one before; late ones may have come in between. Less than a wrap of the
-/// counter.
-/// counter.
+/// Candidates after a repeat: it returns the last mail or the one before, and late mails may be in between. Less than a
+/// wrap of the counter.
 const AFTER_REPEAT: usize = 5;
-/// A late read brings the content of the mailbox at the time of the read: a mail that was accepted by one of this
-/// number of reads before it, after repeats, or after it, by the repeat that recovered it. After a wrap of the counter
-/// it would be another mail; the order of sending is uncertain by a read or two.
+/// Candidates of a late read, before and after its time: it returns the content of the mailbox when the SubDevice
+/// processed it. This mail may have been accepted by an earlier read (before repeats), or by the later repeat that
+/// recovered it. Less than a wrap of the counter; the order of sending is uncertain by a read or two.
 const AROUND_LATE: usize = 4;
-/// Time for which mails are remembered to detect late ones; frames come back 100 ms late at most, or count as lost.
+/// Time for which mails are remembered to detect late duplicates; a frame that comes back more than 100 ms late counts
+/// as lost.
 const KEPT_FOR: Duration = Duration::from_millis(400);
-/// Largest number of remembered mails: a mailbox that is read every 100 us gives no more in the longest delay.
+/// Largest number of remembered mails: a mailbox that is read every 100 us gives fewer in the longest delay.
 const KEPT: usize = 1024;
 const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
 
-/// How a mail was received.
+/// The read that returned a mail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReadKind {
-    /// By a read of its own.
+    /// The expected read.
     Expected,
-    /// After a repeat request.
+    /// A read after a repeat request.
     Repeat,
-    /// Beside the expected read: by one that was given up before it came back, and may have been recovered meanwhile,
-    /// or by the second copy of one.
+    /// A read that was given up before its frame came back, and may have been recovered meanwhile; or the second copy
+    /// of a read.
     Stray,
 }
 
@@ -44,12 +43,12 @@ struct Known {
     counter: u8,
     /// Hash of the content.
     content: u64,
-    /// When the read that brought it was sent.
+    /// When the read that returned it was sent.
     sent: Instant,
 }
 
-/// The last accepted mails, in the order in which their reads were sent: the order in which the SubDevice handed them
-/// over, except for repeated ones.
+/// The last accepted mails, in the order in which their reads were sent. This is the order in which the SubDevice sent
+/// them, except for repeated mails.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
     /// Newest first.
@@ -57,8 +56,8 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// Whether a mail is a duplicate; a new one is recorded. `sent` is when its read was sent, or any time between that
-    /// and the end of the previous read.
+    /// Whether a mail is a duplicate; a new mail is recorded. `sent` is when its read was sent, or any time between
+    /// that and the end of the previous read.
     pub(super) fn is_duplicate(&mut self, counter: u8, content: &[u8], kind: ReadKind, sent: Instant) -> bool {
         if counter == 0 {
             return false;
@@ -94,19 +93,19 @@ mod tests {
 
     // covers: mailbox
     #[test]
-    fn the_same_counter_with_the_same_content_is_a_double() {
+    fn the_same_counter_with_the_same_content_is_a_duplicate() {
         let mut recent = Recent::default();
         let mut is_duplicate =
             |counter, content: &[u8]| recent.is_duplicate(counter, content, ReadKind::Expected, Instant(1));
         assert!(!is_duplicate(1, b"a"));
         assert!(is_duplicate(1, b"a"));
-        assert!(!is_duplicate(1, b"b"), "a counter that stands still");
+        assert!(!is_duplicate(1, b"b"), "the counter does not change");
         assert!(!is_duplicate(0, b"b"), "0 is no counter");
         assert!(!is_duplicate(0, b"b"), "0 is no counter");
     }
 
     #[test]
-    fn after_a_repeat_older_mails_are_doubles_too() {
+    fn after_a_repeat_older_mails_are_duplicates_too() {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         let mut is_duplicate = |counter, kind, ms| recent.is_duplicate(counter, b"x", kind, at(ms));
@@ -119,7 +118,7 @@ mod tests {
 
     // covers: mailbox-faults
     #[test]
-    fn what_comes_late_is_compared_with_what_was_read_about_the_time_when_it_left() {
+    fn a_late_mail_is_compared_with_mails_read_about_the_time_of_its_read() {
         let mut recent = Recent::default();
         let at = |ms: u64| Instant(ms * 1_000_000);
         let mut is_duplicate = |counter, kind, ms| recent.is_duplicate(counter, b"x", kind, at(ms));
@@ -129,12 +128,12 @@ mod tests {
                 assert!(!is_duplicate(counter, ReadKind::Expected, 310 * turn + u64::from(counter)));
             }
         }
-        assert!(is_duplicate(7, ReadKind::Stray, 300), "a repeat brought it long after it was accepted");
-        assert!(is_duplicate(1, ReadKind::Stray, 300), "healed by a read that was sent later");
-        assert!(is_duplicate(3, ReadKind::Stray, 312), "healed");
+        assert!(is_duplicate(7, ReadKind::Stray, 300), "a repeat returned it long after it was accepted");
+        assert!(is_duplicate(1, ReadKind::Stray, 300), "recovered by a read that was sent later");
+        assert!(is_duplicate(3, ReadKind::Stray, 312), "recovered");
         assert!(
             !is_duplicate(2, ReadKind::Stray, 316),
-            "that with this counter before is a turn away: this one is new"
+            "the mail with the same counter is a wrap away: this one is new"
         );
         assert!(is_duplicate(2, ReadKind::Stray, 316));
     }

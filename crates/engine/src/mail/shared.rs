@@ -1,4 +1,4 @@
-//! Common state of the tasks and handles of one mailbox.
+//! State of one mailbox, shared by its tasks and handles.
 
 mod work;
 
@@ -18,8 +18,7 @@ use super::unsolicited::UnsolicitedQueues;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
-/// Counters of the SubDevice and of the MainDevice. A session lasts from PREOP to INIT, also while the SubDevice does
-/// not answer.
+/// Parameters of a session. A session lasts from PREOP to INIT, also while the SubDevice does not answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Session {
     pub station: StationAddress,
@@ -32,7 +31,7 @@ pub(super) struct Session {
     pub since: Instant,
 }
 
-/// The mutable part.
+/// The mutable state.
 #[derive(Debug)]
 pub(super) struct MailboxState {
     pub session: Option<Session>,
@@ -40,22 +39,22 @@ pub(super) struct MailboxState {
     pub recent: Recent,
     /// The session may be used.
     pub open: bool,
-    /// Counts openings and closings, so that tasks of an earlier session end.
+    /// Counts openings and closings, so that tasks and conversations of an earlier epoch end.
     pub epoch: u32,
     pub lanes: [LaneState; Lane::COUNT],
     /// Lane with the next turn to write.
     pub next_lane: usize,
     pub next_id: u32,
-    /// The session in which a writer and a reader run.
+    /// The epoch in which a writer and a reader run.
     pub writer: Option<u32>,
     pub reader: Option<u32>,
     /// The send mailbox is known to be full.
     pub full: bool,
-    /// A poll is requested whether the send mailbox is full.
+    /// A poll of the send mailbox's status is requested.
     pub poll_requested: bool,
     /// Presumed time at which the mail being read became available.
     pub available_at: Instant,
-    /// Duration of accesses: polls, and reads.
+    /// Shortest duration of a poll and of a read.
     pub trips: [ShortestTrip; 2],
     /// The receive mailbox is full, and may stay full until the send mailbox is read.
     pub blocked: bool,
@@ -63,7 +62,7 @@ pub(super) struct MailboxState {
     pub repeat: bool,
     /// A read is on the wire.
     pub reading: bool,
-    /// Number of notifications of the reader.
+    /// Number of times that work was given to the reader.
     pub tasks: u32,
     /// A repeat may bring mail that was received before.
     pub repeated: bool,
@@ -74,7 +73,7 @@ pub(super) struct MailboxState {
     pub last_error: u32,
 }
 
-/// One mailbox.
+/// One mailbox, shared by its handles, conversations and tasks.
 #[derive(Debug)]
 pub(super) struct SharedMailbox {
     pub bus: Bus,
@@ -125,13 +124,13 @@ impl SharedMailbox {
         self.state.borrow()
     }
 
-    /// The session, while it is open and still the one of `time`.
+    /// The session, if it is open and `epoch` is the current one.
     pub(super) fn session(&self, epoch: u32) -> Option<Session> {
         let state = self.state();
         if state.open && state.epoch == epoch { state.session } else { None }
     }
 
-    /// The mailbox may be used, with a new session.
+    /// Opens the mailbox with a new session.
     pub(super) fn open(&self, session: Session) {
         {
             let state = &mut *self.state_mut();
@@ -141,7 +140,7 @@ impl SharedMailbox {
         self.notify_all();
     }
 
-    /// The mailbox cannot be used, and its content is lost; all requests end.
+    /// Closes the mailbox: its content is lost, and all requests end.
     pub(super) fn close(&self) {
         {
             let state = &mut *self.state_mut();
@@ -155,8 +154,8 @@ impl SharedMailbox {
         self.notify_all();
     }
 
-    /// The mailbox cannot be used until it is resumed; all requests end. Mail of reads that may be lost has to be
-    /// requested again.
+    /// Closes the mailbox until it is resumed; all requests end. If a read may be lost, its mail is requested again
+    /// later.
     pub(super) fn suspend(&self) {
         {
             let state = &mut *self.state_mut();

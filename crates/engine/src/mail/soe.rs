@@ -1,4 +1,4 @@
-//! SoE: reads and writes elements of IDNs, in fragments where they are long (protocol 6.6).
+//! SoE: reads and writes elements of IDNs, long ones in fragments (protocol 6.6).
 
 pub mod command;
 
@@ -13,7 +13,7 @@ use super::lane::Lane;
 use super::stream::Overflow;
 use super::{Mailbox, MailboxError};
 
-/// Drives of a SubDevice.
+/// Largest number of drives of a SubDevice.
 const DRIVES: u8 = 8;
 
 /// An element of an IDN of a drive.
@@ -23,7 +23,7 @@ pub struct SoeAddress {
     pub drive: u8,
     /// The IDN.
     pub idn: Idn,
-    /// One element, or several to read at once.
+    /// One element, or several for a read.
     pub elements: SoeElements,
 }
 
@@ -100,13 +100,13 @@ impl From<MailboxError> for SoeFailure {
     }
 }
 
-/// Reads elements of at most `limit` bytes together; several follow one another in the order of their bits.
+/// Reads elements of at most `limit` bytes in total; several elements are in the order of their bits.
 pub async fn read(mailbox: &Mailbox, address: SoeAddress, limits: Limits, limit: usize) -> Result<Vec<u8>, SoeError> {
     read_inner(mailbox, address, limits, limit).await.map_err(|cause| SoeError { address, cause })
 }
 
-/// Writes an element. Only the last fragment has an answer: after an error reply meanwhile, whatever its cause, the
-/// write has failed, and the value in the SubDevice is unknown.
+/// Writes an element. Only the last fragment has an answer: if an error reply arrives before it, whatever its cause,
+/// the write has failed, and the value in the SubDevice is unknown.
 pub async fn write(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits: Limits) -> Result<(), SoeError> {
     write_inner(mailbox, address, data, limits).await.map_err(|cause| SoeError { address, cause })
 }

@@ -1,10 +1,10 @@
-//! Sources and sinks of transfer data, piece by piece, so that no transfer needs memory for all of it.
+//! Sources and sinks of transfer data in pieces, so that no transfer needs memory for all data.
 
 use alloc::vec::Vec;
 
 /// Data to send.
 pub trait Source {
-    /// Total length in bytes, where known in advance.
+    /// Total length in bytes, if known in advance.
     fn total(&self) -> Option<u64>;
 
     /// Copies the next bytes into `buffer` and returns their number; fewer than fit only at the end.
@@ -22,7 +22,7 @@ pub struct Overflow {
 
 /// Receiver of transfer data.
 pub trait Sink {
-    /// The transfer begins, or begins again where a request was repeated; `total` bytes will come, where announced.
+    /// The transfer begins, or begins again after a repeated request; `total` is the announced number of bytes, if any.
     fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow>;
 
     /// Takes the next bytes.
@@ -80,7 +80,7 @@ impl Sink for Bounded {
     fn begin(&mut self, total: Option<u64>) -> Result<(), Overflow> {
         self.bytes.clear();
         let limit = self.limit as u64;
-        // Memory is allocated as bytes arrive: a size that a SubDevice merely claims costs nothing.
+        // Memory is allocated as bytes arrive: an announced size alone allocates nothing.
         match total {
             Some(bytes) if bytes > limit => Err(Overflow { bytes, limit }),
             Some(_) | None => Ok(()),
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_claimed_size_beyond_the_limit_is_refused_at_once() {
+    fn an_announced_size_beyond_the_limit_is_refused_at_once() {
         assert_eq!(Bounded::new(7).begin(Some(1 << 32)), Err(Overflow { bytes: 1 << 32, limit: 7 }));
     }
 }

@@ -1,5 +1,5 @@
-//! The router and its protocols against a SubDevice that consists of a mailbox only, undisturbed and with frames lost,
-//! late and duplicated. Time is virtual, random numbers come from a seed.
+//! Tests of the router and its protocols with a SubDevice that consists of a mailbox only, undisturbed and with frames
+//! lost, late and duplicated. Time is virtual, random numbers are seeded.
 
 mod device;
 mod interrupted;
@@ -20,7 +20,7 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
 use self::device::{Device, STATION};
-use self::server::Everything;
+use self::server::AllProtocols;
 use super::{Limits, Mailbox};
 use crate::link::{Link, LinkSet};
 use crate::ring::Identity;
@@ -39,17 +39,17 @@ enum Fate {
     Passes,
     LostOut,
     LostBack,
-    /// Comes back later.
+    /// The frame comes back later.
     Late(Duration),
-    /// At a ring's transition to closed: both copies reach the SubDevice.
-    MetTwice,
+    /// The ring closes while the frame is on the wire: the SubDevice processes both copies.
+    ProcessedTwice,
 }
 
 /// A MainDevice with one SubDevice.
 struct Bench {
     supervisor: Supervisor,
     mailbox: Mailbox,
-    device: Device<Everything>,
+    device: Device<AllProtocols>,
     now: Instant,
     under_way: Vec<(Instant, Link, Vec<u8>)>,
 }
@@ -58,7 +58,7 @@ impl Bench {
     fn new(links: LinkSet, size: u16) -> Bench {
         let identity = Identity::new(MacCodec::FlagsFirst, MAIN, Some(REDUNDANT));
         let supervisor = Supervisor::new(identity, links, Instant(0));
-        let server = Everything::new(usize::from(size) - 6);
+        let server = AllProtocols::new(usize::from(size) - 6);
         let device = Device::new(size, server);
         let mailbox = Mailbox::new(&supervisor.bus(), 0);
         mailbox.open(StationAddress(STATION), device.layout, 1);
@@ -75,7 +75,7 @@ impl Bench {
         result
     }
 
-    /// Sends queued frames and advances time to the next event, by a millisecond at most.
+    /// Sends queued frames and advances time to the next event, by at most a millisecond.
     fn step(&mut self, mut fate: impl FnMut() -> Fate) {
         self.supervisor.poll(self.now);
         let mut sent = Vec::new();
@@ -88,7 +88,7 @@ impl Bench {
             if last == Fate::LostOut {
                 continue;
             }
-            if link == Link::Main || last == Fate::MetTwice {
+            if link == Link::Main || last == Fate::ProcessedTwice {
                 self.device.pass(&mut frame, self.now);
             } else {
                 frame[6] |= 0x02;

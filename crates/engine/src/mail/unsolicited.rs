@@ -39,7 +39,7 @@ pub struct Unclaimed {
     pub payload: Vec<u8>,
 }
 
-/// The rings.
+/// Queues of unsolicited mail: emergencies, and one queue per kind.
 #[derive(Debug)]
 pub(super) struct UnsolicitedQueues {
     emergencies: BoundedQueue<(Instant, Emergency)>,

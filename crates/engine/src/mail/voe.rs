@@ -11,7 +11,7 @@ use super::lane::Lane;
 use super::unsolicited::Unsolicited;
 use super::{Mailbox, MailboxError};
 
-/// Pause between two polls for a message: this one at first, growing to the longest.
+/// First pause between two polls for a message; the pauses grow.
 const FIRST_PAUSE: Duration = Duration::from_micros(200);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(2);
@@ -34,7 +34,7 @@ pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(
     conversation.send(&payload, limit).await
 }
 
-/// Sends a message and waits for the next one of the same vendor.
+/// Sends a message and waits for the next message of the same vendor.
 pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Result<Voe, MailboxError> {
     let mut conversation = mailbox.conversation(Lane::Voe).await?;
     conversation.settle().await?;
@@ -54,7 +54,7 @@ pub async fn receive_directly(mailbox: &Mailbox, limit: Duration) -> Result<Voe,
     wait(mailbox, limit, Mailbox::mail_available).await
 }
 
-async fn wait(mailbox: &Mailbox, limit: Duration, look: impl Fn(&Mailbox)) -> Result<Voe, MailboxError> {
+async fn wait(mailbox: &Mailbox, limit: Duration, poll: impl Fn(&Mailbox)) -> Result<Voe, MailboxError> {
     let bus = mailbox.bus();
     let (until, mut pause) = (bus.now() + limit, Duration::ZERO);
     loop {
@@ -67,7 +67,7 @@ async fn wait(mailbox: &Mailbox, limit: Duration, look: impl Fn(&Mailbox)) -> Re
             }
             None if left.is_zero() => return Err(MailboxError::NoAnswer { limit }),
             None => {
-                look(mailbox);
+                poll(mailbox);
                 pause = (pause * 3 / 2).clamp(FIRST_PAUSE, LONGEST_PAUSE);
             }
         }

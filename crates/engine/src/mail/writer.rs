@@ -1,7 +1,6 @@
-//! Writes one message after the other, the lanes in turn (protocol 6.1).
-//!
-//! A lost write is repeated with the same counter until the SubDevice accepts it; a SubDevice that received the first
-//! one drops the repetition. No other message is sent meanwhile: it would make the old counter look new.
+//! Writes messages one at a time, alternating between the lanes (protocol 6.1). A lost write is repeated with the same
+//! counter until the SubDevice accepts it; a SubDevice that received the first write drops the repetition. No other
+//! message is sent meanwhile: after it, the old counter would count as new.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -15,11 +14,11 @@ use super::lane::{Lane, Outgoing};
 use super::reader;
 use super::shared::{Session, SharedMailbox};
 
-/// Pause between two attempts to write into a full mailbox: this one at first, growing to the longest.
+/// First pause between two attempts to write into a full mailbox; the pauses grow.
 const FIRST_PAUSE: Duration = Duration::from_micros(100);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
-/// Number of losses after which a write is given up, whatever its duration.
+/// Number of losses after which a write is given up at its time limit.
 const RETRIES: usize = 5;
 
 /// Starts a writer unless one runs.
@@ -59,7 +58,7 @@ async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
     }
 }
 
-/// The next message, with the lanes in turn; `None` ends the writer.
+/// The next message, alternating between the lanes; `None` ends the writer.
 fn next(shared: &Rc<SharedMailbox>, epoch: u32) -> Option<(Outgoing, Session)> {
     let state = &mut *shared.state_mut();
     if state.epoch != epoch {
@@ -112,7 +111,7 @@ async fn write(
         if shared.session(epoch).is_none() {
             return Err(MailboxError::Closed);
         }
-        // A SubDevice that cannot send its own mail accepts no other.
+        // A SubDevice with a full send mailbox may not empty its receive mailbox.
         shared.state_mut().blocked = true;
         reader::start(shared);
         bus.sleep(pause).await;

@@ -220,7 +220,7 @@ fn addresses_and_filter_are_set_and_told_beside_frames() {
     let (own, sent) = (mailbox.clone(), settings.clone());
     let told = world.run(async move {
         eoe::set_ip(&own, 0, &sent, LIMITS).await?;
-        eoe::ask_ip(&own, 0, LIMITS).await
+        eoe::read_ip(&own, 0, LIMITS).await
     });
     let told = told.expect("it has an IP stack");
     assert_eq!((told.gateway, told.dns, &told.name), (settings.gateway, settings.dns, &settings.name));
@@ -229,7 +229,7 @@ fn addresses_and_filter_are_set_and_told_beside_frames() {
     let own = mailbox.clone();
     let back = world.run(async move {
         eoe::set_filter(&own, 0, filter, LIMITS).await?;
-        eoe::ask_filter(&own, 0, LIMITS).await
+        eoe::read_filter(&own, 0, LIMITS).await
     });
     assert_eq!(back, Ok(filter));
     let own = mailbox.clone();
@@ -244,7 +244,7 @@ fn addresses_and_filter_are_set_and_told_beside_frames() {
     world.power_off(DeviceIndex(TERMINAL));
     world.run_cycles(20);
     let own = world.mailbox(TERMINAL);
-    let closed = world.run(async move { eoe::ask_ip(&own, 0, LIMITS).await }).expect_err("it has no power");
+    let closed = world.run(async move { eoe::read_ip(&own, 0, LIMITS).await }).expect_err("it has no power");
     assert_eq!(closed.cause, EoeFailure::Mailbox(MailboxError::Closed));
 }
 
@@ -279,7 +279,7 @@ fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told() {
     for _ in 0..2 {
         world.settle();
         let own = world.mailbox(TERMINAL);
-        let told = world.run(async move { eoe::ask_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
+        let told = world.run(async move { eoe::read_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
         assert_eq!((told.address, &told.name), (settings.address, &settings.name));
         // Without power it forgets them.
         world.power_off(DeviceIndex(TERMINAL));

@@ -28,10 +28,10 @@ pub async fn download(
     let size = source.total().and_then(|total| u32::try_from(total).ok());
     let Some(total) = size else { return Err(SdoError { object, cause: SdoFailure::UnknownSize }) };
     let mut transfer = Transfer::begin(mailbox, object, limits).await?;
-    let room = transfer.conversation.request_capacity();
+    let capacity = transfer.conversation.request_capacity();
     let left = |sent: u64| usize::try_from(u64::from(total) - sent).unwrap_or(usize::MAX);
     let expedited = (1..=EXPEDITED_MAX_DATA).contains(&left(0));
-    let beside = if expedited { EXPEDITED_MAX_DATA } else { room.saturating_sub(INITIATE_LEN) };
+    let beside = if expedited { EXPEDITED_MAX_DATA } else { capacity.saturating_sub(INITIATE_LEN) };
     let mut data = vec![0; beside.min(left(0))];
     fill(&mut transfer, source, &mut data, 0, total)?;
     let request = if expedited {
@@ -47,7 +47,7 @@ pub async fn download(
     let mut sent = data.len() as u64;
     let mut toggle = false;
     while sent < u64::from(total) {
-        data.resize(room.saturating_sub(SEGMENT_OVERHEAD).max(1).min(left(sent)), 0);
+        data.resize(capacity.saturating_sub(SEGMENT_OVERHEAD).max(1).min(left(sent)), 0);
         fill(&mut transfer, source, &mut data, sent, total)?;
         sent += data.len() as u64;
         segment(&mut transfer, toggle, sent == u64::from(total), &data).await?;

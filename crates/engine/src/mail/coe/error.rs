@@ -33,7 +33,7 @@ pub enum SdoFailure {
     Size {
         /// Announced bytes.
         announced: u64,
-        /// Bytes received until they were too many or the last segment was received.
+        /// Bytes received until the announced size was exceeded or the last segment was received.
         got: u64,
     },
     /// The receiver does not accept this size.
@@ -63,7 +63,7 @@ impl fmt::Display for SdoError {
             SdoFailure::TooLong(Overflow { bytes, limit }) => {
                 write!(f, "{bytes} bytes, at most {limit} were expected")
             }
-            SdoFailure::UnknownSize => f.write_str("an SDO download has to say how many bytes it is, up to 4 GiB"),
+            SdoFailure::UnknownSize => f.write_str("an SDO download needs a size, up to 4 GiB"),
             SdoFailure::SourceEnded { got, announced } => {
                 write!(f, "expected {announced} bytes to write, the source had {got}")
             }

@@ -11,21 +11,21 @@ use crate::mail::{Limits, Mailbox};
 /// Longest message that is read.
 const LONGEST: usize = 4096;
 
-/// The history as the SubDevice has it.
+/// The diagnosis history of a SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct History {
-    /// Messages that it can hold.
+    /// Largest number of messages.
     pub maximum: u8,
-    /// Subindex of the newest message; 0 where there is none.
+    /// Subindex of the newest message; 0 if there is none.
     pub newest: u8,
-    /// Subindex of the newest message that was acknowledged; 0 where none was.
+    /// Subindex of the newest acknowledged message; 0 if there is none.
     pub acknowledged: u8,
     /// Some messages were not acknowledged.
     pub new_available: bool,
     /// Settings and flags of lost messages.
     pub flags: DiagnosisFlags,
-    /// Subindex and bytes of each message, the oldest first; a
-    /// [`DiagnosisMessage`](ringcat_wire::mailbox::coe::DiagnosisMessage) reads them.
+    /// Subindex and bytes of each message, the oldest first;
+    /// [`DiagnosisMessage`](ringcat_wire::mailbox::coe::DiagnosisMessage) decodes them.
     pub messages: Vec<(u8, Vec<u8>)>,
 }
 

@@ -101,17 +101,17 @@ pub struct Entry {
     pub sub_index: u8,
     /// Data type.
     pub data_type: DataType,
-    /// Bits.
+    /// Length in bits.
     pub bit_length: u16,
     /// Access rights.
     pub access: AccessRights,
-    /// Unit, where the SubDevice names one.
+    /// Unit, if the SubDevice reports one.
     pub unit: Option<u16>,
-    /// Default value, where the SubDevice names one.
+    /// Default value, if the SubDevice reports one.
     pub default: Option<Vec<u8>>,
-    /// Smallest value, where the SubDevice names one.
+    /// Smallest value, if the SubDevice reports one.
     pub minimum: Option<Vec<u8>>,
-    /// Largest value, where the SubDevice names one.
+    /// Largest value, if the SubDevice reports one.
     pub maximum: Option<Vec<u8>>,
     /// Name.
     pub name: String,
@@ -120,7 +120,9 @@ pub struct Entry {
 /// Indices of the objects in a list.
 pub async fn list(mailbox: &Mailbox, list: ListType, limits: Limits) -> Result<Vec<u16>, InformationError> {
     let code = list.code().to_le_bytes();
-    let data = ask(mailbox, InformationOpcode::ListRequest, &code, InformationOpcode::ListResponse, 2, limits).await?;
+    let data =
+        request_fragments(mailbox, InformationOpcode::ListRequest, &code, InformationOpcode::ListResponse, 2, limits)
+            .await?;
     Ok(Indices(&data[2..]).iter().collect())
 }
 
@@ -134,7 +136,7 @@ pub async fn lengths(mailbox: &Mailbox, limits: Limits) -> Result<[u16; 5], Info
 /// Description of an object.
 pub async fn object(mailbox: &Mailbox, index: u16, limits: Limits) -> Result<Object, InformationError> {
     let (request, response) = (InformationOpcode::ObjectRequest, InformationOpcode::ObjectResponse);
-    let data = ask(mailbox, request, &index.to_le_bytes(), response, 2, limits).await?;
+    let data = request_fragments(mailbox, request, &index.to_le_bytes(), response, 2, limits).await?;
     let ObjectDescription { index, data_type, max_sub_index, code, name } = ObjectDescription::decode(&data)?;
     Ok(Object { index, data_type, max_sub_index, code, name: text(name) })
 }
@@ -146,9 +148,9 @@ pub async fn entry(
     wanted: ValueInfo,
     limits: Limits,
 ) -> Result<Entry, InformationError> {
-    let asked = EntryRequest { index, sub_index, value_info: wanted }.encode();
+    let requested = EntryRequest { index, sub_index, value_info: wanted }.encode();
     let (request, response) = (InformationOpcode::EntryRequest, InformationOpcode::EntryResponse);
-    let data = ask(mailbox, request, &asked, response, 3, limits).await?;
+    let data = request_fragments(mailbox, request, &requested, response, 3, limits).await?;
     let entry = EntryDescription::decode(&data)?;
     Ok(Entry {
         index: entry.index,
@@ -175,7 +177,7 @@ type Fragment = (Vec<u8>, u16);
 
 /// Sends a request and joins the fragments of the answer. The answer also starts with the first `key` bytes of the
 /// request.
-async fn ask(
+async fn request_fragments(
     mailbox: &Mailbox,
     request: InformationOpcode,
     data: &[u8],

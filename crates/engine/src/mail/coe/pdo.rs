@@ -40,7 +40,7 @@ pub async fn write_assignment(
     limits: Limits,
 ) -> Result<(), SdoError> {
     let object = ASSIGNMENT_BASE + u16::from(sync_manager);
-    // An assigned PDO cannot be mapped.
+    // The mapping of an assigned PDO cannot be changed.
     write(mailbox, SdoAddress::new(object, 0), &[0], limits).await?;
     for pdo in pdos {
         if let Some(entries) = &pdo.entries {

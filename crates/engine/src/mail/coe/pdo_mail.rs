@@ -22,7 +22,7 @@ const COUNT: u16 = 512;
 pub enum PdoMailError {
     /// The mailbox failed, or the SubDevice refused.
     Mailbox(MailboxError),
-    /// Index outside the direction: expected 0x1600..=0x17FF to the SubDevice, these or 0x1A00..=0x1BFF from it.
+    /// No PDO of this direction: expected 0x1600..=0x17FF to the SubDevice, these or 0x1A00..=0x1BFF from it.
     Index {
         /// The given index.
         pdo: u16,

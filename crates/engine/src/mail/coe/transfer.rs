@@ -9,13 +9,13 @@ use super::error::{SdoError, SdoFailure};
 use crate::mail::lane::Lane;
 use crate::mail::{Conversation, Limits, Mailbox, MailboxError};
 
-/// Objects of every CoE device; the abort for a missing one serves as well.
+/// Objects of every CoE device; the abort for a missing object is an answer, too.
 const DEVICE_TYPE: u16 = 0x1000;
 const IDENTITY: u16 = 0x1018;
-/// Attempts to read it, where an error reply may belong to another message.
+/// Attempts to read one of them, if error replies may belong to other messages.
 const FENCES: usize = 3;
 
-/// A transfer in progress. When it ends early, by an error or because it is dropped, it is aborted.
+/// A transfer in progress. If it ends early, by an error or because it is dropped, it is aborted.
 pub(super) struct Transfer {
     pub conversation: Conversation,
     pub object: SdoAddress,
@@ -35,7 +35,7 @@ impl Transfer {
         Ok(Transfer { conversation, object, limits, busy: false, payload })
     }
 
-    /// Sends a request and waits for the response that `accept` recognises. An abort is one.
+    /// Sends a request and waits for an abort or for the response that `accept` recognises.
     pub(super) async fn exchange<T>(
         &mut self,
         request: &SdoRequest<'_>,
@@ -107,9 +107,9 @@ impl Drop for Transfer {
     }
 }
 
-/// The answer to a request that was given up may still come, and be taken for the answer to the next request for the
-/// same object. So another object is read first: a SubDevice answers in order, so after that answer no older one can
-/// come.
+/// Waits out the answer to a request that was given up: it may still arrive and look like the answer to the next
+/// request for the same object. So another object is read first: a SubDevice answers in order, so no older answer can
+/// arrive after that.
 pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Limits) -> Result<(), MailboxError> {
     let mut result = Ok(());
     for _ in 0..FENCES {
@@ -117,13 +117,13 @@ pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Lim
         let fence = if late == DEVICE_TYPE { IDENTITY } else { DEVICE_TYPE };
         conversation.mark(fence);
         conversation.forget_late();
-        result = ask_fence(conversation, fence, limits).await;
+        result = read_fence(conversation, fence, limits).await;
         match result {
             Ok(()) => return Ok(()),
-            // A certain refusal is an answer, too; otherwise the refusal may belong to another message.
+            // A refusal that certainly belongs to this request is an answer, too.
             Err(MailboxError::Error(_)) => {}
             Err(error) => {
-                // Where the request was not sent, nothing has changed.
+                // The request was not sent: the late answer may still arrive.
                 if conversation.late_mark().is_none() {
                     conversation.mark(late);
                     conversation.expect_late(limits.1);
@@ -135,7 +135,7 @@ pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Lim
     if conversation.late_mark().is_some() { result } else { Ok(()) }
 }
 
-async fn ask_fence(conversation: &mut Conversation, fence: u16, limits: Limits) -> Result<(), MailboxError> {
+async fn read_fence(conversation: &mut Conversation, fence: u16, limits: Limits) -> Result<(), MailboxError> {
     let request = SdoRequest::Upload { index: fence, sub_index: 0, complete_access: false };
     let mut payload = [0; INITIATE_LEN];
     let length = request.encode(&mut payload).unwrap_or(0);

@@ -17,7 +17,7 @@ pub async fn read(mailbox: &Mailbox, object: SdoAddress, limits: Limits, limit: 
     Ok(sink.into_bytes())
 }
 
-/// The beginning of an object: its size, and the data that came with it.
+/// The first response of an upload: the size of the object, and its first data.
 struct First {
     total: u64,
     data: Vec<u8>,
@@ -69,7 +69,7 @@ pub async fn upload(
         }
         toggle = !toggle;
     }
-    // All data is received, though no segment was marked as the last one.
+    // All data is received, although no segment was marked as the last one.
     transfer.done();
     Ok(())
 }

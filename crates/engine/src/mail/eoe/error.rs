@@ -41,7 +41,7 @@ impl fmt::Display for EoeFailure {
         match self {
             EoeFailure::Mailbox(error) => error.fmt(f),
             EoeFailure::Refused(result) => write!(f, "the SubDevice refused: {result}"),
-            EoeFailure::LongName { bytes } => write!(f, "a name of {bytes} bytes, there is room for 32"),
+            EoeFailure::LongName { bytes } => write!(f, "a name of {bytes} bytes, at most 32 are possible"),
         }
     }
 }

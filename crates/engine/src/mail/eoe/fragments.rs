@@ -1,11 +1,11 @@
-//! Frames cut into the payloads of mailbox messages (protocol 6.5).
+//! Cuts Ethernet frames into payloads of mailbox messages (protocol 6.5).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::eoe::{BLOCK, EoeBody, EoeFragment, EoeMessage};
 
-/// The payloads of a frame's fragments, one after the other.
+/// Iterates over the payloads of a frame's fragments.
 #[derive(Debug)]
 pub(super) struct Fragments<'a> {
     frame: &'a [u8],
@@ -18,7 +18,7 @@ pub(super) struct Fragments<'a> {
 }
 
 impl<'a> Fragments<'a> {
-    /// The fragments of a frame for a mailbox of this size (header included); `None` where a fragment does not fit.
+    /// The fragments of a frame for a mailbox of this size (header included); `None` if a fragment does not fit.
     pub(super) fn new(frame: &'a [u8], number: u8, mailbox_size: usize, wants_time: bool) -> Option<Fragments<'a>> {
         let piece = EoeFragment::max_data(mailbox_size);
         (piece > 0).then_some(Fragments { frame, number, piece, wants_time, next: 0 })
@@ -63,18 +63,18 @@ mod tests {
 
     // covers: 6.5, eoe
     #[test]
-    fn all_but_the_last_are_whole_blocks_with_their_place() {
+    fn all_fragments_but_the_last_are_whole_blocks_with_their_offset() {
         // 128 bytes of mailbox, 10 of headers, 96 of data.
         let fragments = cut(200, 128);
         assert_eq!(fragments.iter().map(Vec::len).collect::<Vec<_>>(), [100, 100, 12]);
-        // Fragment 0 gives the length of the frame in blocks, the others their offset. Frame 5.
+        // Fragment 0 contains the length of the frame in blocks, the others their offset. Frame 5.
         assert_eq!(fragments[0][..6], [0x00, 0x00, 0xC0, 0x51, 0, 1], "7 blocks");
         assert_eq!(fragments[1][..6], [0x00, 0x00, 0xC1, 0x50, 96, 97], "from block 3");
         assert_eq!(fragments[2][..6], [0x00, 0x01, 0x82, 0x51, 192, 193], "from block 6, the last");
     }
 
     #[test]
-    fn a_frame_that_fits_is_one_fragment_and_a_mailbox_without_room_takes_none() {
+    fn a_frame_that_fits_is_one_fragment_and_a_small_mailbox_takes_none() {
         assert_eq!(cut(60, 1486), [[&[0x00, 0x01, 0x80, 0x50][..], &(0..60).collect::<Vec<u8>>()].concat()]);
         assert_eq!(cut(1514, 1486).iter().map(Vec::len).collect::<Vec<_>>(), [1476, 4 + 42]);
         assert_eq!(cut(96, 128).len(), 1);

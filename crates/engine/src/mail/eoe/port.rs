@@ -14,17 +14,16 @@ use ringcat_wire::mailbox::eoe::EoeFragment;
 /// Longest time that a SubDevice may leave a fragment in its mailbox; then its frame is dropped, as a network does.
 const SEND_LIMIT: Duration = Duration::from_millis(500);
 
-/// The Ethernet of one SubDevice: frames to it and from it. A mailbox has one port at most, which ends when dropped.
-///
-/// It outlives the absence of the SubDevice. While the mailbox is not in use the port is down: frames are refused, and
-/// queued frames are dropped and counted.
+/// The Ethernet port of one SubDevice: frames to it and from it. A mailbox has at most one port; it is closed when
+/// dropped. It stays valid while the SubDevice is absent. While the mailbox is not in use, the port is down: frames are
+/// refused, and queued frames are dropped and counted.
 #[derive(Debug)]
 pub struct EthernetPort {
     shared: Rc<SharedMailbox>,
 }
 
 impl EthernetPort {
-    /// Opens the port of a mailbox; `None` where it is open already.
+    /// Opens the port of a mailbox; `None` if it is already open.
     pub fn open(mailbox: &Mailbox) -> Option<EthernetPort> {
         let shared = mailbox.shared().clone();
         let attachment = {
@@ -50,7 +49,7 @@ impl EthernetPort {
         self.queue(frame, false).map(drop)
     }
 
-    /// As [`EthernetPort::send`], and requests the time at which the SubDevice forwards the frame: the answer is a
+    /// As [`EthernetPort::send`], and requests the time at which the SubDevice forwards the frame: the result is a
     /// [`TimeStamp`] with the returned number.
     pub fn send_with_time(&self, frame: &[u8]) -> Result<u8, QueueError> {
         self.queue(frame, true)
@@ -65,7 +64,7 @@ impl EthernetPort {
         Ok(number)
     }
 
-    /// Number of frames that can be queued now; 0 while it is down.
+    /// Number of frames that can be queued now; 0 while the port is down.
     pub fn room(&self) -> usize {
         if self.is_up() { self.shared.state().ethernet.room() } else { 0 }
     }
@@ -132,14 +131,14 @@ async fn send_all(shared: Rc<SharedMailbox>, attachment: u32) {
         if !shared.changed.until(work).await {
             return;
         }
-        // It was closed meanwhile: the frames are dropped, too.
+        // The mailbox was closed meanwhile: its queued frames are dropped, too.
         let Ok(mut conversation) = Conversation::take(&shared, Lane::Frames).await else { continue };
         while let Some(frame) = next(&shared, attachment) {
             let result = send(&mut conversation, &frame).await;
             let now = shared.bus.now();
             shared.state_mut().ethernet.sent(frame.bytes.len(), result.is_ok(), now);
             if result == Err(MailboxError::Closed) {
-                // It may be open again, and then needs a new conversation.
+                // When the mailbox is open again, a new conversation is needed.
                 break;
             }
         }
@@ -154,7 +153,7 @@ fn next(shared: &Rc<SharedMailbox>, attachment: u32) -> Option<Outgoing> {
         }
         traffic.next_outgoing()
     };
-    // A sender may wait for room.
+    // A sender may wait for space in the queue.
     shared.changed.notify();
     frame
 }

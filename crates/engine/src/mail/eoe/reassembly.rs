@@ -1,8 +1,6 @@
-//! Joins fragments to frames as they arrive (protocol 6.5).
-//!
-//! Frames are distinguished by their number, so fragments of several may be interleaved. A fragment that does not
-//! continue its frame drops that frame; a fragment 0 starts a new one. A SubDevice can occupy memory for one frame per
-//! number at most.
+//! Joins fragments to frames as they arrive (protocol 6.5). Frames are distinguished by their number, so fragments of
+//! several frames may be interleaved. If a fragment does not continue its frame, the frame is dropped; fragment 0
+//! starts a new frame. A SubDevice can occupy memory for at most one frame per number.
 
 use alloc::vec::Vec;
 
@@ -72,12 +70,12 @@ impl Reassembly {
 }
 
 impl Partial {
-    /// False where the fragment does not belong to this frame.
+    /// Appends a fragment; false if it does not continue this frame.
     fn append(&mut self, fragment: &EoeFragment<'_>) -> bool {
-        let goes_on = fragment.number == self.next && fragment.offset() == self.bytes.len();
+        let continues = fragment.number == self.next && fragment.offset() == self.bytes.len();
         let whole = fragment.last || (!fragment.data.is_empty() && fragment.data.len().is_multiple_of(BLOCK));
         let length = self.bytes.len() + fragment.data.len();
-        if !goes_on || !whole || length > self.announced.min(MAX_FRAME) {
+        if !continues || !whole || length > self.announced.min(MAX_FRAME) {
             return false;
         }
         self.bytes.extend_from_slice(fragment.data);
@@ -108,7 +106,7 @@ mod tests {
 
     // covers: 6.5, eoe
     #[test]
-    fn fragments_of_sixteen_frames_that_mix_are_told_apart() {
+    fn interleaved_fragments_of_sixteen_frames_are_joined() {
         let mut reassembly = Reassembly::default();
         let frames: Vec<_> = (0..16).map(|number| cut(number, 100 + usize::from(number), number)).collect();
         for frame in &frames {
@@ -122,13 +120,13 @@ mod tests {
 
     // covers: 6.5, eoe
     #[test]
-    fn a_lost_fragment_loses_its_frame_and_no_other() {
+    fn a_lost_fragment_drops_only_its_own_frame() {
         let mut reassembly = Reassembly::default();
         let [first, second] = [cut(1, 250, 1), cut(2, 250, 2)];
         take(&mut reassembly, &first[0]);
         take(&mut reassembly, &second[0]);
         assert_eq!(take(&mut reassembly, &first[2]), Outcome::Lost);
-        assert_eq!(take(&mut reassembly, &first[1]), Outcome::Lost, "its frame is gone");
+        assert_eq!(take(&mut reassembly, &first[1]), Outcome::Lost, "its frame was dropped");
         take(&mut reassembly, &second[1]);
         assert_eq!(take(&mut reassembly, &second[2]), Outcome::Frame(alloc::vec![2; 250]));
         // The last fragment is lost: the frame number is used again sixteen frames later.
@@ -139,7 +137,7 @@ mod tests {
 
     // covers: eoe
     #[test]
-    fn what_claims_too_much_or_no_whole_blocks_is_lost() {
+    fn fragments_of_impossible_length_or_offset_are_lost() {
         let mut reassembly = Reassembly::default();
         let fragment = |number, blocks, last, data| EoeFragment {
             frame: 0,
@@ -153,8 +151,8 @@ mod tests {
         assert_eq!(reassembly.take(&fragment(0, 1, true, &[0; 64])), Outcome::Lost, "more than announced");
         assert_eq!(reassembly.take(&fragment(0, 63, true, &[0; 1600])), Outcome::Lost, "no frame is so long");
         assert_eq!(reassembly.take(&fragment(0, 4, false, &[0; 31])), Outcome::Lost, "no whole blocks");
-        assert_eq!(reassembly.take(&fragment(0, 4, false, &[])), Outcome::Lost, "nothing");
+        assert_eq!(reassembly.take(&fragment(0, 4, false, &[])), Outcome::Lost, "no data");
         reassembly.take(&fragment(0, 4, false, &[0; 32]));
-        assert_eq!(reassembly.take(&fragment(1, 2, true, &[0; 8])), Outcome::Lost, "another place");
+        assert_eq!(reassembly.take(&fragment(1, 2, true, &[0; 8])), Outcome::Lost, "another offset");
     }
 }

@@ -48,7 +48,7 @@ pub async fn set_ip(mailbox: &Mailbox, port: u8, settings: &IpSettings, limits: 
 }
 
 /// Reads the IP parameters at a port of the SubDevice.
-pub async fn ask_ip(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<IpSettings, EoeError> {
+pub async fn read_ip(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<IpSettings, EoeError> {
     request(mailbox, port, EoeBody::GetIp, limits, |body| match body {
         EoeBody::Ip(result, parameters) => Some((result, parameters.into())),
         _ => None,
@@ -66,7 +66,7 @@ pub async fn set_filter(mailbox: &Mailbox, port: u8, filter: AddressFilter, limi
 }
 
 /// Reads the address filter of a port of the SubDevice.
-pub async fn ask_filter(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<AddressFilter, EoeError> {
+pub async fn read_filter(mailbox: &Mailbox, port: u8, limits: Limits) -> Result<AddressFilter, EoeError> {
     request(mailbox, port, EoeBody::GetFilter, limits, |body| match body {
         EoeBody::Filter(result, filter) => Some((result, filter)),
         _ => None,
@@ -90,13 +90,13 @@ async fn request<T>(
         conversation.settle().await?;
         let accept = |payload: &[u8]| {
             let message = EoeMessage::decode(payload).ok()?;
-            // Some SubDevices leave the port out.
+            // Some SubDevices always answer with port 0.
             if message.port == port || message.port == 0 { answer(message.body) } else { None }
         };
         conversation.request(&payload[..length], limits, accept).await
     };
     match exchange.await {
-        Ok((EoeResult::OK, told)) => Ok(told),
+        Ok((EoeResult::OK, value)) => Ok(value),
         Ok((result, _)) => Err(failed(EoeFailure::Refused(result))),
         Err(error) => Err(failed(error.into())),
     }

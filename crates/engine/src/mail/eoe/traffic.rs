@@ -14,14 +14,14 @@ use crate::time::Instant;
 
 /// Shortest frame: its Ethernet header.
 const MIN_FRAME: usize = 14;
-/// Frames that may be queued for sending: about twenty milliseconds of a mailbox's throughput. Faster senders have to
+/// Frames that may be queued for sending: about twenty milliseconds of a mailbox's throughput. A faster sender must
 /// wait.
 pub const QUEUE: usize = 32;
 /// Received frames that are kept until the application takes them.
 const RECEIVED: usize = 64;
 /// Time stamps that are kept until the application takes them.
 const TIME_STAMPS: usize = 16;
-/// Time after a fragment in which the reader polls for others; later, the mail watch finds them.
+/// Time after a fragment in which the reader polls for others; later fragments are detected by the mail status.
 const ACTIVE_FOR: Duration = Duration::from_millis(20);
 /// Rates are those of the last full second.
 const RATE_PERIOD: Duration = Duration::from_secs(1);
@@ -31,11 +31,11 @@ const RATE_PERIOD: Duration = Duration::from_secs(1);
 pub struct EthernetFrame {
     /// The frame, without check sequence.
     pub bytes: Vec<u8>,
-    /// When it arrived at the SubDevice, if that reports it: lower half of the time, nanoseconds.
+    /// Time at which it arrived at the SubDevice, if the SubDevice reports it: lower half, nanoseconds.
     pub time_ns: Option<u32>,
 }
 
-/// When a SubDevice forwarded a frame with a requested time stamp.
+/// Time at which a SubDevice forwarded a frame with a requested time stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeStamp {
     /// Number of the frame, as [`super::EthernetPort::send_with_time`] returned it.
@@ -48,9 +48,9 @@ pub struct TimeStamp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QueueError {
-    /// The mailbox is not in use: the SubDevice is in INIT or does not answer; or it has no room for a fragment.
+    /// The mailbox is not in use (the SubDevice is in INIT or does not answer), or it is too small for a fragment.
     Down,
-    /// The queue is full; room becomes available after [`super::EthernetPort::ready`].
+    /// The queue is full; [`super::EthernetPort::ready`] waits for space.
     Full,
     /// Not an Ethernet frame of 14 to 1,518 bytes.
     Length {
@@ -62,7 +62,7 @@ pub enum QueueError {
 impl fmt::Display for QueueError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            QueueError::Down => f.write_str("there is no EoE at present: the SubDevice is in INIT or does not answer"),
+            QueueError::Down => f.write_str("no EoE at present: the SubDevice is in INIT or does not answer"),
             QueueError::Full => write!(f, "{QUEUE} frames wait to be sent"),
             QueueError::Length { bytes } => {
                 write!(f, "an Ethernet frame has {MIN_FRAME} to {MAX_FRAME} bytes, got {bytes}")
@@ -147,7 +147,7 @@ impl Rate {
     }
 }
 
-/// The Ethernet of one mailbox.
+/// Ethernet traffic of one mailbox.
 #[derive(Debug)]
 pub(in crate::mail) struct Traffic {
     /// A port is open. Without one, fragments are handled as unsolicited mail.
@@ -183,7 +183,7 @@ impl Traffic {
         }
     }
 
-    /// Frames in progress when the mailbox was closed or opened are dropped.
+    /// Drops frames in progress when the mailbox is closed or opened.
     pub(in crate::mail) fn reset(&mut self) {
         self.counters.tx_dropped += self.outgoing.len() as u64;
         self.outgoing.clear();
@@ -273,7 +273,7 @@ impl Traffic {
         self.time_stamps.pop()
     }
 
-    /// Time since the last fragment, while more are expected soon.
+    /// Time since the last fragment, while further fragments are expected.
     pub(in crate::mail) fn recently_active(&self, now: Instant) -> Option<Duration> {
         let idle = now.since(self.last_fragment.filter(|_| self.attached)?);
         (idle < ACTIVE_FOR).then_some(idle)
@@ -309,14 +309,14 @@ mod tests {
         for at in 0..10 {
             rate.add(Instant(5 * SECOND + at * SECOND / 10), 100);
         }
-        assert_eq!(rate.per_second(Instant(5 * SECOND + SECOND / 2)), (0, 0), "it is not over");
+        assert_eq!(rate.per_second(Instant(5 * SECOND + SECOND / 2)), (0, 0), "the first second is not over");
         assert_eq!(rate.per_second(Instant(6 * SECOND + SECOND / 2)), (1000, 10));
         assert_eq!(rate.per_second(Instant(7 * SECOND)), (0, 0));
     }
 
     // covers: eoe
     #[test]
-    fn queues_are_bounded_and_what_does_not_fit_is_told_or_counted() {
+    fn queues_are_bounded_and_frames_that_do_not_fit_are_refused_or_counted() {
         let mut traffic = Traffic::new();
         for _ in 0..QUEUE {
             assert!(traffic.queue(&[0; 60], false).is_ok());

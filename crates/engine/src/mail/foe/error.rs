@@ -31,7 +31,7 @@ pub enum FoeFailure {
         /// Error text; may be empty.
         text: String,
     },
-    /// A packet came with another number than expected.
+    /// A packet had another number than expected.
     Packet {
         /// Expected.
         expected: u32,
@@ -45,7 +45,7 @@ pub enum FoeFailure {
     },
     /// The receiver does not accept this size.
     TooLong(Overflow),
-    /// The mailbox has no room for data.
+    /// The mailbox is too small for data.
     SmallMailbox,
 }
 
@@ -68,7 +68,7 @@ impl fmt::Display for FoeFailure {
             FoeFailure::TooLong(Overflow { bytes, limit }) => {
                 write!(f, "{bytes} bytes or more, at most {limit} were expected")
             }
-            FoeFailure::SmallMailbox => f.write_str("the mailbox has no room for data"),
+            FoeFailure::SmallMailbox => f.write_str("the mailbox is too small for data"),
         }
     }
 }

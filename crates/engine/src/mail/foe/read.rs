@@ -42,7 +42,7 @@ async fn run(
     loop {
         taken = taken.and_then(|()| sink.take(&data));
         if let Err(overflow) = taken {
-            transfer.give_up(FoeErrorCode::DISK_FULL, b"no room");
+            transfer.give_up(FoeErrorCode::DISK_FULL, b"file too long");
             return Err(FoeFailure::TooLong(overflow));
         }
         bytes += data.len() as u64;
@@ -67,16 +67,16 @@ async fn next<P: FnMut(FoeProgress)>(
     expected: u32,
 ) -> Result<Vec<u8>, FoeFailure> {
     let accept = |answer: FoeMessage<'_>| match answer {
-        // The last packet again: it crossed its acknowledgement.
+        // The previous packet again: the SubDevice repeated it before it received the acknowledgement.
         FoeMessage::Data { packet, .. } if packet == expected.wrapping_sub(1) => None,
         FoeMessage::Data { packet, data } if packet == expected => Some(Ok(data.to_vec())),
         FoeMessage::Data { packet, .. } => Some(Err(packet)),
         _ => None,
     };
-    match transfer.ask(message, accept).await? {
+    match transfer.request(message, accept).await? {
         Ok(data) => Ok(data),
         Err(got) => {
-            transfer.give_up(FoeErrorCode::PACKET_NUMBER_WRONG, b"another packet was expected");
+            transfer.give_up(FoeErrorCode::PACKET_NUMBER_WRONG, b"wrong packet number");
             Err(FoeFailure::Packet { expected, got })
         }
     }

@@ -35,16 +35,16 @@ async fn run(
         return Err(FoeFailure::SmallMailbox);
     }
     let request = FoeMessage::Write { password: options.password, name: file.as_bytes() };
-    transfer.ask(&request, acknowledged(0)).await?;
+    transfer.request(&request, acknowledged(0)).await?;
     let mut data = vec![0; full];
     let (mut packet, mut bytes) = (0u32, 0);
     loop {
         let count = source.fill(&mut data).min(full);
         packet = packet.wrapping_add(1);
-        transfer.ask(&FoeMessage::Data { packet, data: &data[..count] }, acknowledged(packet)).await?;
+        transfer.request(&FoeMessage::Data { packet, data: &data[..count] }, acknowledged(packet)).await?;
         bytes += count as u64;
         (transfer.progress)(FoeProgress::Bytes(bytes));
-        // A short packet ends the file, an empty one if the last one was full.
+        // A packet with less data than fits ends the file; it is empty if the length is a multiple of a full packet.
         if count < full {
             transfer.busy = false;
             return Ok(bytes);
@@ -52,7 +52,8 @@ async fn run(
     }
 }
 
-/// The acknowledgement of a packet; others belong to packets that were repeated while the SubDevice was busy.
+/// Recognises the acknowledgement of a packet; others belong to packets that were repeated while the SubDevice was
+/// busy.
 fn acknowledged(expected: u32) -> impl FnMut(FoeMessage<'_>) -> Option<()> {
     move |answer| match answer {
         FoeMessage::Acknowledge { packet } => (packet == expected).then_some(()),

@@ -1,4 +1,4 @@
-//! Expected answers to a client's message: none, one or several, and whether a transfer is in progress then.
+//! The expected answers to a client's message (none, one or several), and whether a transfer is in progress afterwards.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -20,7 +20,7 @@ const VENDOR_LEN: usize = 4;
 /// Longest message that ends a transfer, in bytes.
 const END_LEN: usize = 64;
 
-/// Expectation of a client's message.
+/// The answer that a client's message expects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum ExpectedAnswer {
     /// An answer that [`AnswerFilter`] recognises.
@@ -29,7 +29,7 @@ pub(super) enum ExpectedAnswer {
     None,
 }
 
-/// How to recognise an answer.
+/// Recognises an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum AnswerFilter {
     /// Beginning of an SDO transfer, with index and subindex.
@@ -60,7 +60,7 @@ pub(super) enum AnswerFilter {
 enum Transfer {
     #[default]
     None,
-    /// An object: index, subindex, bytes left where it is an upload.
+    /// An object: index and subindex.
     Object(u16, u8),
     /// A file.
     File,
@@ -74,7 +74,7 @@ enum Transfer {
 #[derive(Debug, Default)]
 pub(super) struct Dialogue {
     transfer: Transfer,
-    /// A request that decides by its answer: the transfer that a success starts.
+    /// The transfer that is in progress if the answer is a success.
     pending: Transfer,
 }
 
@@ -86,7 +86,7 @@ pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
         Protocol::Foe => Ok(Lane::Foe),
         Protocol::Soe => Ok(Lane::Soe),
         Protocol::Voe => Ok(Lane::Voe),
-        // Frames belong to the network interface of the host.
+        // Ethernet frames pass through the network interface of the host, not the gateway.
         Protocol::Eoe if payload.first().is_some_and(|first| EOE_REQUESTS.contains(&(first & EOE_TYPE))) => {
             Ok(Lane::Eoe)
         }
@@ -101,8 +101,8 @@ impl Dialogue {
         self.transfer != Transfer::None
     }
 
-    /// A client's message goes to the SubDevice, whose receive mailbox has this size. The error is for the client: such
-    /// a service is not relayed.
+    /// Takes a message that is about to be written into a receive mailbox of this size. The error is the detail of an
+    /// error reply: the service is not relayed.
     pub(super) fn request(&mut self, lane: Lane, payload: &[u8], mailbox_size: usize) -> Result<ExpectedAnswer, u16> {
         self.pending = self.transfer.clone();
         match lane {
@@ -111,7 +111,7 @@ impl Dialogue {
             Lane::Soe => self.request_soe(payload),
             Lane::Aoe => {
                 let (header, _) = AmsHeader::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
-                // Bit 0 is that of a response.
+                // Bit 0 marks a response.
                 let request = header.flags & AmsHeader::REQUEST != 0 && header.flags & 0x0001 == 0;
                 Ok(if request {
                     ExpectedAnswer::Matching(AnswerFilter::Aoe(header.invoke_id))
@@ -186,7 +186,7 @@ impl Dialogue {
                 ExpectedAnswer::None
             }
             FoeMessage::Acknowledge { packet } => answer(Some(packet.wrapping_add(1)), None),
-            // A client that is busy receives the packet again.
+            // The SubDevice repeats the packet for a busy client.
             FoeMessage::Busy { .. } => answer(None, None),
             FoeMessage::Error { .. } => {
                 self.transfer = Transfer::None;
@@ -214,7 +214,7 @@ impl Dialogue {
         })
     }
 
-    /// An answer was received from a send mailbox of this size; true where more parts follow.
+    /// Takes an answer from a send mailbox of this size; true if more parts follow.
     pub(super) fn answered(&mut self, filter: &AnswerFilter, payload: &[u8], mailbox_size: usize) -> bool {
         let pending = core::mem::take(&mut self.pending);
         let mut more = false;
@@ -231,7 +231,7 @@ impl Dialogue {
                 }
                 Ok(FoeMessage::Data { .. }) => Transfer::File,
                 Ok(FoeMessage::Acknowledge { .. }) => pending,
-                // The client repeats its message; the repeated one counts.
+                // The client repeats its message.
                 Ok(FoeMessage::Busy { .. }) => Transfer::File,
                 _ => Transfer::None,
             },
@@ -248,7 +248,8 @@ impl Dialogue {
         more
     }
 
-    /// The message that ends the transfer for the SubDevice; empty where none is in progress or no such message exists.
+    /// The message that ends the transfer in the SubDevice; `None` if no transfer is in progress or no such message
+    /// exists.
     pub(super) fn end(&mut self) -> Option<Vec<u8>> {
         let mut out = vec![0; END_LEN];
         let length = match core::mem::take(&mut self.transfer) {
@@ -257,7 +258,7 @@ impl Dialogue {
                 SdoRequest::Abort { index, sub_index, code }.encode(&mut out[..INITIATE_LEN])
             }
             Transfer::File => {
-                let text = b"the client of the gateway has gone";
+                let text = b"the gateway client has ended";
                 FoeMessage::Error { code: FoeErrorCode::ILLEGAL, text }.encode(&mut out)
             }
             Transfer::None | Transfer::FileRead | Transfer::Fragments => None,
@@ -266,7 +267,7 @@ impl Dialogue {
         Some(out)
     }
 
-    /// The request was written and its answer did not come: the SubDevice may be in the middle of the transfer.
+    /// The answer to the written request is missing: the SubDevice may be in the middle of the transfer.
     pub(super) fn unanswered(&mut self) {
         let pending = core::mem::take(&mut self.pending);
         if !self.is_open() {
@@ -276,7 +277,7 @@ impl Dialogue {
 }
 
 impl AnswerFilter {
-    /// The requested object, where known.
+    /// Index of the requested object, if known.
     pub(super) fn index(&self) -> Option<u16> {
         match self {
             AnswerFilter::Initiate(index, _) => Some(*index),
@@ -284,7 +285,7 @@ impl AnswerFilter {
         }
     }
 
-    /// Whether a mail is a further part of the answer. For SDO information, only the first part names its subject.
+    /// Whether a mail is a further part of the answer. For SDO information, only the first part names its object.
     pub(super) fn continues(&self, payload: &[u8]) -> bool {
         match self {
             AnswerFilter::Information(answer, _) => SdoInformation::decode(payload)
@@ -296,13 +297,13 @@ impl AnswerFilter {
     /// Whether a mail is an answer, or the first part of it.
     pub(super) fn matches(&self, payload: &[u8]) -> bool {
         match self {
-            AnswerFilter::Initiate(asked, asked_sub) => match SdoResponse::decode(payload) {
+            AnswerFilter::Initiate(object, entry) => match SdoResponse::decode(payload) {
                 Ok(
                     SdoResponse::DownloadDone { index, sub_index, .. }
                     | SdoResponse::UploadExpedited { index, sub_index, .. }
                     | SdoResponse::UploadNormal { index, sub_index, .. }
                     | SdoResponse::Abort { index, sub_index, .. },
-                ) => (index, sub_index) == (*asked, *asked_sub),
+                ) => (index, sub_index) == (*object, *entry),
                 _ => false,
             },
             AnswerFilter::Segment => matches!(
@@ -335,7 +336,8 @@ impl AnswerFilter {
     }
 }
 
-/// A question about the dictionary. Answers start with the request: the kind of a list, an index, a subindex.
+/// Filter for the answer to an SDO information request. The answer starts with the data of the request: the kind of a
+/// list, an index, a subindex.
 fn request_information(payload: &[u8]) -> Result<ExpectedAnswer, u16> {
     let request = SdoInformation::decode(payload).map_err(|_| ErrorReply::SIZE_TOO_SHORT)?;
     let (answer, length) = match request.opcode {

@@ -29,17 +29,17 @@ const ANSWERS: usize = 1024;
 /// Time limit until a SubDevice accepts a message, and until it answers; files may have to be erased first.
 const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(1));
 const FILE_LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(3));
-/// A client whose message has waited for so long has repeated it or disconnected.
+/// Longest time in the queue; after this time the client has repeated the message or disconnected.
 const STALE: Duration = Duration::from_secs(5);
 /// Longest pause of a client within a transfer.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Longest transfer while others wait.
+/// Longest transfer while other clients wait.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// An answer for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Relayed {
-    /// The client, as named with its message.
+    /// Number of the client, as passed with its message.
     pub client: u64,
     /// EtherCAT header of type 5 and the mailbox message.
     pub bytes: Vec<u8>,
@@ -62,14 +62,14 @@ pub struct RelayCounters {
     pub malformed: u64,
 }
 
-/// Pending answer of the MainDevice itself: payloads of the same protocol, or the detail of an error reply.
+/// Future answer of the MainDevice itself: payloads of the same protocol, or the detail of an error reply.
 pub type OwnAnswer = Pin<Box<dyn Future<Output = Result<Vec<Vec<u8>>, u16>>>>;
 
 /// Target of a message.
 pub enum Recipient {
     /// A SubDevice, through its mailbox.
     SubDevice(Mailbox),
-    /// The MainDevice itself. The answer is prepared when it is the message's turn.
+    /// The MainDevice itself. The future runs when it is the message's turn.
     Own(OwnAnswer),
 }
 
@@ -98,7 +98,7 @@ struct State {
     counters: RelayCounters,
 }
 
-/// Takes messages of clients and returns answers.
+/// Queues messages of clients and returns answers.
 pub struct GatewayQueue {
     shared: Rc<Shared>,
 }
@@ -116,13 +116,14 @@ impl core::fmt::Debug for GatewayQueue {
 }
 
 impl GatewayQueue {
-    /// A desk without messages.
+    /// An empty queue.
     pub fn new(bus: &Bus) -> GatewayQueue {
         GatewayQueue { shared: Rc::new(Shared { bus: bus.clone(), state: RefCell::default(), changed: bus.signal() }) }
     }
 
-    /// Takes a client's message, EtherCAT header included. `find` returns the target with its address, and whether the
-    /// target supports its protocol. A message that cannot be passed on is answered with an error reply.
+    /// Takes a client's message, EtherCAT header included. `find` returns the recipient, or the detail of an error
+    /// reply if there is none or it does not support the protocol. The answer to a message that cannot be passed on is
+    /// an error reply.
     pub fn take(&self, client: u64, bytes: &[u8], find: impl FnOnce(&Message<'_>) -> Result<Recipient, u16>) {
         self.shared.state.borrow_mut().counters.messages += 1;
         let Ok(message) = gateway::decode(bytes) else {
@@ -170,7 +171,7 @@ impl GatewayQueue {
             let state = &mut *self.shared.state.borrow_mut();
             for queue in state.queues.values_mut() {
                 queue.jobs.retain(|job| job.client != client);
-                // Without a turn, the task that processes its transfer ends it.
+                // The task that processes the transfer detects the missing turn and ends the transfer.
                 queue.turns.remove(&client);
             }
             state.answers.retain(|answer| answer.client != client);
@@ -190,7 +191,7 @@ impl GatewayQueue {
 }
 
 impl State {
-    /// Puts an answer into the queue of the client; false where it does not fit.
+    /// Queues an answer for the client; false if it does not fit.
     fn put(&mut self, job: &Job, protocol: Protocol, payload: &[u8]) -> bool {
         let header = Header { protocol, length: payload.len() as u16, ..job.header };
         let mut bytes = vec![0; gateway::HEADER_LEN + Header::LEN + payload.len()];
@@ -218,7 +219,7 @@ impl Shared {
         self.state.borrow_mut().refuse(job, detail);
     }
 
-    /// The next message: of the client with the oldest last turn. `None` where there is none.
+    /// The next message, of the client with the oldest last turn. `None` if no message waits.
     fn next(&self, key: (u16, usize)) -> Option<Job> {
         let now = self.bus.now();
         let state = &mut *self.state.borrow_mut();
@@ -259,7 +260,7 @@ impl Shared {
     }
 }
 
-/// Processes the messages for one SubDevice and lane, until there are none.
+/// Processes the messages for one SubDevice and lane until the queue is empty.
 async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: Lane) {
     while let Some(job) = shared.next(key) {
         let conversation = async {
@@ -274,7 +275,7 @@ async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: La
     }
 }
 
-/// Answers the messages for the MainDevice itself, until there are none.
+/// Answers the messages for the MainDevice itself until the queue is empty.
 async fn serve_own(shared: Rc<Shared>, key: (u16, usize)) {
     while let Some(mut job) = shared.next(key) {
         let Some(answer) = job.own.take() else { continue };
@@ -295,7 +296,7 @@ async fn settle(conversation: &mut Conversation, lane: Lane) -> Result<(), Mailb
     }
 }
 
-/// One message and its answers, and the rest of the same transfer.
+/// Processes one message with its answers, and the rest of the same transfer.
 async fn hold_conversation(
     shared: &Rc<Shared>,
     key: (u16, usize),
@@ -330,7 +331,7 @@ async fn hold_conversation(
     }
 }
 
-/// One message and its answers; false where an answer did not come.
+/// Processes one message with its answers; false if an answer is missing.
 async fn exchange(
     shared: &Rc<Shared>,
     conversation: &mut Conversation,

@@ -1,4 +1,4 @@
-//! Work for the tasks of a mailbox: starts them where they do not run.
+//! Work for the tasks of a mailbox: starts a task that is not running.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -28,7 +28,7 @@ impl SharedMailbox {
                 return Err(MailboxError::TooLong { bytes: payload.len(), limit: capacity });
             }
             let queue = &mut state.lanes[lane.index()];
-            if !queue.has_room() {
+            if !queue.has_space() {
                 state.counters.refused += 1;
                 return Err(MailboxError::Full { limit });
             }
@@ -40,7 +40,7 @@ impl SharedMailbox {
         Ok(id)
     }
 
-    /// The mailbox can be used again, unchanged.
+    /// Opens a suspended mailbox again, with the same session.
     pub(in crate::mail) fn resume(self: &Rc<SharedMailbox>) {
         {
             let state = &mut *self.state_mut();
@@ -57,7 +57,7 @@ impl SharedMailbox {
         reader::start(self);
     }
 
-    /// There is mail, or there may be.
+    /// The send mailbox is full, or may be: the reader reads it.
     pub(in crate::mail) fn mail_available(self: &Rc<SharedMailbox>) {
         {
             let state = &mut *self.state_mut();
@@ -67,7 +67,7 @@ impl SharedMailbox {
         reader::start(self);
     }
 
-    /// There may be mail: the reader polls once.
+    /// The reader polls the status of the send mailbox once.
     pub(in crate::mail) fn poll_once(self: &Rc<SharedMailbox>) {
         self.state_mut().poll_requested = true;
         reader::start(self);

@@ -8,7 +8,7 @@ use crate::mail::{Limits, Mailbox};
 
 /// Set and enabled.
 const START: u16 = 0x0003;
-/// Neither set nor enabled: aborts a running command, acknowledges one that has ended.
+/// Neither set nor enabled: aborts a running command, acknowledges an ended one.
 const CANCEL: u16 = 0x0000;
 
 /// Data state of a procedure command.
@@ -42,7 +42,7 @@ pub async fn start(mailbox: &Mailbox, drive: u8, idn: Idn, limits: Limits) -> Re
     write(mailbox, SoeAddress::value(drive, idn), &START.to_le_bytes(), limits).await
 }
 
-/// Aborts a command that is being executed, or acknowledges one that has ended, so that it can be started again.
+/// Aborts a running command, or acknowledges an ended one, so that it can be started again.
 pub async fn abort(mailbox: &Mailbox, drive: u8, idn: Idn, limits: Limits) -> Result<(), SoeError> {
     write(mailbox, SoeAddress::value(drive, idn), &CANCEL.to_le_bytes(), limits).await
 }

@@ -62,7 +62,7 @@ impl<S: Server> Device<S> {
     }
 
     /// Queues unsolicited mail.
-    pub fn say(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
+    pub fn queue_mail(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
         self.sent_counter = next_counter(self.sent_counter);
         let mut mail = Header::new(protocol, self.sent_counter, payload.len() as u16).encode().to_vec();
         mail.extend_from_slice(payload);
@@ -70,9 +70,9 @@ impl<S: Server> Device<S> {
         self.queue.push_back((now, mail));
     }
 
-    /// Queues unsolicited mail before all waiting mail.
-    pub fn cut_in(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
-        self.say(protocol, payload, now);
+    /// Queues unsolicited mail in front of all waiting mail.
+    pub fn queue_first(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
+        self.queue_mail(protocol, payload, now);
         if let Some(mail) = self.queue.pop_back() {
             self.queue.push_front(mail);
         }
@@ -80,7 +80,7 @@ impl<S: Server> Device<S> {
 
     /// Runs the application.
     pub fn run(&mut self, now: Instant) {
-        // With many answers queued it accepts no further message.
+        // With several answers queued, the SubDevice accepts no further message.
         if self.queue.len() < 4
             && let Some(mail) = self.received.take()
             && let Ok(message) = Message::decode(&mail)
@@ -89,7 +89,7 @@ impl<S: Server> Device<S> {
             self.received_counter = message.header.counter;
             self.served.push(message.header.counter);
             for (protocol, payload) in self.server.serve(message.header.protocol, message.payload) {
-                self.say(protocol, &payload, now + self.delay);
+                self.queue_mail(protocol, &payload, now + self.delay);
             }
         }
         if self.ready.is_none() && self.queue.front().is_some_and(|(at, _)| *at <= now) {
@@ -113,21 +113,21 @@ impl<S: Server> Device<S> {
         self.run(now);
     }
 
-    /// A frame passes.
+    /// Processes a frame.
     pub fn pass(&mut self, frame: &mut [u8], now: Instant) {
         self.run(now);
-        let places: Vec<_> = {
+        let datagrams: Vec<_> = {
             let parsed = Frame::parse(frame).unwrap();
             let mut at = parsed.payload_offset();
-            let place = |datagram: ringcat_wire::datagram::Datagram<'_>| {
+            let datagram_at = |datagram: ringcat_wire::datagram::Datagram<'_>| {
                 let data = at + HEADER_LEN;
                 at = data + datagram.data.len() + 2;
                 let header = datagram.header;
                 (header.command, header.adp(), header.ado().0, data..data + datagram.data.len())
             };
-            parsed.datagrams().map(place).collect()
+            parsed.datagrams().map(datagram_at).collect()
         };
-        for (command, station, register, data) in places {
+        for (command, station, register, data) in datagrams {
             let end = data.end;
             if station == STATION && self.access(command, register, &mut frame[data], now) {
                 let wkc = u16::from_le_bytes([frame[end], frame[end + 1]]) + 1;
@@ -191,7 +191,7 @@ impl<S: Server> Device<S> {
     }
 }
 
-/// Bytes of a number, for objects and files.
+/// Pseudo-random bytes from a seed, for objects and files.
 pub fn pattern(seed: u32, length: usize) -> Vec<u8> {
     let mut bytes = vec![0; length];
     let mut state = seed | 1;

@@ -1,4 +1,4 @@
-//! A SubDevice that does not answer for a time, and returns with its mailbox unchanged or reset.
+//! A SubDevice that does not answer for a time, and answers again with its mailbox unchanged or reset.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -24,8 +24,8 @@ fn emergency(code: u16) -> Vec<u8> {
 }
 
 impl Bench {
-    /// Does not answer for 200 ms, which is noticed after `noticed`.
-    fn is_away(&mut self, noticed: Duration) {
+    /// The SubDevice does not answer for 200 ms; the MainDevice detects this after `noticed`.
+    fn stops_answering(&mut self, noticed: Duration) {
         let (until, end) = (self.now + noticed, self.now + Duration::from_millis(200));
         while self.now < until {
             self.step(|| Fate::LostOut);
@@ -44,16 +44,16 @@ impl Bench {
 
 // covers: 6.2, mailbox
 #[test]
-fn a_mail_whose_read_was_lost_at_an_outage_is_read_when_the_subdevice_is_back() {
+fn a_mail_lost_at_an_outage_is_read_when_the_subdevice_answers_again() {
     for noticed in (0..4000).step_by(50) {
         let mut bench = Bench::new(LinkSet::Single, 64);
         for code in 1..=3 {
-            bench.device.say(Protocol::Coe, &emergency(code), bench.now);
+            bench.device.queue_mail(Protocol::Coe, &emergency(code), bench.now);
         }
         bench.mailbox.mail_available();
         // The first read reaches the SubDevice; its answer and all later frames are lost.
         bench.step(|| Fate::LostBack);
-        bench.is_away(Duration::from_micros(noticed));
+        bench.stops_answering(Duration::from_micros(noticed));
         bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(50));
         assert_eq!(bench.codes(), [1, 2, 3], "noticed after {noticed} us: {:?}", bench.mailbox.counters());
@@ -62,7 +62,7 @@ fn a_mail_whose_read_was_lost_at_an_outage_is_read_when_the_subdevice_is_back() 
 
 // covers: 6.1, mailbox
 #[test]
-fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
+fn an_answer_from_before_an_outage_does_not_answer_another_request() {
     let message = |text: &[u8]| Voe { vendor_id: 1, vendor_type: 1, data: text.to_vec() };
     let address = |idn| SoeAddress::value(1, Idn::standard(0, idn));
     let object = SdoAddress::new(0x2000, 1);
@@ -71,7 +71,7 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
         let (old, new) = (pattern(1, 20), pattern(2, 20));
         bench.device.server.idns.insert((1, 7), old.clone());
         bench.device.server.objects.insert((0x2000, 1), old);
-        // One request per protocol; all reach the SubDevice, and no answer is fetched.
+        // One request per protocol; all reach the SubDevice, and no answer is read.
         bench.device.delay = Duration::from_millis(2);
         let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
         let lost = (
@@ -82,7 +82,7 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
         while bench.device.served.len() < 3 {
             bench.step(|| Fate::Passes);
         }
-        bench.is_away(Duration::from_micros(noticed));
+        bench.stops_answering(Duration::from_micros(noticed));
         assert_eq!(lost.0.take(), Some(Err(MailboxError::Closed)), "noticed after {noticed} us");
         assert!(matches!(lost.1.take(), Some(Err(error)) if error.cause == SoeFailure::Mailbox(MailboxError::Closed)));
         assert!(lost.2.take().is_some_and(|result| result.is_err()));
@@ -90,30 +90,30 @@ fn an_answer_that_waited_during_an_outage_answers_no_other_request() {
         bench.device.server.idns.insert((1, 7), new.clone());
         bench.device.server.objects.insert((0x2000, 1), new.clone());
         let [a, b, c] = core::array::from_fn(|_| bench.mailbox.clone());
-        let asked = (
+        let after = (
             bench.start(async move { voe::exchange(&a, &message(b"after"), LIMITS).await }),
             bench.start(async move { soe::read(&b, address(7), LIMITS, 100).await }),
         );
         assert_eq!(bench.run(async move { read(&c, object, LIMITS, 100).await }), Ok(new.clone()));
         bench.pass(Duration::from_secs(2));
-        assert_eq!(asked.0.take(), Some(Ok(message(b"after"))), "noticed after {noticed} us");
-        assert_eq!(asked.1.take(), Some(Ok(new)), "noticed after {noticed} us");
+        assert_eq!(after.0.take(), Some(Ok(message(b"after"))), "noticed after {noticed} us");
+        assert_eq!(after.1.take(), Some(Ok(new)), "noticed after {noticed} us");
     }
 }
 
 // covers: mailbox
 #[test]
-fn what_was_read_before_a_restart_and_comes_back_after_it_is_nobodys() {
+fn mail_that_was_read_before_a_restart_is_dropped_after_it() {
     let mut bench = Bench::new(LinkSet::Single, 64);
-    bench.device.say(Protocol::Coe, &emergency(1), bench.now);
+    bench.device.queue_mail(Protocol::Coe, &emergency(1), bench.now);
     bench.mailbox.mail_available();
     bench.step(|| Fate::Late(Duration::from_millis(60)));
     bench.pass(Duration::from_millis(10));
-    // It lost its power and is in PREOP again; the first mail of the new session is another one.
+    // The SubDevice lost its power and is in PREOP again; the first mail of the new session is another mail.
     bench.mailbox.suspend();
     let layout = bench.device.layout;
     bench.mailbox.open(StationAddress(STATION), layout, 1);
-    bench.device.say(Protocol::Coe, &emergency(2), bench.now);
+    bench.device.queue_mail(Protocol::Coe, &emergency(2), bench.now);
     for _ in 0..10 {
         bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(10));

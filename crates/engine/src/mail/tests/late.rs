@@ -1,4 +1,4 @@
-//! Late mail: fragments of an answer that was given up, and error replies that may belong to another message.
+//! Late mail: fragments of the answer to an abandoned request, and error replies that may belong to another message.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -28,13 +28,13 @@ fn message(text: &[u8]) -> Voe {
 }
 
 impl Bench {
-    /// Begins a vendor message and its answer, then gives it up after a time.
-    fn ask_for(&mut self, text: &[u8], time: Duration, limits: Limits) -> Outcome {
+    /// Starts the exchange of a vendor message, and gives it up after a time.
+    fn begin_exchange(&mut self, text: &[u8], time: Duration, limits: Limits) -> Outcome {
         let (mailbox, bus, message) = (self.mailbox.clone(), self.supervisor.bus(), message(text));
         self.start(async move { bus.within(time, voe::exchange(&mailbox, &message, limits)).await.ok() })
     }
 
-    /// A message of a vendor-specific protocol without an answer.
+    /// Sends a message of a vendor-specific protocol without an answer.
     fn send_unanswered(&mut self) {
         let mailbox = self.mailbox.clone();
         assert_eq!(self.run(async move { raw::send(&mailbox, Lane::of(9), &[0], LIMITS.0).await }), Ok(()));
@@ -42,7 +42,7 @@ impl Bench {
 
     fn refuse(&mut self, detail: u16) -> ErrorReply {
         let reply = ErrorReply::new(detail);
-        self.device.say(Protocol::Error, &reply.encode(), self.now);
+        self.device.queue_mail(Protocol::Error, &reply.encode(), self.now);
         reply
     }
 
@@ -57,7 +57,7 @@ type Outcome = alloc::rc::Rc<core::cell::RefCell<Option<Option<Result<Voe, Mailb
 
 // covers: 6.6, mailbox
 #[test]
-fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
+fn late_fragments_before_the_next_request_do_not_answer_it() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (old, new) = (pattern(1, 150), pattern(2, 150));
     let address = SoeAddress::value(1, Idn::standard(0, 7));
@@ -67,7 +67,7 @@ fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     bench.until_served(1);
     bench.pass(MS);
     bench.device.server.idns.insert((1, 7), new.clone());
-    // One of the three is read before the next request.
+    // One of the three fragments is read before the next request.
     bench.mailbox.mail_available();
     while bench.mailbox.counters().unclaimed == 0 {
         bench.step(|| Fate::Passes);
@@ -78,10 +78,10 @@ fn late_fragments_begun_without_a_waiting_request_are_kept_from_the_next() {
     assert_eq!(bench.mailbox.counters().unclaimed, 3);
 }
 
-// The write was accepted, its response was late, and meanwhile the reader brought the first fragment.
+// The SubDevice accepted the write, the frame was late, and the reader read the first fragment meanwhile.
 // covers: mailbox
 #[test]
-fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
+fn late_fragments_before_the_confirmed_write_do_not_answer_the_next_request() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (old, new) = (pattern(1, 150), pattern(2, 150));
     let address = SoeAddress::value(1, Idn::standard(0, 7));
@@ -89,7 +89,7 @@ fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
     let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
     let given_up =
         bench.start(async move { bus.within(2 * MS, soe::read(&mailbox, address, LIMITS, 1000)).await.is_err() });
-    // Only reads come back.
+    // Only frames with reads come back.
     let mailbox = bench.mailbox.clone();
     let fate = || if mailbox.shared().state().reading { Fate::Passes } else { Fate::LostBack };
     while bench.device.served.is_empty() {
@@ -103,7 +103,7 @@ fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
         bench.step(fate);
     }
     let counters = mailbox.counters();
-    assert_eq!((counters.written, counters.read), (0, 1), "an answer begins, and nobody knows that it was asked for");
+    assert_eq!((counters.written, counters.read), (0, 1), "the answer begins before the write is confirmed");
     assert_eq!(given_up.take(), Some(true));
     let mailbox = bench.mailbox.clone();
     assert_eq!(bench.run(async move { soe::read(&mailbox, address, LIMITS, 1000).await }), Ok(new));
@@ -112,36 +112,36 @@ fn late_fragments_begun_before_their_write_was_known_are_kept_from_the_next() {
 
 // covers: mailbox
 #[test]
-fn the_answer_to_a_request_written_after_it_was_abandoned_is_not_the_next_ones() {
+fn the_answer_to_a_request_abandoned_before_its_write_is_not_the_next_answer() {
     let limits = (Duration::from_secs(1), 10 * MS);
     let mut bench = Bench::new(LinkSet::Single, 64);
-    let given_up = bench.ask_for(b"before", MS, limits);
-    // No frame arrives for longer than an answer may take.
+    let given_up = bench.begin_exchange(b"before", MS, limits);
+    // All frames are lost for longer than the time limit of an answer.
     let end = bench.now + 40 * MS;
     while given_up.borrow().is_none() {
         bench.step(|| Fate::LostOut);
     }
-    let asked = bench.ask_for(b"after", 10 * LIMITS.1, limits);
+    let next = bench.begin_exchange(b"after", 10 * LIMITS.1, limits);
     while bench.now < end {
         bench.step(|| Fate::LostOut);
     }
     bench.pass(100 * MS);
     assert_eq!(given_up.take(), Some(None));
-    assert_eq!(asked.take(), Some(Some(Ok(message(b"after")))));
+    assert_eq!(next.take(), Some(Some(Ok(message(b"after")))));
     assert_eq!(bench.device.served, [1, 2], "both were written");
 }
 
 // covers: 6.1, mailbox
 #[test]
-fn an_error_reply_of_unclear_cause_leaves_the_request_it_ends_in_doubt() {
+fn after_an_ambiguous_error_reply_a_late_answer_is_expected() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     bench.send_unanswered();
-    let first = bench.ask_for(b"first", LIMITS.1, LIMITS);
+    let first = bench.begin_exchange(b"first", LIMITS.1, LIMITS);
     bench.until_served(2);
     let at = bench.now;
     let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
-    bench.device.cut_in(Protocol::Error, &reply.encode(), at);
+    bench.device.queue_first(Protocol::Error, &reply.encode(), at);
     while first.borrow().is_none() {
         bench.step(|| Fate::Passes);
     }
@@ -153,11 +153,11 @@ fn an_error_reply_of_unclear_cause_leaves_the_request_it_ends_in_doubt() {
 
 // covers: 6.3, mailbox
 #[test]
-fn a_download_that_was_perhaps_not_what_was_refused_is_aborted() {
-    for in_doubt in [false, true] {
+fn a_download_is_aborted_after_an_ambiguous_error_reply() {
+    for ambiguous in [false, true] {
         let mut bench = Bench::new(LinkSet::Single, 64);
         bench.device.delay = 3 * MS;
-        if in_doubt {
+        if ambiguous {
             bench.send_unanswered();
         }
         let before = bench.device.served.len();
@@ -167,21 +167,21 @@ fn a_download_that_was_perhaps_not_what_was_refused_is_aborted() {
         bench.until_served(before + 1);
         let at = bench.now;
         let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
-        bench.device.cut_in(Protocol::Error, &reply.encode(), at);
+        bench.device.queue_first(Protocol::Error, &reply.encode(), at);
         bench.pass(50 * MS);
-        assert!(written.take().is_some_and(|result| result.is_err()), "in doubt: {in_doubt}");
-        let aborts: &[AbortCode] = if in_doubt { &[AbortCode::GENERAL] } else { &[] };
-        assert_eq!(bench.device.server.aborts, aborts, "in doubt: {in_doubt}");
+        assert!(written.take().is_some_and(|result| result.is_err()), "ambiguous: {ambiguous}");
+        let aborts: &[AbortCode] = if ambiguous { &[AbortCode::GENERAL] } else { &[] };
+        assert_eq!(bench.device.server.aborts, aborts, "ambiguous: {ambiguous}");
     }
 }
 
 // covers: 6.4, mailbox
 #[test]
-fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up() {
-    for in_doubt in [false, true] {
+fn a_file_transfer_is_aborted_only_after_an_ambiguous_error_reply() {
+    for ambiguous in [false, true] {
         let mut bench = Bench::new(LinkSet::Single, 64);
         bench.device.delay = 3 * MS;
-        if in_doubt {
+        if ambiguous {
             bench.send_unanswered();
         }
         let before = bench.device.served.len();
@@ -191,16 +191,16 @@ fn a_file_that_is_surely_refused_with_an_error_reply_is_not_given_up() {
         });
         bench.until_served(before + 1);
         let at = bench.now;
-        bench.device.cut_in(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
+        bench.device.queue_first(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
         bench.pass(50 * MS);
-        assert!(written.take().is_some_and(|result| result.is_err()), "in doubt: {in_doubt}");
-        assert_eq!(bench.device.server.foe_errors.len(), usize::from(in_doubt), "in doubt: {in_doubt}");
+        assert!(written.take().is_some_and(|result| result.is_err()), "ambiguous: {ambiguous}");
+        assert_eq!(bench.device.server.foe_errors.len(), usize::from(ambiguous), "ambiguous: {ambiguous}");
     }
 }
 
 // covers: 6.1, mailbox
 #[test]
-fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
+fn the_refusal_of_ethernet_frames_does_not_end_a_request_of_a_proven_protocol() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     let mailbox = bench.mailbox.clone();
@@ -211,7 +211,7 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
     // The server does not support EoE; its error reply arrives before the answer.
     let mailbox = bench.mailbox.clone();
     bench.start(async move { mailbox.conversation(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
-    let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
+    let second = bench.begin_exchange(b"second", LIMITS.1, LIMITS);
     bench.pass(20 * MS);
     assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
     let kept = bench.mailbox.pop_unsolicited(Unsolicited::Other).map(|mail| mail.protocol);
@@ -220,31 +220,31 @@ fn a_protocol_that_is_known_is_not_refused_because_ethernet_frames_are() {
 
 // covers: 6.1, mailbox
 #[test]
-fn an_error_reply_to_something_else_does_not_end_the_wait_for_a_late_answer() {
+fn an_error_reply_to_another_message_does_not_end_the_wait_for_a_late_answer() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     bench.send_unanswered();
-    bench.ask_for(b"first", MS / 5, LIMITS);
+    bench.begin_exchange(b"first", MS / 5, LIMITS);
     bench.until_served(2);
     bench.pass(MS / 2);
-    let second = bench.ask_for(b"second", LIMITS.1, LIMITS);
+    let second = bench.begin_exchange(b"second", LIMITS.1, LIMITS);
     let at = bench.now;
-    bench.device.cut_in(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
+    bench.device.queue_first(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
     bench.pass(100 * MS);
     assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
 }
 
 // covers: mailbox
 #[test]
-fn an_error_reply_that_comes_while_its_conversation_ends_is_kept_as_unasked_mail() {
+fn an_error_reply_at_the_end_of_its_conversation_is_kept_as_unsolicited_mail() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let (mailbox, asking) = (bench.mailbox.clone(), bench.mailbox.clone());
     // This message has no answer; the conversation has ended when the error reply is delivered.
     let ended = bench.start(async move {
         let mut exchange = pin!(raw::exchange(&asking, Lane::of(9), &[0], LIMITS));
         poll_fn(|context| {
-            let gone = mailbox.shared().state_mut().lanes[Lane::of(9).index()].has_arrivals();
-            if gone { Poll::Ready(true) } else { exchange.as_mut().poll(context).map(|_| false) }
+            let has_arrived = mailbox.shared().state_mut().lanes[Lane::of(9).index()].has_arrivals();
+            if has_arrived { Poll::Ready(true) } else { exchange.as_mut().poll(context).map(|_| false) }
         })
         .await
     });

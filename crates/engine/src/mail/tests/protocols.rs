@@ -1,4 +1,4 @@
-//! Each protocol, undisturbed.
+//! Each protocol without disturbances.
 
 use alloc::string::ToString;
 use alloc::vec;
@@ -53,7 +53,7 @@ fn objects_of_any_size_are_written_and_read_in_segments() {
 
 // covers: 6.3, sdo
 #[test]
-fn what_is_larger_than_the_receiver_takes_is_aborted() {
+fn an_upload_beyond_the_limit_of_the_receiver_is_aborted() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 500));
     let mailbox = bench.mailbox.clone();
@@ -65,7 +65,7 @@ fn what_is_larger_than_the_receiver_takes_is_aborted() {
 
 // covers: 6.3, sdo
 #[test]
-fn a_toggle_that_stands_still_is_aborted() {
+fn a_toggle_bit_that_does_not_alternate_aborts_the_transfer() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 500));
     bench.device.server.wrong_toggle = true;
@@ -78,7 +78,7 @@ fn a_toggle_that_stands_still_is_aborted() {
 
 // covers: sdo
 #[test]
-fn a_transfer_that_is_dropped_is_aborted_and_the_next_one_is_not_disturbed() {
+fn a_dropped_transfer_is_aborted_and_does_not_disturb_the_next_one() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let data = pattern(3, 5000);
     bench.device.server.objects.insert((0x2000, 1), data.clone());
@@ -100,7 +100,7 @@ fn a_transfer_that_is_dropped_is_aborted_and_the_next_one_is_not_disturbed() {
 
 // covers: 6.3, sdo-information
 #[test]
-fn lists_objects_and_entries_come_in_fragments() {
+fn lists_objects_and_entries_are_joined_from_fragments() {
     let mut bench = Bench::new(LinkSet::Single, 40);
     for index in 0..300 {
         bench.device.server.objects.insert((0x2000 + index, 0), vec![0; 4]);
@@ -138,13 +138,13 @@ fn assignment_and_mapping_are_written_and_read_back() {
 
 // covers: 6.3, sdo-information
 #[test]
-fn an_emergency_between_request_and_response_is_kept_and_told() {
+fn an_emergency_between_request_and_response_is_kept_and_is_an_event() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     bench.device.server.objects.insert((0x2000, 1), vec![1, 2, 3]);
     let emergency = Emergency { error_code: 0x5112, error_register: 4, data: [1, 2, 3, 4, 5] };
     let mut mail = vec![0x00, 0x10];
     mail.extend(emergency.encode());
-    bench.device.say(Protocol::Coe, &mail, bench.now);
+    bench.device.queue_mail(Protocol::Coe, &mail, bench.now);
     let mailbox = bench.mailbox.clone();
     assert_eq!(
         bench.run(async move { read(&mailbox, SdoAddress::new(0x2000, 1), LIMITS, 4).await }),
@@ -152,12 +152,12 @@ fn an_emergency_between_request_and_response_is_kept_and_told() {
     );
     assert_eq!(bench.mailbox.pop_emergency().map(|(_, emergency)| emergency), Some(emergency));
     assert_eq!(bench.mailbox.pop_emergency(), None);
-    let told = core::iter::from_fn(|| bench.supervisor.pop_event()).any(
+    let reported = core::iter::from_fn(|| bench.supervisor.pop_event()).any(
         |timed| matches!(timed.event, crate::event::Event::Emergency { subdevice: 0, emergency: e } if e == emergency),
     );
-    assert!(told);
+    assert!(reported);
     for _ in 0..40 {
-        bench.device.say(Protocol::Coe, &mail, bench.now);
+        bench.device.queue_mail(Protocol::Coe, &mail, bench.now);
     }
     bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(50));
@@ -187,13 +187,13 @@ fn files_of_any_size_are_written_and_read() {
 
 // covers: 6.4, foe
 #[test]
-fn a_busy_subdevice_is_asked_again_and_its_progress_is_told() {
+fn messages_to_a_busy_subdevice_are_repeated_and_its_progress_is_reported() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let data = pattern(9, 200);
     bench.device.server.busy = 3;
     let (mailbox, written) = (bench.mailbox.clone(), data.clone());
-    let told = alloc::rc::Rc::new(core::cell::RefCell::new(Vec::new()));
-    let notes = told.clone();
+    let reported = alloc::rc::Rc::new(core::cell::RefCell::new(Vec::new()));
+    let notes = reported.clone();
     let result = bench.run(async move {
         let note = |progress| notes.borrow_mut().push(progress);
         foe::write(&mailbox, "a", FoeOptions::default(), &mut Bytes::new(&written), note).await
@@ -201,8 +201,8 @@ fn a_busy_subdevice_is_asked_again_and_its_progress_is_told() {
     assert_eq!(result, Ok(200));
     assert_eq!(bench.device.server.files[b"a".as_slice()], data);
     let busy = |done| FoeProgress::Busy { done, entire: 100, text: "thinking".into() };
-    assert_eq!(told.borrow()[..3], [busy(98), busy(99), busy(100)]);
-    assert_eq!(told.borrow().last(), Some(&FoeProgress::Bytes(200)));
+    assert_eq!(reported.borrow()[..3], [busy(98), busy(99), busy(100)]);
+    assert_eq!(reported.borrow().last(), Some(&FoeProgress::Bytes(200)));
     bench.device.server.busy = u32::MAX;
     let mailbox = bench.mailbox.clone();
     let error = bench.run(async move {
@@ -211,12 +211,12 @@ fn a_busy_subdevice_is_asked_again_and_its_progress_is_told() {
     });
     assert_eq!(error.unwrap_err().to_string(), "FoE \"a\": the SubDevice was busy for 200 ms without progress");
     bench.pass(Duration::from_millis(5));
-    assert_eq!(bench.device.server.foe_errors.len(), 1, "it is told that the transfer is over");
+    assert_eq!(bench.device.server.foe_errors.len(), 1, "the transfer is aborted");
 }
 
 // covers: 6.4, foe
 #[test]
-fn code_and_text_of_a_refused_file_reach_the_user() {
+fn code_and_text_of_a_refused_file_are_in_the_error() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let mailbox = bench.mailbox.clone();
     let error = bench
@@ -251,8 +251,8 @@ fn idns_are_written_and_read_in_fragments() {
     let error = bench.run(async move { soe::read(&mailbox, address, LIMITS, 4000).await }).unwrap_err();
     assert!(error.to_string().contains("refused by the drive: 0x1001"), "{error}");
     let mailbox = bench.mailbox.clone();
-    let nobody = SoeAddress::value(8, Idn::standard(0, 1));
-    let error = bench.run(async move { soe::read(&mailbox, nobody, LIMITS, 4000).await }).unwrap_err();
+    let no_drive = SoeAddress::value(8, Idn::standard(0, 1));
+    let error = bench.run(async move { soe::read(&mailbox, no_drive, LIMITS, 4000).await }).unwrap_err();
     assert_eq!(error.cause, SoeFailure::Drive);
 }
 
@@ -278,12 +278,12 @@ fn ads_requests_are_answered_by_their_invoke_id() {
 
 // covers: 6.8, voe
 #[test]
-fn vendor_messages_are_exchanged_and_received_unasked() {
+fn vendor_messages_are_exchanged_and_received_unsolicited() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     let message = Voe { vendor_id: 0x0C47, vendor_type: 3, data: b"hello".to_vec() };
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
     assert_eq!(bench.run(async move { voe::exchange(&mailbox, &sent, LIMITS).await }), Ok(message.clone()));
-    // Sent without waiting, its echo is unsolicited.
+    // The echo of a message that was sent without waiting is unsolicited.
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
     let result = bench.run(async move {
         voe::send(&mailbox, &sent, LIMITS.0).await?;
@@ -296,7 +296,7 @@ fn vendor_messages_are_exchanged_and_received_unasked() {
 
 // covers: 6.1, mailbox-faults
 #[test]
-fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice() {
+fn an_error_reply_goes_to_the_request_of_an_unsupported_protocol() {
     let mut bench = Bench::new(LinkSet::Single, 128);
     bench.device.server.objects.insert((0x2000, 1), pattern(1, 2000));
     let mailbox = bench.mailbox.clone();
@@ -313,10 +313,10 @@ fn an_error_reply_goes_to_the_request_whose_protocol_is_unknown_to_the_subdevice
     assert_eq!(object.borrow_mut().take(), Some(Ok(pattern(1, 2000))));
 }
 
-// Only the last fragment has an answer: an earlier error reply may belong to any of them, or to another message.
+// Only the last fragment has an answer: an earlier error reply may belong to any fragment, or to another message.
 // covers: 6.6, mailbox-faults
 #[test]
-fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits() {
+fn an_error_reply_while_fragments_are_written_fails_the_write() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let address = SoeAddress::value(1, Idn::standard(0, 7));
     let mailbox = bench.mailbox.clone();
@@ -328,7 +328,7 @@ fn an_error_reply_while_fragments_are_written_fails_the_write_whoever_else_waits
         bench.step(|| Fate::Passes);
     }
     let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
-    bench.device.say(Protocol::Error, &reply.encode(), bench.now);
+    bench.device.queue_mail(Protocol::Error, &reply.encode(), bench.now);
     bench.pass(Duration::from_millis(100));
     assert_eq!(other.borrow_mut().take(), Some(Err(MailboxError::Error(reply))));
     let cause = SoeFailure::Mailbox(MailboxError::Error(reply));

@@ -19,9 +19,9 @@ use super::device::Server;
 
 /// Objects, files and IDNs, kept in memory.
 #[derive(Default)]
-pub struct Everything {
-    /// Room for a payload.
-    room: usize,
+pub struct AllProtocols {
+    /// Largest payload in bytes.
+    capacity: usize,
     pub objects: BTreeMap<(u16, u8), Vec<u8>>,
     pub idns: BTreeMap<(u8, u16), Vec<u8>>,
     pub files: BTreeMap<Vec<u8>, Vec<u8>>,
@@ -31,7 +31,7 @@ pub struct Everything {
     pub foe_errors: Vec<(u32, String)>,
     /// The next messages of FoE are answered with BUSY.
     pub busy: u32,
-    /// The toggle of the next segment is wrong.
+    /// The toggle bit of the next segment is wrong.
     pub wrong_toggle: bool,
     sdo: Option<Sdo>,
     reading: Option<(Vec<u8>, u32)>,
@@ -47,7 +47,7 @@ struct Sdo {
     toggle: bool,
 }
 
-impl Server for Everything {
+impl Server for AllProtocols {
     fn serve(&mut self, protocol: Protocol, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
         match protocol {
             Protocol::Coe => {
@@ -72,13 +72,13 @@ impl Server for Everything {
     }
 }
 
-impl Everything {
-    pub fn new(room: usize) -> Everything {
-        Everything { room, ..Everything::default() }
+impl AllProtocols {
+    pub fn new(capacity: usize) -> AllProtocols {
+        AllProtocols { capacity, ..AllProtocols::default() }
     }
 
     fn upload(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Vec<(Protocol, Vec<u8>)> {
-        let mut out = vec![0; self.room];
+        let mut out = vec![0; self.capacity];
         let Some(data) = self.objects.get(&(index, sub_index)).cloned() else {
             return abort(index, sub_index, AbortCode::OBJECT_DOES_NOT_EXIST);
         };
@@ -87,7 +87,7 @@ impl Everything {
             return encoded(&response, &mut out);
         }
         let total = data.len();
-        let at = total.min(self.room - 10);
+        let at = total.min(self.capacity - 10);
         let first = data[..at].to_vec();
         self.sdo = Some(Sdo { key: (index, sub_index), data, at, total, toggle: false });
         let total = total as u32;
@@ -97,7 +97,7 @@ impl Everything {
 
     fn sdo(&mut self, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
         let Ok(request) = SdoRequest::decode(payload) else { return Vec::new() };
-        let mut out = vec![0; self.room];
+        let mut out = vec![0; self.capacity];
         let response = match request {
             SdoRequest::DownloadExpedited { index, sub_index, data, .. } => {
                 self.objects.insert((index, sub_index), data.to_vec());
@@ -132,7 +132,7 @@ impl Everything {
                 let Some(sdo) = self.sdo.as_mut().filter(|sdo| sdo.toggle == toggle) else {
                     return abort(0, 0, AbortCode::TOGGLE_NOT_ALTERNATED);
                 };
-                let end = sdo.total.min(sdo.at + self.room - 3);
+                let end = sdo.total.min(sdo.at + self.capacity - 3);
                 let data = sdo.data[sdo.at..end].to_vec();
                 (sdo.at, sdo.toggle) = (end, !sdo.toggle);
                 let toggle = toggle ^ core::mem::take(&mut self.wrong_toggle);
@@ -162,7 +162,7 @@ impl Everything {
                 let index = request.object().unwrap();
                 let Some((_, sub_index)) = self.objects.keys().rfind(|(i, _)| *i == index) else {
                     let code = AbortCode::OBJECT_DOES_NOT_EXIST.0.to_le_bytes().to_vec();
-                    return fragments(InformationOpcode::Error, &code, self.room);
+                    return fragments(InformationOpcode::Error, &code, self.capacity);
                 };
                 let (max_sub_index, code) = (*sub_index, ObjectCode::Variable);
                 let description =
@@ -191,13 +191,13 @@ impl Everything {
             }
             _ => return Vec::new(),
         };
-        fragments(opcode, &data, self.room)
+        fragments(opcode, &data, self.capacity)
     }
 
     fn foe(&mut self, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
-        let full = self.room - FoeMessage::OVERHEAD;
+        let full = self.capacity - FoeMessage::OVERHEAD;
         let message = FoeMessage::decode(payload).unwrap();
-        let mut out = vec![0; self.room];
+        let mut out = vec![0; self.capacity];
         let needs_answer = !matches!(message, FoeMessage::Error { .. });
         if self.busy > 0 && needs_answer {
             self.busy -= 1;
@@ -255,8 +255,8 @@ impl Everything {
 
     /// The next packet, an acknowledgement or an error.
     fn foe_reply(&self, answer: Result<(), (FoeErrorCode, &str)>, packets: bool) -> Vec<(Protocol, Vec<u8>)> {
-        let full = self.room - FoeMessage::OVERHEAD;
-        let mut out = vec![0; self.room];
+        let full = self.capacity - FoeMessage::OVERHEAD;
+        let mut out = vec![0; self.capacity];
         let reply = match (answer, &self.reading, &self.writing) {
             (Err((code, text)), _, _) => FoeMessage::Error { code, text: text.as_bytes() },
             (Ok(()), Some((file, next)), _) if packets => {
@@ -272,8 +272,8 @@ impl Everything {
 
     fn soe(&mut self, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
         let message = SoeMessage::decode(payload).unwrap();
-        let mut out = vec![0; self.room];
-        let full = self.room - SoeMessage::OVERHEAD;
+        let mut out = vec![0; self.capacity];
+        let full = self.capacity - SoeMessage::OVERHEAD;
         match message.operation {
             SoeOperation::ReadRequest => {
                 let base = SoeMessage { operation: SoeOperation::ReadResponse, data: &[], ..message };
@@ -308,7 +308,7 @@ impl Everything {
 
     fn aoe(&mut self, payload: &[u8]) -> Vec<(Protocol, Vec<u8>)> {
         let (header, data) = AmsHeader::decode(payload).unwrap();
-        let mut out = vec![0; self.room];
+        let mut out = vec![0; self.capacity];
         let result = AdsErrorCode::NO_ERROR;
         let response = match AdsRequest::decode(header.command, data).unwrap() {
             AdsRequest::Write { group, offset, data } => {
@@ -342,12 +342,12 @@ fn abort(index: u16, sub_index: u8, code: AbortCode) -> Vec<(Protocol, Vec<u8>)>
 }
 
 /// SDO information in as many fragments as needed.
-fn fragments(opcode: InformationOpcode, data: &[u8], room: usize) -> Vec<(Protocol, Vec<u8>)> {
-    let pieces: Vec<&[u8]> = data.chunks(room - SdoInformation::OVERHEAD).collect();
+fn fragments(opcode: InformationOpcode, data: &[u8], capacity: usize) -> Vec<(Protocol, Vec<u8>)> {
+    let pieces: Vec<&[u8]> = data.chunks(capacity - SdoInformation::OVERHEAD).collect();
     let count = pieces.len();
     let fragment = |(at, data): (usize, &&[u8])| {
         let left = (count - 1 - at) as u16;
-        let mut out = vec![0; room];
+        let mut out = vec![0; capacity];
         let message = SdoInformation { opcode, fragments_left: left, data, incomplete: left > 0 };
         let length = message.encode(&mut out).unwrap();
         (Protocol::Coe, out[..length].to_vec())

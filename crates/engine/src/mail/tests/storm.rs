@@ -1,4 +1,4 @@
-//! All protocols at once over one mailbox, while frames are lost, late and duplicated, and procedures are dropped.
+//! All protocols in parallel over one mailbox, while frames are lost, late and duplicated, and procedures are dropped.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -26,9 +26,9 @@ use crate::mail::{Limits, Mailbox, aoe, foe, soe, voe};
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
 
 /// Random numbers from a seed (xorshift).
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     fn below(&mut self, limit: u64) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -90,22 +90,22 @@ async fn vendor(mailbox: Mailbox, done: Done) {
 }
 
 /// Fate of a frame.
-fn fate(dice: &mut Dice, percent: u64, links: LinkSet) -> Fate {
-    if dice.below(100) >= percent {
+fn fate(random: &mut Random, percent: u64, links: LinkSet) -> Fate {
+    if random.below(100) >= percent {
         return Fate::Passes;
     }
-    match dice.below(4) {
+    match random.below(4) {
         0 => Fate::LostOut,
         1 => Fate::LostBack,
-        2 => Fate::Late(Duration::from_micros(dice.below(60_000))),
-        _ if links == LinkSet::Ring => Fate::MetTwice,
+        2 => Fate::Late(Duration::from_micros(random.below(60_000))),
+        _ if links == LinkSet::Ring => Fate::ProcessedTwice,
         _ => Fate::LostBack,
     }
 }
 
 /// One run; `percent` of the frames are disturbed.
 fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
-    let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+    let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let mut bench = Bench::new(links, 64);
     let done = Done::default();
     let mailbox = || bench.mailbox.clone();
@@ -117,20 +117,20 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
     bench.start(ads(d, done.clone()));
     bench.start(vendor(e, done.clone()));
     let end = bench.now + Duration::from_secs(60);
-    let (mut said, mut heard) = (0u16, Vec::new());
+    let (mut queued, mut emergencies) = (0u16, Vec::new());
     while *done.borrow() != [1; 5] {
         assert!(bench.now < end, "seed {seed}: not done in 60 s: {:?}, {:?}", done.borrow(), bench.mailbox.counters());
-        if dice.below(40) == 0 && said < 200 {
-            said += 1;
-            let emergency = Emergency { error_code: said, error_register: 0, data: [0; 5] };
+        if random.below(40) == 0 && queued < 200 {
+            queued += 1;
+            let emergency = Emergency { error_code: queued, error_register: 0, data: [0; 5] };
             let mut mail = vec![0x00, 0x10];
             mail.extend(emergency.encode());
-            bench.device.say(Protocol::Coe, &mail, bench.now);
+            bench.device.queue_mail(Protocol::Coe, &mail, bench.now);
         }
-        if drops && dice.below(60) == 0 {
-            // Another request, which is given up early.
+        if drops && random.below(60) == 0 {
+            // A further request that is given up early.
             let (mailbox, bus) = (bench.mailbox.clone(), bench.supervisor.bus());
-            let (limit, which) = (Duration::from_micros(dice.below(3000)), dice.below(3));
+            let (limit, which) = (Duration::from_micros(random.below(3000)), random.below(3));
             bench.start(async move {
                 let object = SdoAddress::new(0x2000, 1);
                 let _ = match which {
@@ -145,53 +145,55 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
                 };
             });
         }
-        bench.step(|| fate(&mut dice, percent, links));
-        heard.extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+        bench.step(|| fate(&mut random, percent, links));
+        emergencies
+            .extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
     }
     for _ in 0..10 {
         bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(100));
-        heard.extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+        emergencies
+            .extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
     }
-    heard.sort_unstable();
+    emergencies.sort_unstable();
     let counters = bench.mailbox.counters();
-    assert_eq!(heard, (1..=said).collect::<Vec<_>>(), "seed {seed}: each emergency once, {counters:?}");
+    assert_eq!(emergencies, (1..=queued).collect::<Vec<_>>(), "seed {seed}: each emergency once, {counters:?}");
     let steps = bench.device.served.windows(2);
-    // A message that was never accepted leaves a gap; no message is served twice in a row.
+    // The counter of a message that was never accepted is missing; no message is executed twice in a row.
     assert!(steps.clone().all(|pair| pair[0] != pair[1]), "seed {seed}");
 }
 
 // covers: mailbox-faults
 #[test]
-fn all_protocols_run_side_by_side_over_one_mailbox() {
+fn all_protocols_run_in_parallel_over_one_mailbox() {
     storm(1, LinkSet::Single, 0, false);
 }
 
 // covers: mailbox-faults
 #[test]
-fn nothing_is_lost_or_mistaken_whatever_becomes_of_frames_seeds_0_to_99() {
+fn no_mail_is_lost_or_confused_whatever_frames_are_lost_seeds_0_to_99() {
     for seed in 0..100 {
         storm(seed, if seed % 2 == 0 { LinkSet::Ring } else { LinkSet::Single }, 1 + seed % 20, false);
     }
 }
 
-/// A mail was read four times in 200 ms, each time by a frame that came too late or after a repeat.
+/// A mail was read four times in 200 ms, each time by a late frame or after a repeat.
 // covers: mailbox-faults
 #[test]
-fn a_mail_that_comes_late_long_after_it_was_accepted_is_a_double_seed_2468() {
+fn a_late_mail_long_after_its_acceptance_is_a_duplicate_seed_2468() {
     storm(2468, LinkSet::Ring, 20, false);
 }
 
-/// A request was given up whose answer had begun before the write was confirmed.
+/// A request was given up after its answer had begun, before the write was confirmed.
 // covers: mailbox-faults
 #[test]
-fn fragments_of_an_abandoned_request_are_not_taken_for_those_of_the_next() {
+fn fragments_of_an_abandoned_request_do_not_answer_the_next_request() {
     storm(3580, LinkSet::Ring, 20, true);
 }
 
 // covers: mailbox-faults
 #[test]
-fn procedures_that_are_dropped_harm_nobody_seeds_0_to_99() {
+fn dropped_procedures_do_not_disturb_others_seeds_0_to_99() {
     for seed in 0..100 {
         storm(seed, LinkSet::Single, seed % 10, true);
     }

@@ -127,8 +127,9 @@ impl Shared {
         }
     }
 
-    /// Completes the datagrams to one SubDevice that was reached by the received copy (CR-06). All others count as
-    /// lost: the missing copy may be the one that the addressed SubDevice processed.
+    /// Completes the datagrams that one addressed SubDevice processed in the received copy (CR-06), and all datagrams
+    /// if the missing copies were sent on silent links. All others count as lost: the addressed SubDevice may have
+    /// processed the missing copy.
     fn expire(&mut self, slot: usize) {
         let Some(flight) = self.flights.take(slot) else { return };
         self.monitor.observe(flight.arrivals);
