@@ -1,11 +1,14 @@
 //! Distributed clocks as arithmetic: delays, drifts and phases from latched times, start times, corrections (protocol
 //! 7).
+//!
 //! * [`wiring`]: the path of a frame through the segment;
 //! * [`delay`]: propagation delays along this path, with known times of [`cables`] and of `sums` of cables;
 //! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
 //! * [`start`]: start times of SYNC signals;
-//! * [`follow`]: adjusts the cycle of the host to the reference clock. This module has no access to the bus:
-//!   [`crate::procedures::clocks`] measures and writes, [`crate::exchange`] sends the cyclic datagrams.
+//! * [`follow`]: adjusts the cycle of the host to the reference clock.
+//!
+//! This module has no access to the bus: [`crate::procedures::clocks`] measures and writes, [`crate::exchange`] sends
+//! the cyclic datagrams.
 
 pub mod branches;
 pub mod cable_ends;

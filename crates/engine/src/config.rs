@@ -105,7 +105,7 @@ pub struct SyncManagerOverride {
 /// from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubDeviceConfig {
-    /// Where it is expected.
+    /// Expected place.
     pub address: ConfigAddress,
     /// Expected identity.
     pub expected: Expected,

@@ -69,7 +69,7 @@ pub enum Event {
     },
     /// A problem that keeps a scan from being complete.
     ScanFailed {
-        /// What and where.
+        /// The problem and its place.
         reason: String,
     },
     /// A fault in a SubDevice's SII that was worked around.
@@ -89,7 +89,7 @@ pub enum Event {
     LineCrossed {
         /// Position; `None` if the crossed line is detected but not located (protocol LC-02).
         position: Option<Position>,
-        /// The port of entry, where known.
+        /// The entry port, if known.
         entry_port: Option<u8>,
     },
     /// Frames enter all SubDevices of a ring at another port than 0: the cables of the main and the redundant link are
@@ -293,7 +293,7 @@ pub enum Event {
         /// Its position now.
         to: Position,
     },
-    /// A SubDevice of another identity is where a declared one is expected. It is not configured.
+    /// A SubDevice of another identity is at the place of a declared one. It is not configured.
     Mismatch {
         /// Index in the declaration.
         subdevice: usize,

@@ -1,7 +1,8 @@
-//! Junction redundancy as the application requests it (protocol 9.4): the mode, and declared connections. A local ring
-//! begins at one port of a junction and returns to another port. A connection names the cable that returns, the
-//! *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring. This module checks the form
-//! of a connection; it is compared with the segment when it is applied.
+//! Junction redundancy as the application requests it (protocol 9.4): the mode, and declared connections.
+//!
+//! A local ring begins at one port of a junction and returns to another port. A connection names the cable that
+//! returns, the *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring. This module
+//! checks the form of a connection; it is compared with the segment when it is applied.
 
 use core::fmt;
 

@@ -1,8 +1,9 @@
-//! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007). A [`Mailbox`] is
-//! the handle to a SubDevice's router. Each protocol has a [`Lane`]; a procedure that exchanges messages holds the lane
-//! as a [`Conversation`]. A request is written with the next counter, and a received mail is delivered to its lane. All
-//! lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is kept in bounded queues.
-//! The parts:
+//! Mailboxes: one router per SubDevice, and the protocols that share it (protocol 6, decision 0007).
+//!
+//! A [`Mailbox`] is the handle to a SubDevice's router. Each protocol has a [`Lane`]; a procedure that exchanges
+//! messages holds the lane as a [`Conversation`]. A request is written with the next counter, and a received mail is
+//! delivered to its lane. All lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is
+//! kept in bounded queues. The parts:
 //!
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
 //! * `delivery`: assigns mail to its lane; `recent`: detects duplicate mail;

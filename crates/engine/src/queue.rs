@@ -1,5 +1,7 @@
-//! A bounded single-producer single-consumer queue of words, between the two halves of the engine. It needs neither
-//! locks nor `unsafe`: the slots are atomics. The producer never waits; messages that do not fit are counted.
+//! A bounded single-producer single-consumer queue of words, between the two halves of the engine.
+//!
+//! It needs neither locks nor `unsafe`: the slots are atomics. The producer never waits; messages that do not fit are
+//! counted.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -40,7 +42,7 @@ pub fn queue(capacity: usize) -> (Producer, Consumer) {
 }
 
 impl Producer {
-    /// Appends a message; false (and counted) where the queue is full.
+    /// Appends a message; false (and counted) if the queue is full.
     pub fn push(&mut self, message: [u64; WORDS]) -> bool {
         let shared = &*self.shared;
         let head = shared.head.load(Ordering::Relaxed);

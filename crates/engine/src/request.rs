@@ -1,7 +1,9 @@
 //! Requests that a cyclic thread starts and reuses (Master Redundancy 5.8, IgH manual): no allocation, no lock, no
-//! waiting. A request has memory of its own, with the size given at its creation. The cyclic side owns a request that
-//! is not busy: it may change target, timeout and data, and start it. The acyclic half executes the request and returns
-//! it with a result. One file per kind; the common part is in `slot`.
+//! waiting.
+//!
+//! A request has memory of its own, with the size given at its creation. The cyclic side owns a request that is not
+//! busy: it may change target, timeout and data, and start it. The acyclic half executes the request and returns it
+//! with a result. One file per kind; the common part is in `slot`.
 
 mod register;
 mod sdo;

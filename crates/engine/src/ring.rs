@@ -3,8 +3,9 @@
 //! * [`frame_limit`]: largest number of datagrams in a frame;
 //! * [`identity`]: marks in the source address and in Idx, which identify received frames;
 //! * [`merge`]: combines the data of two copies, by command (protocol 9.3);
-//! * [`monitor`]: whether the ring is closed, from the links on which the copies arrive (protocol 9.2.1). With a single
-//!   link the same code runs, and waits for one copy.
+//! * [`monitor`]: whether the ring is closed, from the links on which the copies arrive (protocol 9.2.1).
+//!
+//! With a single link the same code runs, and waits for one copy.
 
 pub mod frame_limit;
 pub mod identity;

@@ -95,7 +95,7 @@ impl fmt::Display for RedundancyLoss {
 /// One link (`ecrt_master_link_state` of the IgH manual).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatus {
-    /// Whether the interface has a carrier; `None` where the link layer does not report it.
+    /// Whether the interface has a carrier; `None` if the link layer does not report it.
     pub carrier: Option<bool>,
     /// Number of SubDevices that processed the last frames sent on this link. In a closed ring without branches, all of
     /// them process the frames of MAIN.

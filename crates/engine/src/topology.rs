@@ -1,11 +1,13 @@
 //! The connections between ports of SubDevices, from DL status and receive times (protocol 2.1 to 2.4, 2.9, 9.5).
+//!
 //! Input: the registers of each SubDevice, in the order in which frames pass the processing units: first the SubDevices
 //! on the main link, then those on the redundant link. Output: a tree, and findings about the cabling. Any status word
 //! is allowed: none causes a panic, an inconsistent status word becomes a finding.
 //!
 //! In a broken ring the SubDevices of the redundant link form a tree of their own, oriented like the intact ring, with
-//! the SubDevice next to the break as its head: its unconnected port 0 is the break, not a finding. Rings behind
-//! junctions ([`LocalRing`]) must be passed in: open ports do not distinguish them from a tree.
+//! the SubDevice next to the break as its head: its unconnected port 0 is the break, not a finding.
+//!
+//! Rings behind junctions ([`LocalRing`]) must be passed in: open ports do not distinguish them from a tree.
 
 mod candidates;
 mod ends;

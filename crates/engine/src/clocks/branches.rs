@@ -1,8 +1,9 @@
-//! Sets of ports to close, one after the other, to measure the branches behind forks without a clock (protocol 7.1). A
-//! clock in front of such a fork measures the time of all branches together. With all branches closed, it measures the
-//! path to the fork; with one branch open, the path into this branch. The single times follow exactly from these sums.
-//! Input: the cables, and which SubDevices have a clock. Output: sets of ports. SubDevices behind closed ports are not
-//! reachable, so this is done at set-up only, before the exchange of process data.
+//! Sets of ports to close, one after the other, to measure the branches behind forks without a clock (protocol 7.1).
+//!
+//! A clock in front of such a fork measures the time of all branches together. With all branches closed, it measures
+//! the path to the fork; with one branch open, the path into this branch. The single times follow exactly from these
+//! sums. Input: the cables, and which SubDevices have a clock. Output: sets of ports. SubDevices behind closed ports
+//! are not reachable, so this is done at set-up only, before the exchange of process data.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -1,8 +1,9 @@
-//! Measured times of the cables of a segment, for delays that cannot be measured now. A frame passes the members of an
-//! intact local ring only once, so the cables between them cannot be measured. They are measured while the ring is
-//! open: at set-up, which opens it for this purpose, or while it is broken. If SubDevices without a clock are in
-//! between, only the sum of several cables is measured; times that follow from such sums are known as well
-//! (`clocks::sums`).
+//! Measured times of the cables of a segment, for delays that cannot be measured now.
+//!
+//! A frame passes the members of an intact local ring only once, so the cables between them cannot be measured. They
+//! are measured while the ring is open: at set-up, which opens it for this purpose, or while it is broken. If
+//! SubDevices without a clock are in between, only the sum of several cables is measured; times that follow from such
+//! sums are known as well (`clocks::sums`).
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;

@@ -1,9 +1,10 @@
-//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1). The path
-//! of the frame is followed port by port ([`Wiring::path`]). Between two arrivals at a SubDevice with a clock lies a
-//! branch. The clock measures the time of the branch; without the times that the SubDevices in the branch measured
-//! themselves, the rest is the time on cables. SubDevices without a clock are part of the cable. A cable takes the same
-//! time in both directions; with this and the known times of cables ([`Cables`]) the delays follow. Behind a fork
-//! without a clock they may not follow: then the clocks there form a group with an unknown place within the branch
+//! Propagation delays of any segment, from the times at which one frame came in at each port (protocol 7.1).
+//!
+//! The path of the frame is followed port by port ([`Wiring::path`]). Between two arrivals at a SubDevice with a clock
+//! lies a branch. The clock measures the time of the branch; without the times that the SubDevices in the branch
+//! measured themselves, the rest is the time on cables. SubDevices without a clock are part of the cable. A cable takes
+//! the same time in both directions; with this and the known times of cables ([`Cables`]) the delays follow. Behind a
+//! fork without a clock they may not follow: then the clocks there form a group with an unknown place within the branch
 //! (`clocks::places`).
 
 use alloc::vec;

@@ -1,7 +1,8 @@
-//! Adjusts the cycle of the host to the reference clock (master shift, protocol 7.4). Input: the system time at which
-//! the host's next cycle begins. Output: the correction of the cycle after it. Every cyclic frame reads the reference
-//! clock, and its send time on the host is known, so neither late wake-ups nor the propagation of the frame disturb the
-//! loop.
+//! Adjusts the cycle of the host to the reference clock (master shift, protocol 7.4).
+//!
+//! Input: the system time at which the host's next cycle begins. Output: the correction of the cycle after it. Every
+//! cyclic frame reads the reference clock, and its send time on the host is known, so neither late wake-ups nor the
+//! propagation of the frame disturb the loop.
 
 /// Part of a phase error that one cycle corrects, as a shift.
 const PROPORTIONAL: u32 = 4;

@@ -1,7 +1,8 @@
-//! The mean of several measurements of receive times, corrected for the drift of each clock (protocol 7.1). A SubDevice
-//! measures times between its ports on its own clock. In a line of 200 SubDevices the frame returns to the first
-//! SubDevice after 200 us; two clocks that differ by 100 ppm differ by 20 ns after this time. The drift follows from
-//! the progress of each clock from the first measurement to the last.
+//! The mean of several measurements of receive times, corrected for the drift of each clock (protocol 7.1).
+//!
+//! A SubDevice measures times between its ports on its own clock. In a line of 200 SubDevices the frame returns to the
+//! first SubDevice after 200 us; two clocks that differ by 100 ppm differ by 20 ns after this time. The drift follows
+//! from the progress of each clock from the first measurement to the last.
 
 use alloc::vec::Vec;
 
@@ -14,7 +15,7 @@ use super::{FRACTION, PortTimes};
 pub struct Latched {
     /// Registers DC_RECEIVE_TIME of port 0..3.
     pub ports: [u32; 4],
-    /// Register DC_RECEIVE_TIME_EPU; its low half where the clock has 32 bits.
+    /// Register DC_RECEIVE_TIME_EPU; the low half if the clock has 32 bits.
     pub unit: u64,
 }
 

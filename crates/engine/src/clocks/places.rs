@@ -1,5 +1,7 @@
-//! Times at which a frame reaches the clocks, as far as they are known. Clocks with known times between each other form
-//! a group; between groups only a range is known, or nothing. Delays are known for the group of the reference clock.
+//! Times at which a frame reaches the clocks, as far as they are known.
+//!
+//! Clocks with known times between each other form a group; between groups only a range is known, or nothing. Delays
+//! are known for the group of the reference clock.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -35,7 +37,7 @@ struct Group {
 /// The known times of one frame.
 #[derive(Clone, Debug)]
 pub(super) struct Places {
-    /// By position: where the frame first enters the SubDevice.
+    /// By position: place at which the frame first enters the SubDevice.
     pub entered: Vec<Option<Place>>,
     groups: Vec<Group>,
 }

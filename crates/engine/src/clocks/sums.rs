@@ -1,6 +1,7 @@
-//! Times of cables from sums over several cables: linear equations, solved exactly. Input: sums of cables with their
-//! time; a cable is listed as often as it counts. Output: the time of other sums, if it follows exactly. Coefficients
-//! are small, because a frame passes a cable once in each direction.
+//! Times of cables from sums over several cables: linear equations, solved exactly.
+//!
+//! Input: sums of cables with their time; a cable is listed as often as it counts. Output: the time of other sums, if
+//! it follows exactly. Coefficients are small, because a frame passes a cable once in each direction.
 
 use alloc::vec;
 use alloc::vec::Vec;

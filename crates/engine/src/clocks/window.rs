@@ -1,6 +1,8 @@
-//! Whether clocks are within the sync window. Input: single results. Output: changes to report. A change counts after
-//! several consecutive results. Clocks that leave the window soon after they came back must stay inside for longer each
-//! time before this is reported, so that clocks at the edge of the window do not cause events for ever.
+//! Whether clocks are within the sync window. Input: single results. Output: changes to report.
+//!
+//! A change counts after several consecutive results. Clocks that leave the window soon after they came back must stay
+//! inside for longer each time before this is reported, so that clocks at the edge of the window do not cause events
+//! for ever.
 
 /// Consecutive results until a change is reported.
 const RESULTS: u32 = 3;

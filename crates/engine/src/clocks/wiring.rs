@@ -1,7 +1,8 @@
-//! The connections between ports, and the path of a frame over them (protocol 2.1, 7.1). Input: a [`Topology`], and
-//! which ports are open now. A topology contains local rings as branches; the wiring contains their closing cables too.
-//! Output: the arrivals of a frame of either link, in order, and whether it passes the processing unit after each
-//! arrival.
+//! The connections between ports, and the path of a frame over them (protocol 2.1, 7.1).
+//!
+//! Input: a [`Topology`], and which ports are open now. A topology contains local rings as branches; the wiring
+//! contains their closing cables too. Output: the arrivals of a frame of either link, in order, and whether it passes
+//! the processing unit after each arrival.
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -1,10 +1,10 @@
-//! Where a SubDevice is expected.
+//! Expected place of a SubDevice.
 
 use core::fmt;
 
 use crate::info::SubDeviceInfo;
 
-/// Where a SubDevice is expected.
+/// Expected place of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ConfigAddress {
     /// Position in the configured order, from 0. If an optional SubDevice is absent, the following ones are expected

@@ -46,9 +46,11 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 }
 
 /// Finds the SubDevice of each declaration: one [`Resolution`] per declaration in their order, then the SubDevices
-/// without a declaration. Groups are found first, at any place; positions count the SubDevices that belong to no group.
-/// If an optional SubDevice is absent, the following declarations by position are searched one place nearer to the
-/// start. Of several combinations of absent optional SubDevices, that with the fewest errors is taken.
+/// without a declaration.
+///
+/// Groups are found first, at any place; positions count the SubDevices that belong to no group. If an optional
+/// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
+/// combinations of absent optional SubDevices, that with the fewest errors is taken.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Resolution> {
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {

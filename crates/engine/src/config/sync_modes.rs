@@ -57,9 +57,11 @@ impl SyncSignals {
         mode.assign_activate & UNIT != 0 && mode.assign_activate & (SYNC0 | SYNC1) != 0
     }
 
-    /// The signals of an operation mode of the SII, for a MainDevice with this cycle. The cycle of SYNC0 is that of the
-    /// mode if it has one; otherwise the cycle of the MainDevice times the factor (a negative factor divides, 0 counts
-    /// as 1). The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are signed.
+    /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
+    ///
+    /// The cycle of SYNC0 is that of the mode if it has one; otherwise the cycle of the MainDevice times the factor (a
+    /// negative factor divides, 0 counts as 1). The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are
+    /// signed.
     ///
     /// # Errors
     /// A mode without signals, or with impossible cycles.

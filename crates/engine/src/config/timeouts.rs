@@ -52,7 +52,7 @@ impl Timeouts {
     }
 }
 
-/// The limit of one state change, where it differs from [`Timeouts`].
+/// The limit of one state change, if it differs from [`Timeouts`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StateTimeout {
     /// State before.

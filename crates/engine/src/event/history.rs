@@ -1,6 +1,8 @@
 //! Diagnosis history: events of SubDevices and cables, the content of object 0x10F3 of the MainDevice (protocol 6.3,
-//! 10.2). Input: the events of the acyclic half. Output: messages in slots; a new message overwrites the oldest one. As
-//! in the history of a SubDevice, a flag shows that messages were lost.
+//! 10.2).
+//!
+//! Input: the events of the acyclic half. Output: messages in slots; a new message overwrites the oldest one. As in the
+//! history of a SubDevice, a flag shows that messages were lost.
 
 use alloc::vec::Vec;
 
@@ -29,7 +31,7 @@ pub struct Incident {
     pub number: u16,
     /// Index in the declaration of the SubDevice concerned.
     pub subdevice: Option<usize>,
-    /// Additional code; 0 where there is none.
+    /// Additional code; 0 if there is none.
     pub detail: u32,
 }
 

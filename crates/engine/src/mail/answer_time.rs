@@ -1,8 +1,9 @@
-//! When to poll for an answer, estimated from earlier answers. A read that is too early costs a datagram as long as the
-//! mailbox; a late read costs time. So the first poll is at the expected time. If the last answer was available then,
-//! it reads the mailbox at once, otherwise it polls the status byte. After several answers at the expected time, an
-//! earlier poll is tried. Times exclude queueing: how long datagrams wait for a busy wire does not depend on the
-//! SubDevice.
+//! When to poll for an answer, estimated from earlier answers.
+//!
+//! A read that is too early costs a datagram as long as the mailbox; a late read costs time. So the first poll is at
+//! the expected time. If the last answer was available then, it reads the mailbox at once, otherwise it polls the
+//! status byte. After several answers at the expected time, an earlier poll is tried. Times exclude queueing: how long
+//! datagrams wait for a busy wire does not depend on the SubDevice.
 
 use core::time::Duration;
 
@@ -66,7 +67,7 @@ impl AnswerTime {
         (waited / PAUSE_PART).clamp(SHORTEST_PAUSE, LONGEST_PAUSE)
     }
 
-    /// An answer was found `after` its request; the last poll before it, at `vain`, found nothing.
+    /// An answer was available `after` its request; the last poll before it, at `empty_poll`, found no mail.
     pub(super) fn took(&mut self, after: Duration, empty_poll: Option<Duration>) {
         let is_known = self.usual != Duration::ZERO;
         let trying = is_known && self.is_trying();

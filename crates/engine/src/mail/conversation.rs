@@ -181,15 +181,15 @@ impl Conversation {
             self.poll_for_more()?;
             // If the late request is written only now, its time limit starts now.
             let ready = || {
-                let heard = |lane: &mut LaneState| match lane.take() {
+                let received = |lane: &mut LaneState| match lane.take() {
                     Some(arrival) => Some(Some(arrival)),
                     None => (lane.late_until != Some(until)).then_some(None),
                 };
-                self.with(heard).transpose()
+                self.with(received).transpose()
             };
-            let heard =
+            let received =
                 self.shared.bus.within(self.limit, self.shared.changed.until(ready)).await.unwrap_or(Ok(None))?;
-            let Some(arrival) = heard else { continue };
+            let Some(arrival) = received else { continue };
             let (is_part, is_over) = match &arrival {
                 Arrival::Payload(payload) => (true, delivery::is_last(self.lane, payload)),
                 Arrival::Refused(_, doubtful) => (false, !doubtful),

@@ -1,8 +1,9 @@
-//! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (protocol 6.5). An [`EthernetPort`]
-//! takes whole Ethernet frames for a SubDevice and returns received frames. Its task cuts frames into fragments and
-//! writes them in a lane of their own, so that they alternate with the other protocols; received fragments are joined
-//! as they arrive. The cycle of the application does not limit the rate: fragments follow as fast as the SubDevice
-//! accepts and sends them. The parts:
+//! EoE: Ethernet through a mailbox, and the addresses of the IP stack behind it (protocol 6.5).
+//!
+//! An [`EthernetPort`] takes whole Ethernet frames for a SubDevice and returns received frames. Its task cuts frames
+//! into fragments and writes them in a lane of their own, so that they alternate with the other protocols; received
+//! fragments are joined as they arrive. The cycle of the application does not limit the rate: fragments follow as fast
+//! as the SubDevice accepts and sends them. The parts:
 //!
 //! * `fragments`, `reassembly`: frames to fragments and back;
 //! * `traffic`: queues and counters of one mailbox; [`port`]: the handle;

@@ -306,8 +306,9 @@ impl LaneState {
         self.pending.as_ref().filter(|pending| !pending.answered)
     }
 
-    /// Takes a possible answer for the conversation. False if no conversation waits. `seen` is the presumed time at
-    /// which it became available; `last`: no further part follows.
+    /// Takes a possible answer for the conversation. False if no conversation waits.
+    ///
+    /// `seen` is the presumed time at which it became available; `last`: no further part follows.
     pub(super) fn arrive(&mut self, arrival: Arrival, seen: Instant, last: bool) -> bool {
         let Some(pending) = &mut self.pending else {
             if last {

@@ -1,4 +1,5 @@
 //! Messages with any payload from the application, in the lane of a protocol or of any other mail type ([`Lane::of`]).
+//!
 //! The router sets header and counter, so that these messages do not disturb other conversations.
 
 use alloc::vec::Vec;

@@ -1,6 +1,8 @@
-//! Duplicate mail (protocol 6.1, 6.2). A repeat, or a frame that comes back late, returns a mail with its old counter;
-//! some SubDevices send an answer twice. A mail is a duplicate if its counter is not zero, and counter and content
-//! equal those of a recent mail. The content is compared because some SubDevices never change their counter.
+//! Duplicate mail (protocol 6.1, 6.2).
+//!
+//! A repeat, or a frame that comes back late, returns a mail with its old counter; some SubDevices send an answer
+//! twice. A mail is a duplicate if its counter is not zero, and counter and content equal those of a recent mail. The
+//! content is compared because some SubDevices never change their counter.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;

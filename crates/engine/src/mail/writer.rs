@@ -1,6 +1,7 @@
-//! Writes messages one at a time, alternating between the lanes (protocol 6.1). A lost write is repeated with the same
-//! counter until the SubDevice accepts it; a SubDevice that received the first write drops the repetition. No other
-//! message is sent meanwhile: after it, the old counter would count as new.
+//! Writes messages one at a time, alternating between the lanes (protocol 6.1).
+//!
+//! A lost write is repeated with the same counter until the SubDevice accepts it; a SubDevice that received the first
+//! write drops the repetition. No other message is sent meanwhile: after it, the old counter would count as new.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

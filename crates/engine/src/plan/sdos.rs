@@ -1,6 +1,7 @@
-//! SDO downloads of PDO assignment and mapping, if they differ from the SII (protocol 5.2, 6.3). Per SyncManager:
-//! subindex 0 of the assignment is set to 0; for each changed PDO, subindex 0 of the mapping is set to 0, then its
-//! entries and their number are written; then the entries of the assignment and their number are written.
+//! SDO downloads of PDO assignment and mapping, if they differ from the SII (protocol 5.2, 6.3).
+//!
+//! Per SyncManager: subindex 0 of the assignment is set to 0; for each changed PDO, subindex 0 of the mapping is set to
+//! 0, then its entries and their number are written; then the entries of the assignment and their number are written.
 
 use alloc::vec::Vec;
 

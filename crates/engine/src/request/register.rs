@@ -5,9 +5,11 @@ use ringcat_wire::address::RegisterAddress;
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
 
-/// A request for registers of one SubDevice. It may be moved to the cyclic thread. The acyclic half sends it in a frame
-/// of its own, within about a millisecond. Cyclic frames are built once at activation, compared with what was sent, and
-/// expected back at a known time; with a register datagram in them, the length of a cycle would depend on requests.
+/// A request for registers of one SubDevice. It may be moved to the cyclic thread.
+///
+/// The acyclic half sends it in a frame of its own, within about a millisecond. Cyclic frames are built once at
+/// activation, compared with what was sent, and expected back at a known time; with a register datagram in them, the
+/// length of a cycle would depend on requests.
 #[derive(Debug)]
 pub struct RegisterRequest {
     pub(super) request: Request,

@@ -42,7 +42,7 @@ impl VoeHandler {
     }
 
     /// As [`VoeHandler::read`], but reads the mailbox at once and repeatedly, without polling its status: for
-    /// SubDevices that answer at once, or whose mailbox status is unreliable.
+    /// SubDevices that answer at once, or with an unreliable mailbox status.
     ///
     /// # Errors
     /// It is in progress.

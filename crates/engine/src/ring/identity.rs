@@ -2,7 +2,7 @@
 //!
 //! The source address carries the identity of the MainDevice, the bit of the link on which the copy was sent, and the
 //! lower 8 bits of the frame's sequence number (protocol 9.7.1, 9.7.2). The Idx of every datagram carries the class bit
-//! and 7 further bits, so that a frame that was delayed by more than 256 others is never taken for a new one.
+//! and 7 further bits, so that a frame that was delayed by more than 256 others never counts as a new one.
 
 use ringcat_wire::datagram;
 use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE, MacAddress};
@@ -185,7 +185,7 @@ impl Identity {
 }
 
 /// The half for which a received frame is, without the identity of the MainDevice: the class bit of its first datagram.
-/// Foreign frames are classified by the same bit. `None` where there is no first datagram.
+/// Foreign frames are classified by the same bit. `None` if there is no first datagram.
 pub fn class_of(bytes: &[u8]) -> Option<Class> {
     let index = *bytes.get(FIRST_INDEX_AT)?;
     Some(if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic })

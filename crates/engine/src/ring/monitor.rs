@@ -1,6 +1,8 @@
-//! Whether the ring is closed, from the links on which the copies of frames arrive (protocol 9.2.1). A copy that
-//! arrives on the link it was sent on proves an open ring; two copies that both arrive on the other link prove a closed
-//! ring. A missing copy proves nothing: it may be a single loss, or a break that the controllers have not detected yet.
+//! Whether the ring is closed, from the links on which the copies of frames arrive (protocol 9.2.1).
+//!
+//! A copy that arrives on the link it was sent on proves an open ring; two copies that both arrive on the other link
+//! prove a closed ring. A missing copy proves nothing: it may be a single loss, or a break that the controllers have
+//! not detected yet.
 
 use crate::link::Link;
 

@@ -1,6 +1,8 @@
-//! The cables of a segment, from its topology, and the error counters of the ports at their ends. The controller that
-//! first detects an invalid frame counts it (protocol 2.5), at the receiving end of the cable that damaged the frame.
-//! The following controllers count it as a forwarded error, which says nothing about their own cables.
+//! The cables of a segment, from its topology, and the error counters of the ports at their ends.
+//!
+//! The controller that first detects an invalid frame counts it (protocol 2.5), at the receiving end of the cable that
+//! damaged the frame. The following controllers count it as a forwarded error, which says nothing about their own
+//! cables.
 
 use alloc::vec::Vec;
 use core::fmt;

@@ -1,8 +1,10 @@
 //! A frame that is alone on the wire, so that no other frame changes the times that SubDevices latch for it (protocol
-//! 7.1). Input: a datagram that must be alone ([`Bus::alone`]). It waits until all acyclic frames have returned or are
-//! lost and no cyclic frame is on the wire; the next acyclic frame waits until all copies of this frame are received.
-//! The cyclic half is not involved: it posts the number of frames sent ([`Board::at_rest`]). If it has sent meanwhile,
-//! the answer is discarded ([`BusError::Disturbed`]). A procedure may also request a pause of the cyclic half
+//! 7.1).
+//!
+//! Input: a datagram that must be alone ([`Bus::alone`]). It waits until all acyclic frames have returned or are lost
+//! and no cyclic frame is on the wire; the next acyclic frame waits until all copies of this frame are received. The
+//! cyclic half is not involved: it posts the number of frames sent ([`Board::at_rest`]). If it has sent meanwhile, the
+//! answer is discarded ([`BusError::Disturbed`]). A procedure may also request a pause of the cyclic half
 //! ([`Bus::ask_for_pause`]).
 
 mod latch;

@@ -60,7 +60,7 @@ impl Bus {
         }
     }
 
-    /// Whether the interfaces have carriers, by [`crate::link::Link::index`]; `None` where the links do not report it.
+    /// Whether the interfaces have carriers, by [`crate::link::Link::index`]; `None` if the links do not report it.
     pub fn carriers(&self) -> [Option<bool>; 2] {
         self.shared.borrow().carriers
     }

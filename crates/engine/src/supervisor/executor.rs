@@ -1,6 +1,7 @@
-//! A single-threaded executor for procedures. Procedures wait only for transfers, timers, signals and groups of this
-//! engine. Each of these stores its waiting tasks and wakes exactly these, so that neither wakers nor synchronisation
-//! are needed.
+//! A single-threaded executor for procedures.
+//!
+//! Procedures wait only for transfers, timers, signals and groups of this engine. Each of these stores its waiting
+//! tasks and wakes exactly these, so that neither wakers nor synchronisation are needed.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

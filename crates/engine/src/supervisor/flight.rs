@@ -146,7 +146,7 @@ impl Flight {
         self.arrivals.arrived & links.mask() == links.mask()
     }
 
-    /// The links whose copy has not returned, a bit each.
+    /// The links with a copy that has not returned, a bit each.
     pub fn missing_links(&self, links: LinkSet) -> u8 {
         links.mask() & !self.arrivals.arrived
     }

@@ -1,5 +1,6 @@
-//! Procedures that are started together and awaited together. When the group is dropped, its procedures end, so that
-//! they do not disturb a new attempt.
+//! Procedures that are started together and awaited together.
+//!
+//! When the group is dropped, its procedures end, so that they do not disturb a new attempt.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;

@@ -1,9 +1,12 @@
-//! Datagrams that wait to be sent: mailbox reads after all others, and few at a time. A SubDevice prepares its answer
-//! while the MainDevice waits, and idles until its next request. So requests are sent before reads, which are long: the
-//! reads of a hundred SubDevices occupy the wire for a millisecond, in which all SubDevices idle. Datagrams handed to
-//! the interface cannot be reordered, so the reads on the wire are limited to the number that keeps the wire busy until
-//! the first one returns. Requests are sent first as long as their SubDevice has not used more than its share of the
-//! wire ([`super::turns`]): otherwise continuous requests to one SubDevice would delay the answers of all others.
+//! Datagrams that wait to be sent: mailbox reads after all others, and few at a time.
+//!
+//! A SubDevice prepares its answer while the MainDevice waits, and idles until its next request. So requests are sent
+//! before reads, which are long: the reads of a hundred SubDevices occupy the wire for a millisecond, in which all
+//! SubDevices idle. Datagrams handed to the interface cannot be reordered, so the reads on the wire are limited to the
+//! number that keeps the wire busy until the first one returns.
+//!
+//! Requests are sent first as long as their SubDevice has not used more than its share of the wire ([`super::turns`]):
+//! otherwise continuous requests to one SubDevice would delay the answers of all others.
 
 use core::time::Duration;
 

@@ -1,6 +1,7 @@
-//! Deadline of a frame's copies, learnt from received copies. The deadline follows the measured round trips: after a
-//! cut, a lost frame costs only a few round trips, and a frame that a thousand SubDevices or a busy host delay does not
-//! count as lost.
+//! Deadline of a frame's copies, from measured round trips.
+//!
+//! After a cut, a lost frame costs only a few round trips, and a frame that a thousand SubDevices or a busy host delay
+//! does not count as lost.
 
 use core::time::Duration;
 

@@ -1,7 +1,8 @@
-//! Detects silent links, whose sent copies do not come back. A reply that needs both copies would wait until its
-//! deadline for the copy on a dead link (a cut host cable), each time. A copy is not awaited on a link that has been
-//! silent for [`SILENCE`] while the copy on the other link proves the ring open. Frames are still sent on the silent
-//! link, to detect when copies come back.
+//! Detects silent links: copies that are sent on them do not come back.
+//!
+//! A reply that needs both copies would wait until its deadline for the copy on a dead link (a cut host cable), each
+//! time. A copy is not awaited on a link that has been silent for [`SILENCE`] while the copy on the other link proves
+//! the ring open. Frames are still sent on the silent link, to detect when copies come back.
 
 use core::time::Duration;
 

@@ -1,6 +1,8 @@
-//! Mail that came back after its read was given up (decision 0007). A read empties the mailbox, so its result must not
-//! be dropped. A mail arrives without a waiting reader in two cases: the ring closed while a frame was on the wire, so
-//! that both copies passed the SubDevice and each read a mail; or the frame came back after it was given up.
+//! Mail that came back after its read was given up (decision 0007).
+//!
+//! A read empties the mailbox, so its result must not be dropped. A mail arrives without a waiting reader in two cases:
+//! the ring closed while a frame was on the wire, so that both copies passed the SubDevice and each read a mail; or the
+//! frame came back after it was given up.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;

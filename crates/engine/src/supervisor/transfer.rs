@@ -18,9 +18,9 @@ pub(crate) struct Request {
     pub target: Target,
     /// Data to send; zeros for reads.
     pub data: Vec<u8>,
-    /// Data of the redundant copy, where it differs; of the same length.
+    /// Data of the redundant copy, if it differs; of the same length.
     pub redundant: Option<Vec<u8>>,
-    /// Station that the redundant copy addresses, where it differs.
+    /// Station that the redundant copy addresses, if it differs.
     pub redundant_station: Option<StationAddress>,
     /// The working counter with which a second copy need not be awaited.
     pub expected: Option<Wkc>,

@@ -1,9 +1,11 @@
-//! Waiting datagrams in an order that is fair between SubDevices. Each addressed SubDevice has an account of the bytes
-//! sent to it, its mailbox reads included. Bandwidth is divided into rounds; in each round every SubDevice may use a
-//! share of bytes, in the order of requests. Data beyond the share waits for later rounds, and datagrams to newly
-//! addressed SubDevices are sent first: neither a long file transfer nor a thousand datagrams to one SubDevice block
-//! the others. SubDevices with continuous data get the same number of bytes each, to within one datagram of each and
-//! one share. While no SubDevice needs more than its share, the order is that of requests.
+//! Waiting datagrams in an order that is fair between SubDevices.
+//!
+//! Each addressed SubDevice has an account of the bytes sent to it, its mailbox reads included. Bandwidth is divided
+//! into rounds; in each round every SubDevice may use a share of bytes, in the order of requests. Data beyond the share
+//! waits for later rounds, and datagrams to newly addressed SubDevices are sent first: neither a long file transfer nor
+//! a thousand datagrams to one SubDevice block the others. SubDevices with continuous data get the same number of bytes
+//! each, to within one datagram of each and one share. While no SubDevice needs more than its share, the order is that
+//! of requests.
 
 use alloc::collections::{BTreeMap, BinaryHeap};
 use core::cell::Cell;

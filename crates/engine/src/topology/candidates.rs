@@ -1,5 +1,7 @@
-//! Rings behind junctions that could explain the open ports of a segment (protocol 9.4). Input: the port status of the
-//! SubDevices. Output: sets of closing cables that fit. A test with frames must show which set is right.
+//! Rings behind junctions that could explain the open ports of a segment (protocol 9.4).
+//!
+//! Input: the port status of the SubDevices. Output: sets of closing cables that fit. A test with frames must show
+//! which set is right.
 
 use alloc::vec::Vec;
 
@@ -9,10 +11,11 @@ use super::port::PortOf;
 use super::rings::unconnected;
 use super::tree::{NodeStatus, Topology};
 
-/// Sets of closing cables that could explain the open ports, those with early tails first; at most `most`. Open ports
-/// alone do not show where a ring ends: any SubDevice after the junction could also be connected to the last member of
-/// the ring. The caller must find out which set is right. If the redundant link has SubDevices (a broken ring, or
-/// branches that only its frames pass), the result is empty.
+/// Sets of closing cables that could explain the open ports, those with early tails first; at most `most`.
+///
+/// Open ports alone do not show where a ring ends: any SubDevice after the junction could also be connected to the last
+/// member of the ring. The caller must find out which set is right. If the redundant link has SubDevices (a broken
+/// ring, or branches that only its frames pass), the result is empty.
 pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
     candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
 }

@@ -1,7 +1,9 @@
-//! Rings behind a junction (protocol 9.4): their place in the tree, and their cables. A local ring begins at one port
-//! of its junction, connects its members, and returns to a later port. Frames pass the members in the same order
-//! whether the ring is closed or broken at one cable. So the tree contains the ring as a branch on the port where it
-//! begins, without the two ports of the closing cable: the tree is the same for a closed and a broken ring.
+//! Rings behind a junction (protocol 9.4): their place in the tree, and their cables.
+//!
+//! A local ring begins at one port of its junction, connects its members, and returns to a later port. Frames pass the
+//! members in the same order whether the ring is closed or broken at one cable. So the tree contains the ring as a
+//! branch on the port where it begins, without the two ports of the closing cable: the tree is the same for a closed
+//! and a broken ring.
 
 use alloc::vec::Vec;
 

@@ -1,5 +1,7 @@
-//! Follows the path of a frame through the segment and attaches each SubDevice where the frame must have reached it. If
-//! frames enter a SubDevice at port 0, they pass its processing unit before the SubDevices on its ports 3, 1, 2. If
+//! Follows the path of a frame through the segment and attaches each SubDevice at the port at which the frame must have
+//! reached it.
+//!
+//! If frames enter a SubDevice at port 0, they pass its processing unit before the SubDevices on its ports 3, 1, 2. If
 //! they enter at another port, they pass the processing unit when they are about to leave through port 0 or have come
 //! back there (protocol 2.1): SubDevices on ports before that have earlier positions, and are attached to it afterwards
 //! ([`Walk::take_over`]).
@@ -123,7 +125,7 @@ impl<'s> Walk<'s> {
         self.rings.orphans.contains(&node)
     }
 
-    /// End of a stub whose SubDevices are all connected through ports 0 and 1: the only SubDevice with one of them
+    /// End of a stub of SubDevices that are connected through ports 0 and 1: the only SubDevice with one of both ports
     /// open.
     pub(super) fn loose_end(&self, stub: core::ops::Range<usize>) -> Option<PortOf> {
         let mut end = None;

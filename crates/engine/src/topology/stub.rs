@@ -1,7 +1,8 @@
-//! The SubDevices of the redundant link in a broken ring, as a tree that is oriented like the intact ring. Frames of
-//! the redundant link run along the trunk to the break without passing a processing unit of the trunk, but pass the
-//! branches on its ports. On the way back they pass the processing units of the trunk, beginning next to the break
-//! (protocol 2.9). So, by position, these branches precede the head, and the rest follows it.
+//! The SubDevices of the redundant link in a broken ring, as a tree that is oriented like the intact ring.
+//!
+//! Frames of the redundant link run along the trunk to the break without passing a processing unit of the trunk, but
+//! pass the branches on its ports. On the way back they pass the processing units of the trunk, beginning next to the
+//! break (protocol 2.9). So, by position, these branches precede the head, and the rest follows it.
 
 use alloc::vec::Vec;
 use core::ops::Range;

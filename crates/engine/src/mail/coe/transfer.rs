@@ -107,9 +107,9 @@ impl Drop for Transfer {
     }
 }
 
-/// Waits out the answer to a request that was given up: it may still arrive and look like the answer to the next
-/// request for the same object. So another object is read first: a SubDevice answers in order, so no older answer can
-/// arrive after that.
+/// Excludes the late answer to a request that was given up: it may still arrive and could be confused with the answer
+/// to the next request for the same object. So another object is read first: a SubDevice answers in order, so no older
+/// answer can arrive after that.
 pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Limits) -> Result<(), MailboxError> {
     let mut result = Ok(());
     for _ in 0..FENCES {

@@ -15,8 +15,10 @@ use ringcat_wire::mailbox::eoe::EoeFragment;
 const SEND_LIMIT: Duration = Duration::from_millis(500);
 
 /// The Ethernet port of one SubDevice: frames to it and from it. A mailbox has at most one port; it is closed when
-/// dropped. It stays valid while the SubDevice is absent. While the mailbox is not in use, the port is down: frames are
-/// refused, and queued frames are dropped and counted.
+/// dropped.
+///
+/// It stays valid while the SubDevice is absent. While the mailbox is not in use, the port is down: frames are refused,
+/// and queued frames are dropped and counted.
 #[derive(Debug)]
 pub struct EthernetPort {
     shared: Rc<SharedMailbox>,

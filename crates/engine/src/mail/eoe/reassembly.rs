@@ -1,6 +1,8 @@
-//! Joins fragments to frames as they arrive (protocol 6.5). Frames are distinguished by their number, so fragments of
-//! several frames may be interleaved. If a fragment does not continue its frame, the frame is dropped; fragment 0
-//! starts a new frame. A SubDevice can occupy memory for at most one frame per number.
+//! Joins fragments to frames as they arrive (protocol 6.5).
+//!
+//! Frames are distinguished by their number, so fragments of several frames may be interleaved. If a fragment does not
+//! continue its frame, the frame is dropped; fragment 0 starts a new frame. A SubDevice can occupy memory for at most
+//! one frame per number.
 
 use alloc::vec::Vec;
 

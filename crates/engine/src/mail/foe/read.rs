@@ -60,7 +60,7 @@ async fn run(
     }
 }
 
-/// Sends a message whose answer is a packet.
+/// Sends a message and waits for a packet as the answer.
 async fn next<P: FnMut(FoeProgress)>(
     transfer: &mut Transfer<P>,
     message: &FoeMessage<'_>,

@@ -171,12 +171,12 @@ impl AllProtocols {
                 (InformationOpcode::ObjectResponse, out[..length].to_vec())
             }
             InformationOpcode::EntryRequest => {
-                let asked = EntryRequest::decode(request.data).unwrap();
-                let length = self.objects[&(asked.index, asked.sub_index)].len();
+                let requested = EntryRequest::decode(request.data).unwrap();
+                let length = self.objects[&(requested.index, requested.sub_index)].len();
                 let description = EntryDescription {
-                    index: asked.index,
-                    sub_index: asked.sub_index,
-                    value_info: asked.value_info,
+                    index: requested.index,
+                    sub_index: requested.sub_index,
+                    value_info: requested.value_info,
                     data_type: DataType(7),
                     bit_length: 8 * length as u16,
                     access: AccessRights(AccessRights::READ),

@@ -20,9 +20,11 @@ const TURN_CHECK_PAUSE: Duration = Duration::from_micros(100);
 
 impl Bus {
     /// Sends a datagram once, alone on the wire, and returns the reply, whatever its working counter. Copies sent on
-    /// the link `no_return` are known not to return. The future fails with [`BusError::Busy`] if the wire was never
-    /// free, with [`BusError::Disturbed`] if a cyclic frame was sent while this one was on the wire, with
-    /// [`BusError::Lost`] if a copy of this frame, or of a cyclic frame, did not return.
+    /// the link `no_return` are known not to return.
+    ///
+    /// The future fails with [`BusError::Busy`] if the wire was never free, with [`BusError::Disturbed`] if a cyclic
+    /// frame was sent while this one was on the wire, with [`BusError::Lost`] if a copy of this frame, or of a cyclic
+    /// frame, did not return.
     pub(crate) fn alone(
         &self,
         command: Command,

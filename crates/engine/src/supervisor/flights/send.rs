@@ -71,7 +71,7 @@ impl Shared {
         now.since(since) >= STARVED
     }
 
-    /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` where nothing fits.
+    /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` if nothing fits.
     fn pack(&mut self, limit: usize) -> Option<Flight> {
         let sequence = self.flights.sequence.next();
         let mut flight = self.flights.fresh(sequence);
@@ -161,7 +161,7 @@ impl Shared {
     }
 }
 
-/// Appends the datagrams of a request. Returns the offset of its own data; `None` where they do not fit.
+/// Appends the datagrams of a request. Returns the offset of its own data; `None` if they do not fit.
 fn put(builder: &mut FrameBuilder<'_>, request: &Request, index: u8, now: Instant) -> Option<usize> {
     if let Some((command, target, preceding)) = &request.preceding {
         let at = builder.datagram(*command, index, *target, preceding.len())?;
