@@ -44,6 +44,8 @@ pub use options::Options;
 pub use pending::Pending;
 pub use states::{GroupState, SubDeviceState};
 
+pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
+
 use crate::event::{CyclicEvent, Event, TimedEvent};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
@@ -54,7 +56,6 @@ use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::Requests;
-use crate::procedures::shared_clocks::ClockStatus;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
@@ -217,15 +218,12 @@ impl MainDevice {
 
     /// What is known about each clock of the segment, by position; empty without distributed clocks.
     pub fn clocks(&self) -> Vec<ClockStatus> {
-        self.segment
-            .as_ref()
-            .filter(|segment| segment.clocks.are_declared())
-            .map_or(Vec::new(), |segment| segment.clocks.status())
+        self.segment.as_ref().map_or(Vec::new(), |segment| segment.view().clocks().status())
     }
 
     /// Whether all clocks are locked (protocol 7.2).
     pub fn clocks_locked(&self) -> bool {
-        self.segment.as_ref().is_some_and(|segment| segment.clocks.are_locked())
+        self.segment.as_ref().is_some_and(|segment| segment.view().clocks().are_locked())
     }
 
     /// Station addresses of the declared SubDevices.

@@ -24,7 +24,6 @@ pub(crate) mod request_state;
 pub mod scan;
 pub mod serve_requests;
 pub mod services;
-pub mod shared_clocks;
 pub(crate) mod shared_segment;
 pub mod sii;
 pub mod stop;

@@ -14,6 +14,7 @@ mod attention;
 mod breaks;
 mod cabling;
 mod choices;
+pub mod clocks;
 mod crossings;
 mod damper;
 pub mod disturbance;

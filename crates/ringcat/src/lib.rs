@@ -139,8 +139,8 @@ pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
 pub use ringcat_engine::mail::{Limits, Mailbox, MailboxError};
 pub use ringcat_engine::main_device::{
-    ActivateError, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState, MAX_DATAGRAMS,
-    MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
+    ActivateError, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState,
+    HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;
@@ -150,7 +150,6 @@ pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::ports::BlockedPort;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
-pub use ringcat_engine::procedures::shared_clocks::{ClockStatus, HiddenDelay};
 pub use ringcat_engine::procedures::sii::program::SiiWritten;
 pub use ringcat_engine::procedures::stop::StopError;
 pub use ringcat_engine::procedures::unassigned::rescan::{Found, Rescan, Who};

@@ -40,8 +40,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // what happened
     ("event", &["time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
     // what is known of the segment, and what follows from what is seen
-    ("segment", &["time", "link", "ring", "board", "info", "topology", "ring_status", "config", "plan", "layout", "event",
-        "junction"]),
+    ("segment", &["time", "link", "ring", "board", "info", "topology", "ring_status", "config", "clocks", "plan",
+        "layout", "event", "junction"]),
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half

@@ -28,12 +28,12 @@ use crate::procedures::reconcile::reconcile;
 use crate::procedures::scan::Scan;
 use crate::procedures::serve_requests::serve_requests;
 use crate::procedures::services::statistics::collect;
-use crate::procedures::shared_clocks::SharedClocks;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::procedures::supervise::supervise;
 use crate::procedures::verify::verify;
 use crate::queue::queue;
 use crate::ring_status::{CableErrors, cables};
+use crate::segment::clocks::Clocks;
 use crate::segment::member::Member;
 use crate::segment::start::Start;
 use crate::segment::{Cabling, Choices, Known, Observation, Segment, stations_by_position};
@@ -80,12 +80,13 @@ impl MainDevice {
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
         let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, index)).collect();
         let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
-        let beside = Beside { mailboxes, clocks, cache: self.cache.clone(), statistics };
+        let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
         let known = Known {
             members,
             unassigned,
             layout,
             cabling: Cabling { topology, stations, cables, closings, version: 0 },
+            clocks,
             ring: self.first_ring_status(),
             carriers: bus.carriers(),
         };
@@ -155,7 +156,7 @@ impl MainDevice {
         if self.options.supervision {
             let (own_bus, own) = (bus.clone(), segment.clone());
             self.supervisor.spawn(async move {
-                own.clocks.clone().all_in_reach(&own_bus).await;
+                own.until(|segment| (!segment.clocks().are_branches_closed()).then_some(())).await;
                 own_bus.spawn(verify(own_bus.clone(), own.clone()));
                 own_bus.spawn(watch_errors(own_bus.clone(), own.clone()));
                 supervise(own_bus, own).await;
@@ -179,11 +180,10 @@ impl MainDevice {
 }
 
 /// Clocks of all SubDevices that were scanned.
-fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> SharedClocks {
+fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> Clocks {
     let member = |info: &SubDeviceInfo| {
         let index = members.iter().position(|member| member.station == info.station)?;
         Some((index, &*members[index].config))
     };
-    let scanned: &[SubDeviceInfo] = if config.is_some() { &scan.subdevices } else { &[] };
-    SharedClocks::new(config, scanned, topology, member)
+    Clocks::new(config, &scan.subdevices, topology, member)
 }

@@ -1,20 +1,23 @@
-//! Distributed clocks: set up, brought together, watched (protocol 7).
+//! Distributed clocks: set up, locked, watched (protocol 7).
 //!
-//! * `measure`: who is connected to whom now, and what frames take from clock to clock;
+//! * `measure`: how SubDevices are connected now, and how long frames take from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `signals`: SYNC signals of one SubDevice;
-//! * `watch`: the static drift phase, who is locked, whose time each link distributes.
+//! * `drift`: the static drift compensation;
+//! * `watch`: the set-up, the differences, the links of the references.
 //!
-//! What they know about the clocks is in [`SharedClocks`](super::shared_clocks::SharedClocks), which the bring-up of
-//! SubDevices looks at too.
+//! They report what they measured, wrote and read to the model of the segment ([`crate::segment`]), which has the state
+//! of the clocks and says what follows.
 
 mod changes;
+mod drift;
 mod measure;
 mod not_locked;
 mod set_up;
 mod signals;
 mod watch;
 
+pub(super) use drift::compensate_drift;
 pub use not_locked::NotLocked;
 pub(super) use not_locked::SignalsError;
 pub(super) use signals::{restore, start_signals, wait_for_lock};

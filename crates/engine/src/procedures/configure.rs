@@ -209,7 +209,7 @@ impl BringUp<'_> {
 
     /// The SYNC signals that are declared, or what is left of others.
     async fn start_clock(&self) -> Result<(), ConfigureError> {
-        if !self.segment.clocks.are_declared() {
+        if !self.segment.view().clocks().are_declared() {
             return Ok(());
         }
         clocks::restore(self.bus, self.segment, self.index).await?;

@@ -1,6 +1,7 @@
 //! Starting the procedures that the model of the segment asks for. The only place at which they are started.
 
 use super::cabling::examine;
+use super::clocks::compensate_drift;
 use super::junction::isolate_rings;
 use super::presence::prove_inputs;
 use super::recover::bring_up_member;
@@ -25,6 +26,7 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
             Task::ReadUnassigned { station } => bus.spawn(read_unassigned(own_bus, own, station)),
             Task::ExamineCabling { in_control } => bus.spawn(examine(own_bus, own, in_control)),
             Task::IsolateRings => bus.spawn(isolate_rings(own_bus, own)),
+            Task::CompensateDrift => bus.spawn(compensate_drift(own_bus, own)),
             Task::FollowGroups => bus.spawn(follow_groups(own_bus, own)),
         }
     }

@@ -9,10 +9,10 @@ use core::cell::{Cell, Ref, RefCell};
 use core::time::Duration;
 
 use super::error_statistics::ErrorStatistics;
-use super::shared_clocks::SharedClocks;
 use super::sii::SiiCache;
 use crate::board::Board;
 use crate::mail::Mailbox;
+use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::effect::{Effect, Task};
 use crate::segment::{Observation, Segment, Words};
@@ -37,8 +37,6 @@ pub struct SharedSegment {
     next_frame_trial: Rc<Cell<Instant>>,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
-    /// Distributed clocks.
-    pub clocks: SharedClocks,
     /// SII contents read before.
     pub cache: SiiCache,
     /// Error counters.
@@ -50,8 +48,6 @@ pub struct SharedSegment {
 pub struct Beside {
     /// By member.
     pub mailboxes: Vec<Mailbox>,
-    /// Distributed clocks.
-    pub clocks: SharedClocks,
     /// SII contents read before.
     pub cache: SiiCache,
     /// Error counters.
@@ -61,7 +57,7 @@ pub struct Beside {
 impl SharedSegment {
     /// Shares a model.
     pub fn new(bus: Bus, segment: Segment, board: Arc<Board>, beside: Beside) -> SharedSegment {
-        let Beside { mailboxes, clocks, cache, statistics } = beside;
+        let Beside { mailboxes, cache, statistics } = beside;
         SharedSegment {
             segment: Rc::new(RefCell::new(segment)),
             mailboxes: mailboxes.into(),
@@ -72,7 +68,6 @@ impl SharedSegment {
             next_frame_trial: Rc::default(),
             bus,
             board,
-            clocks,
             cache,
             statistics,
         }
@@ -85,7 +80,8 @@ impl SharedSegment {
 
     /// Tells the model what was observed, and carries out what follows.
     pub fn observe(&self, seen: Observation<'_>) {
-        let is_posted = matches!(seen, Observation::Words(_));
+        // Supervision need not wake for these.
+        let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_));
         let effects = self.segment.borrow_mut().observe(seen, self.bus.now());
         for effect in effects.0 {
             match effect {
@@ -94,17 +90,21 @@ impl SharedSegment {
                 Effect::SuspendMailbox { index } => self.mailboxes.get(index).into_iter().for_each(Mailbox::suspend),
                 Effect::MainCount(count) => self.bus.set_main_count(count),
                 Effect::Occupants(occupants) => self.bus.set_occupants(occupants),
-                Effect::Closings(closings) => self.clocks.access().closings = closings,
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
         }
-        self.news.set(self.news.get() || !is_posted);
+        self.news.set(self.news.get() || !is_apart);
         self.changed.notify();
     }
 
-    /// Lets procedures look again at what they wait for beside the model.
+    /// Lets procedures check again what they wait for beside the model.
     pub(super) fn notify(&self) {
         self.changed.notify();
+    }
+
+    /// Hands an observation of clocks to the model.
+    pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
+        self.observe(Observation::Clocks(seen));
     }
 
     /// What is posted, as the model wants it.
@@ -131,7 +131,7 @@ impl SharedSegment {
     }
 
     /// Waits until the model satisfies a condition.
-    pub(super) async fn until<T>(&self, mut ready: impl FnMut(&Segment) -> Option<T>) -> T {
+    pub(crate) async fn until<T>(&self, mut ready: impl FnMut(&Segment) -> Option<T>) -> T {
         self.changed.until(|| ready(&self.segment.borrow())).await
     }
 

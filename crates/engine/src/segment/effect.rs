@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
-use super::cabling::End;
 use super::start::Start;
 use crate::event::Event;
 use crate::ring_status::Occupant;
@@ -30,8 +29,6 @@ pub enum Effect {
     MainCount(u16),
     /// Other SubDevices are at the positions of the cabling.
     Occupants(Vec<Occupant>),
-    /// Local rings close here now: both ends of their closing cables.
-    Closings(Vec<[End; 2]>),
     /// A procedure is to be started.
     Start(Task),
 }
@@ -87,6 +84,8 @@ pub enum Task {
     },
     /// Rings behind junctions are looked into, one after the other.
     IsolateRings,
+    /// The reference time is distributed many times, as fast as the segment allows (protocol 7.2).
+    CompensateDrift,
     /// The cabling is looked at anew, because a hot connect group has joined or left.
     FollowGroups,
 }

@@ -10,6 +10,7 @@ use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cabling::Cabling;
 use super::choices::Choices;
+use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
@@ -20,6 +21,7 @@ use super::ring::{Ring, Words};
 use super::silence::Silence;
 use super::unassigned::UnassignedSubDevice;
 use crate::board::Board;
+use crate::board::clocks::References;
 use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
 use crate::time::Instant;
@@ -35,6 +37,8 @@ pub struct Known {
     pub layout: Layout,
     /// How all of them are connected.
     pub cabling: Cabling,
+    /// Distributed clocks.
+    pub clocks: Clocks,
     /// What is known of the ring.
     pub ring: RingStatus,
     /// Carriers of the links.
@@ -59,6 +63,7 @@ pub struct Segment {
     pub(super) board: Arc<Board>,
     pub(super) choices: Choices,
     pub(super) ring: Ring,
+    pub(super) clocks: Clocks,
     pub(super) breaks: Breaks,
     pub(super) local_rings: LocalRings,
     pub(super) silence: Silence,
@@ -73,7 +78,7 @@ pub struct Segment {
 impl Segment {
     /// The segment at activation.
     pub fn new(known: Known, board: Arc<Board>, choices: Choices) -> Segment {
-        let Known { members, unassigned, layout, cabling, ring, carriers } = known;
+        let Known { members, unassigned, layout, cabling, clocks, ring, carriers } = known;
         Segment {
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
@@ -90,6 +95,7 @@ impl Segment {
             unassigned,
             layout,
             cabling,
+            clocks,
             board,
             choices,
         }
@@ -98,6 +104,17 @@ impl Segment {
     /// When to look at what is posted though nothing else is posted.
     pub fn next_look(&self) -> Instant {
         self.attention.wake
+    }
+
+    /// Distributed clocks.
+    pub fn clocks(&self) -> &Clocks {
+        &self.clocks
+    }
+
+    /// The references that the exchange distributes; `None` while these are not the right ones, or stopped.
+    pub fn references_in_use(&self) -> Option<References> {
+        let (references, _) = self.board.clocks.references();
+        (references == self.clocks.references() && !self.board.clocks.is_held()).then_some(references)
     }
 
     /// The ring and its links, as they were told.

@@ -10,6 +10,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
 use super::asked::Asked;
+use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Disturbance;
 use super::look::Look;
@@ -223,6 +224,9 @@ pub enum Observation<'a> {
         /// Those that are new.
         fresh: &'a [CableErrors],
     },
+
+    /// Clocks were measured, written, read or lost.
+    Clocks(ClockObservation<'a>),
 
     /// Something that puts SubDevices out of reach is wanted.
     Wanted(Disturbance),

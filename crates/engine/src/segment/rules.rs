@@ -1,6 +1,7 @@
 //! What follows from what is seen, rule by rule.
 
 mod breaks;
+mod clocks;
 mod crossings;
 mod fit;
 mod group_matching;

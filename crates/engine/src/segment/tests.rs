@@ -1,5 +1,7 @@
 //! From what is posted and seen to what is told, without a bus.
 
+mod clocks;
+
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -10,6 +12,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, PortKind};
 use ringcat_wire::sii::Identity;
 
+use super::clocks::Clocks;
 use super::disturbance::Disturbance;
 use super::effect::{Check, Effect, Shown, Task};
 use super::member::{Member, Phase};
@@ -55,6 +58,10 @@ fn node(high: u8) -> NodeStatus {
 
 impl Ring {
     fn closed(count: usize) -> Ring {
+        Ring::with_clocks(count, Clocks::new(None, &[], &Topology::default(), |_| None))
+    }
+
+    fn with_clocks(count: usize, clocks: Clocks) -> Ring {
         let member = |index: usize| {
             let identity = Identity { vendor_id: 2, product_code: 7, revision: 1, serial: 0 };
             let (position, station) = (Position(index as u16), station(index));
@@ -82,6 +89,7 @@ impl Ring {
             members: (0..count).map(member).collect(),
             unassigned: Vec::new(),
             layout: Layout::with(&[], rules).unwrap(),
+            clocks,
             cabling,
             ring: RingStatus { redundancy: Redundancy::Unknown, ..RingStatus::default() },
             carriers: [Some(true); 2],

@@ -1,10 +1,11 @@
-//! Who is connected to whom now, and what frames take from clock to clock (protocol 7.1).
+//! How SubDevices are connected now, and how long frames take from clock to clock (protocol 7.1).
 //!
-//! Nothing here disturbs process data, so a measurement may be taken at any time. But a frame meets those in a whole
-//! ring only once, which measures nothing: at the set-up every ring is opened for a moment, with the bit that closes it
-//! again by itself. Of the ring of two links the last port is closed, of one behind a junction both ends of its closing
-//! cable. What was measured of cables then holds afterwards, whatever is plugged where. Before anything is exchanged
-//! the branches of forks without a clock are closed one after the other as well ([`branches`]).
+//! A measurement does not disturb process data, so it may be taken at any time. But a frame passes each SubDevice of a
+//! whole ring only once, which measures nothing: during the set-up every ring is opened for a moment, with the bit that
+//! closes it again by itself. In the ring of two links the last port is closed, in a ring behind a junction both ends
+//! of its closing cable. The times of cables that this measures hold afterwards, wherever they are plugged in. Before
+//! process data is exchanged the branches of forks without a clock are closed one after the other as well
+//! ([`branches`]).
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -17,14 +18,14 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
 use crate::clocks::wiring::{TREES, Wiring};
-use crate::clocks::{Delays, Disagreement, FRACTION, Latched, Measurements, Passage, Segment, branches};
+use crate::clocks::{Cables, Disagreement, Latched, Measurements, Passage, Segment, branches};
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::shared_clocks::{Clocks, Node, SharedClocks};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
 use crate::segment::Observation;
+use crate::segment::clocks::{ClockObservation, Measured, Node};
 use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -44,7 +45,7 @@ const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
 
-/// Who is there, in the order in which frames meet them.
+/// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
 struct Survey {
     stations: Vec<StationAddress>,
@@ -60,16 +61,6 @@ struct Survey {
     is_whole: bool,
 }
 
-/// What was measured.
-#[derive(Clone, Debug)]
-pub(super) struct Measured {
-    /// Station addresses by position.
-    pub stations: Vec<StationAddress>,
-    pub delays: Delays,
-    /// How much faster than the reference each clock runs, by position.
-    pub drift_ppb: Vec<Option<i64>>,
-}
-
 /// Which ports may be closed for a moment, for measuring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opening {
@@ -83,47 +74,46 @@ pub(super) enum Opening {
 
 /// Measures.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
-    let clocks = &segment.clocks;
     let mut survey = look(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
         measure_open(bus, segment, &survey, &rings, &[]).await?;
     }
-    let mut measured = take(bus, clocks, &survey).await?;
+    let mut measured = take(bus, segment, &survey).await?;
     if opening == Opening::Branches && !measured.delays.unknown.is_empty() {
         survey.latched = None;
         measure_branches(bus, segment, &survey, &rings).await;
-        measured = take(bus, clocks, &survey).await?;
+        measured = take(bus, segment, &survey).await?;
     }
     // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that
     // came as a whole, or came back with other cables, has several.
     let is_open = |measured: &Measured| measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
     let is_open_question = is_open(&measured);
     // Opening changes ports, so that the segment is measured again: the same is not opened twice in vain.
-    let is_in_vain = clocks.access().in_vain.as_ref() == Some(&survey.wiring);
+    let is_in_vain = segment.view().clocks().opened_in_vain.as_ref() == Some(&survey.wiring);
     if !is_open_question || opening != Opening::Nothing || rings.is_empty() || is_in_vain {
         let is_still_open = is_open_question && !rings.is_empty();
-        clocks.access().in_vain = is_still_open.then(|| survey.wiring.clone());
-        return measured.exact();
+        let in_vain = is_still_open.then_some(survey.wiring);
+        segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+        return exact(measured);
     }
     let survey = Survey { latched: None, ..survey.clone() };
     measure_open(bus, segment, &survey, &rings, &[]).await?;
-    measured = take(bus, clocks, &survey).await?;
-    clocks.access().in_vain = is_open(&measured).then_some(survey.wiring);
-    measured.exact()
+    measured = take(bus, segment, &survey).await?;
+    let in_vain = is_open(&measured).then_some(survey.wiring);
+    segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+    exact(measured)
 }
 
-impl Measured {
-    /// Nothing where times contradict each other.
-    fn exact(self) -> Result<Measured, String> {
-        if self.delays.is_contradictory {
-            return Err(
-                "cables of a ring do not take as long together as each by itself, although it was opened".to_string()
-            );
-        }
-        Ok(self)
+/// An error where times contradict each other.
+fn exact(measured: Measured) -> Result<Measured, String> {
+    if measured.delays.is_contradictory {
+        return Err(
+            "cables of a ring do not take as long together as each by itself, although it was opened".to_string()
+        );
     }
+    Ok(measured)
 }
 
 /// Opens rings and leaves branches out, measures what cables take, and takes that back.
@@ -156,7 +146,7 @@ async fn measure_open(
             open.is_whole = branches.is_empty();
             // The port at the end of a ring of two links is closed: what comes to it ends there.
             open.deaf = survey.is_closed.then_some(Link::Redundant);
-            take(bus, &segment.clocks, &open).await.map(drop)
+            take(bus, segment, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
     };
@@ -172,8 +162,9 @@ async fn measure_open(
 /// Measures what is behind forks without a clock, branch by branch. What cannot be is left open.
 async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, rings: &[PortOf]) {
     let has_clock: Vec<bool> = {
-        let clocks = segment.clocks.access();
-        survey.stations.iter().map(|station| clocks.has_clock(*station)).collect()
+        let view = segment.view();
+        let has_clock = |station: &StationAddress| view.clocks().node_at(*station).is_some_and(|node| node.has_clock);
+        survey.stations.iter().map(has_clock).collect()
     };
     let mut lines = survey.wiring.clone();
     lines.open(rings);
@@ -219,7 +210,7 @@ impl Survey {
 
 async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
     for _ in 0..LOOKS {
-        let looked = look_once(bus, &segment.clocks).await;
+        let looked = look_once(bus, segment).await;
         // Ports that changed in between have told it to this look.
         segment.observe(Observation::LookAgain);
         match looked {
@@ -232,11 +223,11 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
 }
 
 /// `None` while the segment changes.
-async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, BusError> {
+async fn look_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
     let Some(before) = view(bus).await? else { return Ok(None) };
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    // Receive times say who is entered at which port.
-    let latched = match latch(bus, clocks, &before.stations, None).await {
+    // Receive times show at which port frames enter a SubDevice.
+    let latched = match latch(bus, segment, &before.stations, None).await {
         Err(BusError::Wkc { .. }) => return Ok(None),
         other => other?,
     };
@@ -247,21 +238,21 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
         Err(BusError::Wkc { .. }) => return Ok(None),
         other => other?,
     };
-    let access = clocks.access();
-    let ports = |station: StationAddress| access.nodes.iter().find(|node| node.station == station).map(|n| n.ports);
+    let (segment, counts) = (segment.view(), before.counts);
+    let ports = |station: StationAddress| segment.clocks().node_at(station).map(|node| node.ports);
     let node = |position: usize| NodeStatus {
         dl_status: dl_status[position],
         receive_times: latched[position].map(|latched| latched.ports),
         ports: ports(before.stations[position]).unwrap_or_default(),
     };
-    let place = |end: &(StationAddress, u8)| Some(PortOf { node: before.position(end.0)?, port: end.1 });
-    let closings = access.closings.iter().filter_map(|[head, tail]| {
+    let place = |end: (StationAddress, u8)| Some(PortOf { node: before.position(end.0)?, port: end.1 });
+    let closings = segment.present_closings().into_iter().filter_map(|[head, tail]| {
         let closing = Closing { head: place(head)?, tail: place(tail)? };
         (closing.head.node < closing.tail.node).then_some(closing)
     });
     let closings: Vec<Closing> = closings.collect();
     let nodes: Vec<NodeStatus> = (0..before.stations.len()).map(node).collect();
-    let topology = Topology::with_local_rings(&nodes, usize::from(before.counts.0.0), &closings);
+    let topology = Topology::with_local_rings(&nodes, usize::from(counts.0.0), &closings);
     let is_open = |at: PortOf| {
         let port = dl_status[at.node].ports[usize::from(at.port & 3)];
         port.communication && !port.loop_closed
@@ -280,10 +271,10 @@ async fn look_once(bus: &Bus, clocks: &SharedClocks) -> Result<Option<Survey>, B
 }
 
 /// Several latches of a segment as it is.
-async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measured, String> {
-    let count = clocks.access().config.as_ref().map_or(1, |config| config.measurements.clamp(1, 64));
+async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Measured, String> {
+    let count = segment.view().clocks().config.measurements.clamp(1, 64);
     let entries = survey.wiring.entry_ports();
-    let is_as_before = enter_backwards(bus, clocks, &survey.stations, &entries).await;
+    let is_as_before = enter_backwards(bus, segment, &survey.stations, &entries).await;
     let mut measurements = Measurements::new(&survey.wiring);
     if let Some(latched) = survey.latched.as_ref().filter(|_| is_as_before) {
         measurements.add(latched.clone());
@@ -291,40 +282,54 @@ async fn take(bus: &Bus, clocks: &SharedClocks, survey: &Survey) -> Result<Measu
     let count = count + measurements.count();
     let mut failures = 0;
     while measurements.count() < count {
-        match latch(bus, clocks, &survey.stations, survey.deaf).await {
+        match latch(bus, segment, &survey.stations, survey.deaf).await {
             Ok(latched) => measurements.add(latched),
             Err(error @ (BusError::Busy { .. } | BusError::Disturbed { .. })) => return Err(error.to_string()),
             Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
             Err(_) => failures += 1,
         }
     }
-    let mut access = clocks.access();
-    let access = &mut *access;
-    let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
-    let is_there = |node: &Node| at(node.station).is_some();
-    let reference = access.reference.filter(|index| is_there(&access.nodes[*index]));
-    let reference = reference.or_else(|| access.elect(|_, node| is_there(node)));
-    let on_clock = reference.and_then(|index| at(access.nodes[index].station)).unwrap_or(0);
-    let passages: Vec<Passage> = survey.stations.iter().map(|station| access.passage_of(*station)).collect();
-    let unfit = "receive times do not fit the cabling: a ring behind a junction may be unknown".to_string();
-    if let Some(odd) = measurements.disagreement(on_clock) {
-        // Where a port shows times that cannot be in most of them, no frame comes in there.
-        return Err(if odd.is_possible() { told(&odd, survey.stations[odd.node]) } else { unfit });
-    }
-    let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
-    // Cables of branches that are left out are where they were.
-    if survey.is_whole {
-        segment.set_present(&mut access.cables);
-    }
-    let delays = segment.propagation(&measurements.mean(on_clock), on_clock, &mut access.cables);
-    if delays.is_implausible {
-        return Err(unfit);
-    }
-    Ok(Measured { stations: survey.stations.clone(), delays, drift_ppb: measurements.drift_ppb(on_clock) })
+    let (measured, cables) = evaluate(segment, survey, &measurements)?;
+    segment.observe_clocks(ClockObservation::Cables(cables));
+    measured.ok_or_else(unfit)
 }
 
-/// What is said of measurements that do not agree. No figures: the same is told once.
-fn told(odd: &Disagreement, station: StationAddress) -> String {
+/// What latched receive times tell of delays, `None` where they do not fit the cabling, and of cables.
+fn evaluate(
+    segment: &SharedSegment,
+    survey: &Survey,
+    measurements: &Measurements,
+) -> Result<(Option<Measured>, Cables), String> {
+    let view = segment.view();
+    let clocks = view.clocks();
+    let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
+    let is_there = |node: &Node| at(node.station).is_some();
+    let reference = clocks.reference.filter(|index| is_there(&clocks.nodes[*index]));
+    let reference = reference.or_else(|| clocks.elect(is_there));
+    let on_clock = reference.and_then(|index| at(clocks.nodes[index].station)).unwrap_or(0);
+    let passages: Vec<Passage> = survey.stations.iter().map(|station| clocks.passage_of(*station)).collect();
+    if let Some(odd) = measurements.disagreement(on_clock) {
+        // Where a port shows times that cannot be in most of them, no frame comes in there.
+        return Err(if odd.is_possible() { describe(&odd, survey.stations[odd.node]) } else { unfit() });
+    }
+    let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
+    let mut cables = clocks.cables.clone();
+    // Cables of branches that are left out are where they were.
+    if survey.is_whole {
+        segment.set_present(&mut cables);
+    }
+    let delays = segment.propagation(&measurements.mean(on_clock), on_clock, &mut cables);
+    let (is_plausible, stations) = (!delays.is_implausible, survey.stations.clone());
+    let measured = Measured { stations, delays, drift_ppb: measurements.drift_ppb(on_clock) };
+    Ok((is_plausible.then_some(measured), cables))
+}
+
+fn unfit() -> String {
+    "receive times do not fit the cabling: a ring behind a junction may be unknown".to_string()
+}
+
+/// Measurements that do not agree. Without figures: the same reason is reported once.
+fn describe(odd: &Disagreement, station: StationAddress) -> String {
     match odd.port {
         Some(port) => format!(
             "receive times of station {station} at port {port} differ from measurement to measurement: frames of \
@@ -337,59 +342,36 @@ fn told(odd: &Disagreement, station: StationAddress) -> String {
     }
 }
 
-impl Clocks {
-    fn has_clock(&self, station: StationAddress) -> bool {
-        self.nodes.iter().any(|node| node.station == station && node.has_clock)
+/// Writes DC_LATCH_MODE of controllers that latch in one direction only: the direction from which frames come (protocol
+/// 3.12, 7.5). Returns whether all have the right one already.
+async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[StationAddress], entries: &[u8]) -> bool {
+    let modes = segment.view().clocks().latch_modes(stations, entries);
+    if modes.is_empty() {
+        return true;
     }
-
-    /// What is declared about passages through a SubDevice.
-    fn passage_of(&self, station: StationAddress) -> Passage {
-        let own = self.nodes.iter().find(|node| node.station == station).and_then(|node| node.passage);
-        let usual = self.config.as_ref().map(|config| config.passage);
-        let declared = own.or(usual).unwrap_or_default();
-        let exact = |ns: u16| i64::from(ns) << FRACTION;
-        Passage { processed: exact(declared.processing_ns), forwarded: exact(declared.forwarding_ns) }
-    }
-}
-
-/// Controllers that latch in one direction only are told in which the frame comes (protocol 3.12, 7.5).
-/// Returns whether none had to be.
-async fn enter_backwards(bus: &Bus, clocks: &SharedClocks, stations: &[StationAddress], entries: &[u8]) -> bool {
-    let modes: Vec<(StationAddress, u8)> = {
-        let mut clocks = clocks.access();
-        let mut mode = |station: &StationAddress, entry: &u8| {
-            let node = clocks.nodes.iter_mut().find(|node| node.station == *station && node.has_clock)?;
-            let backwards = *entry != 0;
-            (core::mem::replace(&mut node.latches_backwards, backwards) != backwards)
-                .then_some((*station, u8::from(backwards)))
-        };
-        stations.iter().zip(entries).filter_map(|(station, entry)| mode(station, entry)).collect()
+    segment.observe_clocks(ClockObservation::LatchModes(&modes));
+    let write = |bus: Bus, (station, backwards): (StationAddress, bool)| async move {
+        bus.fpwr(station, map::DC_LATCH_MODE, &[u8::from(backwards)]).await
     };
-    let write = |bus: Bus, (station, mode): (StationAddress, u8)| async move {
-        bus.fpwr(station, map::DC_LATCH_MODE, &[mode]).await
-    };
-    let is_as_before = modes.is_empty();
     // Those without the register do not answer.
     let _ = bus.gather(modes, write).await;
-    is_as_before
+    false
 }
 
 /// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come
 /// home.
 pub(super) async fn latch(
     bus: &Bus,
-    clocks: &SharedClocks,
+    segment: &SharedSegment,
     stations: &[StationAddress],
     deaf: Option<Link>,
 ) -> Result<Vec<Option<Latched>>, BusError> {
-    let asked: Vec<(StationAddress, bool)> = {
-        let clocks = clocks.access();
-        let lacks = |station| clocks.nodes.iter().any(|node| node.station == station && !node.has_clock);
-        stations.iter().map(|station| (*station, !lacks(*station))).collect()
-    };
-    let pauses = match clocks.access().config.as_ref().is_none_or(|config| config.pauses) {
-        true => Pauses::Allowed,
-        false => Pauses::Forbidden,
+    let (asked, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
+        let view = segment.view();
+        let clocks = view.clocks();
+        let lacks = |station| clocks.node_at(station).is_some_and(|node| !node.has_clock);
+        let asked = stations.iter().map(|station| (*station, !lacks(*station)));
+        (asked.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
     };
     let latches = frames::latch(bus, pauses, deaf).await?;
     let read = bus.gather(asked, |bus, (station, asked)| async move {
@@ -398,7 +380,7 @@ pub(super) async fn latch(
         }
         let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
             Ok(bytes) => bytes,
-            // One that is gone is one without a clock.
+            // A SubDevice that does not answer counts as one without a clock.
             Err(BusError::Wkc { .. }) => return Ok(None),
             Err(error) => return Err(error),
         };
@@ -407,7 +389,7 @@ pub(super) async fn latch(
         Ok(Some(Latched { ports: [word(0), word(4), word(8), word(12)], unit }))
     });
     let read: Vec<Option<Latched>> = read.await.into_iter().collect::<Result<_, _>>()?;
-    // One that it has not met has what it latched before.
+    // A SubDevice that the frame has not passed has the times of an earlier one.
     let answered = Wkc(read.iter().flatten().count() as u16);
     if latches.met.0 < answered.0 {
         let target = Target::Broadcast(map::DC_RECEIVE_TIME);

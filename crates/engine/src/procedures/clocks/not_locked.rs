@@ -3,7 +3,7 @@
 use core::fmt;
 use core::time::Duration;
 
-use crate::procedures::shared_clocks::HiddenDelay;
+use crate::segment::clocks::HiddenDelay;
 use crate::supervisor::BusError;
 
 /// A clock did not come into its window.

@@ -34,11 +34,7 @@ impl Segment {
             Observation::Reached { index, attempt, state } => self.settle(index, attempt, state, effects),
             Observation::Returned { index, attempt } => self.observe_return(index, attempt, effects),
             Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt, now, effects),
-            Observation::Unreachable { index, attempt } => {
-                if self.current(index, attempt).is_some() {
-                    self.lose(index, effects);
-                }
-            }
+            Observation::Unreachable { index, attempt } => self.observe_unreachable(index, attempt, effects),
             Observation::Configured { index, is } => self.set_configured(index, is),
             Observation::Undone { index, attempt, reason } => self.observe_undone(index, attempt, &reason, effects),
             Observation::ProcessData { index, step } => self.observe_process_data(index, step, effects),
@@ -63,6 +59,8 @@ impl Segment {
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
             Observation::CableErrors { asked, fresh } => self.observe_cable_errors(asked, fresh),
 
+            Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
+
             Observation::Wanted(disturbance) => self.slot.want(disturbance),
             Observation::Renounced(disturbance) => self.slot.renounce(disturbance),
             Observation::Undisturbed => self.slot.end(),
@@ -75,6 +73,12 @@ impl Segment {
             Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
             Observation::Blocked(ports) => self.blocked.extend(ports),
             Observation::Unblocking => self.blocked.clear(),
+        }
+    }
+
+    fn observe_unreachable(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
+        if self.current(index, attempt).is_some() {
+            self.lose(index, effects);
         }
     }
 

@@ -67,13 +67,12 @@ impl Segment {
         self.cabling = Cabling { version: now.version.wrapping_add(u32::from(is_other)), ..now };
         self.adoptions = self.adoptions.wrapping_add(1);
         effects.0.push(Effect::Occupants(self.occupants()));
-        effects.0.push(Effect::Closings(self.present_closings()));
         // What is broken in it may not have been told yet.
         self.attention.want();
     }
 
     /// Both ends of the closing cables of all local rings of the cabling.
-    fn present_closings(&self) -> Vec<[End; 2]> {
+    pub fn present_closings(&self) -> Vec<[End; 2]> {
         let end = |at: PortOf| Some((*self.cabling.stations.get(at.node)?, at.port));
         let rings = self.cabling.topology.local_rings.iter().map(|ring| ring.closing);
         rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect()

@@ -1,0 +1,95 @@
+//! The life of the clocks of a segment: from the declaration to the lock, and from each change to the next
+//! measurement.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use crate::clocks::SyncWindow;
+use crate::link::Link;
+use crate::time::Instant;
+
+/// The life of the clocks of a segment.
+#[derive(Debug)]
+pub enum Life {
+    /// No distributed clocks are declared.
+    Undeclared,
+    /// The first set-up is under way. It closes no branch.
+    Starting,
+    /// The first set-up is under way. It closes branches of forks without a clock: SubDevices there do not answer.
+    StartingWithoutBranches,
+    /// No set-up has succeeded. With the reason that was reported last.
+    NotSetUp(Option<String>),
+    /// Delays and offsets are written.
+    Running(Running),
+}
+
+/// The state of clocks that were set up.
+#[derive(Debug, Default)]
+pub struct Running {
+    /// The static drift compensation.
+    pub compensation: Compensation,
+    /// Whether the delays that are known are those of the segment.
+    pub delays: Delays,
+    /// What is known and not yet written.
+    pub unwritten: Unwritten,
+    /// The registers to write next.
+    pub due: Due,
+    /// Whether all clocks have reached the window.
+    pub lock: Lock,
+    /// By index, the links of the last answers, where they contradict the known links: the next answers must confirm
+    /// them.
+    pub unconfirmed: Option<Vec<Option<Option<Link>>>>,
+}
+
+/// The static drift compensation: its differences do not show the pace of the cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compensation {
+    /// It is under way.
+    Running,
+    /// It has ended, or has not begun.
+    #[default]
+    Idle,
+}
+
+/// Whether the delays that are known are those of the segment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Delays {
+    /// They are.
+    #[default]
+    Valid,
+    /// The segment has changed since they were measured, at this time first.
+    Doubtful(Instant),
+}
+
+/// Delays that are known and not yet written, by link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unwritten {
+    /// Links with such delays.
+    pub links: [bool; 2],
+    /// Clocks that get another delay.
+    pub clocks: usize,
+    /// The largest change.
+    pub largest_ns: u32,
+}
+
+/// The registers to write next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Due {
+    /// None.
+    #[default]
+    Nothing,
+    /// Delays, before any time is distributed again.
+    Delays,
+    /// Filter depths.
+    Filters,
+}
+
+/// Whether all clocks have reached the window.
+#[derive(Debug, Default)]
+pub enum Lock {
+    /// Not yet.
+    #[default]
+    Open,
+    /// They have. While some clocks receive the time that the host predicts, this evaluates the differences.
+    Locked(SyncWindow),
+}

@@ -1,0 +1,18 @@
+//! The result of a measurement of the segment.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use crate::clocks::Delays;
+
+/// The result of a measurement of the segment.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Station addresses by position.
+    pub stations: Vec<StationAddress>,
+    /// Delays by position.
+    pub delays: Delays,
+    /// How much faster than the reference each clock runs, by position.
+    pub drift_ppb: Vec<Option<i64>>,
+}

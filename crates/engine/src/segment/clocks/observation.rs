@@ -1,0 +1,127 @@
+//! Observations of clocks.
+
+use alloc::string::String;
+
+use ringcat_wire::address::StationAddress;
+
+use super::measured::Measured;
+use crate::clocks::{Cables, Latched, Wiring};
+use crate::link::Link;
+
+/// An observation of clocks: measured, written, read or lost.
+#[derive(Debug)]
+pub enum ClockObservation<'a> {
+    /// The set-up of all clocks begins.
+    SetUpBegun,
+    /// It could not be completed, for this reason.
+    SetUpFailed(String),
+    /// The segment has changed: its delays may not be what they were, and a set-up may succeed.
+    SegmentChanged,
+    /// DC_LATCH_MODE is about to be written: whether frames enter from behind.
+    LatchModes(&'a [(StationAddress, bool)]),
+    /// What latched receive times tell of cables.
+    Cables(Cables),
+    /// The cables whose times are not known although the rings on them were opened; `None` where all are known.
+    OpenedInVain(Option<Wiring>),
+    /// The delays of all clocks, for their set-up.
+    Measured(&'a Measured),
+    /// Local times that one frame latched, by index, and the system time that they are to show.
+    Latched {
+        /// Local times.
+        latched: &'a [Option<Latched>],
+        /// System time of that frame where it came in.
+        wanted: u64,
+    },
+    /// Offsets and delays of all clocks are written.
+    SetUp,
+
+    /// The delays of all clocks after a change of the segment.
+    MeasuredAgain(&'a Measured),
+    /// The delays of the clocks on a link are written.
+    DelaysWritten(Link),
+    /// They could not be written, for this reason.
+    DelaysNotWritten(String),
+    /// The measurement has ended and its delays are written, or the segment could not be measured for too long.
+    MeasurementEnded {
+        /// Why it could not be measured.
+        failed: Option<String>,
+        /// The number of stops of the distribution when it began.
+        holds: u32,
+    },
+    /// Filter depths are written, by index.
+    FiltersWritten(&'a [(usize, [u8; 2])]),
+
+    /// A declared SubDevice with a clock that was not at the scan.
+    Came {
+        /// Its index in the declaration.
+        member: usize,
+    },
+    /// The registers of a clock do not hold what was written, or never did.
+    RegistersLost {
+        /// Its index.
+        index: usize,
+    },
+    /// Local times that one frame latched, for the set-up of one clock.
+    LatchedFor {
+        /// Its index.
+        index: usize,
+        /// Local times by index.
+        latched: &'a [Option<Latched>],
+        /// System time where no other clock has it.
+        host: u64,
+    },
+    /// Offset and delay of that clock are written.
+    OneSetUp {
+        /// Its index.
+        index: usize,
+    },
+    /// Clocks have to learn the time of their reference.
+    TimeWanted,
+    /// The static drift compensation has ended.
+    Compensated,
+
+    /// The differences of all clocks.
+    Answers {
+        /// By index; `None` where the answer was lost.
+        answers: &'a [Option<Answer>],
+        /// A ring has opened or closed: that explains changes of ports.
+        is_explained: bool,
+        /// The number of stops of the distribution when they were read.
+        holds: u32,
+    },
+    /// The delays that [`Due::Delays`](super::life::Due) wants are written, as far as possible.
+    Followed {
+        /// The number of stops of the distribution when the answers were read.
+        holds: u32,
+    },
+    /// DC_SYSTEM_TIME of the reference, and the host time at which the frame was sent.
+    ReferenceTime {
+        /// The lower half of the system time.
+        low: u32,
+        /// Host time in nanoseconds.
+        sent_at: u64,
+    },
+}
+
+/// The answer of one clock, and the link on which it came.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Answer {
+    /// `None`: it did not answer.
+    pub link: Option<Link>,
+    /// Its time less that of its reference.
+    pub difference: Difference,
+    /// How much faster its loop makes it run.
+    pub deviation_ppb: i64,
+}
+
+/// The time of a clock less that of its reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Difference {
+    /// Not read.
+    #[default]
+    Unknown,
+    /// As the clock has it (DC_SYSTEM_TIME_DIFFERENCE).
+    Own(i32),
+    /// Of a clock that frames pass before the reference, as one frame has read both.
+    InFront(i32),
+}

@@ -1,0 +1,274 @@
+//! All clocks of a segment.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{Position, StationAddress};
+
+use super::life::{Compensation, Delays, Due, Life, Lock, Running};
+use super::node::Node;
+use super::status::{ClockStatus, HiddenDelay};
+use crate::board::clocks::References;
+use crate::clocks::{Cables, FRACTION, Passage, Wiring, branches, round};
+use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig};
+use crate::info::SubDeviceInfo;
+use crate::link::Link;
+use crate::time::Instant;
+use crate::topology::Topology;
+
+/// DC_FILTER_DIFFERENCE of clocks behind their reference: the time they receive is exact, and a mean that lags behind
+/// the samples makes the loop oscillate where drift is large.
+const EXACT_DEPTH: u8 = 0;
+/// Of clocks that receive the time that the host predicts: its reset value, which removes most of the host's jitter.
+const HOST_DEPTH: u8 = 4;
+/// DC_FILTER_SPEED: its reset value.
+const SPEED_DEPTH: u8 = 12;
+/// Of a reference that is steered: the host's jitter must not change its speed.
+const STEADY_DEPTH: u8 = 15;
+
+/// All clocks of a segment.
+#[derive(Debug)]
+pub struct Clocks {
+    /// The declaration.
+    pub config: ClockConfig,
+    /// Their life.
+    pub(in crate::segment) life: Life,
+    /// By position of the scan, then those that came later.
+    pub nodes: Vec<Node>,
+    /// The index of the reference.
+    pub reference: Option<usize>,
+    /// What was measured of cables.
+    pub cables: Cables,
+    /// Measurements so far.
+    pub(in crate::segment) measured: u32,
+    /// Rings on these cables were opened, and the times of the cables are not known all the same.
+    pub opened_in_vain: Option<Wiring>,
+    /// System time when host time is zero, as the reference clock has it.
+    pub epoch: u64,
+}
+
+impl Clocks {
+    /// No clocks, or those of a scan, where they are declared: `members` has the index in the declaration and the
+    /// declaration of a SubDevice.
+    pub fn new<'a>(
+        config: Option<ClockConfig>,
+        scanned: &[SubDeviceInfo],
+        topology: &Topology,
+        members: impl Fn(&SubDeviceInfo) -> Option<(usize, &'a SubDeviceConfig)>,
+    ) -> Clocks {
+        let node = |info: &SubDeviceInfo| Node::new(info, members(info));
+        let nodes: Vec<Node> = if config.is_some() { scanned.iter().map(node).collect() } else { Vec::new() };
+        let has_clock: Vec<bool> = nodes.iter().map(|node| node.has_clock).collect();
+        let life = match &config {
+            None => Life::Undeclared,
+            Some(_) if branches::are_hidden(topology, &has_clock) => Life::StartingWithoutBranches,
+            Some(_) => Life::Starting,
+        };
+        let config = config.unwrap_or_default();
+        let epoch = config.epoch;
+        let (reference, cables, measured, opened_in_vain) = (None, Cables::default(), 0, None);
+        Clocks { config, life, nodes, reference, cables, measured, opened_in_vain, epoch }
+    }
+
+    /// Whether distributed clocks are declared.
+    pub fn are_declared(&self) -> bool {
+        !matches!(self.life, Life::Undeclared)
+    }
+
+    /// Whether branches may be closed for the first set-up.
+    pub fn are_branches_closed(&self) -> bool {
+        matches!(self.life, Life::StartingWithoutBranches)
+    }
+
+    /// Whether delays and offsets are written.
+    pub fn are_set_up(&self) -> bool {
+        self.running().is_some()
+    }
+
+    /// Whether all clocks have reached the window.
+    pub fn are_locked(&self) -> bool {
+        self.running().is_some_and(|running| matches!(running.lock, Lock::Locked(_)))
+    }
+
+    /// Since when the delays may not be those of the segment.
+    pub fn doubtful_since(&self) -> Option<Instant> {
+        match self.running()?.delays {
+            Delays::Valid => None,
+            Delays::Doubtful(since) => Some(since),
+        }
+    }
+
+    /// Whether the next answers must confirm the last ones.
+    pub fn are_links_unconfirmed(&self) -> bool {
+        self.running().is_some_and(|running| running.unconfirmed.is_some())
+    }
+
+    /// The links with delays that are known and not yet written.
+    pub fn unwritten(&self) -> Vec<Link> {
+        let links = self.running().map_or([false; 2], |running| running.unwritten.links);
+        Link::ALL.into_iter().filter(|link| links[link.index()]).collect()
+    }
+
+    /// The registers to write next.
+    pub fn due(&self) -> Due {
+        self.running().map_or(Due::Nothing, |running| running.due)
+    }
+
+    pub(in crate::segment) fn running(&self) -> Option<&Running> {
+        if let Life::Running(running) = &self.life { Some(running) } else { None }
+    }
+
+    pub(in crate::segment) fn running_mut(&mut self) -> Option<&mut Running> {
+        if let Life::Running(running) = &mut self.life { Some(running) } else { None }
+    }
+
+    pub(in crate::segment) fn is_compensating(&self) -> bool {
+        self.running().is_some_and(|running| running.compensation == Compensation::Running)
+    }
+
+    /// Whether any SubDevice has a clock.
+    pub fn is_any(&self) -> bool {
+        self.nodes.iter().any(|node| node.has_clock)
+    }
+
+    /// Whether a clock that answers is outside its window, or has not been inside for long enough.
+    pub fn is_any_outside(&self) -> bool {
+        let samples = self.config.lock_samples;
+        self.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
+    }
+
+    /// Each clock of the segment, by position of the scan; then those that came later.
+    pub fn status(&self) -> Vec<ClockStatus> {
+        let with_clock = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
+        let status = |(index, node): (usize, &Node)| ClockStatus {
+            position: node.position,
+            station: node.station,
+            subdevice: node.member,
+            is_reference: self.reference == Some(index),
+            delay_ns: node.delay_ns,
+            hidden: self.hidden(index),
+            offset_ns: node.offset_ns,
+            drift_ppb: node.drift_ppb,
+            difference_ns: node.difference_ns,
+            worst_ns: node.worst_ns,
+            is_locked: node.good >= self.config.lock_samples,
+        };
+        with_clock.map(status).collect()
+    }
+
+    /// Why the delay of a clock is not known.
+    pub fn hidden(&self, index: usize) -> Option<HiddenDelay> {
+        let node = &self.nodes[index];
+        let hidden = node.hidden?;
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main)).and_then(|index| self.nodes[index].unit);
+        let range = hidden.range.zip(reference);
+        Some(HiddenDelay {
+            fork: hidden.fork.map(|fork| Position(fork as u16)),
+            range_ns: range.map(|((least, most), reference)| (round(least - reference), round(most - reference))),
+            is_estimated: node.unit.is_some(),
+        })
+    }
+
+    /// The reference among those that `can` be it: the chosen one, or the first as the configuration wants it.
+    pub fn elect(&self, can: impl Fn(&Node) -> bool) -> Option<usize> {
+        let able = |(_, node): &(usize, &Node)| node.has_clock && !node.is_unset && can(node);
+        let candidates = || self.nodes.iter().enumerate().filter(able).map(|(index, _)| index);
+        let preferred = match self.config.reference {
+            ReferenceClock::FirstWithClock => None,
+            ReferenceClock::FirstConfigured => candidates().find(|index| self.nodes[*index].is_configured),
+            ReferenceClock::Declared(member) => candidates().find(|index| self.nodes[*index].member == Some(member)),
+        };
+        preferred.or_else(|| candidates().next())
+    }
+
+    /// Index of the clock that the others on a link follow: the reference of the segment where it is on that link, else
+    /// the first that frames pass. `None` where delays on that link count from different places.
+    pub fn reference_on(&self, link: Link) -> Option<usize> {
+        if self.is_mixed(link) {
+            return None;
+        }
+        let here = |index: &usize| {
+            let node = &self.nodes[*index];
+            node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some()
+        };
+        let first = || (0..self.nodes.len()).filter(here).min_by_key(|index| self.nodes[*index].unit);
+        self.reference.filter(here).or_else(first)
+    }
+
+    /// The references that the copies of cyclic frames have to distribute.
+    pub fn references(&self) -> References {
+        let station = |link| self.reference_on(link).map(|index| self.nodes[index].station);
+        let redundant_leads = self.reference.and_then(|index| self.nodes[index].link) == Some(Link::Redundant);
+        References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads }
+    }
+
+    /// Whether delays on a link count from different places.
+    pub fn is_mixed(&self, link: Link) -> bool {
+        let mut here =
+            self.nodes.iter().filter(|node| node.has_clock && node.link == Some(link) && node.unit.is_some());
+        let first = here.next().map(|node| node.origin);
+        here.any(|node| Some(node.origin) != first)
+    }
+
+    /// The reference of a link and the clocks that frames pass before it.
+    pub fn in_front_on(&self, link: Link) -> Option<(usize, Vec<usize>)> {
+        let reference = self.reference_on(link)?;
+        let unit = self.nodes[reference].unit;
+        let is_in_front = |(_, node): &(usize, &Node)| {
+            node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some() && node.unit < unit
+        };
+        Some((reference, self.nodes.iter().enumerate().filter(is_in_front).map(|(index, _)| index).collect()))
+    }
+
+    /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED by index. References
+    /// and clocks before them receive the time that the host predicts, all others that of a reference.
+    pub fn filters(&self) -> Vec<(usize, StationAddress, [u8; 2])> {
+        let nodes = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock && node.link.is_some());
+        let depths = nodes.map(|(index, node)| (index, node.station, self.filter_depths(index)));
+        depths.filter(|(index, _, depths)| self.nodes[*index].filter_depths != Some(*depths)).collect()
+    }
+
+    fn filter_depths(&self, index: usize) -> [u8; 2] {
+        let node = &self.nodes[index];
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main));
+        let is_behind = reference.is_some_and(|reference| match node.unit {
+            Some(_) => node.unit > self.nodes[reference].unit,
+            None => node.position > self.nodes[reference].position,
+        });
+        let is_steered = reference == Some(index) && (self.config.bus_shift || self.reference != Some(index));
+        let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
+        [difference, if is_steered { STEADY_DEPTH } else { SPEED_DEPTH }]
+    }
+
+    /// Index of a declared SubDevice.
+    pub fn index_of(&self, member: usize) -> Option<usize> {
+        self.nodes.iter().position(|node| node.member == Some(member))
+    }
+
+    /// The SubDevice with a station address.
+    pub fn node_at(&self, station: StationAddress) -> Option<&Node> {
+        self.nodes.iter().find(|node| node.station == station)
+    }
+
+    /// Station addresses by index.
+    pub fn stations(&self) -> Vec<StationAddress> {
+        self.nodes.iter().map(|node| node.station).collect()
+    }
+
+    /// The declared passage times of a SubDevice.
+    pub fn passage_of(&self, station: StationAddress) -> Passage {
+        let own = self.node_at(station).and_then(|node| node.passage);
+        let declared = own.unwrap_or(self.config.passage);
+        let exact = |ns: u16| i64::from(ns) << FRACTION;
+        Passage { processed: exact(declared.processing_ns), forwarded: exact(declared.forwarding_ns) }
+    }
+
+    /// Clocks whose DC_LATCH_MODE differs from what these ports need, at which frames enter: whether they enter from
+    /// behind (protocol 3.12, 7.5).
+    pub fn latch_modes(&self, stations: &[StationAddress], entries: &[u8]) -> Vec<(StationAddress, bool)> {
+        let wanted = stations.iter().zip(entries).map(|(station, entry)| (*station, *entry != 0));
+        let is_other = |(station, backwards): &(StationAddress, bool)| {
+            self.node_at(*station).is_some_and(|node| node.has_clock && node.latches_backwards != *backwards)
+        };
+        wanted.filter(is_other).collect()
+    }
+}

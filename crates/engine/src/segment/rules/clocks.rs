@@ -1,0 +1,237 @@
+//! What follows from observations of clocks (protocol 7).
+
+mod answers;
+mod delays;
+
+use alloc::string::String;
+
+use ringcat_wire::address::{Position, StationAddress};
+
+use crate::board::clocks::References;
+use crate::clocks::extend;
+use crate::event::Event;
+use crate::link::Link;
+use crate::segment::clocks::{
+    ClockObservation, Compensation, Delays, Due, HiddenDelay, Life, Measured, Node, Running, Unwritten,
+};
+use crate::segment::effect::{Effects, Task};
+use crate::segment::model::Segment;
+use crate::time::Instant;
+
+impl Segment {
+    /// What follows from an observation of clocks.
+    pub(super) fn observe_clocks(&mut self, seen: ClockObservation<'_>, now: Instant, effects: &mut Effects) {
+        match seen {
+            ClockObservation::SetUpBegun => self.clocks.reference = self.clocks.elect(|_| true),
+            ClockObservation::SetUpFailed(reason) => self.observe_failed_set_up(reason, effects),
+            ClockObservation::SegmentChanged => self.doubt(now),
+            ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
+            ClockObservation::Cables(cables) => self.clocks.cables = cables,
+            ClockObservation::OpenedInVain(wiring) => self.clocks.opened_in_vain = wiring,
+            ClockObservation::Measured(measured) => self.clocks.take_over(measured),
+            ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
+            ClockObservation::SetUp => self.observe_set_up(effects),
+
+            ClockObservation::MeasuredAgain(measured) => self.observe_measured_again(measured),
+            ClockObservation::DelaysWritten(link) => self.observe_written(link),
+            ClockObservation::DelaysNotWritten(reason) => effects.report(Event::ClocksFailed { reason }),
+            ClockObservation::MeasurementEnded { failed, holds } => {
+                self.observe_end_of_measurement(failed, holds, effects);
+            }
+            ClockObservation::FiltersWritten(filters) => self.observe_filters(filters),
+
+            ClockObservation::Came { member } => self.observe_clock(member),
+            ClockObservation::RegistersLost { index } => self.observe_lost_registers(index, now),
+            ClockObservation::LatchedFor { index, latched, host } => self.clocks.set_offset(index, latched, host),
+            ClockObservation::OneSetUp { index } => self.clocks.nodes[index].is_unset = false,
+            ClockObservation::TimeWanted => self.compensate(effects),
+            ClockObservation::Compensated => {
+                if let Some(running) = self.clocks.running_mut() {
+                    running.compensation = Compensation::Idle;
+                }
+            }
+
+            ClockObservation::Answers { answers, is_explained, holds } => {
+                self.observe_differences(answers, effects);
+                self.follow_links(answers, is_explained, holds, now, effects);
+            }
+            ClockObservation::Followed { holds } => self.follow(holds),
+            ClockObservation::ReferenceTime { low, sent_at } => {
+                let near = sent_at.wrapping_add(self.clocks.epoch);
+                self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
+            }
+        }
+        self.post_clock_words();
+    }
+
+    /// What the exchange has to know of clocks at any time.
+    fn post_clock_words(&self) {
+        let words = &self.board.clocks;
+        if matches!(self.clocks.life, Life::NotSetUp(_) | Life::Running(_)) && self.clocks.is_any() {
+            words.guard_ports();
+        }
+        let in_front = |link| self.clocks.in_front_on(link).is_some_and(|(_, nodes)| !nodes.is_empty());
+        words.post_in_front(Link::ALL.into_iter().any(in_front));
+    }
+
+    fn observe_failed_set_up(&mut self, reason: String, effects: &mut Effects) {
+        let reported = match &self.clocks.life {
+            Life::NotSetUp(reported) => reported.as_ref(),
+            Life::Undeclared | Life::Starting | Life::StartingWithoutBranches | Life::Running(_) => None,
+        };
+        if reported != Some(&reason) {
+            effects.report(Event::ClocksFailed { reason: reason.clone() });
+        }
+        self.clocks.life = Life::NotSetUp(Some(reason));
+    }
+
+    fn observe_set_up(&mut self, effects: &mut Effects) {
+        self.clocks.life = Life::Running(Running::default());
+        self.board.clocks.post_references(self.clocks.references());
+        self.report_reference(effects);
+        self.report_hidden(effects);
+        self.compensate(effects);
+    }
+
+    /// The segment has changed. What is known of clocks that are set up is in doubt until it is measured again; a
+    /// failure of the set-up is reported anew.
+    fn doubt(&mut self, now: Instant) {
+        match &mut self.clocks.life {
+            Life::Running(Running { delays: delays @ Delays::Valid, .. }) => *delays = Delays::Doubtful(now),
+            Life::NotSetUp(reported) => *reported = None,
+            Life::Undeclared | Life::Starting | Life::StartingWithoutBranches | Life::Running(_) => {}
+        }
+    }
+
+    fn observe_latch_modes(&mut self, modes: &[(StationAddress, bool)]) {
+        for node in &mut self.clocks.nodes {
+            if let Some((_, backwards)) = modes.iter().find(|(station, _)| *station == node.station) {
+                node.latches_backwards = *backwards;
+            }
+        }
+    }
+
+    fn observe_filters(&mut self, filters: &[(usize, [u8; 2])]) {
+        for (index, depths) in filters {
+            self.clocks.nodes[*index].filter_depths = Some(*depths);
+        }
+        if let Some(running) = self.clocks.running_mut() {
+            running.due = Due::Nothing;
+        }
+    }
+
+    /// The static drift compensation starts, unless it is under way.
+    fn compensate(&mut self, effects: &mut Effects) {
+        let Some(running) = self.clocks.running_mut() else { return };
+        if running.compensation == Compensation::Idle {
+            running.compensation = Compensation::Running;
+            effects.start(Task::CompensateDrift);
+        }
+    }
+
+    /// A clock that was not at the scan.
+    fn observe_clock(&mut self, member: usize) {
+        let Some(declared) = self.members.get(member) else { return };
+        if let Some(info) = &declared.info
+            && self.clocks.index_of(member).is_none()
+        {
+            self.clocks.nodes.push(Node::new(info, Some((member, &*declared.config))));
+        }
+    }
+
+    fn observe_lost_registers(&mut self, index: usize, now: Instant) {
+        let node = &mut self.clocks.nodes[index];
+        (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
+        if self.clocks.reference == Some(index) {
+            self.clocks.reference = None;
+        }
+        self.doubt(now);
+    }
+
+    fn observe_measured_again(&mut self, measured: &Measured) {
+        let changes = self.clocks.measure_again(measured);
+        let Some(running) = self.clocks.running_mut() else { return };
+        for link in changes.links {
+            running.unwritten.links[link.index()] = true;
+        }
+        if changes.clocks > 0 {
+            (running.unwritten.clocks, running.unwritten.largest_ns) = (changes.clocks, changes.largest_ns);
+        }
+        if running.unwritten.links.contains(&true) {
+            // No time is distributed while delays count from different clocks.
+            self.board.clocks.post_references(References::default());
+        }
+    }
+
+    fn observe_written(&mut self, link: Link) {
+        if let Some(running) = self.clocks.running_mut() {
+            running.unwritten.links[link.index()] = false;
+        }
+    }
+
+    fn observe_end_of_measurement(&mut self, failed: Option<String>, holds: u32, effects: &mut Effects) {
+        let Some(running) = self.clocks.running_mut() else { return };
+        running.delays = Delays::Valid;
+        let Unwritten { clocks, largest_ns, .. } = running.unwritten;
+        match failed {
+            Some(reason) => effects.report(Event::ClocksFailed { reason }),
+            None => {
+                running.unwritten = Unwritten::default();
+                if clocks > 0 {
+                    effects.report(Event::DelaysChanged { clocks, largest_ns });
+                }
+            }
+        }
+        self.elect(effects);
+        self.report_hidden(effects);
+        self.follow(holds);
+    }
+
+    /// References are those that are wanted, and the distribution goes on.
+    fn follow(&mut self, holds: u32) {
+        self.board.clocks.post_references(self.clocks.references());
+        self.board.clocks.answer(holds);
+        if let Some(running) = self.clocks.running_mut() {
+            running.due = Due::Filters;
+        }
+    }
+
+    /// Replaces a reference that is lost. Returns whether there is another one.
+    fn elect(&mut self, effects: &mut Effects) -> bool {
+        let clocks = &mut self.clocks;
+        let before = clocks.reference;
+        let is_there = |index: usize| clocks.nodes[index].link.is_some() && !clocks.nodes[index].is_unset;
+        if !before.is_some_and(is_there) {
+            clocks.reference = clocks.elect(|node| node.link.is_some() && node.unit.is_some());
+        }
+        if clocks.reference == before {
+            return false;
+        }
+        self.report_reference(effects);
+        true
+    }
+
+    fn report_reference(&self, effects: &mut Effects) {
+        let reference = self.clocks.reference.map(|index| &self.clocks.nodes[index]);
+        let event = Event::ReferenceClock { position: reference.map(|node| Position(node.position)) };
+        match reference {
+            Some(node) => effects.report_of(event, self.occupant(node.station)),
+            None => effects.report(event),
+        }
+    }
+
+    /// Reports delays that are not known, except those that are already reported.
+    fn report_hidden(&mut self, effects: &mut Effects) {
+        for index in 0..self.clocks.nodes.len() {
+            let hidden = self.clocks.hidden(index);
+            let node = &mut self.clocks.nodes[index];
+            let fork = |hidden: HiddenDelay| hidden.fork.map(|fork| usize::from(fork.0));
+            let now = hidden.map(|hidden| (fork(hidden), hidden.is_estimated));
+            let before = core::mem::replace(&mut node.reported_hidden, now);
+            let Some(HiddenDelay { fork, range_ns, is_estimated }) = hidden.filter(|_| now != before) else { continue };
+            let (position, station) = (Position(node.position), node.station);
+            let event = Event::DelayUnknown { position, fork, range_ns, is_estimated };
+            effects.report_of(event, self.occupant(station));
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! What follows from the answers of clocks: their differences, and the links on which they answer.
+
+use alloc::vec::Vec;
+
+use crate::board::clocks::References;
+use crate::clocks::SyncWindow;
+use crate::event::Event;
+use crate::link::Link;
+use crate::segment::clocks::{Answer, Delays, Difference, Due, Life, Lock, Node, Running};
+use crate::segment::effect::Effects;
+use crate::segment::model::Segment;
+use crate::time::Instant;
+
+impl Segment {
+    /// Notes the differences. The event of the lock follows when all are within the window.
+    pub(super) fn observe_differences(&mut self, answers: &[Option<Answer>], effects: &mut Effects) {
+        let differences = self.differences(answers);
+        // While no time is distributed, differences are those of a frame that came another way.
+        if self.board.clocks.is_held() {
+            return;
+        }
+        let is_compensating = self.clocks.is_compensating();
+        let are_locked = self.clocks.are_locked();
+        let references = Link::ALL.map(|link| self.clocks.reference_on(link));
+        let (lock_window_ns, samples) = (self.clocks.config.lock_window_ns, self.clocks.config.lock_samples);
+        let (mut all, mut largest) = (self.clocks.reference.is_some(), 0);
+        for (index, (node, (difference, deviation_ppb))) in self.clocks.nodes.iter_mut().zip(differences).enumerate() {
+            let Some(difference) = difference else {
+                all &= !node.has_clock || node.link.is_none();
+                continue;
+            };
+            // Nothing is written to a reference, so that its own difference is none.
+            let is_reference = references.contains(&Some(index));
+            let difference = if is_reference { 0 } else { difference };
+            let magnitude = difference.unsigned_abs();
+            node.difference_ns = Some(difference);
+            let is_good = magnitude <= lock_window_ns && !is_compensating;
+            node.good = if is_good { node.good.saturating_add(1) } else { 0 };
+            let is_locked = node.good >= samples;
+            if is_locked || (node.worst_ns > 0 && are_locked) {
+                node.worst_ns = node.worst_ns.max(magnitude);
+            }
+            all &= is_locked;
+            if is_locked && !is_reference {
+                // What the loop makes up for, now that it has settled (protocol 7.2.1).
+                node.drift_ppb = -deviation_ppb;
+            }
+            largest = largest.max(magnitude);
+        }
+        // Where a reference is steered, the exchange does not see how far the others are from theirs.
+        let is_steered = references.iter().all(Option::is_some) || self.board.clocks.is_host_told();
+        self.observe_window(largest, is_steered, effects);
+        self.observe_lock(all, largest, is_steered, effects);
+    }
+
+    /// The difference and the deviation of each clock; those that have the jitter of the host as a mean.
+    fn differences(&mut self, answers: &[Option<Answer>]) -> Vec<(Option<i32>, i64)> {
+        let difference = |(node, answer): (&mut Node, &Option<Answer>)| {
+            let Some(answer) = answer else { return (None, 0) };
+            let difference = match answer.difference {
+                Difference::Unknown => None,
+                Difference::Own(ns) => Some(ns),
+                Difference::InFront(ns) => Some(node.average(ns)),
+            };
+            (difference, answer.deviation_ppb)
+        };
+        self.clocks.nodes.iter_mut().zip(answers).map(difference).collect()
+    }
+
+    fn observe_window(&mut self, largest_ns: u32, is_steered: bool, effects: &mut Effects) {
+        let inside = largest_ns <= self.clocks.config.sync_window_ns;
+        let Some(Running { lock: Lock::Locked(window), .. }) = self.clocks.running_mut() else { return };
+        if !is_steered && !window.is_outside() {
+            window.skip();
+        } else if window.take(inside) {
+            effects.report(Event::SyncWindow { inside, spread_ns: largest_ns });
+        }
+    }
+
+    fn observe_lock(&mut self, all: bool, largest_ns: u32, is_steered: bool, effects: &mut Effects) {
+        let Some(Running { lock: lock @ Lock::Open, .. }) = self.clocks.running_mut().filter(|_| all) else { return };
+        *lock = Lock::Locked(SyncWindow::inside());
+        self.board.clocks.watch_window();
+        effects.report(Event::ClocksLocked { largest_ns });
+        if is_steered {
+            effects.report(Event::SyncWindow { inside: true, spread_ns: largest_ns });
+        }
+    }
+
+    /// Follows SubDevices from link to link, and replaces a reference that is lost. `is_explained`: changes of ports
+    /// come from a ring that opened or closed, in each part of which the way from clock to clock is what it was.
+    pub(super) fn follow_links(
+        &mut self,
+        answers: &[Option<Answer>],
+        is_explained: bool,
+        holds: u32,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let Some(moved) = self.confirm_links(answers) else { return };
+        let elected = self.elect(effects);
+        let is_other = self.board.clocks.references().0 != self.clocks.references();
+        if self.clocks.doubtful_since().is_some() && !is_explained {
+            return;
+        }
+        if !(moved || is_other || elected || self.board.clocks.is_held()) {
+            return;
+        }
+        if Link::ALL.iter().any(|link| self.clocks.is_mixed(*link)) {
+            // What is between them is not known before the segment has been measured.
+            if let Life::Running(Running { delays: delays @ Delays::Valid, .. }) = &mut self.clocks.life {
+                *delays = Delays::Doubtful(now);
+            }
+            return;
+        }
+        let changed: Vec<Link> = Link::ALL.into_iter().filter(|link| self.clocks.refer(*link)).collect();
+        let Some(running) = self.clocks.running_mut() else { return };
+        for link in changed {
+            running.unwritten.links[link.index()] = true;
+        }
+        if running.unwritten.links.contains(&true) {
+            running.due = Due::Delays;
+            // No time is distributed while delays count from different clocks.
+            self.board.clocks.post_references(References::default());
+        } else {
+            self.follow(holds);
+        }
+    }
+
+    /// Takes over the links of the answers; returns whether any is another one. `None` where the next answers must
+    /// confirm them: answers that came while a ring opened or closed are of both states.
+    fn confirm_links(&mut self, answers: &[Option<Answer>]) -> Option<bool> {
+        let links: Vec<Option<Option<Link>>> = answers.iter().map(|answer| answer.map(|answer| answer.link)).collect();
+        let before = self.clocks.running_mut()?.unconfirmed.take();
+        let nodes = &self.clocks.nodes;
+        let is_certain = |(index, link): (usize, &Option<Option<Link>>)| {
+            let has_moved = link.is_some_and(|link| nodes[index].has_clock && link != nodes[index].link);
+            !has_moved || before.as_ref().is_some_and(|before| before.get(index) == Some(link))
+        };
+        if !links.iter().enumerate().all(is_certain) {
+            self.clocks.running_mut()?.unconfirmed = Some(links);
+            return None;
+        }
+        let mut moved = false;
+        for (node, answer) in self.clocks.nodes.iter_mut().zip(answers) {
+            let Some(answer) = answer.filter(|_| node.has_clock) else { continue };
+            moved |= answer.link != node.link;
+            node.link = answer.link;
+        }
+        Some(moved)
+    }
+}
