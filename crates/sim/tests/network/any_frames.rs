@@ -85,7 +85,9 @@ proptest! {
 
     // covers: robust
     #[test]
-    fn any_bytes_do_not_crash_the_simulator(frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..6)) {
+    fn any_bytes_do_not_crash_the_simulator(
+        frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..6),
+    ) {
         let mut network = everything();
         exchange(&mut network, &frames);
     }

@@ -136,14 +136,18 @@ proptest! {
 
     // covers: sim-frames
     #[test]
-    fn in_a_straight_ring_a_single_break_isolates_no_subdevice(count in 1usize..40, cut in any::<prop::sample::Index>()) {
+    fn in_a_straight_ring_a_single_break_isolates_no_subdevice(
+        count in 1usize..40,
+        cut in any::<prop::sample::Index>(),
+    ) {
         let mut cables: Vec<(Plug, Plug)> = vec![((0, 0), (1, 0))];
         cables.extend((1..count).map(|number| ((number, 1), (number + 1, 0))));
         cables.push(((count, 1), (0, 1)));
         cables.remove(cut.index(cables.len()));
         let model = Walk::new(&cables);
-        let processed_by: usize = HostLink::ALL.iter().filter_map(|link| model.journey(*link)).map(|back| back.processed_by.len()).sum();
-        prop_assert_eq!(processed_by, count);
+        let journeys = HostLink::ALL.iter().filter_map(|link| model.journey(*link));
+        let total: usize = journeys.map(|back| back.processed_by.len()).sum();
+        prop_assert_eq!(total, count);
         compare(&cables, &[Vec::new()])?;
     }
 }
