@@ -128,7 +128,7 @@ impl RxRing {
         if status & TP_STATUS_USER == 0 {
             return Taken::Nothing;
         }
-        // SAFETY: the status says that the slot is ours until it is given back, which needs `&mut self` again; the
+        // SAFETY: this process owns the slot until it returns it, which needs `&mut self` again; the
         // slot lies within the mapping, and bytes have no invalid values.
         let slot = unsafe { std::slice::from_raw_parts_mut(self.slot().as_ptr(), SLOT) };
         let taken = hand_out(status, slot);

@@ -170,7 +170,8 @@ impl TapInterface {
         usize::try_from(count).ok().filter(|count| *count > 0)
     }
 
-    /// Hands a frame to the host. False where it does not take it: the interface is switched off, or memory is short.
+    /// Sends a frame to the host. False if the host does not accept it: the interface is switched off, or memory is
+    /// short.
     pub fn send(&self, frame: &[u8]) -> bool {
         // SAFETY: pointer and length describe live memory that the kernel only reads.
         let count = unsafe { libc::write(self.fd.as_raw_fd(), frame.as_ptr().cast(), frame.len()) };

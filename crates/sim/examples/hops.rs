@@ -1,8 +1,9 @@
 //! Measures the simulator's time for one hop of a frame over a device of a long line, and for a frame of process data
-//! through 50 terminals in OP. The best of several blocks counts, since other load of the machine only adds time.
+//! through 50 terminals in OP. The result is the best of several blocks, because other load of the machine only adds
+//! time.
 //!
-//! `cargo run --release -p ringcat-sim --example hops [devices] [frames] [--general]`; `--general` without precomputed
-//! flights.
+//! `cargo run --release -p ringcat-sim --example hops [devices] [frames] [--general]`; `--general` disables the fast
+//! path.
 
 use std::time::{Duration, Instant};
 
@@ -31,7 +32,7 @@ fn frame(command: Command, target: Target, length: usize) -> Vec<u8> {
     buffer
 }
 
-/// Terminals of each kind in the line of process data.
+/// Number of terminals of each kind in the line of process data.
 const HALF: usize = 25;
 /// Blocks of frames of process data, and frames in each.
 const BLOCKS: usize = 20;
@@ -53,16 +54,17 @@ fn filled(command: Command, target: Target, data: &[u8]) -> Vec<u8> {
 fn exchange(network: &mut Network, bytes: &[u8]) {
     network.send(HostLink::Main, bytes);
     network.advance_until_quiet(network.now() + Duration::from_millis(10));
-    let received = network.receive(HostLink::Main).expect("the line is whole");
+    let received = network.receive(HostLink::Main).expect("the line is closed at its end");
     network.give_back(received.bytes);
 }
 
-/// Terminals with eight outputs each, then as many with eight inputs, in OP: one byte after the other from logical
-/// address 0.
+/// Terminals with eight outputs each, then the same number with eight inputs, in OP: one byte after the other from
+/// logical address 0.
 fn operational(compiled: bool) -> Network {
     let names = ["digital-output-8", "digital-input-8"];
-    let devices =
-        names.iter().flat_map(|name| (0..HALF).map(|_| Device::new(catalogue::by_name(name).expect("it is there"))));
+    let devices = names
+        .iter()
+        .flat_map(|name| (0..HALF).map(|_| Device::new(catalogue::by_name(name).expect("a device of the catalogue"))));
     let options = NetworkOptions { compiled, ..NetworkOptions::default() };
     let mut network = SegmentBuilder::line(devices.collect()).options(options).build().expect("a line");
     network.advance_by(Duration::from_millis(50));
@@ -84,14 +86,14 @@ fn operational(compiled: bool) -> Network {
     network
 }
 
-/// Outputs and inputs in one datagram, and the state of all SubDevices.
+/// A frame with outputs and inputs in one datagram, and a read of the AL status of all SubDevices.
 fn process_data(outputs: u8) -> Vec<u8> {
     let mut buffer = vec![0; MAX_FRAME];
     let mut builder =
         FrameBuilder::ethernet(&mut buffer, MacAddress::BROADCAST, MacAddress::default()).expect("room for a frame");
     let at = builder.datagram(Command::Lrw, 0, Target::Logical(LogicalAddress(0)), 2 * HALF).expect("room");
     builder.datagram(Command::Brd, 0, Target::Broadcast(map::AL_STATUS), 2).expect("room for the datagram");
-    builder.data_mut(at, HALF).expect("they are there").fill(outputs);
+    builder.data_mut(at, HALF).expect("the datagram exists").fill(outputs);
     let length = builder.finish();
     buffer.truncate(length);
     buffer
@@ -100,7 +102,7 @@ fn process_data(outputs: u8) -> Vec<u8> {
 /// Measures the round trip, and the work of the devices afterwards.
 fn measure_process_data(compiled: bool) {
     let mut network = operational(compiled);
-    let (mut way, mut reaction) = (f64::INFINITY, f64::INFINITY);
+    let (mut response, mut reaction) = (f64::INFINITY, f64::INFINITY);
     for block in 0..BLOCKS {
         let bytes = process_data(block as u8);
         let (mut there, mut after) = (Duration::ZERO, Duration::ZERO);
@@ -114,11 +116,11 @@ fn measure_process_data(compiled: bool) {
             last = Instant::now();
             after += last - answered;
         }
-        way = way.min(there.as_secs_f64() * 1e6 / FRAMES as f64);
+        response = response.min(there.as_secs_f64() * 1e6 / FRAMES as f64);
         reaction = reaction.min(after.as_secs_f64() * 1e6 / FRAMES as f64);
     }
     println!(
-        "process data of {} terminals: {way:.2} us to the answer, {reaction:.2} us of the devices after it",
+        "process data of {} terminals: {response:.2} us to the response, {reaction:.2} us of the devices after it",
         2 * HALF
     );
 }
@@ -137,7 +139,7 @@ fn main() {
     println!("{devices} devices in a line, {frames} frames of each kind");
     for (name, bytes) in [
         ("NOP, 32 bytes", frame(Command::Nop, Target::None, 32)),
-        ("FPRD of nobody", frame(Command::Fprd, Target::Station(StationAddress(0xABCD), map::AL_STATUS), 2)),
+        ("FPRD of no SubDevice", frame(Command::Fprd, Target::Station(StationAddress(0xABCD), map::AL_STATUS), 2)),
         ("LRD of nothing mapped, 1400 bytes", frame(Command::Lrd, Target::Logical(LogicalAddress(0)), 1_400)),
         ("BRD of AL status", frame(Command::Brd, Target::Broadcast(map::AL_STATUS), 2)),
     ] {

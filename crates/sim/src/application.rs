@@ -1,10 +1,10 @@
-//! The application behind a SubDevice controller: everything that the PDI side does (protocol 3.4, 5, 6).
+//! The application behind a SubDevice controller: the PDI side (protocol 3.4, 5, 6).
 //!
-//! Input: AL events and virtual time, through [`Application::run`], and faults. Output: AL status, answers in the
-//! mailbox, inputs and latched outputs. The parts: [`state_machine`] evaluates state requests, [`settings`] checks the
+//! Input: AL events and virtual time, through [`Application::run`], and faults. Output: AL status, responses in the
+//! mailbox, inputs and latched outputs. Parts: [`state_machine`] evaluates state requests, [`settings`] checks the
 //! configuration, [`process_data`] moves data, [`mailbox`] passes messages to the [`servers`], one per protocol:
-//! [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and [`servo`] make
-//! inputs, `transitions` leads from state to state. This module combines them.
+//! [`coe`] with its [`dictionary`], [`foe`], [`eoe`], [`soe`], [`aoe`], [`voe`]. [`behaviours`] and [`servo`] compute
+//! inputs, `transitions` changes states. This module combines them.
 
 pub mod answer;
 pub mod aoe;
@@ -70,9 +70,9 @@ pub struct Application {
     files: FileStore,
     faults: MailFaults,
     layout: Layout,
-    /// Served requests, where they are recorded.
+    /// Served requests, if they are recorded.
     record: Option<Vec<ServedMail>>,
-    /// Since when it is in PREOP.
+    /// Time at which PREOP was entered.
     preop_since: SimTime,
     refusals: Vec<Refusal>,
     hanging: bool,
@@ -109,7 +109,7 @@ impl Application {
         application
     }
 
-    /// Restarts: power came, or the controller was reset. Faults and the source of the inputs stay.
+    /// Restarts after power-on or a reset of the controller. Faults and the source of the inputs stay.
     pub fn restart(&mut self, description: &DeviceDescription, now: SimTime) {
         self.machine = StateMachine::default();
         self.dictionary = Dictionary::new(description);
@@ -129,17 +129,17 @@ impl Application {
         self.refusals.push(Refusal { to, code, times });
     }
 
-    /// A hanging application does not react.
+    /// Makes the application hang: it does not react.
     pub fn hang(&mut self, hanging: bool) {
         self.hanging = hanging;
     }
 
-    /// A transition begins; one out of OP sets the outputs to the safe state at once.
+    /// Whether a transition is in progress; a transition out of OP sets the outputs to the safe state at once.
     pub const fn is_changing_state(&self) -> bool {
         self.machine.pending().is_some()
     }
 
-    /// It hangs.
+    /// Whether the application hangs.
     pub const fn is_hanging(&self) -> bool {
         self.hanging
     }
@@ -185,7 +185,7 @@ impl Application {
         if self.hanging {
             return None;
         }
-        let due = |pending: Pending| if self.is_waiting(pending) { pending.give_up } else { pending.at };
+        let due = |pending: Pending| if self.is_waiting(pending) { pending.time_limit } else { pending.at };
         let transition = self.machine.pending().map(due);
         let mail = self.mailbox.as_ref();
         let answer = mail.and_then(Mailbox::next_deadline);
@@ -194,7 +194,7 @@ impl Application {
         [transition, answer, full, service].into_iter().flatten().min()
     }
 
-    /// The transition could be completed, but a condition is missing.
+    /// Whether the transition could be completed, but a condition is missing.
     fn is_waiting(&self, pending: Pending) -> bool {
         pending.at <= self.last_run
     }
@@ -279,7 +279,7 @@ impl Application {
         }
     }
 
-    /// The controller copies AL control by itself; only the process data is updated here.
+    /// The controller itself copies AL control; only the process data is updated here.
     fn run_emulated(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let events = controller.al_event();
         let bytes = controller.register(map::AL_STATUS, AlStatus::LEN);
@@ -293,7 +293,7 @@ impl Application {
                 self.process_data.start(layout, &self.dictionary, controller, now);
             }
         }
-        // Outputs without a watchdog at their SyncManager stay valid whatever the watchdog status.
+        // Outputs of a SyncManager without watchdog stay valid for any watchdog status.
         let alive = controller.process_data_watchdog_ok() || !self.process_data.is_watched();
         let operating = state == AlState::Op && alive;
         if !operating && self.process_data.outputs().iter().any(|byte| *byte != 0) {

@@ -1,8 +1,8 @@
 //! Cables and their effect on a frame (issue 2, part 3; protocol 11.4).
 //!
 //! A cable has two legs, one for each direction. A leg has its far end, its propagation delay, the start of its signal,
-//! and the faults for the next frames. This module decides the fate of a frame whose last bit is due at the far end;
-//! the network knows senders and receivers.
+//! and the faults for the next frames. This module determines the fate of a frame at the time at which its last bit is
+//! due at the far end; the network assigns senders and receivers.
 
 use core::fmt;
 use core::time::Duration;
@@ -10,11 +10,11 @@ use core::time::Duration;
 use crate::frame::Port;
 use crate::time::SimTime;
 
-/// Number of a device: its place in the segment file, from 0.
+/// Number of a device: its position in the segment file, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DeviceIndex(pub usize);
 
-/// Number of a cable in the order in which the cables were given, from 0.
+/// Number of a cable in the order of declaration, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CableId(pub usize);
 
@@ -101,38 +101,38 @@ impl LegId {
 /// Fate of a frame whose last bit is due at the end of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
-    /// It arrives whole.
+    /// Arrives completely.
     Arrives,
-    /// The signal was lost while the frame was arriving: only its beginning came through.
+    /// The signal was lost while the frame was arriving: only its beginning arrives.
     Truncated {
         /// Time for which the receiver saw the frame.
         seen: Duration,
     },
-    /// No part of it arrives.
+    /// Does not arrive.
     Lost,
 }
 
-/// Faults that wait for frames on a leg.
+/// Faults for the next frames on a leg.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LegFaults {
-    /// Frames still to be dropped.
+    /// Number of frames to drop.
     pub(crate) drop: u32,
-    /// Frames still to be doubled.
+    /// Number of frames to duplicate.
     pub(crate) duplicate: u32,
-    /// Frames still to be corrupted.
+    /// Number of frames to corrupt.
     pub(crate) corrupt: u32,
-    /// Frames still to be damaged by an invalid symbol.
+    /// Number of frames to damage by an invalid symbol.
     pub(crate) symbol_errors: u32,
-    /// Frames still to be delayed.
+    /// Number of frames to delay.
     pub(crate) delay: u32,
     /// Their delay.
     pub(crate) delay_by: Duration,
-    /// Every frame is lost although both ends have link.
+    /// Whether every frame is lost although both ends have a link.
     pub(crate) blocked: bool,
 }
 
 impl LegFaults {
-    /// Takes one from a counter of frames; `false` when it is used up.
+    /// Decrements a counter of frames; `false` if it is zero.
     pub(crate) fn take(counter: &mut u32) -> bool {
         let hit = *counter > 0;
         *counter -= u32::from(hit);
@@ -143,13 +143,13 @@ impl LegFaults {
 /// One direction of a cable.
 #[derive(Clone, Debug)]
 pub(crate) struct Leg {
-    /// Its far end.
+    /// Far end.
     pub(crate) to: Endpoint,
     /// Propagation delay.
     pub(crate) delay_ns: u64,
     /// Whether the receiving end detects a signal (detection takes time).
     pub(crate) detected: bool,
-    /// Since when it detects it.
+    /// Time at which it was detected.
     pub(crate) detected_at: SimTime,
     /// Whether any fault is set: avoids the check of each fault for frames on healthy cables.
     pub(crate) faulty: bool,
@@ -161,7 +161,7 @@ pub(crate) struct Leg {
 }
 
 impl Leg {
-    /// A leg with a signal of long standing.
+    /// A leg with a signal that was detected long ago.
     pub(crate) fn new(to: Endpoint, delay_ns: u64) -> Leg {
         Leg {
             to,
@@ -181,7 +181,7 @@ impl Leg {
         self.signal
     }
 
-    /// The signal comes or goes.
+    /// Sets or removes the signal.
     pub(crate) fn set_signal(&mut self, up: bool, now: SimTime) {
         if up && !self.signal {
             self.up_since = now;
@@ -203,15 +203,15 @@ impl Leg {
         self.faulty = blocked || [drop, duplicate, corrupt, symbol_errors, delay].iter().any(|left| *left > 0);
     }
 
-    /// Frames whose first bit arrives at this time or later arrive whole, as long as nothing changes. `None` where
-    /// there is no signal or a fault waits.
+    /// Frames with the first bit arriving at this time or later arrive completely, unless something changes. `None` if
+    /// there is no signal or a fault is set.
     pub(crate) fn steady_since(&self) -> Option<SimTime> {
         let steady = self.signal && self.detected && !self.faulty;
         steady.then(|| SimTime(self.up_since.0.saturating_add(self.delay_ns)).max(self.detected_at))
     }
 
-    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last one is due now: the leg
-    /// must have carried a signal from the first bit's entry to the last bit's exit.
+    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last bit is due now: the leg
+    /// must have carried a signal from the entry of the first bit to the exit of the last bit.
     pub(crate) fn fate(&self, first_out: SimTime) -> Fate {
         let first_in = first_out.back_ns(self.delay_ns);
         if self.signal && self.up_since <= first_in {
@@ -224,7 +224,7 @@ impl Leg {
     }
 }
 
-/// Propagation delay of a cable unless another is asked for: 10 m at 5 ns per metre (protocol 1.3).
+/// Default propagation delay of a cable: 10 m at 5 ns per metre (protocol 1.3).
 pub const DEFAULT_CABLE_DELAY: Duration = Duration::from_nanos(50);
 
 #[cfg(test)]
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_enters_a_dead_cable_is_lost_even_if_it_heals_meanwhile() {
+    fn a_frame_into_a_cut_cable_is_lost_even_if_it_is_repaired_meanwhile() {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(200_000));
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_and_heal_within_one_frame_still_truncates_it() {
+    fn a_cut_and_a_repair_within_one_frame_still_truncate_it() {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(100_010));

@@ -1,9 +1,9 @@
-//! Ready-made devices, by name.
+//! Predefined devices, by name.
 //!
-//! Input: a name as segment files use it. Output: a [`DeviceDescription`] that may be changed before a device is made
-//! of it. Vendor and product numbers are the simulator's own; SyncManager settings are like those of real terminals
-//! (protocol 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`,
-//! devices for the mailbox in `protocols`.
+//! Input: a name as in segment files. Output: a [`DeviceDescription`], which may be changed before a device is created.
+//! Vendor and product numbers belong to the simulator; SyncManager settings are like those of real terminals (protocol
+//! 3.11). Terminals are in `terminals`, the servo drive in `drive`, block and junctions in `machines`, devices for
+//! mailbox tests in `protocols`.
 
 mod drive;
 mod machines;
@@ -16,10 +16,10 @@ use crate::description::DeviceDescription;
 pub use parts::VENDOR_ID;
 pub use protocols::LARGE_OBJECT_BYTES;
 
-/// Makes a description.
+/// Creates a description.
 type Maker = fn(&str) -> DeviceDescription;
 
-/// All devices, in the order of their presentation to users.
+/// All devices, in the order of lists for users.
 const DEVICES: &[(&str, Maker)] = &[
     ("coupler", machines::coupler),
     ("junction", machines::junction),
@@ -45,7 +45,7 @@ pub fn by_name(name: &str) -> Option<DeviceDescription> {
     DEVICES.iter().find(|(known, _)| *known == name).map(|(known, make)| make(known))
 }
 
-/// The names [`by_name`] knows.
+/// The names of all devices.
 pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
     DEVICES.iter().map(|(name, _)| *name)
 }

@@ -1,13 +1,13 @@
 //! One SubDevice controller (ESC), register by register (protocol 2, 3, 4.7, 11.4).
 //!
 //! Input: frames at ports, link changes, accesses of the application, virtual time. Output: frames at ports, events for
-//! the application, deadlines. The network carries frames between controllers; with the application behind the PDI the
-//! controller is a device. Not modelled: MII management, emulated EEPROMs, loops that enhanced link detection closes
-//! (see docs/segments.md).
+//! the application, deadlines. The network moves frames between controllers; controller and application together are a
+//! device. Not modelled: MII management, emulated EEPROMs, loops closed by enhanced link detection (see
+//! docs/segments.md).
 //!
-//! A frame is processed when its last bit has arrived. It takes its whole internal path at once: along 0-(EPU)-3-1-2 to
+//! A frame is processed when its last bit has arrived. It passes its whole internal path at once: 0-(EPU)-3-1-2 up to
 //! the next open port. Autonomous changes (watchdogs, busy EEPROM, temporary loops) are computed at the next access, so
-//! that idle controllers cost no time.
+//! that idle controllers need no computing time.
 
 mod access;
 mod clock;
@@ -59,24 +59,24 @@ use watchdog::Watchdog;
 /// Fate of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passage {
-    /// It leaves by this port, which may be forced open without a link: the frame is lost then.
+    /// The frame leaves through this port. If the port is forced open without a link, the frame is lost.
     Leaves {
         /// The port.
         port: Port,
-        /// Whether it passed the processing unit.
+        /// Whether the frame passed the processing unit.
         processed: bool,
     },
-    /// It is destroyed here.
+    /// The frame is destroyed.
     Destroyed,
 }
 
 /// Exit of frames that enter at a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Way {
+pub(crate) struct InternalPath {
     pub exit: Port,
-    /// Whether they pass the processing unit.
+    /// Whether frames pass the processing unit.
     pub processed: bool,
-    /// Valid as long as [`Controller::stays`] says so.
+    /// Valid while [`Controller::stays`] returns true.
     pub port_changes: u32,
 }
 
@@ -98,10 +98,10 @@ pub struct Controller {
     sync_unit: SyncUnit,
     latch_units: [LatchUnit; 2],
     pass: Pass,
-    /// Loop settings as last written, and those restored when temporary ones end.
+    /// Loop settings as last written, and the settings restored at the end of temporary ones.
     lasting_loops: [LoopControl; 4],
     temporary_loops: Option<(SimTime, [LoopControl; 4])>,
-    /// The frame with the last letter of the reset sequence.
+    /// The frame that wrote the last letter of the reset sequence.
     reset_frame: Option<u64>,
     /// STATION_ADDRESS and the alias bit, cached for every datagram.
     station: u16,
@@ -112,7 +112,7 @@ pub struct Controller {
     irq: u16,
     /// Time of the next autonomous change.
     deadline: SimTime,
-    /// Counts updates of that time.
+    /// Counter of updates of the deadline.
     schedules: u32,
     /// Logical datagrams that were answered, if a checker needs them.
     logical_log: LogicalLog,
@@ -150,27 +150,27 @@ impl Controller {
         }
     }
 
-    /// What the controller is made of.
+    /// The configuration of the controller.
     pub fn config(&self) -> &ControllerConfig {
         &self.config
     }
 
-    /// Starts the log of logical datagrams that the SubDevice answers.
+    /// Starts the log of logical datagrams that the SubDevice processes.
     pub fn log_logical(&mut self) {
         self.logical_log.turn_on();
     }
 
-    /// Whether they are logged.
+    /// Whether logical datagrams are logged.
     pub fn logs_logical(&self) -> bool {
         self.logical_log.is_on()
     }
 
-    /// The newest logical datagrams that the SubDevice answered, oldest first; none where they are not logged.
+    /// The newest logical datagrams that the SubDevice processed, oldest first; none without the log.
     pub fn logical_accesses(&self) -> impl Iterator<Item = &LogicalAccess> {
         self.logical_log.accesses()
     }
 
-    /// Sets the result of the port's link detection. Without power no link is detected.
+    /// Sets the result of the link detection of a port. Without power no link is detected.
     pub fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {
         if !self.powered {
             return;
@@ -182,7 +182,7 @@ impl Controller {
         self.refresh_dl_status();
     }
 
-    /// Takes a frame whose last bit arrived at `port` at `now`, and returns its exit.
+    /// Processes a frame whose last bit arrived at `port` at `now`, and returns its exit.
     pub fn receive(&mut self, frame: &mut SimFrame, port: Port, now: SimTime) -> Passage {
         self.receive_between(frame, port, now.back_ns(frame.first_to_last_bit_ns()), now)
     }
@@ -215,8 +215,8 @@ impl Controller {
         self.travel(frame, port, returns, first_bit, now)
     }
 
-    /// Along 0-(EPU)-3-1-2 from `entry` to the next open port; a frame that entered through a port that it has closed
-    /// itself leaves through it too.
+    /// Path 0-(EPU)-3-1-2 from `entry` to the next open port; a frame that closed its entry port itself also leaves
+    /// through it.
     fn travel(
         &mut self,
         frame: &mut SimFrame,
@@ -225,7 +225,7 @@ impl Controller {
         first_bit: SimTime,
         now: SimTime,
     ) -> Passage {
-        // Ports that the frame itself opens or closes are changed for later frames only.
+        // Changes of ports by the frame itself affect only later frames.
         let passing = self.ports.passing() | u8::from(returns) << entry.index();
         let mut processed = false;
         let mut at = entry;
@@ -243,9 +243,9 @@ impl Controller {
         }
     }
 
-    /// The path of frames that enter at a port, where all of them take the same: not through one that breaks
-    /// circulations.
-    pub(crate) fn way(&self, entry: Port) -> Option<Way> {
+    /// The path of frames that enter at a port, if it is the same for all of them; `None` if the controller breaks
+    /// circulation.
+    pub(crate) fn internal_path(&self, entry: Port) -> Option<InternalPath> {
         let open = self.powered && self.ports.link(entry) && self.ports.passes(entry);
         if !open || self.ports.breaks_circulation() || self.fmmus.reach_registers() {
             return None;
@@ -260,7 +260,7 @@ impl Controller {
             }
             at = ports::next(at);
             if self.ports.passes(at) {
-                return Some(Way { exit: at, processed, port_changes: self.ports.changes() });
+                return Some(InternalPath { exit: at, processed, port_changes: self.ports.changes() });
             }
         }
     }
@@ -270,9 +270,9 @@ impl Controller {
         entry == Port::A || !self.ports.passes(Port::A)
     }
 
-    /// Whether a frame that enters at a port reaches the processing unit without leaving first: all loops on its way
-    /// there are closed.
-    pub(crate) fn turns_round(&self, entry: Port) -> bool {
+    /// Whether a frame that enters at a port reaches the processing unit without leaving before: all loops on the path
+    /// to it are closed.
+    pub(crate) fn returns_to_unit(&self, entry: Port) -> bool {
         let mut at = entry;
         while at != Port::A {
             at = ports::next(at);
@@ -283,22 +283,22 @@ impl Controller {
         entry != Port::A
     }
 
-    /// Whether ports and everything else stay unchanged up to and including a time, without outside access.
+    /// Whether ports and all other properties stay unchanged up to and including a time, without external access.
     #[inline]
     pub(crate) fn stays(&self, port_changes: u32, until: SimTime) -> bool {
         self.ports.changes() == port_changes && self.deadline > until
     }
 
-    /// See [`Way`].
+    /// See [`InternalPath`].
     pub(crate) fn port_changes(&self) -> u32 {
         self.ports.changes()
     }
 
-    /// Processes a good frame on a way that [`Controller::way`] found.
+    /// Processes a good frame on a path found by [`Controller::internal_path`].
     #[inline]
-    pub(crate) fn process_on_way(&mut self, frame: &mut SimFrame, first_bit: SimTime, now: SimTime) {
+    pub(crate) fn process_on_path(&mut self, frame: &mut SimFrame, first_bit: SimTime, now: SimTime) {
         let goes_on = self.process(frame, first_bit, now);
-        debug_assert!(goes_on, "the ways that are found break no circulation");
+        debug_assert!(goes_on, "internal paths break no circulation");
     }
 
     /// Whether the loop of a port is closed, as DL status shows it.
@@ -306,8 +306,8 @@ impl Controller {
         self.ports.loop_closed(port)
     }
 
-    /// Time of the next autonomous change to which the application has to react: a watchdog expires, the EEPROM is
-    /// loaded or has finished a command of the PDI.
+    /// Time of the next autonomous change that requires a reaction of the application: a watchdog expires, or the
+    /// EEPROM is loaded or has finished a command of the PDI.
     pub fn next_deadline(&self) -> Option<SimTime> {
         let sii = self.sii.is_loading() || self.sii_owned_by_pdi();
         let sii = if sii { self.sii.deadline() } else { SimTime::NEVER };
@@ -338,7 +338,7 @@ impl Controller {
         self.schedule();
     }
 
-    /// Counts updates: equal counts mean an equal [`Controller::next_deadline`].
+    /// Counter of updates: equal counters mean an equal [`Controller::next_deadline`].
     pub(crate) fn schedules(&self) -> u32 {
         self.schedules
     }
@@ -365,8 +365,8 @@ impl Controller {
         self.clock.local(now)
     }
 
-    /// Registers and RAM without the effects of reading; values computed at reads may be old. Empty where the range
-    /// leaves the address space.
+    /// Registers and RAM without side effects of reading; values computed on reads may be outdated. Empty if the range
+    /// exceeds the address space.
     pub fn register(&self, address: RegisterAddress, len: usize) -> &[u8] {
         self.memory.span(address.0.into(), len)
     }

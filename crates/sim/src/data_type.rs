@@ -1,4 +1,4 @@
-//! Data type codes of CoE that the models use (protocol 6.3).
+//! CoE data type codes used by the models (protocol 6.3).
 
 /// One bit.
 pub const BOOL: u8 = 0x01;
@@ -14,7 +14,7 @@ pub const U8: u8 = 0x05;
 pub const U16: u8 = 0x06;
 /// Unsigned 32 bits.
 pub const U32: u8 = 0x07;
-/// Characters without an end mark.
+/// Characters without terminating NUL.
 pub const VISIBLE_STRING: u8 = 0x09;
 /// Any bytes.
 pub const OCTET_STRING: u8 = 0x0A;

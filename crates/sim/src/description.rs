@@ -1,8 +1,8 @@
-//! What a simulated SubDevice is: identity, ports, SyncManagers, PDOs, mailbox, clocks, timing and behaviour.
+//! Description of a simulated SubDevice: identity, ports, SyncManagers, PDOs, mailbox, clocks, timing and behaviour.
 //!
-//! In: values written by the [`catalogue`](crate::catalogue), by an application, or read from a real SII image
-//! ([`DeviceDescription::from_sii`](crate::sii_image)). Out: the SII image, the object dictionary and the settings
-//! of the controller follow from it, so that they cannot contradict each other (protocol 4, 5.2, 6.3).
+//! Input: values from the [`catalogue`](crate::catalogue), an application, or a real SII image
+//! ([`DeviceDescription::from_sii`](crate::sii_image)). Output: the SII image, the object dictionary and the settings
+//! of the controller are derived from it, so that they cannot contradict each other (protocol 4, 5.2, 6.3).
 
 mod services;
 
@@ -21,7 +21,7 @@ use crate::controller::{ClockErrors, ControllerConfig, MAX_UNITS, Wander};
 pub use crate::data_type;
 pub use services::{AoeDescription, EoeDescription, EoeEnd, FoeDescription, Services, SoeDescription};
 
-/// One SyncManager as the SII declares it (protocol 4.4).
+/// One SyncManager of the SII (protocol 4.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SyncManagerDescription {
     /// Physical start address.
@@ -30,9 +30,9 @@ pub struct SyncManagerDescription {
     pub length: u16,
     /// Control byte of register 0x0804 + 8n.
     pub control: u8,
-    /// Enable byte of the SII entry, bit 0 is copied to the activate register by a MainDevice.
+    /// Enable byte of the SII entry; a MainDevice copies bit 0 to the activate register.
     pub enable: u8,
-    /// What the SyncManager is for.
+    /// Type of the SyncManager.
     pub kind: SyncManagerKind,
 }
 
@@ -43,11 +43,11 @@ pub struct PdoDescription {
     pub direction: PdoDirection,
     /// Object index of the mapping, 0x16xx or 0x1Axx.
     pub index: u16,
-    /// Name for people.
+    /// Name.
     pub name: String,
     /// SyncManager it is assigned to by default.
     pub sync_manager: Option<u8>,
-    /// Flags of the SII entry, kept as they are.
+    /// Flags of the SII entry, unchanged.
     pub flags: u16,
     /// Its entries, in order.
     pub entries: Vec<PdoEntryDescription>,
@@ -65,9 +65,9 @@ impl PdoDescription {
 pub struct PdoEntryDescription {
     /// Object index, 0 for a gap.
     pub index: u16,
-    /// Sub index.
+    /// Subindex.
     pub sub_index: u8,
-    /// Name for people.
+    /// Name.
     pub name: String,
     /// Data type code, see [`data_type`].
     pub data_type: u8,
@@ -78,20 +78,20 @@ pub struct PdoEntryDescription {
 /// The mailbox of a SubDevice (protocol 4.1, 4.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MailboxDescription {
-    /// Places and sizes in PREOP and above.
+    /// Addresses and sizes in PREOP and above.
     pub standard: MailboxLayout,
-    /// Places and sizes in BOOT; all zero where BOOT is not supported.
+    /// Addresses and sizes in BOOT; all zero if BOOT is not supported.
     pub bootstrap: MailboxLayout,
-    /// Protocols as the SII declares them.
+    /// Protocols in the SII.
     pub protocols: MailboxProtocols,
-    /// What CoE can do, as the general category says.
+    /// CoE features in the general category.
     pub coe_details: CoeDetails,
-    /// Time from a request to its answer.
+    /// Time from a request to its response.
     pub response_time: Duration,
 }
 
 impl MailboxDescription {
-    /// The device answers SDO requests.
+    /// Whether the device answers SDO requests.
     pub fn has_coe(&self) -> bool {
         self.protocols.coe()
     }
@@ -100,24 +100,24 @@ impl MailboxDescription {
 /// Distributed clock of a SubDevice (protocol 3.12, 4.6).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DcDescription {
-    /// 64-bit registers; 32-bit otherwise.
+    /// 64-bit registers (otherwise 32-bit).
     pub wide: bool,
-    /// Operation modes of the SII; an activation that no mode names is refused with 0x0030.
+    /// Operation modes of the SII; an activation value without a mode is refused with 0x0030.
     pub modes: Vec<DcMode>,
-    /// Smallest SYNC0 cycle that is accepted, 0x0035 below.
+    /// Smallest accepted SYNC0 cycle; shorter cycles are refused with 0x0035.
     pub minimum_cycle_ns: u32,
 }
 
-/// How long the application takes to reach each state (protocol 5.4 has what a MainDevice waits).
+/// Time that the application takes to reach each state (protocol 5.4 has the time limits of a MainDevice).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TransitionTimes {
-    /// INIT from anywhere.
+    /// INIT from any state.
     pub to_init: Duration,
     /// PREOP or BOOT from INIT.
     pub to_preop: Duration,
     /// SAFEOP from PREOP.
     pub to_safeop: Duration,
-    /// OP from SAFEOP; the wait for valid outputs comes on top.
+    /// OP from SAFEOP; the wait for valid outputs is added.
     pub to_op: Duration,
     /// SAFEOP from OP, PREOP from SAFEOP or OP.
     pub back: Duration,
@@ -136,13 +136,13 @@ impl Default for TransitionTimes {
     }
 }
 
-/// A SubDevice, complete.
+/// A complete SubDevice.
 #[derive(Clone, Debug)]
 pub struct DeviceDescription {
     /// Name of this device in the segment.
     pub name: String,
-    /// Name in the SII, where it must differ from that of others: with it, SIIs of the same structure differ in their
-    /// fixed area. `None`: `name`, and the fixed areas are equal.
+    /// Name in the SII, if it must differ from that of others: then SIIs of the same structure differ in their fixed
+    /// area. `None`: `name` is used, and the fixed areas are equal.
     pub name_in_sii: Option<String>,
     /// Order code, string of the SII.
     pub order_code: String,
@@ -154,16 +154,16 @@ pub struct DeviceDescription {
     pub alias: u16,
     /// Value of the identification switch; `None` = the request is not supported (protocol 5.3).
     pub identification: Option<u16>,
-    /// Physical address at which the identification switch is read; `None` = it is not in memory (protocol 4.3).
+    /// Physical address of the identification switch; `None` = it is not in memory (protocol 4.3).
     pub id_switch_address: Option<u16>,
     /// Kind of each port.
     pub ports: [PortKind; 4],
     /// Usage of the FMMUs, also their number in the SII.
     pub fmmus: Vec<FmmuUsage>,
-    /// FMMUs that the controller has; `None`: 8.
+    /// FMMUs of the controller; `None`: 8.
     pub controller_fmmus: Option<u8>,
-    /// FMMUs work as they are written on the way from PREOP to SAFEOP, until that state is left: later writes are not
-    /// noticed.
+    /// FMMU registers take effect on the way from PREOP to SAFEOP, until that state is left; later writes have no
+    /// effect.
     pub latches_fmmus: bool,
     /// SyncManagers in order.
     pub sync_managers: Vec<SyncManagerDescription>,
@@ -173,58 +173,60 @@ pub struct DeviceDescription {
     pub objects: Vec<Object>,
     /// Mailbox, if there is one.
     pub mailbox: Option<MailboxDescription>,
-    /// What the protocols of the mailbox do.
+    /// Settings of the mailbox protocols.
     pub services: Services,
     /// Distributed clock, if there is one.
     pub dc: Option<DcDescription>,
     /// PDI type of register 0x0140.
     pub pdi_type: u8,
-    /// Register 0x0141 but for bit 0, which is [`DeviceDescription::emulation`].
+    /// Register 0x0141 except bit 0, which is [`DeviceDescription::emulation`].
     pub esc_configuration: u8,
     /// Registers 0x0150 to 0x0153.
     pub pdi_configuration: [u8; 4],
-    /// AL control is copied to AL status by the controller; no application checks anything (protocol 3.4).
+    /// The controller copies AL control to AL status; no application checks requests (protocol 3.4).
     pub emulation: bool,
-    /// Process data is refused without a running watchdog (0x001F).
+    /// Whether process data is refused without a running watchdog (0x001F).
     pub watchdog_required: bool,
-    /// How long the application waits for outputs between SAFEOP and OP before it refuses with 0x0019.
+    /// Time that the application waits for outputs between SAFEOP and OP before it refuses with 0x0019.
     pub outputs_timeout: Duration,
-    /// After INIT the application refuses SAFEOP for so long (0x0052): its hardware is not ready yet.
+    /// Time after INIT in which the application refuses SAFEOP (0x0052): its hardware is not ready yet.
     pub preop_settling: Duration,
-    /// Current drawn from the E-bus; negative = feeds.
+    /// Current drawn from the E-bus; negative = supplied.
     pub ebus_current_ma: i16,
     /// Durations of the state transitions.
     pub transitions: TransitionTimes,
-    /// Size of the EEPROM; grows where the content needs more.
+    /// Size of the EEPROM; grows if the content needs more.
     pub sii_size_bytes: usize,
-    /// Time the EEPROM takes for each command.
+    /// Duration of each EEPROM command.
     pub sii_busy: Duration,
-    /// The controller reads eight bytes of SII at a time.
+    /// Whether the controller reads eight bytes of SII at a time.
     pub eight_byte_sii: bool,
-    /// Delay of a passage with its processing unit, where it is not that of the segment.
+    /// Delay of a pass through the processing unit, if it differs from that of the segment.
     pub processing_delay: Option<Duration>,
-    /// Delay of a passage without it, where it is not that of the segment.
+    /// Delay of a pass without the processing unit, if it differs from that of the segment.
     pub forwarding_delay: Option<Duration>,
     /// Error of the local clock.
     pub clock_drift_ppb: i64,
     /// Change of the drift over time.
     pub clock_wander: Wander,
-    /// Largest random delay of the detected arrival of a frame.
+    /// Maximum random delay of the detected arrival of a frame.
     pub receive_jitter: Duration,
-    /// The controller latches receive times of frames in processing direction only, unless 0x0936 says otherwise.
+    /// Whether the controller latches receive times of frames in processing direction only, unless 0x0936 selects
+    /// otherwise.
     pub latches_processing_only: bool,
-    /// The controller does not distinguish frames when it latches receive times: other frames on the wire change them.
+    /// Whether the controller does not distinguish frames when it latches receive times: other frames on the wire
+    /// change them.
     pub latches_any_frame: bool,
-    /// Local clock at power-on.
+    /// Value of the local clock at power-on.
     pub clock_start_ns: u64,
-    /// Where the inputs come from.
+    /// Source of the inputs.
     pub behaviour: Behaviour,
-    /// A real image that is used as it is instead of one made from this description.
+    /// A real image to use instead of one derived from this description.
     pub sii_image: Option<Vec<u8>>,
 }
 
 impl DeviceDescription {
-    /// Imperfections of its clock.
+    /// Imperfections of the clock.
     pub fn clock_errors(&self) -> ClockErrors {
         ClockErrors { drift_ppb: self.clock_drift_ppb, wander: self.clock_wander, receive_jitter: self.receive_jitter }
     }
@@ -280,8 +282,8 @@ impl DeviceDescription {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(number))
     }
 
-    /// Length that SyncManager `number` must have with the default assignment: the PDOs decide where there are any,
-    /// also such without bits, otherwise the entry of the SyncManager where that is switched on.
+    /// Length that SyncManager `number` must have with the default assignment: the PDOs determine it if there are any,
+    /// also PDOs without bits; otherwise the entry of the SyncManager if that is enabled.
     pub fn default_length(&self, number: u8) -> u16 {
         if self.default_assignment(number).next().is_some() {
             let bits: u32 = self.default_assignment(number).map(PdoDescription::bit_length).sum();
@@ -291,12 +293,12 @@ impl DeviceDescription {
         entry.filter(|entry| entry.enable & SiiSyncManager::ENABLE != 0).map_or(0, |entry| entry.length)
     }
 
-    /// KiB of process RAM in which all mailboxes and SyncManagers have room, with three buffers where they need them;
-    /// the usual 8 where that is enough.
+    /// KiB of process RAM sufficient for all mailboxes and SyncManagers, with three buffers where needed; the usual 8
+    /// if that is enough.
     pub fn ram_kib(&self) -> u8 {
-        /// As an ET1100 has.
+        /// RAM of an ET1100.
         const USUAL: u32 = 8;
-        /// What the address space has room for.
+        /// Maximum in the address space.
         const MOST: u32 = 60;
         let managers = (0u8..).zip(&self.sync_managers).map(|(number, entry)| {
             let buffered = SyncManagerControl::from_bits(entry.control).mode == SyncManagerMode::Buffered;
@@ -312,13 +314,13 @@ impl DeviceDescription {
         needed.clamp(USUAL, MOST) as u8
     }
 
-    /// SyncManagers of the controller: as many as are described, and those of an ET1100 at the least.
+    /// SyncManagers of the controller: the number in the description, at least those of an ET1100.
     pub fn sync_manager_count(&self) -> u8 {
         let described = u8::try_from(self.sync_managers.len()).unwrap_or(u8::MAX);
         described.clamp(ControllerConfig::default().sync_manager_count, MAX_UNITS)
     }
 
-    /// Gives both mailboxes another size and moves the process data behind them; false for a device without a mailbox
+    /// Sets another size of both mailboxes and moves the process data after them; false for a device without a mailbox
     /// and for one with a real image.
     pub fn set_mailbox_bytes(&mut self, bytes: u16) -> bool {
         let Some(mailbox) = self.mailbox.as_mut().filter(|_| self.sii_image.is_none()) else {
@@ -339,7 +341,7 @@ impl DeviceDescription {
         true
     }
 
-    /// Some SyncManager is for process data, whether or not PDOs describe it.
+    /// Whether a SyncManager is for process data, with or without PDOs that describe it.
     pub fn has_process_data(&self) -> bool {
         self.sync_managers.iter().any(|it| matches!(it.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
     }
@@ -349,7 +351,7 @@ impl DeviceDescription {
         self.sync_managers.iter().position(|entry| entry.kind == kind).and_then(|place| u8::try_from(place).ok())
     }
 
-    /// The device answers SDO requests.
+    /// Whether the device answers SDO requests.
     pub fn has_coe(&self) -> bool {
         self.mailbox.is_some_and(|mailbox| mailbox.has_coe())
     }

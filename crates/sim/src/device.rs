@@ -1,8 +1,8 @@
-//! A SubDevice: a controller and the application behind it.
+//! A SubDevice: a controller and its application.
 //!
-//! In: a [`DeviceDescription`] or a real SII image; frames through [`Device::controller`], the passing of virtual time,
-//! faults. Out: the device's reactions, its inputs and outputs for inspection. Cables and frames between devices are
-//! the network's matter.
+//! Input: a [`DeviceDescription`] or a real SII image; frames through [`Device::controller`], virtual time, faults.
+//! Output: the device's reactions, its inputs and outputs for inspection. The network handles cables and frames between
+//! devices.
 
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{Features, map};
@@ -25,9 +25,9 @@ const FEATURES_DC_64: u16 = 0x000C;
 pub struct Device {
     /// The controller: ports, registers, EEPROM.
     pub controller: Controller,
-    /// The application behind the PDI.
+    /// The application at the PDI.
     pub application: Application,
-    /// What it is made from. Changes to it have no effect on registers and EEPROM.
+    /// Its description. Changes to it have no effect on registers and EEPROM.
     pub description: DeviceDescription,
     starts: u32,
 }
@@ -40,7 +40,7 @@ impl Device {
         Device { application: Application::new(&description), controller, description, starts }
     }
 
-    /// A device that answers like the one whose SII image this is.
+    /// A device with this SII image.
     pub fn from_sii(image: Vec<u8>, name: &str) -> Result<Device, DescriptionError> {
         Ok(Device::new(DeviceDescription::from_sii(image, name)?))
     }
@@ -50,25 +50,25 @@ impl Device {
         &self.description.name
     }
 
-    /// Power comes.
+    /// Switches the power on.
     pub fn power_on(&mut self, now: SimTime) {
         self.controller.power_on(now);
         self.follow_restart(now);
     }
 
-    /// Power goes.
+    /// Switches the power off.
     pub fn power_off(&mut self, now: SimTime) {
         self.controller.power_off(now);
         self.application.restart(&self.description, now);
     }
 
-    /// The application hangs, or goes on.
+    /// Makes the application hang, or continue.
     pub fn hang(&mut self, hanging: bool, now: SimTime) {
         self.application.hang(hanging);
         self.controller.set_pdi_alive(!hanging, now);
     }
 
-    /// The next `times` requests for `to` are refused with `code`; no effect where the controller emulates the device.
+    /// The next `times` requests for `to` are refused with `code`; no effect if the controller emulates the device.
     pub fn refuse_transition(&mut self, to: AlState, code: AlStatusCode, times: u32) {
         self.application.refuse(to, code, times);
     }
@@ -135,23 +135,23 @@ impl Device {
         self.application.process_data().inputs()
     }
 
-    /// How often outputs were taken over in OP. Where a SyncManager raises no event only changes are counted.
+    /// Number of times that outputs were latched in OP. If a SyncManager raises no event, only changes are counted.
     pub const fn outputs_latched(&self) -> u64 {
         self.application.process_data().latched()
     }
 
-    /// Sets the inputs. A drive makes its own and ignores them.
+    /// Sets the inputs. A drive computes its own inputs and ignores them.
     pub fn set_inputs(&mut self, bytes: &[u8]) {
         self.set_input_source(InputSource::Constant(bytes.into()));
     }
 
-    /// Sets the source of the inputs. A drive makes its own and ignores it.
+    /// Sets the source of the inputs. A drive computes its own inputs and ignores it.
     pub fn set_input_source(&mut self, source: InputSource) {
         self.application.set_source(source, &self.description, &mut self.controller);
     }
 }
 
-/// The controller that a description asks for.
+/// The configuration of the controller for a description.
 fn controller_config(description: &DeviceDescription) -> ControllerConfig {
     let clock = match &description.dc {
         None => 0,

@@ -1,4 +1,4 @@
-//! Faults that a test or a demonstration can cause, at once or at a time (issue 2, part 3).
+//! Faults that a test or a demonstration can inject, at once or at a scheduled time (issue 2, part 3).
 //!
 //! Faults on a cable affect the frames that reach its far end from then on, faults on a device its power, its
 //! application, its EEPROM and its state machine.
@@ -15,11 +15,11 @@ use crate::cable::{CableId, DeviceIndex, Direction};
 /// A fault, or its repair.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The cable is cut; both ends notice after their detection delay.
+    /// The cable is cut; both ends detect it after their detection delay.
     Cut(CableId),
-    /// The cable is restored; both ends notice after their detection delay.
+    /// The cable is repaired; both ends detect it after their detection delay.
     Heal(CableId),
-    /// The cable is restored; the receiving end of one direction notices later than the other.
+    /// The cable is repaired; the receiving end of one direction detects it later than the other.
     HealUnevenly {
         /// The cable.
         cable: CableId,
@@ -46,7 +46,7 @@ pub enum Fault {
         /// Number of frames.
         count: u32,
     },
-    /// One bit of the next frames on the cable is inverted, so that their check sequence is wrong.
+    /// One bit of the next frames on the cable is inverted, so that their FCS is wrong.
     Corrupt {
         /// The cable.
         cable: CableId,
@@ -55,8 +55,8 @@ pub enum Fault {
         /// Number of frames.
         count: u32,
     },
-    /// The next frames on the cable contain an invalid symbol (RX_ER): they are damaged, and the receiving port counts
-    /// the symbol, too.
+    /// The next frames on the cable contain an invalid symbol (RX_ER): they are damaged, and the receiving port also
+    /// counts the symbol.
     SymbolErrors {
         /// The cable.
         cable: CableId,
@@ -85,17 +85,17 @@ pub enum Fault {
         /// Delay.
         by: Duration,
     },
-    /// One direction of the cable is dead while both ends still have a link (as behind a media converter), or alive
+    /// One direction of the cable is blocked while both ends still have a link (as with a media converter), or works
     /// again.
     OneWay {
         /// The cable.
         cable: CableId,
         /// The direction.
         direction: Direction,
-        /// Dead or alive.
+        /// Whether it is blocked.
         blocked: bool,
     },
-    /// The device loses its power; its neighbours notice the lost link after their detection delay.
+    /// The device loses its power; its neighbours detect the lost link after their detection delay.
     PowerOff(DeviceIndex),
     /// The device gets power: it loads its EEPROM, starts in INIT, and its links come up after their detection delay.
     PowerOn(DeviceIndex),
@@ -139,8 +139,8 @@ pub enum Fault {
         /// Number of refusals.
         times: u32,
     },
-    /// Accesses of the application to its controller are disturbed, as on a faulty bus between both: they are counted,
-    /// and succeed all the same.
+    /// Accesses of the application to its controller are disturbed, as on a faulty bus: they are counted, and succeed
+    /// nevertheless.
     PdiErrors {
         /// The device.
         device: DeviceIndex,

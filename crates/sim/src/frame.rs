@@ -1,7 +1,7 @@
 //! A frame on its path through the segment (protocol 1.1, 1.2, 1.3).
 //!
-//! Input: the bytes that a host sends. Output: [`SimFrame`], which carries the offsets of its datagrams so that no
-//! controller parses it again, and the state of its frame check sequence. Controllers and network process it.
+//! Input: the bytes sent by a host. Output: [`SimFrame`], which contains the offsets of its datagrams, so that no
+//! controller parses it again, and the state of its FCS. Controllers and network process it.
 
 use ringcat_wire::datagram::{HEADER_LEN, OVERHEAD, WKC_LEN};
 use ringcat_wire::frame::{
@@ -9,17 +9,17 @@ use ringcat_wire::frame::{
     UDP_PORT, wire_time_ns,
 };
 
-/// Bytes of preamble, delimiter and FCS, which take time on the wire beside the frame's own bytes.
+/// Bytes of preamble, delimiter and FCS, transmitted in addition to the bytes of the frame.
 const PREAMBLE_AND_FCS: u64 = 12;
 /// Bytes of an IPv4 header of five words and a UDP header.
 const UDP_HEADERS_LEN: usize = 28;
 const LENGTH_MASK: u16 = 0x07FF;
 const MORE: u8 = 0x80;
 
-/// One of the four ports of a controller. The order of travel (0-3-1-2) is the controller's matter.
+/// One of the four ports of a controller. The controller implements the order 0-3-1-2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Port {
-    /// Port 0, behind which the processing unit sits.
+    /// Port 0, followed by the processing unit.
     A = 0,
     /// Port 1.
     B = 1,
@@ -38,36 +38,36 @@ impl Port {
         self as usize
     }
 
-    /// From a port's number.
+    /// The port with a number.
     pub const fn from_index(index: usize) -> Option<Port> {
         if index < 4 { Some(Self::ALL[index]) } else { None }
     }
 }
 
-/// State of a frame's check sequence (protocol 2.5).
+/// State of the FCS of a frame (protocol 2.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Fcs {
-    /// The frame is as it was sent.
+    /// Valid.
     #[default]
     Good,
-    /// Damaged, and no controller has seen it yet.
+    /// Damaged, not counted by a controller yet.
     Bad,
-    /// Damaged; a controller has counted it and marked it for the following ones.
+    /// Damaged; a controller has counted and marked it for the following ones.
     Marked,
 }
 
-/// A frame's type as a controller sees it.
+/// Type of a frame for a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FrameKind {
-    /// EtherCAT with datagrams (type 1), plain, behind a VLAN tag or in UDP.
+    /// EtherCAT with datagrams (type 1): plain, with a VLAN tag or in UDP.
     Datagrams,
-    /// EtherCAT of another type: never processed, passed on.
+    /// EtherCAT of another type: never processed, forwarded.
     OtherEthercat,
     /// Another protocol.
     Foreign,
 }
 
-/// Where a datagram lies in the frame's bytes.
+/// Position of a datagram in the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DatagramPlace {
     /// Offset of the ten-byte header.
@@ -76,29 +76,29 @@ pub struct DatagramPlace {
     pub length: u16,
 }
 
-/// A frame that travels.
+/// A frame in the segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SimFrame {
     /// The frame without FCS.
     pub bytes: Vec<u8>,
-    /// The datagrams, in order; those before the first that leaves the frame. Empty unless `kind` is `Datagrams`.
+    /// The datagrams, in order, up to the first one that exceeds the frame. Empty unless `kind` is `Datagrams`.
     pub datagrams: Vec<DatagramPlace>,
-    /// Its type for a controller.
+    /// Type for a controller.
     pub kind: FrameKind,
-    /// Shorter than an Ethernet frame may be, or a datagram leaves the frame: an error to every processing unit.
+    /// Shorter than the minimum of Ethernet, or a datagram exceeds the frame: an error for every processing unit.
     pub malformed: bool,
-    /// State of the check sequence.
+    /// State of the FCS.
     pub fcs: Fcs,
-    /// It contains an invalid symbol that the receiving port has not counted yet.
+    /// Whether it contains an invalid symbol that the receiving port has not counted yet.
     pub symbol_error: bool,
-    /// Unique number: for logs, and to recognise the frame when it comes back to a controller.
+    /// Unique number: for logs, and to identify the frame when it returns to a controller.
     pub id: u64,
-    /// Number of datagrams that are processed; further ones are passed on unchanged.
+    /// Maximum number of processed datagrams; further ones are forwarded unchanged.
     pub most_datagrams: usize,
 }
 
 impl SimFrame {
-    /// Takes the bytes of a frame and finds its datagrams. Any bytes will do.
+    /// Creates a frame from any bytes and finds its datagrams.
     pub fn new(id: u64, bytes: Vec<u8>) -> SimFrame {
         let (kind, malformed, fcs, symbol_error) = (FrameKind::Foreign, false, Fcs::Good, false);
         let (datagrams, most_datagrams) = (Vec::new(), usize::MAX);
@@ -107,7 +107,7 @@ impl SimFrame {
         frame
     }
 
-    /// Becomes another frame with these bytes, keeping the buffers: for pools.
+    /// Replaces the frame by these bytes and keeps the buffers: for pools.
     pub fn refill(&mut self, id: u64, bytes: &[u8]) {
         self.id = id;
         self.most_datagrams = usize::MAX;
@@ -117,7 +117,7 @@ impl SimFrame {
         self.parse();
     }
 
-    /// Becomes a copy of another frame, keeping the buffers: for pools.
+    /// Replaces the frame by a copy of another one and keeps the buffers: for pools.
     pub fn copy_from(&mut self, other: &SimFrame) {
         self.bytes.clear();
         self.bytes.extend_from_slice(&other.bytes);
@@ -127,7 +127,7 @@ impl SimFrame {
         (self.symbol_error, self.most_datagrams) = (other.symbol_error, other.most_datagrams);
     }
 
-    /// Keeps the first `len` bytes only: the rest is lost when a cable is cut while the frame passes.
+    /// Keeps only the first `len` bytes: the rest is lost when a cable is cut while the frame passes.
     pub fn truncate(&mut self, len: usize) {
         if len < self.bytes.len() {
             self.bytes.truncate(len);
@@ -136,13 +136,13 @@ impl SimFrame {
         }
     }
 
-    /// Limits the number of datagrams that are processed; further ones are passed on unchanged.
+    /// Limits the number of processed datagrams; further ones are forwarded unchanged.
     pub fn process_at_most(&mut self, most: usize) {
         self.most_datagrams = most;
         self.datagrams.truncate(most);
     }
 
-    /// Whether a controller sees datagrams to process.
+    /// Whether a controller finds datagrams to process.
     pub const fn is_ethercat(&self) -> bool {
         matches!(self.kind, FrameKind::Datagrams)
     }
@@ -152,12 +152,12 @@ impl SimFrame {
         (self.bytes.len() as u64 + PREAMBLE_AND_FCS) * BYTE_TIME_NS
     }
 
-    /// Time for which the frame occupies a link at 100 Mbit/s, gap included.
+    /// Time for which the frame occupies a link at 100 Mbit/s, including the gap.
     pub const fn occupies_ns(&self) -> u64 {
         wire_time_ns(self.bytes.len())
     }
 
-    /// Finds kind and datagrams anew. Controllers walk the lengths of the datagrams, not the one in the EtherCAT header
+    /// Finds kind and datagrams. Controllers use the lengths of the datagrams, not the length in the EtherCAT header
     /// (protocol 1.1).
     fn parse(&mut self) {
         self.datagrams.clear();
@@ -202,7 +202,7 @@ impl DatagramPlace {
         self.data() + self.length as usize
     }
 
-    /// Offset behind the working counter.
+    /// Offset after the working counter.
     pub const fn end(&self) -> usize {
         self.wkc() + WKC_LEN
     }
@@ -211,12 +211,12 @@ impl DatagramPlace {
 /// Offset of the UDP checksum in an EtherCAT frame over UDP, which a processing unit clears (protocol 1.3).
 pub(crate) const UDP_CHECKSUM: usize = ETHERNET_HEADER_LEN + UDP_HEADERS_LEN - 2;
 
-/// Whether the frame's EtherCAT part is wrapped in UDP.
+/// Whether the EtherCAT part of the frame is in UDP.
 pub(crate) fn is_udp(bytes: &[u8]) -> bool {
     bytes.get(12..14).is_some_and(|ethertype| ethertype == ETHERTYPE_IPV4.to_be_bytes())
 }
 
-/// The kind of a frame and the offset of what follows the EtherCAT header.
+/// The kind of a frame and the offset after the EtherCAT header.
 fn classify(bytes: &[u8]) -> (FrameKind, usize) {
     let word = |at: usize| bytes.get(at..at + 2).map(|b| u16::from_be_bytes([b[0], b[1]]));
     let start = match word(12) {
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_frame_keeps_the_datagrams_that_are_whole() {
+    fn a_truncated_frame_keeps_its_complete_datagrams() {
         let mut frame = SimFrame::new(7, two_datagrams());
         frame.truncate(44);
         assert_eq!((frame.datagrams.len(), frame.malformed, frame.fcs), (1, true, Fcs::Bad));
@@ -274,7 +274,7 @@ mod tests {
 
     // covers: sim-faults
     #[test]
-    fn datagrams_behind_the_limit_are_none_also_after_a_cut() {
+    fn datagrams_beyond_the_limit_are_ignored_also_after_a_cut() {
         let mut frame = SimFrame::new(7, two_datagrams());
         frame.process_at_most(1);
         assert_eq!((frame.datagrams.len(), frame.malformed), (1, false));
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn network_variables_and_other_protocols_are_told_apart() {
+    fn network_variables_and_other_protocols_are_distinguished() {
         let mut bytes = two_datagrams();
         bytes[15] = 0x40;
         assert_eq!(SimFrame::new(0, bytes.clone()).kind, FrameKind::OtherEthercat);
@@ -299,7 +299,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_become_a_frame_whose_places_lie_inside(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn any_bytes_become_a_frame_with_datagrams_inside_it(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let mut ethercat = bytes.clone();
             if ethercat.len() > 16 {
                 ethercat[12..14].copy_from_slice(&[0x88, 0xA4]);

@@ -1,5 +1,5 @@
-//! The two network interfaces of the MainDevice: they send at 100 Mbit/s, one frame after the other, and keep what
-//! arrives until it is fetched (protocol 1.3).
+//! The two network interfaces of the MainDevice: they send at 100 Mbit/s, one frame after the other, and store received
+//! frames (protocol 1.3).
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -9,23 +9,23 @@ use crate::frame::SimFrame;
 use crate::queue::Lane;
 use crate::time::SimTime;
 
-/// A frame that came back to the MainDevice.
+/// A frame received by the MainDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Received {
-    /// When its last bit arrived.
+    /// Time at which its last bit arrived.
     pub at: SimTime,
-    /// The frame without check sequence.
+    /// The frame without FCS.
     pub bytes: Vec<u8>,
 }
 
 /// One interface.
 #[derive(Debug)]
 pub(crate) struct HostInterface {
-    /// The direction of the cable that leads away from it, if a cable is plugged in.
+    /// The outgoing direction of its cable, if a cable is plugged in.
     pub(crate) out: Option<LegId>,
-    /// Frames that wait to be fetched.
+    /// Received frames that were not fetched yet.
     pub(crate) received: VecDeque<Received>,
-    /// It was taken down.
+    /// Whether it was taken down.
     pub(crate) disconnected: bool,
     free_at: SimTime,
     ends: VecDeque<SimTime>,
@@ -34,7 +34,7 @@ pub(crate) struct HostInterface {
 }
 
 impl HostLink {
-    /// The lane of events for frames that enter the segment here.
+    /// The event lane for frames that enter the segment here.
     pub(crate) const fn entry_lane(self) -> Lane {
         match self {
             HostLink::Main => Lane::EntryMain,
@@ -56,8 +56,8 @@ impl HostInterface {
         }
     }
 
-    /// Queues a frame behind those that are being sent. Returns when its last bit leaves, or `None` when the queue is
-    /// full.
+    /// Queues a frame after the frames being sent. Returns the time at which its last bit leaves, or `None` if the
+    /// queue is full.
     pub(crate) fn transmit(&mut self, now: SimTime, frame: &SimFrame) -> Option<SimTime> {
         while self.ends.front().is_some_and(|end| *end <= now) {
             self.ends.pop_front();
@@ -72,7 +72,7 @@ impl HostInterface {
         Some(end)
     }
 
-    /// Keeps a frame, or returns it when there is no room.
+    /// Stores a frame, or returns it if the queue is full.
     pub(crate) fn deliver(&mut self, frame: Received) -> Result<(), Received> {
         if self.received.len() >= self.receive_limit {
             return Err(frame);

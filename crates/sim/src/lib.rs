@@ -1,10 +1,10 @@
 //! A register-accurate simulator of EtherCAT segments in virtual time.
 //!
 //! * [`controller`]: one SubDevice controller: ports, processing unit, FMMUs, SyncManagers, SII interface, clock;
-//! * [`device`], [`application`], [`description`], [`sii_image`], [`catalogue`]: what stands behind a controller;
-//! * [`network`], [`cable`], [`host`], [`fault`]: cables, events, hosts and what goes wrong with them;
+//! * [`device`], [`application`], [`description`], [`sii_image`], [`catalogue`]: devices behind a controller;
+//! * [`network`], [`cable`], [`host`], [`fault`]: cables, events, hosts and faults;
 //! * [`segment`]: segments from files;
-//! * [`time`], [`frame`]: virtual time and the frames that travel.
+//! * [`time`], [`frame`]: virtual time and frames.
 //!
 //! No wall clock and no unseeded randomness: the same input gives the same run, bit for bit.
 #![forbid(unsafe_code)]

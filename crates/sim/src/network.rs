@@ -2,24 +2,24 @@
 //! part 3; protocol 2, 9.1, 11.3, 11.4).
 //!
 //! Input: frames of the MainDevice ([`Network::send`]), the time up to which the segment runs ([`Network::advance`]),
-//! and faults. Output: the frames that come back, with the time of their last bit ([`Network::receive`]), and the
-//! devices themselves for inspection. There is no other clock and no other randomness than the seed: the same calls
-//! give the same run, bit for bit.
+//! and faults. Output: the returned frames, with the time of their last bit ([`Network::receive`]), and the devices for
+//! inspection. There is no other clock and no randomness except the seed: the same calls give the same run, bit for
+//! bit.
 //!
 //! # Model
 //!
 //! An event is the arrival of a frame's *last* bit at an end of a cable. Controllers cut through, so the next arrival
-//! is this one, plus the delay of the hop, plus that of the cable; when the first bit passed follows from the frame's
-//! length at 100 Mbit/s. A frame is lost if the cable, from the first bit's entry to the last bit's exit, was dead at
-//! any moment; where the receiver saw its beginning it travels on as a damaged frame (protocol 2.5). Both ends of a
-//! cable notice a lost or a new signal after a detection delay; until then frames sent there are lost. A frame on whose
-//! way through a device a port opens or closes is lost (protocol 2.2).
+//! is this time plus the delay of the hop plus that of the cable; the time of the first bit follows from the frame's
+//! length at 100 Mbit/s. A frame is lost if the cable had no signal at any moment from the entry of its first bit to
+//! the exit of its last bit; if the receiver has seen its beginning, the frame continues as a damaged frame (protocol
+//! 2.5). Both ends of a cable detect a lost or a new signal after a detection delay; until then frames sent there are
+//! lost. A frame is lost if a port on its path through a device opens or closes while it passes (protocol 2.2).
 
 pub mod builder;
 mod cabling;
 mod event;
+mod fast_path;
 mod faults;
-mod flight;
 mod options;
 mod pool;
 mod random;
@@ -45,21 +45,21 @@ use statistics::Statistics;
 pub use options::{Beyond, DatagramLimit, NetworkOptions};
 pub(crate) use random::Random;
 
-/// A device with its place in the segment.
+/// A device with its connections in the segment.
 #[derive(Debug)]
 struct Node {
     device: Device,
-    /// The direction of the cable that leads away from each port.
+    /// The outgoing direction of the cable at each port.
     out: [Option<LegId>; 4],
-    /// When each port last opened or closed because its link came or went.
+    /// Time at which each port last opened or closed because of a link change.
     loop_changed_at: [SimTime; 4],
-    /// The latest of these: spares most frames the look at each.
+    /// The latest of these times: avoids the check of each port for most frames.
     last_loop_change: SimTime,
-    /// The earliest event that will wake the device.
+    /// The time of the earliest wake-up event of the device.
     wake_at: SimTime,
-    /// The controller's schedule that this was arranged for.
+    /// The schedule counter of the controller for this wake-up.
     arranged: Option<u32>,
-    /// The frame that the device has not reacted to yet, during a leap.
+    /// The frame to which the device has not reacted yet, during [`Network::advance_until_quiet`].
     unsettled_by: Option<u64>,
 }
 
@@ -68,7 +68,7 @@ struct Node {
 struct Cable {
     spec: CableSpec,
     cut: bool,
-    /// Counts changes of the signal, so that a detection knows whether it is out of date.
+    /// Counter of signal changes, so that outdated detections are recognised.
     epoch: u32,
 }
 
@@ -86,27 +86,27 @@ pub struct Network {
     scheduled: Vec<Option<Fault>>,
     random: Random,
     statistics: Statistics,
-    /// Counts changes of cables, links and power.
+    /// Counter of changes of cables, links and power.
     wiring: u32,
-    /// The ways of frames of both interfaces.
+    /// The routes of frames of both interfaces.
     routes: [Route; 2],
-    /// Time goes on to here before the caller has a say again,
+    /// Time limit of the running call.
     limit: SimTime,
-    /// or only to the first frame that arrives.
+    /// Whether the running call also ends at the first received frame.
     until_received: bool,
-    /// The last hop of a flight.
-    flown_to: SimTime,
-    /// Time leaps: devices react when the frames have left the segment.
-    leaping: bool,
+    /// Time of the last hop on the fast path.
+    fast_path_until: SimTime,
+    /// Whether devices react only after the frames have left the segment.
+    defers_settling: bool,
     /// Devices that have not reacted yet.
     unsettled: Vec<u32>,
 }
 
 impl Network {
-    /// A segment of these devices and cables. It begins at time zero with the power just switched on and all links up.
+    /// A segment of these devices and cables. It starts at time zero at power-on, with all links up.
     ///
     /// # Errors
-    /// A cable that ends at a device or port that does not exist, or where another cable is plugged in.
+    /// A cable that ends at a missing device or port, or at a port with another cable.
     pub fn new(devices: Vec<Device>, cables: Vec<CableSpec>, options: NetworkOptions) -> Result<Network, SegmentError> {
         let out = cabling::plug(&devices, &cables)?;
         let legs = cables.iter().flat_map(|cable| {
@@ -131,16 +131,16 @@ impl Network {
             routes: Default::default(),
             limit: SimTime::ZERO,
             until_received: false,
-            flown_to: SimTime::ZERO,
+            fast_path_until: SimTime::ZERO,
             options,
-            leaping: false,
+            defers_settling: false,
             unsettled: Vec::new(),
         };
         network.start();
         Ok(network)
     }
 
-    /// A segment as a file describes it.
+    /// A segment from a file.
     ///
     /// # Errors
     /// As [`Network::new`].
@@ -149,17 +149,17 @@ impl Network {
         Network::new(devices, segment.cables, segment.options)
     }
 
-    /// The time up to which everything has happened.
+    /// The time up to which all events have been processed.
     pub fn now(&self) -> SimTime {
         self.now
     }
 
-    /// When the next thing happens, if anything does.
+    /// Time of the next event, if there is one.
     pub fn next_event(&self) -> Option<SimTime> {
         self.queue.next_at()
     }
 
-    /// Lets everything happen that is due up to and including `to`.
+    /// Processes all events up to and including `to`.
     pub fn advance(&mut self, to: SimTime) {
         self.limit = to;
         self.settle_all();
@@ -175,8 +175,8 @@ impl Network {
         self.now = self.now.max(to);
     }
 
-    /// Lets everything happen that is due up to and including the moment at which a frame has arrived at an interface,
-    /// or `to` if none does; or nothing, if one is waiting there already.
+    /// Processes all events up to and including the time at which a frame has arrived at an interface, or `to` if none
+    /// arrives; does nothing if a frame is waiting already.
     pub fn advance_until_received(&mut self, to: SimTime) {
         let waits = |network: &Network| network.hosts.iter().any(|host| !host.received.is_empty());
         self.until_received = true;
@@ -198,14 +198,14 @@ impl Network {
     }
 
     /// Processes all events, in their order and at their times, until no frame is left in the segment: the time
-    /// advances to the moment at which the last one has left, but not beyond `limit`.
+    /// advances to the exit of the last frame, but not beyond `limit`.
     ///
-    /// The devices react to the frames that have passed them with [`Network::settle_all`], or when the next frame
-    /// reaches them: callers that need responses as soon as possible take the frames first.
+    /// The devices react to the frames that have passed them in [`Network::settle_all`], or when the next frame reaches
+    /// them. Callers that need responses as soon as possible receive the frames first.
     pub fn advance_until_quiet(&mut self, limit: SimTime) {
-        self.leaping = true;
+        self.defers_settling = true;
         self.pass_all_frames(limit);
-        self.leaping = false;
+        self.defers_settling = false;
     }
 
     fn pass_all_frames(&mut self, limit: SimTime) {
@@ -220,43 +220,43 @@ impl Network {
             self.now = at;
             follows = self.handle(event);
         }
-        self.now = self.now.max(self.flown_to);
+        self.now = self.now.max(self.fast_path_until);
     }
 
-    /// Lets the time pass.
+    /// Advances the time.
     pub fn advance_by(&mut self, time: Duration) {
         self.advance(self.now + time);
     }
 
-    /// What happens, and what follows from it at once if it is the next hop of a frame.
+    /// Processes an event and returns the next hop of a frame, if that follows at once.
     fn handle(&mut self, event: Event) -> Option<(SimTime, Event)> {
         match event {
             Event::Entry { slot, link, leg } => return self.enter(slot, link, leg),
-            Event::Arrival { slot, leg, meddled } => return self.arrive(slot, leg, meddled),
+            Event::Arrival { slot, leg, faults_applied } => return self.arrive(slot, leg, faults_applied),
             Event::Detection { leg, epoch } => self.detect(leg, epoch),
             Event::Wake { device } => self.wake(device as usize),
-            Event::Fault { number } => self.strike(number as usize),
+            Event::Fault { number } => self.apply_scheduled(number as usize),
         }
         None
     }
 
-    /// Sends a frame (without check sequence) on an interface, padded to the shortest that Ethernet allows. It leaves
-    /// behind those that are queued there. On an interface without carrier it is lost.
+    /// Sends a frame (without FCS) on an interface, padded to the minimum of Ethernet, after the frames queued there.
+    /// On an interface without carrier the frame is lost.
     pub fn send(&mut self, link: HostLink, bytes: &[u8]) {
         self.transmit(link, bytes);
     }
 
-    /// The next frame that arrived on an interface with a good check sequence.
+    /// The next frame received on an interface with a valid FCS.
     pub fn receive(&mut self, link: HostLink) -> Option<Received> {
         self.hosts[link as usize].received.pop_front()
     }
 
-    /// Gives the buffer of a received frame back, so that sending does not need a new one.
+    /// Returns the buffer of a received frame, so that sending needs no new one.
     pub fn give_back(&mut self, bytes: Vec<u8>) {
         self.frames.give_back(bytes);
     }
 
-    /// Whether the interface has link, as far as it has noticed.
+    /// Whether the interface has detected a link.
     pub fn carrier(&self, link: HostLink) -> bool {
         self.hosts[link as usize].out.is_some_and(|out| self.legs[out.reverse().index()].detected)
     }
@@ -269,7 +269,7 @@ impl Network {
         &self.nodes[device.0].device
     }
 
-    /// A device, to be changed from outside at the present time; it looks at what has changed before time goes on.
+    /// A device to be changed from outside at the current time; it evaluates the changes before time advances.
     ///
     /// # Panics
     /// When there is no device with this number.
@@ -289,7 +289,7 @@ impl Network {
         self.cables.iter().map(|cable| &cable.spec)
     }
 
-    /// The cable that is plugged in there.
+    /// The cable at this endpoint.
     pub fn cable_at(&self, endpoint: Endpoint) -> Option<CableId> {
         let out = match endpoint {
             Endpoint::Device(device, port) => self.nodes.get(device.0)?.out[port.index()],
@@ -298,7 +298,7 @@ impl Network {
         out.map(LegId::cable)
     }
 
-    /// The first cable that joins two devices.
+    /// The first cable that connects two devices.
     pub fn cable_between(&self, one: DeviceIndex, other: DeviceIndex) -> Option<CableId> {
         let is = |endpoint: Endpoint, wanted| matches!(endpoint, Endpoint::Device(device, _) if device == wanted);
         let joins = |spec: &CableSpec| is(spec.a, one) && is(spec.b, other) || is(spec.a, other) && is(spec.b, one);
@@ -315,7 +315,7 @@ impl Network {
         &self.statistics
     }
 
-    /// The options it was made with.
+    /// The options of the segment.
     pub fn options(&self) -> &NetworkOptions {
         &self.options
     }

@@ -1,23 +1,23 @@
-//! The event queue: what happens next in virtual time (issue 2, part 3).
+//! The event queue of virtual time (issue 2, part 3).
 //!
 //! Input: events with their due times. Output: the events in the order of time; events of the same time in the order of
-//! insertion, so that every run is the same. Events go into lanes, so that a caller that processes some kinds of events
-//! ahead of time sees when the others are due. The queue keeps its memory: after its largest length, it allocates no
-//! more.
+//! insertion, so that every run is the same. Events are stored in lanes, so that a caller that processes some kinds of
+//! events ahead of time can read when the others are due. The queue reuses its memory: after its maximum length, it
+//! does not allocate.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::time::SimTime;
 
-/// Kinds of events with a query for the next due time each. Their order is common.
+/// Kinds of events with a separate query for the next due time. Their order is common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// All events without a lane of their own.
+    /// All other events.
     Any = 0,
-    /// Frames of the main interface that enter the segment and change no ways.
+    /// Frames of the main interface that enter the segment and change no paths.
     EntryMain = 1,
-    /// Frames of the redundant interface that enter the segment and change no ways.
+    /// Frames of the redundant interface that enter the segment and change no paths.
     EntryRedundant = 2,
     /// Frames that have passed all devices.
     Exit = 3,
@@ -25,7 +25,7 @@ pub(crate) enum Lane {
 
 const LANES: usize = 4;
 
-/// Events in the order of their time.
+/// Events ordered by time.
 #[derive(Debug)]
 pub(crate) struct EventQueue<E> {
     lanes: [BinaryHeap<Entry<E>>; LANES],
@@ -54,28 +54,28 @@ impl<E> PartialOrd for Entry<E> {
 }
 
 impl<E> Ord for Entry<E> {
-    /// The heap gives its greatest entry first, which has to be the earliest.
+    /// The heap returns its greatest entry first, which has to be the earliest.
     fn cmp(&self, other: &Self) -> Ordering {
         (other.at, other.sequence).cmp(&(self.at, self.sequence))
     }
 }
 
 impl<E: Copy> EventQueue<E> {
-    /// An empty queue with room for this many events of any kind.
+    /// An empty queue with this capacity in each lane.
     pub(crate) fn with_capacity(capacity: usize) -> EventQueue<E> {
         let mut lanes = [const { BinaryHeap::new() }; LANES];
         lanes[Lane::Any as usize].reserve(capacity);
         EventQueue { lanes, sequence: 0 }
     }
 
-    /// Puts in an event.
+    /// Inserts an event.
     pub(crate) fn push(&mut self, lane: Lane, at: SimTime, event: E) {
         self.sequence += 1;
         self.lanes[lane as usize].push(Entry { at, sequence: self.sequence, event });
     }
 
-    /// Inserts an event and removes the earliest that is due by `limit`, the new one included: the step of a frame from
-    /// one device to the next, which is mostly the earliest.
+    /// Inserts an event and removes the earliest that is due by `limit`, which may be the new one: the step of a frame
+    /// from one device to the next, which is mostly the earliest event.
     pub(crate) fn push_pop(&mut self, at: SimTime, event: E, limit: SimTime) -> Option<(SimTime, E)> {
         if self.next_at().is_none_or(|first| at < first) && at <= limit {
             return Some((at, event));
@@ -84,7 +84,7 @@ impl<E: Copy> EventQueue<E> {
         self.pop_until(limit)
     }
 
-    /// Takes out the earliest event that is due by `limit`.
+    /// Removes the earliest event that is due by `limit`.
     pub(crate) fn pop_until(&mut self, limit: SimTime) -> Option<(SimTime, E)> {
         let order = |heap: &BinaryHeap<Entry<E>>| heap.peek().map(|first| (first.at, first.sequence));
         let mut earliest = None;
@@ -100,12 +100,12 @@ impl<E: Copy> EventQueue<E> {
         Some((at, event))
     }
 
-    /// When the earliest event is due.
+    /// Time of the earliest event.
     pub(crate) fn next_at(&self) -> Option<SimTime> {
         self.lanes.iter().filter_map(|heap| heap.peek()).map(|entry| entry.at).min()
     }
 
-    /// When the earliest event of a lane is due; never where there is none.
+    /// Time of the earliest event of a lane; `NEVER` if the lane is empty.
     pub(crate) fn next_in(&self, lane: Lane) -> SimTime {
         self.lanes[lane as usize].peek().map_or(SimTime::NEVER, |entry| entry.at)
     }
@@ -117,7 +117,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn events_of_one_time_come_in_the_order_they_were_put_in() {
+    fn events_of_the_same_time_are_in_the_order_of_insertion() {
         let mut queue = EventQueue::with_capacity(4);
         use Lane::{Any, EntryMain, EntryRedundant, Exit};
         for (lane, at, event) in [(Any, 5, 'c'), (Exit, 3, 'a'), (EntryMain, 5, 'd'), (EntryRedundant, 3, 'b')] {
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_before_its_time() {
+    fn no_event_occurs_before_its_time() {
         let mut queue = EventQueue::with_capacity(1);
         queue.push(Lane::Exit, SimTime(10), ());
         assert_eq!((queue.next_in(Lane::Exit), queue.next_in(Lane::Any)), (SimTime(10), SimTime::NEVER));

@@ -21,10 +21,10 @@ pub use error::SegmentError;
 /// The segment file of the demonstration: a ring of couplers, terminals and a servo drive.
 pub const DEMO: &str = include_str!("../segments/demo.toml");
 
-/// A segment as a file describes it.
+/// A segment as described in a file.
 ///
-/// Cable `n` is the one that attaches device `n`; after these come the one that closes the ring, if there is one, and
-/// those that the file lists. (Devices that the file attaches by listed cables only shift the numbers.)
+/// Cable `n` is the cable of device `n`. After these follow the cable that closes the ring, if there is one, and the
+/// cables listed in the file. (Devices attached only by listed cables shift the numbers.)
 #[derive(Clone, Debug)]
 pub struct Segment {
     /// Name of the segment.
@@ -38,10 +38,10 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Reads a segment file. SII images are looked for relative to it.
+    /// Reads a segment file. Paths of SII images are relative to it.
     ///
     /// # Errors
-    /// A file that cannot be read, and what [`Segment::from_toml`] refuses.
+    /// A file that cannot be read, and the errors of [`Segment::from_toml`].
     pub fn load(path: &Path) -> Result<Segment, SegmentError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
@@ -49,11 +49,11 @@ impl Segment {
         Segment::from_toml(&text, base_dir).map_err(|error| error.in_file(path))
     }
 
-    /// Reads the text of a segment file. SII images are looked for relative to `base_dir`.
+    /// Reads the text of a segment file. Paths of SII images are relative to `base_dir`.
     ///
     /// # Errors
     /// Text that is not TOML, unknown or missing keys, values out of range, unknown device types, SII images that
-    /// cannot be read, names used twice, and cables that end nowhere or where another is plugged in.
+    /// cannot be read, duplicate names, and cables with a missing end or at a port with another cable.
     pub fn from_toml(text: &str, base_dir: &Path) -> Result<Segment, SegmentError> {
         let file = format::File::parse(text)?;
         let options = file.options(text)?;

@@ -1,8 +1,8 @@
 //! SII image from a device description, and description from a real SII image (protocol 4).
 //!
-//! In and out: [`DeviceDescription`] and the bytes of an EEPROM. A real image is kept byte for byte; the description
-//! made from it says what the device behind it must do. Where an image is silent, as about the mapping of a device
-//! whose PDOs are only in its dictionary, what is missing is filled in so that SyncManagers and dictionary agree.
+//! Converts between [`DeviceDescription`] and the bytes of an EEPROM. A real image is kept byte for byte; the
+//! description derived from it defines the behaviour of the device. If an image lacks information, such as the mapping
+//! of a device with PDOs only in its dictionary, substitutes are added so that SyncManagers and dictionary agree.
 
 mod reader;
 
@@ -18,15 +18,15 @@ use crate::description::{DeviceDescription, PdoDescription};
 
 /// Bytes per KBit, the unit of the size word.
 const BYTES_PER_KBIT: usize = 128;
-/// Largest EEPROM that the size word can name.
+/// Largest EEPROM that the size word can describe.
 const MAX_IMAGE_BYTES: usize = 0x1_0000 * BYTES_PER_KBIT;
-/// Most characters of a string that are written.
+/// Maximum number of characters of a string.
 const MAX_STRING: usize = 255;
 
-/// Why an SII image makes no device.
+/// The reason for which an SII image is no device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptionError {
-    /// The image itself is broken.
+    /// The image is invalid.
     Sii(SiiError),
     /// More SyncManagers than a controller has.
     SyncManagers {
@@ -50,12 +50,12 @@ impl fmt::Display for DescriptionError {
 
 impl std::error::Error for DescriptionError {}
 
-/// The EEPROM content of a device: the real image where there is one, with the alias and the serial number of the
-/// description. An image made from the description grows beyond the declared size where the content needs it; strings
-/// beyond 255 and entries beyond what the format holds are left out.
+/// The EEPROM content of a device: the real image if there is one, with the alias and the serial number of the
+/// description. An image derived from the description grows beyond the declared size if the content needs it; strings
+/// beyond 255 and entries beyond the limits of the format are omitted.
 pub fn build(description: &DeviceDescription) -> Vec<u8> {
     if let Some(image) = &description.sii_image {
-        return personalise(image.clone(), description);
+        return with_alias_and_serial(image.clone(), description);
     }
     let mut size = description.sii_size_bytes.next_multiple_of(BYTES_PER_KBIT).clamp(BYTES_PER_KBIT, MAX_IMAGE_BYTES);
     loop {
@@ -65,14 +65,14 @@ pub fn build(description: &DeviceDescription) -> Vec<u8> {
             Err(SiiWriteError::Full { expected, .. }) if size < MAX_IMAGE_BYTES => {
                 size = expected.max(size + 1).next_multiple_of(BYTES_PER_KBIT).min(MAX_IMAGE_BYTES);
             }
-            // What cannot be written at all ends the chain of categories before it.
+            // An item that cannot be written ends the list of categories before it.
             Err(_) => return image,
         }
     }
 }
 
-/// Writes alias and serial number into a real image; the same ones leave it as it is.
-fn personalise(mut image: Vec<u8>, description: &DeviceDescription) -> Vec<u8> {
+/// Writes alias and serial number into a real image; equal values leave it unchanged.
+fn with_alias_and_serial(mut image: Vec<u8>, description: &DeviceDescription) -> Vec<u8> {
     if let Some(bytes) = image.first_chunk_mut::<{ SiiHeader::LEN }>() {
         let mut header = SiiHeader::decode(bytes);
         let serial = description.identity.serial;
@@ -86,18 +86,18 @@ fn personalise(mut image: Vec<u8>, description: &DeviceDescription) -> Vec<u8> {
     image
 }
 
-/// Bytes of an image that mean something: up to the end marker.
+/// Used bytes of an image, up to the end marker.
 pub fn used_bytes(description: &DeviceDescription) -> usize {
     let mut image = vec![0; build(description).len()];
     write(description, &mut image).unwrap_or(image.len())
 }
 
-/// Strings of an image with their numbers.
+/// Strings of an image with their indices.
 #[derive(Default)]
 struct StringTable<'a>(Vec<&'a str>);
 
 impl<'a> StringTable<'a> {
-    /// The number of a string, 0 for none.
+    /// The index of a string, 0 for none.
     fn number(&mut self, string: &'a str) -> u8 {
         let end = (0..=string.len().min(MAX_STRING)).rev().find(|end| string.is_char_boundary(*end)).unwrap_or(0);
         let string = &string[..end];
@@ -152,18 +152,18 @@ fn write(description: &DeviceDescription, image: &mut [u8]) -> Result<usize, Sii
     writer.finish()
 }
 
-/// The name that a MainDevice reads.
+/// The name in the SII.
 fn name(description: &DeviceDescription) -> &str {
     description.name_in_sii.as_ref().unwrap_or(&description.name)
 }
 
-/// Reserved words 0x20 to 0x23, among those from 0x1D on.
-const IMPRINT: core::ops::Range<usize> = 3..7;
+/// Offsets of reserved words 0x20 to 0x23, counted from word 0x1D.
+const CONTENT_HASH: core::ops::Range<usize> = 3..7;
 
-/// Tells the contents of one device from those of others of its kind that have another name: what follows the fixed
-/// area is not the same then, and MainDevices that read the rest once for all with the same fixed area would not see
-/// it. In many real images these words differ, too. 64 bits of FNV-1a.
-fn imprint(description: &DeviceDescription) -> [u16; 4] {
+/// A hash that distinguishes the content of devices with a different name: MainDevices cache the categories of devices
+/// with an equal fixed area, but these devices differ in their categories. These words also differ in many real images.
+/// 64 bits of FNV-1a.
+fn content_hash(description: &DeviceDescription) -> [u16; 4] {
     let Some(name) = &description.name_in_sii else { return [0; 4] };
     let hash = name
         .bytes()
@@ -175,7 +175,7 @@ fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
     let kbit = u16::try_from(size_bytes / BYTES_PER_KBIT - 1).unwrap_or(u16::MAX);
     let mailbox = description.mailbox;
     let mut reserved_1d = SiiHeader::default().reserved_1d;
-    reserved_1d[IMPRINT].copy_from_slice(&imprint(description));
+    reserved_1d[CONTENT_HASH].copy_from_slice(&content_hash(description));
     let esc_configuration = description.esc_configuration & !1 | u8::from(description.emulation);
     let [a, b, c, d] = description.pdi_configuration;
     SiiHeader {
@@ -194,8 +194,7 @@ fn header(description: &DeviceDescription, size_bytes: usize) -> SiiHeader {
 }
 
 fn general<'a>(description: &'a DeviceDescription, strings: &mut StringTable<'a>) -> General {
-    // String 1 is the order code, as in real images: some MainDevices take it for the name without asking this
-    // category.
+    // String 1 is the order code, as in real images: some MainDevices use it as name without reading this category.
     let order = strings.number(&description.order_code);
     let group = strings.number(&description.group);
     let protocols = description.mailbox.map(|mailbox| mailbox.protocols).unwrap_or_default();
@@ -239,7 +238,7 @@ fn physical_ports(ports: &[PortKind; 4]) -> u16 {
     })
 }
 
-/// The PDOs of one direction with their entries, as the writer takes them.
+/// The PDOs of one direction with their entries, for the writer.
 struct PdoTable<'a> {
     heads: Vec<(&'a PdoDescription, u8)>,
     entries: Vec<Vec<PdoEntry>>,

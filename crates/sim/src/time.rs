@@ -1,7 +1,7 @@
 //! Virtual time: nanoseconds since the start of the simulation.
 //!
-//! In: nothing; the network moves it. Out: [`SimTime`], an instant that is added to and subtracted from with
-//! [`Duration`]. No wall clock is read anywhere in this crate.
+//! [`SimTime`] is an instant that is added to and subtracted from with [`Duration`]; the network advances it. This
+//! crate reads no wall clock.
 
 use core::fmt;
 use core::ops::{Add, AddAssign, Sub};
@@ -14,7 +14,7 @@ pub struct SimTime(pub u64);
 impl SimTime {
     /// The start of the simulation.
     pub const ZERO: SimTime = SimTime(0);
-    /// Later than anything that happens.
+    /// Later than any event.
     pub const NEVER: SimTime = SimTime(u64::MAX);
 
     /// From nanoseconds.
@@ -37,7 +37,7 @@ impl SimTime {
         self.0
     }
 
-    /// The time since `earlier`, zero where `earlier` is later.
+    /// The time since `earlier`; zero if `earlier` is later.
     pub const fn since(self, earlier: SimTime) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }

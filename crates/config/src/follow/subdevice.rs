@@ -92,12 +92,12 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
         Addressing::AutoIncrement if bus.groups[index].is_some() => true,
         Addressing::AutoIncrement => match subdevice.auto_increment {
             Some(own) if own != adp && subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: it would reach no SubDevice, so it is not sent \
+                "{name} counts positions, but Adp {adp} is the PhysAddr; no SubDevice has this position: not sent \
                  (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(own) if own != adp => note(format!("{name} with Adp {adp} goes to another SubDevice: not sent")),
             None if subdevice.station == Some(adp) => note(format!(
-                "{name} counts positions, and Adp {adp} is the PhysAddr: it would reach no SubDevice, so it is not sent \
+                "{name} counts positions, but Adp {adp} is the PhysAddr; no SubDevice has this position: not sent \
                  (Cmd 4 and 5 address by PhysAddr)"
             )),
             Some(_) | None => true,

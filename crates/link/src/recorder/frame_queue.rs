@@ -79,7 +79,7 @@ pub fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
 }
 
 impl Producer {
-    /// Appends a frame; false (and counted) where the queue is full.
+    /// Appends a frame; false (and counted) if the queue is full.
     pub fn push(&mut self, note: Note, frame: &[u8]) -> bool {
         let shared = &*self.shared;
         let frame = &frame[..frame.len().min(LONGEST)];

@@ -127,7 +127,7 @@ fn frames_lost_to_a_full_queue_are_in_the_statistics() {
     assert_eq!(statistics.len(), 2);
     for (interface, body) in statistics.into_iter().enumerate() {
         assert_eq!(word(body, 0) as usize, interface);
-        // Three options of eight bytes behind interface and time: seen, lost, lost by the kernel.
+        // Three options of eight bytes after interface and time: seen, lost, lost by the kernel.
         let option = |at: usize| (word(body, 12 + 12 * at), u64::from(word(body, 16 + 12 * at)));
         let of = recorded[interface];
         assert_eq!(option(0), (0x0008_0004, of.received + of.sent + of.lost));

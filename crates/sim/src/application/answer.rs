@@ -1,4 +1,4 @@
-//! Result of a mailbox message: a protocol server gives it, the mailbox sends it.
+//! Result of a mailbox message: a protocol server returns it, the mailbox sends it.
 
 /// Result of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]

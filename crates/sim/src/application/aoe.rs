@@ -17,7 +17,7 @@ pub const MEMORY: u32 = 0x4020;
 /// Bytes of the memory.
 pub const MEMORY_BYTES: usize = 4096;
 
-/// ADS states: as after start-up, at work, at rest.
+/// ADS states: after start-up, running, stopped.
 const ADS_RUN: u16 = 5;
 const ADS_STOP: u16 = 6;
 const COMPLETE_ACCESS: u32 = 1 << 8;
@@ -32,7 +32,7 @@ pub struct AoeServer {
 }
 
 impl AoeServer {
-    /// The server of a device whose mailbox is opened.
+    /// The server of a device when its mailbox is opened.
     pub fn new(description: &AoeDescription, device_name: &str) -> AoeServer {
         let mut name = [0; 16];
         for (place, byte) in name[..15].iter_mut().zip(device_name.bytes()) {

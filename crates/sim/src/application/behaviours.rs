@@ -7,22 +7,22 @@ use core::fmt;
 
 use crate::time::SimTime;
 
-/// Computes inputs from the time and the outputs that are valid now.
+/// Computes inputs from the time and the currently valid outputs.
 pub type InputFunction = fn(SimTime, outputs: &[u8], inputs: &mut [u8]);
 
-/// Source of the inputs. Longer values are cut, shorter ones are filled with zeros.
+/// Source of the inputs. Longer values are truncated, shorter ones are filled with zeros.
 #[derive(Clone)]
 pub enum InputSource {
-    /// The same bytes until the test changes them.
+    /// The same bytes until a test changes them.
     Constant(Vec<u8>),
     /// The device's own valid outputs.
     Outputs,
-    /// A function, called anew after each exchange of process data.
+    /// A function, called after each exchange of process data.
     Function(InputFunction),
 }
 
 impl InputSource {
-    /// The value changes without new outputs.
+    /// Whether the value changes without new outputs.
     pub const fn varies_with_time(&self) -> bool {
         matches!(self, InputSource::Function(_))
     }
@@ -47,7 +47,7 @@ impl fmt::Debug for InputSource {
     }
 }
 
-/// What the application does with process data.
+/// Handling of process data.
 #[derive(Clone, Debug)]
 pub enum Behaviour {
     /// Outputs are kept for inspection, inputs come from a source.
@@ -77,7 +77,7 @@ pub fn sawtooth_16(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     }
 }
 
-/// A bit pattern that counts up once per 10 ms, for digital inputs that change by themselves.
+/// A bit pattern that counts up every 10 ms, for digital inputs that change without outputs.
 pub fn counter_10_ms(now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     let count = (now.0 / 10_000_000).to_le_bytes();
     for (byte, value) in inputs.iter_mut().zip(count) {

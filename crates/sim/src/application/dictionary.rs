@@ -1,10 +1,9 @@
 //! The object dictionary of a simulated SubDevice (protocol 6.3).
 //!
-//! Input: the device's description, from which the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
-//! assignments (0x1C10 + SyncManager) and the mapped objects follow; reads and writes by index and sub index. Output:
-//! bytes or an abort code. `entry` defines entries, `history` the diagnosis history, `sync` the synchronisation
-//! parameters. The SDO services are in [`coe`](super::coe), the process data of a given assignment in
-//! [`process_data`](super::process_data).
+//! Input: the device's description, which defines the standard objects, the PDO mappings (0x16xx, 0x1Axx), the PDO
+//! assignments (0x1C10 + SyncManager) and the mapped objects; reads and writes by index and subindex. Output: bytes or
+//! an abort code. `entry` defines entries, `history` the diagnosis history, `sync` the synchronisation parameters. The
+//! SDO services are in [`coe`](super::coe), the process data of an assignment in [`process_data`](super::process_data).
 
 mod diagnosis;
 mod entry;
@@ -31,14 +30,14 @@ pub use sync::SyncParameters;
 #[derive(Clone, Debug, Default)]
 pub struct Dictionary {
     objects: Vec<Object>,
-    /// Messages of the diagnosis history that were not acknowledged.
+    /// Number of unacknowledged messages of the diagnosis history.
     unacknowledged: u8,
-    /// Counts changes of values.
+    /// Counter of value changes.
     revision: u32,
 }
 
 impl Dictionary {
-    /// The dictionary of a description; it has PDO lists even where no CoE makes them visible.
+    /// The dictionary of a description; it has PDO lists also for devices without CoE.
     pub fn new(description: &DeviceDescription) -> Dictionary {
         Dictionary { objects: objects::build(description), unacknowledged: 0, revision: 0 }
     }
@@ -48,17 +47,17 @@ impl Dictionary {
         &self.objects
     }
 
-    /// Looks an object up.
+    /// Finds an object.
     pub fn object(&self, index: u16) -> Option<&Object> {
         self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|place| &self.objects[place])
     }
 
-    /// Counts changes: equal counts mean equal values.
+    /// Counter of value changes: equal counters mean equal values.
     pub const fn revision(&self) -> u32 {
         self.revision
     }
 
-    /// Index, sub index and value of all entries of these objects, numbers sign-extended.
+    /// Index, subindex and value of all entries of these objects, numbers sign-extended.
     pub fn numbers(&self, indices: core::ops::RangeInclusive<u16>) -> impl Iterator<Item = (u16, u8, u64)> {
         let objects = self.objects.iter().filter(move |object| indices.contains(&object.index));
         objects.flat_map(|object| {
@@ -66,7 +65,7 @@ impl Dictionary {
         })
     }
 
-    /// An object before a change.
+    /// An object to be changed.
     fn object_mut(&mut self, index: u16) -> Option<&mut Object> {
         self.revision = self.revision.wrapping_add(1);
         let place = self.objects.binary_search_by_key(&index, |object| object.index).ok()?;
@@ -80,7 +79,7 @@ impl Dictionary {
         if entry.access == Access::WriteOnly { Err(AbortCode::WRITE_ONLY) } else { Ok(&entry.value) }
     }
 
-    /// All entries from sub index 0 (padded to 16 bits) or 1 on, packed (protocol 6.3, complete access).
+    /// All entries from subindex 0 (padded to 16 bits) or 1 on, packed (protocol 6.3, complete access).
     pub fn read_complete(&self, index: u16, from: u8) -> Result<Vec<u8>, AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let mut bytes = Vec::new();
@@ -97,7 +96,7 @@ impl Dictionary {
         Ok(bytes)
     }
 
-    /// Writes one entry by SDO, in `state`.
+    /// Writes one entry by SDO in `state`.
     pub fn write(&mut self, index: u16, sub_index: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
         self.check_write(index, sub_index, data, state)?;
         let object = self.object_mut(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
@@ -110,7 +109,7 @@ impl Dictionary {
         Ok(())
     }
 
-    /// Writes a whole list by SDO: entries first, then their number, all or nothing.
+    /// Writes a whole list by SDO: first the entries, then their number; an error changes nothing.
     pub fn write_complete(&mut self, index: u16, from: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
         let before = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?.clone();
         let result = self.write_parts(&before, from, data, state);
@@ -156,7 +155,7 @@ impl Dictionary {
         }
     }
 
-    /// Whether this number of bytes may be written to an entry by SDO in `state`, whatever their values.
+    /// Whether an SDO may write this number of bytes to an entry in `state`, for any values.
     pub fn check_access(&self, index: u16, sub_index: u8, length: usize, state: AlState) -> Result<(), AbortCode> {
         let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
@@ -199,7 +198,7 @@ impl Dictionary {
         }
     }
 
-    /// Whether an entry may be mapped in this direction. Without a direction in its rights, it may be in both.
+    /// Whether an entry may be mapped in this direction. Access rights without a direction permit both.
     fn check_mapped(&self, direction: PdoDirection, data: &[u8]) -> Result<(), AbortCode> {
         let mapped = MappedEntry::decode(data).ok_or(AbortCode::LENGTH_TOO_SHORT)?;
         if mapped.bit_length == 0 {
@@ -220,7 +219,7 @@ impl Dictionary {
         if mapped.index >= 0x2000 && fits && directed { Ok(()) } else { Err(AbortCode::CANNOT_BE_MAPPED) }
     }
 
-    /// Sets a value from inside the device; a value of another length is cut or filled with zeros.
+    /// Sets a value from inside the device; a value of another length is truncated or filled with zeros.
     pub fn set(&mut self, index: u16, sub_index: u8, data: &[u8]) {
         if let Some(entry) = self.object_mut(index).and_then(|object| object.entry_mut(sub_index)) {
             for (place, byte) in entry.value.iter_mut().enumerate() {
@@ -229,21 +228,21 @@ impl Dictionary {
         }
     }
 
-    /// Sets a value from inside the device, whatever its length.
+    /// Sets a value of any length from inside the device.
     pub fn replace(&mut self, index: u16, sub_index: u8, data: &[u8]) {
         if let Some(entry) = self.object_mut(index).and_then(|object| object.entry_mut(sub_index)) {
             entry.value = data.into();
         }
     }
 
-    /// PDO indices that are assigned to a SyncManager now.
+    /// PDO indices that are currently assigned to a SyncManager.
     pub fn assigned(&self, sync_manager: u8) -> impl Iterator<Item = u16> {
         let object = self.object(ASSIGNMENT_BASE + u16::from(sync_manager));
         let entries = object.into_iter().flat_map(Object::listed);
         entries.filter_map(|entry| entry.value.first_chunk().map(|bytes| u16::from_le_bytes(*bytes)))
     }
 
-    /// What a PDO maps now.
+    /// Entries currently mapped to a PDO.
     pub fn mapped(&self, pdo: u16) -> impl Iterator<Item = MappedEntry> {
         self.object(pdo).into_iter().flat_map(Object::listed).filter_map(|entry| MappedEntry::decode(&entry.value))
     }

@@ -1,6 +1,6 @@
-//! The EoE server of a device: frames in fragments, an IP stack or a loop behind them, IP parameters (protocol 6.5).
+//! The EoE server of a device: frames in fragments, an IP stack or a loop, IP parameters (protocol 6.5).
 //!
-//! Input: the payload of an EoE message, virtual time. Output: the answer, and frames of the device. [`reassembly`]
+//! Input: the payload of an EoE message, virtual time. Output: the response, and frames of the device. [`reassembly`]
 //! joins fragments, [`stack`] is an IP stack that answers ping and serves TCP. Time stamps are in virtual time.
 
 mod addresses;
@@ -25,7 +25,7 @@ pub use addresses::Addresses;
 
 /// Messages of the device that wait for room in the mailbox.
 const MAX_WAITING: usize = 64;
-/// Room of messages without a frame: the address filter is the longest.
+/// Size of messages without a frame: the address filter is the longest.
 const MAX_OTHER: usize = 128;
 
 /// The server with its state between messages.
@@ -50,7 +50,7 @@ enum End {
 }
 
 impl EoeServer {
-    /// The server of a device whose mailbox is opened.
+    /// The server of a device when its mailbox is opened.
     pub fn new(description: &EoeDescription) -> EoeServer {
         let unset = Ipv4Addr::UNSPECIFIED;
         let addresses = Addresses {
@@ -127,7 +127,7 @@ impl EoeServer {
             match &mut self.end {
                 End::Stack(stack) => {
                     stack.receive(frame);
-                    self.let_stack_work(room, now);
+                    self.run_stack(room, now);
                 }
                 End::Loop => payloads = self.cut(port, &frame, room),
                 End::Nothing => {}
@@ -141,8 +141,8 @@ impl EoeServer {
     }
 
     /// Runs the due work of the stack; its frames wait for the mailbox.
-    pub fn let_stack_work(&mut self, room: usize, now: SimTime) {
-        // A stack with blocked output stops.
+    pub fn run_stack(&mut self, room: usize, now: SimTime) {
+        // A stack with a full output queue pauses.
         while self.waiting.len() < MAX_WAITING {
             let End::Stack(stack) = &mut self.end else {
                 return;
@@ -158,7 +158,7 @@ impl EoeServer {
     /// Next time at which the stack has work without input.
     pub fn next_deadline(&mut self, now: SimTime) -> Option<SimTime> {
         match &mut self.end {
-            // While frames wait for the mailbox, the mailbox determines the progress.
+            // While frames wait for the mailbox, the mailbox determines the next step.
             End::Stack(stack) if self.waiting.is_empty() => stack.next_deadline(now),
             End::Stack(_) | End::Loop | End::Nothing => None,
         }
@@ -204,7 +204,7 @@ impl EoeServer {
         new.gateway = parameters.gateway.unwrap_or(new.gateway);
         new.dns = parameters.dns.unwrap_or(new.dns);
         new.name = parameters.name.map_or(new.name, <[u8]>::to_vec);
-        if !new.make_sense() {
+        if !new.are_valid() {
             return EoeResult::UNSPECIFIED;
         }
         if let End::Stack(stack) = &mut self.end {

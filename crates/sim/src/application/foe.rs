@@ -1,8 +1,9 @@
 //! The FoE server of a device: files to be read and written, a boot loader for its firmware (protocol 6.4).
 //!
-//! Input: the payload of a FoE message, the state, virtual time. Output: the answer. [`files`] keeps written files over
-//! power cycles, [`firmware`] defines images. In BOOT only the firmware is served; it can be written in no other state.
-//! Erasing the old firmware takes time, with BUSY as answer; an incomplete firmware leaves the device without one.
+//! Input: the payload of a FoE message, the state, virtual time. Output: the response. [`files`] keeps written files
+//! over power cycles, [`firmware`] defines images. In BOOT only the firmware is served; it can be written only there.
+//! Erasing the old firmware takes time, during which the response is BUSY. An incomplete firmware leaves the device
+//! without firmware.
 
 pub mod files;
 pub mod firmware;
@@ -15,7 +16,7 @@ use crate::description::FoeDescription;
 use crate::time::SimTime;
 use files::FileStore;
 
-/// Most text that an error carries.
+/// Maximum length of an error text.
 const MAX_TEXT: usize = 64;
 /// Total of the BUSY progress.
 const BUSY_ENTIRE: u16 = 100;
@@ -23,17 +24,17 @@ const BUSY_ENTIRE: u16 = 100;
 /// Context of a transfer.
 #[derive(Debug)]
 pub struct Files<'a> {
-    /// What the device says about itself.
+    /// Settings of the server.
     pub description: &'a FoeDescription,
     /// Non-volatile files.
     pub store: &'a mut FileStore,
-    /// The device is in BOOT.
+    /// Whether the device is in BOOT.
     pub boot: bool,
     /// Data bytes of each packet to the device except the last.
     pub receive_data: usize,
     /// Data bytes of each packet from the device except the last.
     pub send_data: usize,
-    /// The present time.
+    /// Current time.
     pub now: SimTime,
 }
 
@@ -51,7 +52,7 @@ enum Transfer {
     Write { name: Vec<u8>, data: Vec<u8>, packet: u32, erased_at: Option<SimTime> },
 }
 
-/// Why a message ends the transfer.
+/// The reason for which a message ends the transfer.
 struct Failure(FoeErrorCode, &'static str);
 
 impl FoeServer {
@@ -68,8 +69,8 @@ impl FoeServer {
             FoeMessage::Read { password, name } => self.read(password, name, files),
             FoeMessage::Write { password, name } => self.write(password, name, files),
             FoeMessage::Data { packet, data } => self.take(packet, data, files),
-            FoeMessage::Acknowledge { packet } => self.go_on(packet, files),
-            FoeMessage::Busy { .. } => self.again(files),
+            FoeMessage::Acknowledge { packet } => self.next_packet(packet, files),
+            FoeMessage::Busy { .. } => self.current_packet(files),
             FoeMessage::Error { .. } => {
                 self.transfer = None;
                 return Answer::Silence;
@@ -86,7 +87,7 @@ impl FoeServer {
         check(password, name, files)?;
         let data = files.store.file(name).ok_or(Failure(FoeErrorCode::NOT_FOUND, "no such file"))?.to_vec();
         self.transfer = Some(Transfer::Read { data, packet: 1 });
-        self.again(files)
+        self.current_packet(files)
     }
 
     fn write(&mut self, password: u32, name: &[u8], files: &Files<'_>) -> Result<Answer, Failure> {
@@ -99,8 +100,8 @@ impl FoeServer {
         Ok(encode(&FoeMessage::Acknowledge { packet: 0 }))
     }
 
-    /// The packet of a file that is being read, first time or repeated.
-    fn again(&self, files: &Files<'_>) -> Result<Answer, Failure> {
+    /// The current packet of a read, for the first time or repeated.
+    fn current_packet(&self, files: &Files<'_>) -> Result<Answer, Failure> {
         let Some(Transfer::Read { data, packet }) = &self.transfer else {
             return Err(Failure(FoeErrorCode::ILLEGAL, "nothing is being read"));
         };
@@ -109,20 +110,20 @@ impl FoeServer {
         Ok(encode(&FoeMessage::Data { packet: *packet, data: piece }))
     }
 
-    fn go_on(&mut self, acknowledged: u32, files: &Files<'_>) -> Result<Answer, Failure> {
+    fn next_packet(&mut self, acknowledged: u32, files: &Files<'_>) -> Result<Answer, Failure> {
         let Some(Transfer::Read { data, packet }) = &mut self.transfer else {
             return Err(Failure(FoeErrorCode::ILLEGAL, "nothing is being read"));
         };
         if acknowledged != *packet {
             return Err(Failure(FoeErrorCode::PACKET_NUMBER_WRONG, "acknowledged another packet"));
         }
-        // The packet that was shorter than the others was the last one.
+        // A packet shorter than the others was the last one.
         if files.send_data.saturating_mul(*packet as usize) > data.len() {
             self.transfer = None;
             return Ok(Answer::Silence);
         }
         *packet += 1;
-        self.again(files)
+        self.current_packet(files)
     }
 
     fn take(&mut self, number: u32, piece: &[u8], files: &mut Files<'_>) -> Result<Answer, Failure> {

@@ -1,4 +1,4 @@
-//! The application's mail: passes messages to the servers, sends answers and unsolicited mail (protocol 6).
+//! Mail of the application: passes messages to the servers, sends responses and unsolicited mail (protocol 6).
 //!
 //! Input: AL events of the mailbox SyncManagers, the time, emergencies and diagnosis messages of the device, faults.
 //! Output: mail that the MainDevice reads.
@@ -19,19 +19,20 @@ use crate::time::SimTime;
 const NEW_DIAGNOSIS: u16 = 0xFF00;
 /// Object 0x1001.
 const ERROR_REGISTER: u16 = 0x1001;
-/// Most bytes of a message in the diagnosis history.
+/// Maximum number of bytes of a message in the diagnosis history.
 const MAX_DIAGNOSIS: usize = 256;
 
 /// Capacity of a record; later requests are not recorded.
 const MAX_RECORDED: usize = 1 << 18;
 
 impl Application {
-    /// Starts to record served requests; earlier ones are dropped. A restart of the device does not end the record.
+    /// Starts recording served requests; earlier records are dropped. A restart of the device does not end the
+    /// recording.
     pub fn record_mail(&mut self) {
         self.record = Some(Vec::new());
     }
 
-    /// Requests served since the record began, the oldest first.
+    /// Requests served since the start of the recording, oldest first.
     pub fn served_mail(&self) -> &[ServedMail] {
         self.record.as_deref().unwrap_or_default()
     }
@@ -47,14 +48,14 @@ impl Application {
         self.mailbox.as_mut().is_some_and(|mailbox| mailbox.post(protocol, payload, ready))
     }
 
-    /// Sends an emergency and sets the error register; false where it cannot be sent.
+    /// Sends an emergency and sets the error register; false if it cannot be sent.
     pub fn emergency(&mut self, emergency: &Emergency) -> bool {
         self.dictionary.set(ERROR_REGISTER, 0, &[emergency.error_register]);
         self.post(Protocol::Coe, emergency_payload(emergency))
     }
 
-    /// Adds a message to the diagnosis history, with the present time and these parameters; an emergency reports it
-    /// where the flags say so. False where it is not kept.
+    /// Adds a message to the diagnosis history, with the current time and these parameters; an emergency reports it if
+    /// the flags request this. False if the message is not stored.
     pub fn diagnose(&mut self, message: &DiagnosisMessage<'_>, parameters: &[DiagnosisParameter<'_>]) -> bool {
         let mut bytes = vec![0; MAX_DIAGNOSIS];
         let mut length = DiagnosisMessage::OVERHEAD;
@@ -92,7 +93,7 @@ impl Application {
         let (Some(mailbox), Some(declared)) = (&mut self.mailbox, description.mailbox) else {
             return;
         };
-        // An answer that leaves makes room for the waiting message.
+        // Sending a response makes room for the waiting message.
         mailbox.send(controller, now);
         let servers = &mut self.servers;
         if let Some(message) = mailbox.take(controller, events, &self.faults, now) {

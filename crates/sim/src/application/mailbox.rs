@@ -1,8 +1,8 @@
-//! The SubDevice's end of the mailbox: counters, duplicates, answers in order, repeat of a lost one (protocol 6.1,
+//! The mailbox of the SubDevice: counters, duplicates, order of responses, repetition of a lost response (protocol 6.1,
 //! 6.2).
 //!
 //! Input: AL events of the two mailbox SyncManagers, virtual time, [`faults`]. Output: messages for a protocol server
-//! and, some time later, its answers in the send mailbox, with unsolicited mail in between. The servers
+//! and, after the response time, its responses in the send mailbox, interleaved with unsolicited mail. The servers
 //! ([`servers`](super::servers)) interpret the messages.
 
 pub mod faults;
@@ -21,12 +21,13 @@ use crate::controller::Controller;
 use crate::time::SimTime;
 use faults::MailFaults;
 
-/// Answers that may wait for the send mailbox; beyond this, messages stay in the receive mailbox.
+/// Maximum number of responses waiting for the send mailbox; beyond it, messages stay in the receive mailbox.
 const MAX_ANSWERS: usize = 4;
 
-/// Unsolicited messages of servers that may wait; more of them would delay requests too long.
+/// Maximum number of unsolicited messages of servers waiting; more would delay requests too long.
 const MAX_OWN: usize = 2;
-/// Messages that may wait for the send mailbox, answers and others together; further others are dropped.
+/// Maximum number of messages waiting for the send mailbox, responses and others; further unsolicited messages are
+/// dropped.
 const MAX_POSTED: usize = 64;
 
 /// A message that waits for the send mailbox.
@@ -34,19 +35,19 @@ const MAX_POSTED: usize = 64;
 struct Queued {
     ready: SimTime,
     mail: Mail,
-    /// The message is written twice, both times with the same counter.
+    /// Whether the message is written twice with the same counter.
     twice: bool,
 }
 
 #[derive(Clone, Debug)]
 enum Mail {
-    /// A new message, which gets its counter when it is sent, unless a fault gives it this one.
+    /// A new message. Its counter is assigned when it is sent, unless a fault sets this value.
     New { protocol: Protocol, address: u16, payload: Vec<u8>, counter: Option<u8> },
-    /// A repeated message, byte for byte.
+    /// A repetition, byte for byte.
     Again(Vec<u8>),
 }
 
-/// The mailbox of a device while it is in use.
+/// The mailbox of a device in operation.
 #[derive(Clone, Debug)]
 pub struct Mailbox {
     layout: MailboxLayout,
@@ -55,17 +56,17 @@ pub struct Mailbox {
     received_counter: u8,
     sent_counter: u8,
     queue: VecDeque<Queued>,
-    /// The last answer put into the send mailbox, and the one before it.
+    /// The last response written to the send mailbox, and the one before it.
     last: Option<Vec<u8>>,
     before_last: Option<Vec<u8>>,
     repeat: bool,
-    /// An answer is ready and the send mailbox is full.
+    /// Whether a response is ready while the send mailbox is full.
     blocked: bool,
 }
 
 impl Mailbox {
-    /// The mailbox is opened; the value of the repeat request in the register is the initial one (protocol 6.2, step
-    /// 4).
+    /// Opens the mailbox; the current value of the repeat request in the register is the initial one (protocol 6.2,
+    /// step 4).
     pub fn open(
         layout: MailboxLayout,
         (receive_manager, send_manager): (u8, u8),
@@ -102,12 +103,12 @@ impl Mailbox {
         receive | send
     }
 
-    /// When the next message is ready for sending.
+    /// Time at which the next message is ready for sending.
     pub fn next_deadline(&self) -> Option<SimTime> {
         if self.blocked { None } else { self.queue.iter().map(|queued| queued.ready).min() }
     }
 
-    /// Takes the message in the receive mailbox, if there is one and its answer can be queued.
+    /// Takes the message from the receive mailbox, if there is one and its response can be queued.
     pub fn take(
         &mut self,
         controller: &mut Controller,
@@ -123,7 +124,8 @@ impl Mailbox {
         controller.pdi_read(RegisterAddress(self.layout.receive_offset), &mut bytes, now).then_some(bytes)
     }
 
-    /// Serves one message with `server`, which receives protocol and payload. Its answers are sent at `ready` or later.
+    /// Serves one message with `server`, which receives protocol and payload. Its responses are sent at `ready` or
+    /// later.
     pub fn serve(
         &mut self,
         bytes: &[u8],
@@ -162,7 +164,7 @@ impl Mailbox {
         }
     }
 
-    /// Whether few enough messages wait that servers may add unsolicited ones.
+    /// Whether servers may add unsolicited messages.
     pub fn has_room(&self) -> bool {
         self.queue.len() < MAX_OWN
     }
@@ -177,7 +179,7 @@ impl Mailbox {
         usize::from(self.layout.send_size).saturating_sub(Header::LEN)
     }
 
-    /// Sends an unsolicited message; false with too many waiting.
+    /// Sends an unsolicited message; false if too many are waiting.
     pub fn post(&mut self, protocol: Protocol, payload: Vec<u8>, ready: SimTime) -> bool {
         if self.queue.len() >= MAX_POSTED || payload.len() > self.room() {
             return false;
@@ -221,7 +223,7 @@ impl Mailbox {
         bytes
     }
 
-    /// Puts the next ready message into the send mailbox if there is room.
+    /// Writes the next ready message to the send mailbox if that is empty.
     pub fn send(&mut self, controller: &mut Controller, now: SimTime) {
         self.blocked = false;
         let Some(place) = self.queue.iter().position(|queued| queued.ready <= now) else {
@@ -232,7 +234,7 @@ impl Mailbox {
         };
         let bytes = self.encode(mail);
         if !controller.pdi_write(RegisterAddress(self.layout.send_offset), &bytes, now) {
-            // It has its counter and remains the next one.
+            // The message has its counter and remains the next one.
             self.queue.push_front(Queued { ready, mail: Mail::Again(bytes), twice });
             self.blocked = true;
             return;
@@ -245,7 +247,7 @@ impl Mailbox {
         self.blocked = self.queue.iter().any(|next| next.ready <= now);
     }
 
-    /// The activation of a SyncManager changed: repeats the last answer if the MainDevice requests it.
+    /// Handles a changed activation of a SyncManager: repeats the last response if the MainDevice requests it.
     pub fn check_repeat(&mut self, controller: &mut Controller, now: SimTime) {
         let manager = self.read_send_manager(controller, now);
         if manager.activate.repeat_request == self.repeat {
@@ -253,7 +255,7 @@ impl Mailbox {
         }
         self.repeat = manager.activate.repeat_request;
         let lost = if manager.status.mailbox_full {
-            // The waiting message was put there after the lost one had been read; it goes second.
+            // The waiting message was written after the lost response had been read; it follows the repetition.
             if let Some(waiting) = self.last.take() {
                 self.queue.push_front(Queued { ready: now, mail: Mail::Again(waiting), twice: false });
             }
@@ -269,7 +271,7 @@ impl Mailbox {
         self.acknowledge_repeat(controller, now);
     }
 
-    /// Disabling and enabling a SyncManager discards its content.
+    /// Disables and enables the SyncManager, which discards its content.
     fn empty_send_mailbox(&self, controller: &mut Controller, now: SimTime) {
         for deactivate in [true, false] {
             self.write_pdi_control(deactivate, !self.repeat, controller, now);

@@ -1,17 +1,17 @@
-//! Where mapped objects are in the images of the process data.
+//! Positions of mapped objects in the images of the process data.
 //!
-//! Input: the areas of a direction, and the dictionary with assignment and mapping. Output: the place of an object, its
-//! value in an image.
+//! Input: the areas of a direction, and the dictionary with assignment and mapping. Output: the position of an object,
+//! and its value in an image.
 
 use super::dictionary::{Dictionary, MappedEntry};
 use super::settings::Area;
 
-/// A mapped entry and its place in the image of its direction.
+/// A mapped entry and its position in the image of its direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlacedEntry {
     /// The entry.
     pub entry: MappedEntry,
-    /// Its first bit.
+    /// First bit.
     pub bit_offset: usize,
 }
 
@@ -53,7 +53,7 @@ impl Mapping {
         })
     }
 
-    /// Sets the value of an object of up to 64 bits in an image; no effect where it is not mapped.
+    /// Sets the value of an object of up to 64 bits in an image; no effect if it is not mapped.
     pub fn set_value(&self, index: u16, sub_index: u8, value: u64, image: &mut [u8]) {
         let Some(placed) = self.find(index, sub_index) else {
             return;
@@ -70,7 +70,7 @@ impl Mapping {
 }
 
 impl PlacedEntry {
-    /// The bytes from that of the first bit on, zeros beyond the end of the image.
+    /// The bytes from the byte of the first bit on, with zeros beyond the end of the image.
     fn bytes(&self, image: &[u8]) -> [u8; 16] {
         let rest = image.get(self.bit_offset / 8..).unwrap_or_default();
         rest.first_chunk().copied().unwrap_or_else(|| {
@@ -80,7 +80,7 @@ impl PlacedEntry {
         })
     }
 
-    /// As many ones as it has bits, at most 64.
+    /// A mask with as many ones as the object has bits, at most 64.
     fn mask(&self) -> u64 {
         u64::MAX.checked_shr(64u32.saturating_sub(self.entry.bit_length.into())).unwrap_or(0)
     }

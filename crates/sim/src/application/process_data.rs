@@ -1,4 +1,4 @@
-//! Process data of a simulated SubDevice: outputs taken from the SyncManagers, inputs put into them.
+//! Process data of a simulated SubDevice: reads outputs from the SyncManagers, writes inputs to them.
 //!
 //! Input: the checked areas ([`Layout`]), AL events, virtual time. Output: the valid outputs (zero in the safe state)
 //! and inputs in the buffers. The state machine decides whether outputs may be used.
@@ -35,7 +35,7 @@ pub struct ProcessData {
     output_mapping: Mapping,
     input_mapping: Mapping,
     received: Vec<u8>,
-    /// Buffer of the previously received outputs.
+    /// Previously received outputs.
     before: Vec<u8>,
     outputs: Vec<u8>,
     inputs: Vec<u8>,
@@ -75,17 +75,17 @@ impl ProcessData {
         &self.inputs
     }
 
-    /// How often outputs were taken over in OP.
+    /// Number of times that outputs were latched in OP.
     pub const fn latched(&self) -> u64 {
         self.latched
     }
 
-    /// Outputs were received since SAFEOP was entered, or there are none to wait for.
+    /// Whether outputs were received since SAFEOP was entered, or there are none.
     pub fn outputs_seen(&self) -> bool {
         self.seen || !self.layout.outputs.iter().any(|area| area.event)
     }
 
-    /// A missing frame of outputs trips the watchdog.
+    /// Whether missing outputs trip the watchdog.
     pub fn is_watched(&self) -> bool {
         self.layout.outputs.iter().any(|area| area.watchdog)
     }
@@ -95,7 +95,7 @@ impl ProcessData {
         &self.layout
     }
 
-    /// The drive, where the device is one.
+    /// The drive, if the device is a drive.
     pub const fn servo(&self) -> Option<&Servo> {
         match &self.source {
             Source::Servo(servo) => Some(servo),
@@ -103,14 +103,14 @@ impl ProcessData {
         }
     }
 
-    /// Current value of an object that is mapped in the process data, or that the drive computes.
+    /// Current value of an object that is mapped or computed by the drive.
     pub fn value(&self, index: u16, sub_index: u8) -> Option<u64> {
         let output = || self.output_mapping.value(index, sub_index, &self.outputs);
         let mapped = self.input_mapping.value(index, sub_index, &self.inputs).or_else(output);
         mapped.or_else(|| self.servo().and_then(|servo| servo.value(index, sub_index)))
     }
 
-    /// The object is part of the outputs.
+    /// Whether the object is part of the outputs.
     pub fn is_output(&self, index: u16, sub_index: u8) -> bool {
         self.output_mapping.find(index, sub_index).is_some()
     }
@@ -122,7 +122,7 @@ impl ProcessData {
         outputs.chain(inputs).fold(0, |mask, area| mask | event_bit(area.sync_manager))
     }
 
-    /// A relevant SyncManager raises no event: it is checked after each frame.
+    /// Whether a SyncManager raises no event and has to be checked after each frame.
     pub fn is_polled(&self) -> bool {
         let silent = |areas: &[Area]| areas.iter().any(|area| !area.event);
         silent(&self.layout.outputs) || self.varies() && silent(&self.layout.inputs)
@@ -135,7 +135,7 @@ impl ProcessData {
         }
     }
 
-    /// The process data becomes active, outputs still in the safe state.
+    /// Starts the process data, with outputs in the safe state.
     pub fn start(&mut self, layout: Layout, dictionary: &Dictionary, controller: &mut Controller, now: SimTime) {
         let total = |areas: &[Area]| areas.iter().map(|area| usize::from(area.length)).sum::<usize>();
         self.output_mapping = Mapping::new(&layout.outputs, dictionary);
@@ -148,7 +148,7 @@ impl ProcessData {
         self.refresh(controller, now);
     }
 
-    /// The process data ends.
+    /// Stops the process data.
     pub fn stop(&mut self, now: SimTime) {
         self.outputs.fill(0);
         self.release_drive(now);
@@ -161,7 +161,7 @@ impl ProcessData {
         self.seen = false;
     }
 
-    /// Outputs go to the safe state.
+    /// Sets outputs to the safe state.
     pub fn make_safe(&mut self, controller: &mut Controller, now: SimTime) {
         self.outputs.fill(0);
         self.received.fill(0);
@@ -170,14 +170,14 @@ impl ProcessData {
         self.refresh(controller, now);
     }
 
-    /// Power comes or goes: a drive restarts.
+    /// Restarts a drive after power-on.
     pub fn power_on(&mut self, now: SimTime) {
         if let Source::Servo(servo) = &mut self.source {
             servo.power_on(now);
         }
     }
 
-    /// A drive moves up to now, whether or not there is process data.
+    /// Moves a drive up to `now`, with or without process data.
     pub fn advance(&mut self, now: SimTime) {
         if let Source::Servo(servo) = &mut self.source {
             servo.advance(now);
@@ -191,7 +191,7 @@ impl ProcessData {
         }
     }
 
-    /// The last received outputs become valid: OP begins.
+    /// Starts OP: the last received outputs become valid.
     pub fn operate(&mut self, dictionary: &Dictionary, controller: &mut Controller, now: SimTime) {
         if self.outputs.is_empty() {
             return;
@@ -200,7 +200,7 @@ impl ProcessData {
         self.refresh(controller, now);
     }
 
-    /// Takes new outputs and makes new inputs, after AL `events`.
+    /// Takes new outputs and updates the inputs, after AL `events`.
     pub fn exchange(
         &mut self,
         dictionary: &Dictionary,
@@ -254,7 +254,7 @@ impl ProcessData {
         }
     }
 
-    /// Makes inputs and writes them into the SyncManagers.
+    /// Computes inputs and writes them to the SyncManagers.
     fn refresh(&mut self, controller: &mut Controller, now: SimTime) {
         match &mut self.source {
             Source::Terminal(source) => source.fill(now, &self.outputs, &mut self.inputs),
@@ -268,7 +268,7 @@ impl ProcessData {
         }
     }
 
-    /// Sets the source of the inputs. A drive makes its own and ignores it.
+    /// Sets the source of the inputs. A drive computes its own inputs and ignores it.
     pub fn set_source(&mut self, new: InputSource, controller: &mut Controller, now: SimTime) {
         match &mut self.source {
             Source::Terminal(source) => *source = new,

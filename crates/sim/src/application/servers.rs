@@ -1,7 +1,7 @@
-//! The protocol servers behind a device's mailbox, one per protocol that the SII announces (protocol 6).
+//! The protocol servers of a device, one per protocol in the SII (protocol 6).
 //!
-//! Input: a message's protocol and payload, the state, the rest of the application. Output: an answer. A protocol that
-//! is not announced, or not served in this state, gets the mailbox error "protocol not supported".
+//! Input: protocol and payload of a message, the state, the context. Output: a response. A protocol that is not in the
+//! SII, or not served in this state, gets the mailbox error "protocol not supported".
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::foe::FoeMessage;
@@ -23,17 +23,17 @@ use crate::time::SimTime;
 /// Context of the servers.
 #[derive(Debug)]
 pub struct Surroundings<'a> {
-    /// What the device says about itself.
+    /// Settings of the device.
     pub description: &'a DeviceDescription,
-    /// Announced protocols.
+    /// Protocols in the SII.
     pub declared: MailboxDescription,
-    /// Present state.
+    /// Current state.
     pub state: AlState,
     /// Largest length of each answer after the mailbox header.
     pub room: usize,
     /// Largest length of each request after the mailbox header.
     pub receive_room: usize,
-    /// The present time.
+    /// Current time.
     pub now: SimTime,
     /// The objects.
     pub dictionary: &'a mut Dictionary,
@@ -54,7 +54,7 @@ pub struct Servers {
 }
 
 impl Servers {
-    /// The servers of a device whose mailbox is opened.
+    /// The servers of a device when its mailbox is opened.
     pub fn new(description: &DeviceDescription) -> Servers {
         let announced = description.mailbox.map(|mailbox| mailbox.protocols).unwrap_or_default();
         let services = &description.services;
@@ -67,12 +67,12 @@ impl Servers {
         }
     }
 
-    /// Ethernet over EtherCAT, where the device supports it.
+    /// Ethernet over EtherCAT, if the device supports it.
     pub const fn eoe(&self) -> Option<&EoeServer> {
         self.eoe.as_ref()
     }
 
-    /// The drives, where the device has some.
+    /// The drives, if the device has any.
     pub const fn soe(&self) -> Option<&SoeServer> {
         self.soe.as_ref()
     }
@@ -83,7 +83,7 @@ impl Servers {
         let boot = state == AlState::Boot;
         let unsupported = Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL);
         match protocol {
-            // Errors are never answered, or two ends would answer each other endlessly.
+            // Errors are never answered: two ends could answer each other endlessly.
             Protocol::Error => Answer::Silence,
             Protocol::Foe if declared.protocols.foe() => {
                 let mut files = Files {
@@ -121,10 +121,10 @@ impl Servers {
     /// Runs due work that needs no request.
     pub fn work(&mut self, room: usize, now: SimTime) {
         if let Some(eoe) = &mut self.eoe {
-            eoe.let_stack_work(room, now);
+            eoe.run_stack(room, now);
         }
         if let Some(soe) = &mut self.soe {
-            soe.let_commands_end(now);
+            soe.end_due_commands(now);
         }
     }
 

@@ -1,13 +1,13 @@
-//! A CiA 402 drive with a motor and a load that have inertia: profile and cyclic modes, homing, brake, fault reactions.
+//! A CiA 402 drive with the inertia of motor and load: profile and cyclic modes, homing, brake, fault reactions.
 //!
-//! Input: objects of the outputs and of the dictionary (`parameters`), virtual time. Output: the objects that
-//! [`Servo::value`] knows, among them statusword, position, velocity and torque. The drive computes in steps of
-//! [`STEP_NS`], whose times do not depend on frames. Units are increments, seconds and thousandths of the rated torque.
+//! Input: objects of the outputs and of the dictionary (`parameters`), virtual time. Output: the objects of
+//! [`Servo::value`], including statusword, position, velocity and torque. The drive computes in steps of [`STEP_NS`] at
+//! times that do not depend on frames. Units are increments, seconds and thousandths of the rated torque.
 //!
-//! A step runs the power state machine ([`power`]), which gives the action (`Order`), lets the mode move the set-point,
-//! computes the torque with a position loop around a velocity loop (`motion`), and moves the motor. `homing` searches
-//! the origin, `status` gives the values for the application. Position and velocity of the motor are those of the
-//! machine, whose position 0 is the position at first power-on; `origin` is the offset found by homing.
+//! A step runs the power state machine ([`power`]), which determines the action (`Order`). The mode moves the
+//! set-point, a position loop around a velocity loop computes the torque (`motion`), and the motor moves. `homing`
+//! searches for the origin, `status` computes the values for the application. Position and velocity of the motor are
+//! those of the machine, with position 0 at the first power-on; `origin` is the offset found by homing.
 
 mod axis;
 mod homing;
@@ -35,7 +35,7 @@ pub use power::{DriveCommand, DriveState};
 
 /// Duration of the drive's self-test after power-on.
 const SELF_TEST_NS: u64 = 10_000_000;
-/// Largest number of steps made up for after a time without access to the drive.
+/// Maximum number of steps computed at once after a time without access to the drive.
 const MAX_STEPS: u64 = 80_000;
 
 const NEW_SET_POINT: u16 = 0x0010;
@@ -50,26 +50,26 @@ pub struct Servo {
     state: DriveState,
     command: DriveCommand,
     controlword: u16,
-    /// Outputs are valid.
+    /// Whether outputs are valid.
     remote: bool,
     mode: i8,
     parameters: Parameters,
     /// Revision of the dictionary from which the parameters were read.
     revision: Option<u32>,
     motor: Motor,
-    /// Position of the application where that of the machine is 0.
+    /// Application position at machine position 0.
     origin: f64,
     set_position: f64,
     set_velocity: f64,
     set_torque: f64,
-    /// Target of the set-point, number of steps to it (cyclic), and the next target (profile).
+    /// Target of the set-point, number of steps to the target (cyclic), and the next target (profile).
     goal: Option<f64>,
     steps_left: u32,
     next_goal: Option<f64>,
     acknowledged: bool,
     homing: Homing,
     limited: bool,
-    /// Time for which the following error has been too large, and the target reached, in seconds.
+    /// Time in seconds for which the following error has been too large, and for which the target has been reached.
     lagging: f64,
     settled: f64,
     error_code: u16,
@@ -83,14 +83,14 @@ impl Servo {
         self.state
     }
 
-    /// Power comes: the load is at its last position, the result of homing is lost.
+    /// Power-on: the load is at its last position, the result of homing is lost.
     pub fn power_on(&mut self, now: SimTime) {
         let motor = Motor { velocity: 0.0, torque: 0.0, ..self.motor };
         let ready_at = SimTime(now.0.saturating_add(SELF_TEST_NS));
         *self = Servo { motor, set_position: motor.position, at: now, ready_at, ..Servo::default() };
     }
 
-    /// New outputs: the motor moves up to now, then the drive takes the new command.
+    /// Applies new outputs: moves the motor up to `now`, then takes the new command.
     pub fn command(&mut self, now: SimTime, mapping: &Mapping, outputs: &[u8], dictionary: &Dictionary) {
         self.advance(now);
         self.take_parameters(mapping, outputs, dictionary);
@@ -125,7 +125,7 @@ impl Servo {
         }
     }
 
-    /// Earlier commands are dropped when the drive is enabled, or returns to a mode.
+    /// Drops earlier commands when the drive is enabled or returns to a mode.
     fn forget_targets(&mut self) {
         (self.goal, self.next_goal, self.acknowledged) = (None, None, false);
         self.homing = Homing::NotStarted;
@@ -167,7 +167,7 @@ impl Servo {
         }
     }
 
-    /// Outputs are no longer valid: 0x6007 gives the action of an enabled drive, any other drive switches off.
+    /// Outputs are no longer valid: 0x6007 determines the action of an enabled drive; any other drive switches off.
     pub fn release(&mut self, now: SimTime) {
         self.advance(now);
         self.remote = false;
@@ -185,8 +185,8 @@ impl Servo {
 
     fn fail(&mut self, code: u16) {
         self.error_code = code;
-        self.state = if self.stands_still() { DriveState::Fault } else { DriveState::FaultReactionActive };
-        // It stops from its actual position, not from the set-point.
+        self.state = if self.is_at_standstill() { DriveState::Fault } else { DriveState::FaultReactionActive };
+        // The drive stops from its actual position, not from the set-point.
         self.track_motor(self.motor.velocity);
     }
 
@@ -228,7 +228,7 @@ impl Servo {
         let limited = torque.clamp(-most(p.negative_torque), most(p.positive_torque));
         self.limited |= limited != torque;
         self.motor.step(limited, order == Order::Off);
-        self.look_for_home(before);
+        self.search_home(before);
         self.watch();
         self.leave(order);
     }
@@ -252,9 +252,9 @@ impl Servo {
         }
     }
 
-    /// Transitions that wait for the motor, or occur at once where the drive function is off.
+    /// Transitions that wait for the motor, or occur at once if the drive function is off.
     fn leave(&mut self, order: Order) {
-        if order != Order::Off && !self.stands_still() {
+        if order != Order::Off && !self.is_at_standstill() {
             return;
         }
         self.state = match (self.state, self.command) {
@@ -279,13 +279,13 @@ impl Servo {
         }
     }
 
-    /// The machine position of an application position that is less than half the encoder range away.
+    /// The machine position of an application position, less than half the encoder range away.
     fn on_machine(&self, position: i32) -> f64 {
         let here = (self.set_position + self.origin).round();
         here - self.origin + f64::from(position.wrapping_sub(here as i64 as i32))
     }
 
-    fn stands_still(&self) -> bool {
+    fn is_at_standstill(&self) -> bool {
         self.set_velocity == 0.0 && self.motor.velocity.abs() < STANDSTILL
     }
 

@@ -1,7 +1,7 @@
-//! Checks the configuration that the MainDevice wrote (protocol 5.2), with codes of protocol 5.5.
+//! Checks the configuration written by the MainDevice (protocol 5.2), with codes of protocol 5.5.
 //!
-//! Input: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (whose PDO
-//! assignment gives the lengths). Output: the process data areas, or the AL status code of the refusal.
+//! Input: SyncManager, watchdog and clock registers through the PDI, the description, the dictionary (its PDO
+//! assignment defines the lengths). Output: the process data areas, or the AL status code of the refusal.
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlStatusCode;
@@ -18,22 +18,22 @@ pub const MAX_SYNC_MANAGERS: u8 = 16;
 /// First address of the process RAM; below it nothing is buffered.
 const RAM_START: u32 = 0x1000;
 
-/// A part of the process data behind one SyncManager.
+/// The part of the process data in one SyncManager.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
     /// Number of the SyncManager.
     pub sync_manager: u8,
     /// Physical start address.
     pub start: u16,
-    /// Bytes.
+    /// Number of bytes.
     pub length: u16,
-    /// Raises an AL event.
+    /// Whether it raises an AL event.
     pub event: bool,
-    /// Retriggers the process data watchdog.
+    /// Whether it retriggers the process data watchdog.
     pub watchdog: bool,
 }
 
-/// Where outputs and inputs are.
+/// Areas of outputs and inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Areas that EtherCAT writes.
@@ -53,7 +53,7 @@ pub fn sync_managers(controller: &mut Controller, now: SimTime) -> Vec<SyncManag
     found
 }
 
-/// The mailbox SyncManagers are as the layout (standard or bootstrap) says.
+/// Whether the mailbox SyncManagers match the layout (standard or bootstrap).
 pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, actual: &[SyncManager]) -> bool {
     let (out, back) = mailbox_numbers(description, layout);
     let place = |number: u8| actual.get(usize::from(number));
@@ -70,8 +70,8 @@ pub fn mailbox_matches(description: &DeviceDescription, layout: &MailboxLayout, 
         && matches(back, layout.send_offset, layout.send_size, SyncManagerDirection::Read)
 }
 
-/// Numbers of the SyncManagers of mailboxes with this layout: to the device, from the device. Those at the mailbox
-/// addresses where there are any, as for BOOT, else the first ones.
+/// Numbers of the SyncManagers of mailboxes with this layout: to the device, from the device. These are the
+/// SyncManagers at the mailbox addresses if there are any, as for BOOT, otherwise the first ones.
 pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) -> (u8, u8) {
     let of = |kind, start| {
         let at_place = description.sync_managers.iter().position(|entry| (entry.kind, entry.start) == (kind, start));
@@ -81,7 +81,7 @@ pub fn mailbox_numbers(description: &DeviceDescription, layout: &MailboxLayout) 
     out.zip(of(SyncManagerKind::MailboxIn, layout.send_offset)).unwrap_or((0, 1))
 }
 
-/// Checks the SyncManagers of the process data and returns their areas. One for OP only may be off.
+/// Checks the SyncManagers of the process data and returns their areas. A SyncManager for OP only may be disabled.
 pub fn process_data(
     description: &DeviceDescription,
     dictionary: &Dictionary,
@@ -135,7 +135,7 @@ pub fn process_data(
     Ok(layout)
 }
 
-/// Areas of the process data on a device without checks: as set in the SyncManagers.
+/// Areas of the process data of a device without checks: the current settings of the SyncManagers.
 pub fn unchecked(description: &DeviceDescription, actual: &[SyncManager]) -> Layout {
     let mut layout = Layout::default();
     for (number, (entry, manager)) in (0u8..).zip(description.sync_managers.iter().zip(actual)) {
@@ -164,7 +164,7 @@ fn area(number: u8, manager: &SyncManager) -> Area {
     }
 }
 
-/// Required length of a SyncManager: with CoE that of the assigned PDOs, otherwise that of the SII.
+/// Required length of a SyncManager: with CoE the length of the assigned PDOs, otherwise that of the SII.
 fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, number: u8) -> u32 {
     if description.has_coe() {
         return dictionary.assigned_bits(number).div_ceil(8);
@@ -177,7 +177,7 @@ fn assigned_twice(dictionary: &Dictionary, number: u8) -> bool {
     assigned.iter().enumerate().any(|(place, pdo)| assigned[..place].contains(pdo))
 }
 
-/// Two SyncManagers share a byte, or one leaves the memory. Three-buffer mode uses three times the length.
+/// Whether two SyncManagers share a byte, or one exceeds the memory. Three-buffer mode uses three times the length.
 fn overlap(actual: &[SyncManager], ram_kib: u8) -> bool {
     let memory_end = RAM_START + u32::from(ram_kib) * 1024;
     let ranges: Vec<(u32, u32)> = actual

@@ -16,11 +16,11 @@ use crate::description::SoeDescription;
 use crate::time::SimTime;
 use idn::IdnObject;
 
-/// Largest element that is written in fragments, in bytes.
+/// Maximum number of bytes of an element written in fragments.
 const MAX_ELEMENT: usize = 1 << 16;
-/// Notifications that wait for the mailbox; more are dropped.
+/// Maximum number of notifications waiting for the mailbox; further ones are dropped.
 const MAX_NOTIFICATIONS: usize = 64;
-/// IDN of the list of all IDNs, and of that of all procedure commands.
+/// IDN of the list of all IDNs, and IDN of the list of all procedure commands.
 const ALL_IDNS: Idn = Idn::standard(0, 17);
 const ALL_COMMANDS: Idn = Idn::standard(0, 25);
 
@@ -28,7 +28,7 @@ const ALL_COMMANDS: Idn = Idn::standard(0, 25);
 #[derive(Clone, Debug)]
 pub struct SoeServer {
     drives: Vec<Vec<IdnObject>>,
-    /// Fragments of an element that is being written.
+    /// Fragments of an element during a write.
     written: Option<Fragments>,
     notifications: VecDeque<Vec<u8>>,
 }
@@ -38,12 +38,12 @@ struct Fragments {
     drive: u8,
     elements: SoeElements,
     data: Vec<u8>,
-    /// Number of fragments that follow.
+    /// Number of following fragments.
     left: u16,
 }
 
 impl SoeServer {
-    /// The server of a device whose mailbox is opened.
+    /// The server of a device when its mailbox is opened.
     pub fn new(description: &SoeDescription) -> SoeServer {
         let mut drives = description.drives.clone();
         for drive in &mut drives {
@@ -128,7 +128,7 @@ impl SoeServer {
     }
 
     /// Ends the due procedure commands; each causes a notification.
-    pub fn let_commands_end(&mut self, now: SimTime) {
+    pub fn end_due_commands(&mut self, now: SimTime) {
         for (number, drive) in (0u8..).zip(&mut self.drives) {
             for object in drive {
                 if object.ends(now) && self.notifications.len() < MAX_NOTIFICATIONS {
@@ -140,7 +140,7 @@ impl SoeServer {
         }
     }
 
-    /// When the next procedure command ends.
+    /// Time at which the next procedure command ends.
     pub fn next_deadline(&self) -> Option<SimTime> {
         self.drives.iter().flatten().filter_map(IdnObject::running_until).min()
     }
@@ -151,7 +151,7 @@ impl SoeServer {
     }
 }
 
-/// The lists that every drive has: all IDNs, all procedure commands.
+/// Adds the lists that every drive has: all IDNs, all procedure commands.
 fn add_lists(drive: &mut Vec<IdnObject>) {
     let mut all: Vec<Idn> = drive.iter().map(|object| object.idn).chain([ALL_IDNS, ALL_COMMANDS]).collect();
     all.sort_unstable();
@@ -166,7 +166,7 @@ fn add_lists(drive: &mut Vec<IdnObject>) {
     }
 }
 
-/// Data in as many messages as it takes.
+/// Data in the required number of messages.
 fn fragments(operation: SoeOperation, drive: u8, elements: SoeElements, idn: Idn, data: &[u8], room: usize) -> Answer {
     let most = room.saturating_sub(SoeMessage::OVERHEAD).max(1);
     let pieces: Vec<&[u8]> = if data.is_empty() { vec![data] } else { data.chunks(most).collect() };

@@ -1,6 +1,6 @@
 //! The EtherCAT state machine inside a SubDevice (protocol 5.1, 5.3).
 //!
-//! Input: AL control as the MainDevice wrote it, and the end times of transitions. Output: the action of the
+//! Input: AL control as written by the MainDevice, and the end times of transitions. Output: the action of the
 //! application ([`Reaction`]) and the values of AL status and AL status code. [`settings`](super::settings) checks the
 //! configuration.
 
@@ -27,10 +27,10 @@ pub enum Reaction {
 pub struct Pending {
     /// Target state.
     pub to: AlState,
-    /// When the application completes it.
+    /// Time at which the application completes it.
     pub at: SimTime,
-    /// When the application stops waiting for further conditions.
-    pub give_up: SimTime,
+    /// Time at which the application stops waiting for further conditions.
+    pub time_limit: SimTime,
 }
 
 /// State, error and the transition in progress.
@@ -49,7 +49,7 @@ impl Default for StateMachine {
 }
 
 impl StateMachine {
-    /// Present state; the old one during a transition.
+    /// Current state; the old state during a transition.
     pub const fn state(&self) -> AlState {
         self.state
     }
@@ -76,7 +76,7 @@ impl StateMachine {
         }
     }
 
-    /// AL control was written. `identification` is the value the device has for such a request.
+    /// Handles a write to AL control. `identification` is the device's identification value.
     pub fn request(&mut self, control: AlControl, boot: bool, identification: Option<u16>) -> Reaction {
         let requested = AlState::from_code(control.state);
         if self.error.is_some() && !control.acknowledge && requested != Some(AlState::Init) {
@@ -96,13 +96,13 @@ impl StateMachine {
         if to == self.state { Reaction::Report } else { Reaction::Begin(to) }
     }
 
-    /// The request is refused: the state stays, the error is shown.
+    /// Refuses the request: the state stays, the error is set.
     pub fn refuse(&mut self, code: AlStatusCode) -> Reaction {
         self.pending = None;
         self.fail(self.state, code)
     }
 
-    /// The application leaves its state by itself.
+    /// The application itself leaves its state.
     pub fn fail(&mut self, to: AlState, code: AlStatusCode) -> Reaction {
         self.state = to;
         self.error = Some(code);
@@ -111,18 +111,18 @@ impl StateMachine {
         Reaction::Report
     }
 
-    /// A transition with this duration begins; its other conditions must be met within `patience` after that.
+    /// Begins a transition with this duration; its other conditions must be met within `patience` after that.
     pub fn begin(&mut self, to: AlState, now: SimTime, takes: Duration, patience: Duration) {
         let at = now + takes;
-        self.pending = Some(Pending { to, at, give_up: at + patience });
+        self.pending = Some(Pending { to, at, time_limit: at + patience });
     }
 
-    /// The transition in progress is given up for another request.
+    /// Aborts the transition in progress in favour of another request.
     pub fn abandon(&mut self) {
         self.pending = None;
     }
 
-    /// The transition in progress is complete. Returns the previous state.
+    /// Completes the transition in progress. Returns the previous state.
     pub fn complete(&mut self) -> AlState {
         let from = self.state;
         if let Some(pending) = self.pending.take() {
@@ -154,7 +154,7 @@ mod tests {
 
     // covers: 5.1, sim-states
     #[test]
-    fn each_pair_of_states_begins_or_is_refused_as_the_state_machine_says() {
+    fn each_pair_of_states_begins_or_is_refused_by_the_state_machine() {
         for from in AlState::ALL {
             for to in AlState::ALL {
                 let mut machine = machine(from);
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_code_that_names_no_state_is_0x0012() {
+    fn an_unknown_state_code_is_0x0012() {
         for code in [0, 5, 6, 7, 9, 15] {
             let mut machine = machine(AlState::PreOp);
             machine.request(AlControl { state: code, ..AlControl::new(AlState::Init) }, false, None);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_for_init_acknowledges_by_itself() {
+    fn a_request_for_init_implies_the_acknowledge() {
         let mut machine = machine(AlState::SafeOp);
         machine.fail(AlState::PreOp, AlStatusCode::INVALID_INPUT_CONFIGURATION);
         assert_eq!(machine.request(AlControl::new(AlState::Init), false, None), Reaction::Begin(AlState::Init));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn identification_is_in_the_status_code_while_it_is_asked_for() {
+    fn identification_is_in_the_status_code_while_it_is_requested() {
         let mut machine = machine(AlState::PreOp);
         let asking = AlControl { identification: true, ..AlControl::new(AlState::PreOp) };
         machine.request(asking, false, Some(0x1234));

@@ -19,7 +19,7 @@ use crate::time::SimTime;
 const SOFTWARE_VERSION: u16 = 0x100A;
 
 impl Application {
-    /// AL control was written.
+    /// Handles a write to AL control.
     pub(super) fn requested(&mut self, description: &DeviceDescription, controller: &mut Controller, now: SimTime) {
         let control = controller.al_control(now);
         let boot = bootstrap(description).is_some();
@@ -87,7 +87,7 @@ impl Application {
                 self.layout = layout;
                 Ok(())
             }
-            // SyncManagers for OP only were enabled since (protocol 4.4).
+            // SyncManagers for OP only have been enabled meanwhile (protocol 4.4).
             (AlState::SafeOp, AlState::Op) => {
                 let actual = settings::sync_managers(controller, now);
                 let ram_kib = controller.config().ram_kib;
@@ -134,7 +134,7 @@ impl Application {
         Some(code)
     }
 
-    /// A transition is due.
+    /// Completes a due transition.
     pub(super) fn finish(
         &mut self,
         pending: Pending,
@@ -142,9 +142,9 @@ impl Application {
         controller: &mut Controller,
         now: SimTime,
     ) {
-        let no_sync = controller.waits_for_sync0(now);
+        let no_sync = controller.awaits_sync0(now);
         if pending.to == AlState::Op && (no_sync || !self.process_data.outputs_seen()) {
-            if now >= pending.give_up {
+            if now >= pending.time_limit {
                 self.machine.refuse(if no_sync { AlStatusCode::NO_SYNC } else { AlStatusCode::NO_VALID_OUTPUTS });
                 self.report(controller, now);
             } else if controller.al_event() & EVENT_AL_CONTROL != 0 {

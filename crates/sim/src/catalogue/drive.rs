@@ -1,6 +1,6 @@
 //! The servo drive: its SII, and its objects by CiA 402 (IEC 61800-7-201) and ETG.6010.
 //!
-//! Each object that the drive uses has its default and its range here; [`servo`](crate::application::servo) implements
+//! This file defines each object of the drive with default and range; [`servo`](crate::application::servo) implements
 //! them.
 
 use ringcat_wire::mailbox::coe::AccessRights;
@@ -20,13 +20,13 @@ use crate::description::{DcDescription, DeviceDescription, data_type};
 const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Smallest cycle of process data.
 const MINIMUM_CYCLE_NS: u32 = 125_000;
-/// Units of ETG.1004 for SDO information, which has room for prefix and unit; speeds and accelerations do not fit and
-/// are told by 0x60A8 to 0x60AA. Increments (00 B5), milli (FD), ampere (04), second (03) and their places in 32 bits,
-/// with "per second" and "per second squared" (57) as denominators, are those of ESI files of drives on the market.
+/// Units of ETG.1004 for SDO information, which provides prefix and unit; speeds and accelerations do not fit and are
+/// given by 0x60A8 to 0x60AA. Increments (00 B5), milli (FD), ampere (04), second (03) and their positions in 32 bits,
+/// with "per second" and "per second squared" (57) as denominators, are those of ESI files of commercial drives.
 const INCREMENTS: u16 = 0x00B5;
 const THOUSANDTHS: u16 = 0xFD00;
 const MILLIAMPERES: u16 = 0xFD04;
-/// The same in 32 bits: increments, increments per second, increments per second squared.
+/// The units in 32 bits: increments, increments per second, increments per second squared.
 const SI_UNITS: [(u16, &str, u32); 3] = [
     (0x60A8, "SI unit position", 0x00B5_0000),
     (0x60A9, "SI unit velocity", 0x00B5_0300),
@@ -92,7 +92,7 @@ pub fn servo(name: &str) -> DeviceDescription {
     description
 }
 
-/// A number with as many bytes as its type.
+/// A number with the length of its type.
 fn number(data_type: u8, access: Access, value: i64) -> Entry {
     let length = match data_type {
         I8 | U8 => 1,

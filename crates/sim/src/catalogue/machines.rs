@@ -8,10 +8,10 @@ use super::parts::{FIXED_MANDATORY, entry, pdo, sync_manager};
 use crate::application::{Behaviour, InputSource};
 use crate::description::{DcDescription, DeviceDescription, data_type};
 
-/// Bytes in each direction of the block.
+/// Bytes of the block in each direction.
 pub const BLOCK_BYTES: u16 = 400;
 
-/// A device of this maker without process data, mailbox and clock.
+/// A device of the simulator without process data, mailbox and clock.
 pub(super) fn machine(name: &str, product_code: u32) -> DeviceDescription {
     let identity = Identity { vendor_id: VENDOR_ID, product_code, revision: 0x0010_0000, serial: 0 };
     DeviceDescription::plain(name, identity)
@@ -30,7 +30,7 @@ pub fn coupler(name: &str) -> DeviceDescription {
     description
 }
 
-/// Four MII ports to branch cables; no process data, emulated state machine.
+/// Four MII ports for branch cables; no process data, emulated state machine.
 pub fn junction(name: &str) -> DeviceDescription {
     let mut description = machine(name, 0x0462_0004);
     description.group = "System terminals".into();
@@ -42,7 +42,7 @@ pub fn junction(name: &str) -> DeviceDescription {
     description
 }
 
-/// Several hundred bytes in and out, without mailbox; the inputs are the valid outputs.
+/// Several hundred bytes of inputs and outputs, without mailbox; the inputs are the valid outputs.
 pub fn block(name: &str) -> DeviceDescription {
     let mut description = machine(name, 0x0190_0190);
     description.group = "Blocks".into();
@@ -52,7 +52,7 @@ pub fn block(name: &str) -> DeviceDescription {
         sync_manager(0x1000, BLOCK_BYTES, 0x64, SyncManagerKind::Outputs),
         sync_manager(inputs_start, BLOCK_BYTES, 0x20, SyncManagerKind::Inputs),
     ];
-    // One entry holds at most 255 bits; 25 bytes each make few entries.
+    // One entry holds at most 255 bits; entries of 25 bytes keep their number small.
     let entries = |base: u16, name: &str| {
         let places = 1..=(BLOCK_BYTES / 25) as u8;
         places.map(|sub_index| entry(base, sub_index, name, data_type::OCTET_STRING, 200)).collect::<Vec<_>>()

@@ -1,4 +1,4 @@
-//! Pieces that the devices of the catalogue share.
+//! Parts shared by the devices of the catalogue.
 
 use core::time::Duration;
 
@@ -9,11 +9,11 @@ use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, PdoDirectio
 use crate::application::dictionary::{Access, Entry, Object, SyncParameters};
 use crate::description::{MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription, data_type};
 
-/// SyncManager enable byte: to be activated.
+/// SyncManager enable byte: activate.
 pub const ENABLE: u8 = 0x01;
-/// Flags of a PDO whose content is fixed and which must be there.
+/// Flags of a mandatory PDO with fixed content.
 pub const FIXED_MANDATORY: u16 = 0x0011;
-/// Flags of a PDO that may be changed.
+/// Flags of a PDO that can be changed.
 pub const FLEXIBLE: u16 = 0x0000;
 /// Two E-bus ports.
 pub const EBUS_PORTS: [PortKind; 4] =
@@ -25,7 +25,7 @@ const NANOSECONDS: u16 = 0xF703;
 
 const MAILBOX_START: u16 = 0x1000;
 const MAILBOX_SIZE: u16 = 128;
-/// Behind the two mailboxes.
+/// First address after the two mailboxes.
 pub const OUTPUTS_START: u16 = MAILBOX_START + 2 * MAILBOX_SIZE;
 
 /// A SyncManager.
@@ -82,7 +82,7 @@ pub fn pdo(
     PdoDescription { direction, index, name: name.into(), sync_manager, flags, entries }
 }
 
-/// Settings of one channel: a record with a number that can be written and a text too long for an expedited transfer.
+/// Settings of one channel: a record with a writable number and a text too long for an expedited transfer.
 pub fn channel_settings(index: u16) -> Object {
     let entries = vec![
         Entry::new(1, data_type::U16, Access::ReadWrite, &0u16.to_le_bytes()).named("User value"),
@@ -93,8 +93,8 @@ pub fn channel_settings(index: u16) -> Object {
     Object::record(index, "Settings", entries)
 }
 
-/// Synchronisation of a SyncManager (ETG.1020): free running or with its event, and with SYNC0 or not. The MainDevice
-/// sets type and cycle, or distributed clocks give them when SAFEOP is entered.
+/// Synchronisation of a SyncManager (ETG.1020): free run or SyncManager event, and optionally SYNC0. The MainDevice
+/// sets type and cycle, or the device takes them from the distributed clocks when SAFEOP is entered.
 pub fn sync_parameters(index: u16, name: &str, minimum_cycle_ns: u32, sync0: bool) -> Object {
     let sync0 = if sync0 { SyncParameters::SYNC0 } else { 0 };
     let types = SyncParameters::FREE_RUN | SyncParameters::SYNCHRONOUS | sync0;
@@ -115,5 +115,5 @@ pub fn sync_parameters(index: u16, name: &str, minimum_cycle_ns: u32, sync0: boo
     Object::record(index, name, entries)
 }
 
-/// Vendor number of the simulated devices; no vendor has it.
+/// Vendor number of the simulated devices; it is not assigned to any vendor.
 pub const VENDOR_ID: u32 = 0x0000_0C47;

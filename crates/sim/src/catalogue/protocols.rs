@@ -23,14 +23,14 @@ const OUTPUTS_START: u16 = SEND_START + MAILBOX_SIZE;
 const INPUTS_START: u16 = OUTPUTS_START + 0x100;
 /// Bytes of the large object.
 pub const LARGE_OBJECT_BYTES: usize = 100_000;
-/// Messages that the diagnosis history keeps.
+/// Capacity of the diagnosis history.
 const DIAGNOSIS_MESSAGES: u8 = 20;
 
 const fn layout(size: u16) -> MailboxLayout {
     MailboxLayout { receive_offset: RECEIVE_START, receive_size: size, send_offset: SEND_START, send_size: size }
 }
 
-/// A device with a mailbox of 1,024 bytes, one of 512 bytes in BOOT, and four bytes of process data each way.
+/// A device with a mailbox of 1,024 bytes, a BOOT mailbox of 512 bytes, and four bytes of inputs and outputs.
 fn device(name: &str, product_code: u32, protocols: u16) -> DeviceDescription {
     let identity = Identity { vendor_id: VENDOR_ID, product_code, revision: 0x0010_0000, serial: 0 };
     let mut description = DeviceDescription::plain(name, identity);
@@ -73,7 +73,7 @@ fn device(name: &str, product_code: u32, protocols: u16) -> DeviceDescription {
     description
 }
 
-/// Every protocol on one mailbox; a dictionary with every data type, arrays, records and a large object.
+/// All protocols in one mailbox; a dictionary with all data types, arrays, records and a large object.
 pub fn all_protocols(name: &str) -> DeviceDescription {
     let every = MailboxProtocols::AOE
         | MailboxProtocols::EOE
@@ -92,7 +92,7 @@ pub fn all_protocols(name: &str) -> DeviceDescription {
     description
 }
 
-/// Ethernet over EtherCAT with an IP stack behind it, and a dictionary.
+/// Ethernet over EtherCAT with an IP stack, and a dictionary.
 pub fn ethernet_terminal(name: &str) -> DeviceDescription {
     let mut description = device(name, 0x19C9_3052, MailboxProtocols::EOE | MailboxProtocols::COE);
     let Some(mailbox) = &mut description.mailbox else {

@@ -12,7 +12,7 @@ use crate::application::{Behaviour, InputSource};
 use crate::description::{DeviceDescription, data_type};
 
 const DIGITAL_START: u16 = 0x1000;
-/// DIGITAL_OUTPUTS, the register behind the output pins of a controller without microcontroller.
+/// DIGITAL_OUTPUTS, the register of the output pins of a controller without microcontroller.
 const DIGITAL_OUTPUT_REGISTER: u16 = 0x0F00;
 const PDI_DIGITAL_IO: u8 = 0x04;
 const SPI: u8 = 0x05;
@@ -64,7 +64,7 @@ pub fn digital_output(name: &str, channels: u8) -> DeviceDescription {
     description
 }
 
-/// The same terminal without a microcontroller: pins at the controller, state machine emulated, no AL events.
+/// The same terminal without a microcontroller: I/O pins of the controller, emulated state machine, no AL events.
 pub fn emulated(mut description: DeviceDescription) -> DeviceDescription {
     description.emulation = true;
     description.pdi_type = PDI_DIGITAL_IO;
@@ -82,8 +82,8 @@ pub fn emulated(mut description: DeviceDescription) -> DeviceDescription {
     description
 }
 
-/// Analogue inputs, 16 bits each behind a status word, by default a sawtooth; a second PDO per channel leaves the
-/// status out and can be assigned instead.
+/// Analogue inputs of 16 bits, each after a status word, with a sawtooth as default value; a second PDO per channel
+/// omits the status and can be assigned instead.
 pub fn analog_input(name: &str, channels: u8) -> DeviceDescription {
     let mut description = terminal(name, 0x0BF0, channels);
     description.pdi_type = SPI;

@@ -4,7 +4,7 @@ use super::*;
 use crate::sii_image::{build, used_bytes};
 
 #[test]
-fn each_name_makes_a_device_with_a_sound_image_of_256_to_1024_bytes() {
+fn each_name_results_in_a_device_with_a_valid_image_of_256_to_1024_bytes() {
     for name in names() {
         let description = by_name(name).unwrap();
         let image = build(&description);
@@ -34,7 +34,7 @@ fn product_codes_differ() {
 }
 
 #[test]
-fn sync_manager_lengths_are_those_of_the_assigned_pdos() {
+fn sync_manager_lengths_match_the_assigned_pdos() {
     for name in names() {
         let description = by_name(name).unwrap();
         for (number, entry) in (0u8..).zip(&description.sync_managers) {
@@ -48,7 +48,7 @@ fn sync_manager_lengths_are_those_of_the_assigned_pdos() {
 
 // covers: sim-devices
 #[test]
-fn a_description_comes_back_from_its_own_image() {
+fn a_description_is_restored_from_its_image() {
     for name in names() {
         let description = by_name(name).unwrap();
         let again = DeviceDescription::from_sii(build(&description), name).unwrap();

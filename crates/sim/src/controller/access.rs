@@ -17,21 +17,21 @@ use super::sync_manager::Claim;
 
 /// End of the 64 KiB address space.
 const ADDRESS_END: u32 = 0x1_0000;
-/// First address at which a SyncManager can stand: digital outputs.
+/// First address that a SyncManager can cover: digital outputs.
 const SYNC_MANAGER_AREA: u32 = map::DIGITAL_OUTPUTS.0 as u32;
-/// The register in which single bits can be written by FMMUs (protocol 3.10).
+/// The register in which FMMUs can write single bits (protocol 3.10).
 const BITWISE: core::ops::Range<u32> = SYNC_MANAGER_AREA..SYNC_MANAGER_AREA + 4;
 /// Registers blocked while the SII interface is busy (protocol 3.8).
 const SII_BLOCK: core::ops::Range<u32> = map::SII_CONTROL.0 as u32..map::SII_CONTROL.0 as u32 + 14;
 
-/// A part of an access: it ends at `until`, and its bytes lie at `address` where it is allowed.
+/// A part of an access: it ends at `until`; its bytes are at `address` if the access is allowed.
 struct Part {
     until: u32,
     address: Option<u32>,
 }
 
 impl Controller {
-    /// Reads into `out`, or combines with it by OR. Returns how many bytes were accessible.
+    /// Reads into `out`, or combines by OR. Returns the number of accessible bytes.
     pub(super) fn read(&mut self, side: Side, address: u32, out: &mut [u8], or: bool) -> usize {
         let end = (address + out.len() as u32).min(ADDRESS_END);
         let (mut at, mut count) = (address, 0);
@@ -53,8 +53,8 @@ impl Controller {
         count
     }
 
-    /// [`Controller::read`] by EtherCAT of bytes inside one register that is always there and is no time: the way of
-    /// nearly all reads. False where it is another.
+    /// [`Controller::read`] by EtherCAT for bytes inside one register that always exists and is no time: the case of
+    /// nearly all reads. False in all other cases.
     #[inline]
     pub(super) fn read_register(&mut self, address: u32, out: &mut [u8], or: bool) -> bool {
         const END: u32 = map::FMMU_BASE.0 as u32;
@@ -80,8 +80,8 @@ impl Controller {
         true
     }
 
-    /// Writes `data`. Where `mask` is not 0xFF, only its bits are written (in [`BITWISE`]; elsewhere the others become
-    /// 0). Returns how many bytes were accessible.
+    /// Writes `data`. If `mask` is not 0xFF, only its bits are written (in [`BITWISE`]; elsewhere the other bits become
+    /// 0). Returns the number of accessible bytes.
     pub(super) fn write(&mut self, side: Side, address: u32, data: &[u8], mask: u8) -> usize {
         let end = (address + data.len() as u32).min(ADDRESS_END);
         let (mut at, mut count) = (address, 0);
@@ -120,7 +120,7 @@ impl Controller {
         }
     }
 
-    /// Effect of a write before its frame ends.
+    /// Effects of a write before the end of its frame.
     fn note_ecat_write(&mut self, address: u32) {
         if address == map::REGISTER_WRITE_ENABLE.0.into() {
             self.pass.register_write_enable = true;
@@ -129,7 +129,7 @@ impl Controller {
         }
     }
 
-    /// The longest part from `at` with a uniform answer.
+    /// The longest part from `at` with equal access rights.
     fn part(&mut self, side: Side, write: bool, at: u32, end: u32) -> Part {
         let run = self.memory.run(at, side);
         let mut until = run.end.min(end);
@@ -160,7 +160,7 @@ impl Controller {
             return None;
         }
         let grant = self.sync_managers.access(n, side, write, at, until)?;
-        // Buffers that the RAM has no room for are not there.
+        // Buffers beyond the RAM do not exist.
         let fits = grant.address + (until - at) <= self.memory.len();
         match side {
             Side::Ecat => self.pass.sync_managers |= 1 << n,
@@ -199,7 +199,7 @@ impl Controller {
             && !self.pass.register_write_enable
     }
 
-    /// Side effects of register reads, and registers that are computed when read. A part never holds two of them.
+    /// Side effects of register reads, and registers computed on reads. A part contains at most one of them.
     fn note_read(&mut self, side: Side, at: u32, until: u32) {
         let reads = |address: ringcat_wire::address::RegisterAddress, len: u32| {
             at < u32::from(address.0) + len && u32::from(address.0) < until
@@ -227,7 +227,8 @@ impl Controller {
         }
     }
 
-    /// Reads the bits of a piece into a datagram's data, whose first logical bit is `base`. Whether any was accessible.
+    /// Reads the bits of a piece into a datagram's data; `base` is the first logical bit of the data. Returns whether
+    /// any bit was accessible.
     pub(super) fn read_bits(&mut self, piece: Piece, base: u64, data: &mut [u8]) -> bool {
         let at = piece.logical - base;
         if is_whole_bytes(piece, at) {
@@ -252,7 +253,7 @@ impl Controller {
         any
     }
 
-    /// Writes the bits of a piece from a datagram's data. Whether any was accessible.
+    /// Writes the bits of a piece from a datagram's data. Returns whether any bit was accessible.
     pub(super) fn write_bits(&mut self, piece: Piece, base: u64, data: &[u8]) -> bool {
         let at = piece.logical - base;
         if is_whole_bytes(piece, at) {
@@ -276,7 +277,7 @@ impl Controller {
     }
 }
 
-/// Whether a piece that starts at bit `at` of the data begins and ends with bytes on both sides.
+/// Whether a piece starting at bit `at` of the data consists of whole bytes on both sides.
 fn is_whole_bytes(piece: Piece, at: u64) -> bool {
     (at | piece.physical | piece.len) & 7 == 0
 }
@@ -286,7 +287,7 @@ fn physical(bit: u64) -> Option<u32> {
     u32::try_from(bit / 8).ok().filter(|&address| address < ADDRESS_END)
 }
 
-/// Where bit `done` of a piece is in its physical byte, and how many more bits are in that byte.
+/// Position of bit `done` of a piece in its physical byte, and number of remaining bits in that byte.
 fn bits_in_byte(piece: Piece, done: u64) -> (u64, u64) {
     let shift = (piece.physical + done) % 8;
     (shift, (8 - shift).min(piece.len - done))

@@ -1,8 +1,8 @@
 //! The local clock of distributed clocks and the receive-time latches (protocol 3.12, 7.1, 7.2.1).
 //!
-//! In: virtual time, and the system times that EtherCAT writes. Out: local time, with the error of a free clock
-//! ([`oscillator`]) and steered by the control loop ([`control_loop`]), and which ports' receive times belong to a
-//! latching frame. SYNC and LATCH units are in [`super::sync_unit`].
+//! Input: virtual time, and the system times written by EtherCAT. Output: local time with the error of a free-running
+//! clock ([`oscillator`]), corrected by the control loop ([`control_loop`]), and the ports at which a latching frame is
+//! recorded. SYNC and LATCH units are in [`super::sync_unit`].
 
 mod control_loop;
 mod oscillator;
@@ -20,11 +20,11 @@ use oscillator::{FRACTION, Oscillator};
 /// Imperfections of a clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockErrors {
-    /// How much it runs ahead of virtual time, in parts per billion.
+    /// Frequency error relative to virtual time, in parts per billion.
     pub drift_ppb: i64,
     /// Change of the drift over time.
     pub wander: Wander,
-    /// Largest random delay of the detected arrival of a frame.
+    /// Maximum random delay of the detected arrival of a frame.
     pub receive_jitter: Duration,
 }
 
@@ -37,12 +37,12 @@ pub(super) struct Clock {
     jitter_ns: u64,
     control: ControlLoop,
     steering: Steering,
-    /// Count of the free clock when steering began, and local time then, both with fraction.
+    /// Count of the free-running clock when the current correction began, and local time then, both with fraction.
     anchor: (i128, i128),
     arrivals: [Option<(u64, SimTime)>; 4],
     /// The frame whose further arrivals are latched.
     latching: Option<u64>,
-    /// Ports at which the next arrival is latched, of any frame, where frames are not distinguished.
+    /// Ports at which the next arrival of any frame is latched, if the controller does not distinguish frames.
     armed: [bool; 4],
     /// The last latching frame, and the time at which the processing unit processed it.
     latched: Option<(u64, SimTime)>,
@@ -82,7 +82,7 @@ impl Clock {
         self.local(self.seen(port, first_bit))
     }
 
-    /// When the controller detects the first bit of a frame.
+    /// Time at which the controller detects the first bit of a frame.
     fn seen(&self, port: Port, first_bit: SimTime) -> SimTime {
         if self.jitter_ns == 0 {
             return first_bit;
@@ -94,15 +94,15 @@ impl Clock {
         SimTime(first_bit.0.saturating_add((hash >> 11) % (self.jitter_ns + 1)))
     }
 
-    /// Counts of the free and the steered clock since power-on, with fraction.
+    /// Counts of the free-running and the corrected clock since power-on, with fraction.
     fn counted(&self, now: SimTime) -> (i128, i128) {
         let free = self.oscillator.counted(i128::from(now.0) - i128::from(self.started.0));
         let since = free - self.anchor.0;
         (free, self.anchor.1 + since + self.steering.added(since))
     }
 
-    /// Compares the copy of the system time that was taken at the first bit of a frame with the one received, and
-    /// steers. `correction` is what the registers add to local time: offset minus delay.
+    /// Compares the copy of the system time at the first bit of a frame with the received time, and corrects the clock.
+    /// `correction` is the value added to local time: offset minus delay.
     pub fn compare(&mut self, received: u32, correction: u64, first_bit: SimTime, settings: LoopSettings) {
         let copy = self.stamp(Port::A, first_bit).wrapping_add(correction) as u32;
         let dt = copy.wrapping_sub(received) as i32;
@@ -110,7 +110,7 @@ impl Clock {
         self.steer(first_bit, self.control.steering(settings));
     }
 
-    /// Resets the loop: the clock runs free.
+    /// Resets the loop: the clock is not corrected.
     pub fn restart_loop(&mut self, now: SimTime) {
         self.control = ControlLoop::default();
         self.steer(now, Steering::FREE);
@@ -126,8 +126,8 @@ impl Clock {
         (self.control.difference_register(), self.control.speed_register())
     }
 
-    /// When local time reaches a value that is not long ago or far away: the clock is steered by less than a
-    /// thousandth, so a few steps are enough.
+    /// Time at which local time reaches a value in the near past or future: the correction is below a thousandth, so a
+    /// few steps are enough.
     pub fn when(&self, local: u64, now: SimTime) -> SimTime {
         let mut at = now;
         for _ in 0..8 {
@@ -140,20 +140,20 @@ impl Clock {
         at
     }
 
-    /// Records the first bit of a frame at a port. Returns whether it is latched: a latching frame that came back, or
-    /// any frame where frames are not distinguished.
+    /// Records the first bit of a frame at a port. Returns whether it is latched: a latching frame that returns, or any
+    /// frame if frames are not distinguished.
     pub fn arrived(&mut self, port: Port, frame: u64, first_bit: SimTime) -> bool {
         self.arrivals[port.index()] = Some((frame, first_bit));
         core::mem::take(&mut self.armed[port.index()]) || self.latching == Some(frame)
     }
 
-    /// Starts latching `frame`, which the processing unit processes at `at_unit`; yields the arrivals it has had so
-    /// far. Where frames are not distinguished (`any`) it yields the last arrival at each port, and the next one at the
-    /// other ports counts.
+    /// Starts latching `frame`, which the processing unit processes at `at_unit`; returns its arrivals so far. If
+    /// frames are not distinguished (`any`), it returns the last arrival at each port; at the other ports the next
+    /// arrival is latched.
     pub fn latch(&mut self, frame: u64, at_unit: SimTime, any: bool) -> impl Iterator<Item = (Port, SimTime)> + use<> {
         let arrivals = self.arrivals;
         self.latched = Some((frame, at_unit));
-        // It has entered here before, or another one after it.
+        // The time of the frame's first arrival here; a later frame may have arrived since.
         let since = arrivals.iter().flatten().filter(|(id, _)| *id == frame).map(|(_, at)| *at).min();
         let is_in = move |id: u64, at: SimTime| id == frame || (any && since.is_none_or(|since| at >= since));
         self.latching = (!any).then_some(frame);

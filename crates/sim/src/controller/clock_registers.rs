@@ -1,4 +1,4 @@
-//! Registers of distributed clocks: what writing and reading them does (protocol 3.12, 7.2.1, 7.3).
+//! Registers of distributed clocks: effects of writes and reads (protocol 3.12, 7.2.1, 7.3).
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::{DcActivation, DcLatchControl, map};
@@ -20,7 +20,7 @@ pub enum LatchPin {
 }
 
 impl Controller {
-    /// A write of clock registers took effect; `first_bit` is when its frame began.
+    /// A write to clock registers takes effect; `first_bit` is the time at which its frame began.
     pub(super) fn clock_written(&mut self, at: u32, bytes: &[(u8, u8)], first_bit: SimTime, now: SimTime) {
         let end = at + bytes.len() as u32;
         let is = |register: RegisterAddress, len: u32| at < u32::from(register.0) + len && u32::from(register.0) < end;
@@ -44,13 +44,13 @@ impl Controller {
         }
     }
 
-    /// Whether the lower half of the start time is all of it.
+    /// Whether the lower half of the start time is the complete start time.
     fn starts_by_half(&self) -> bool {
         let activation = DcActivation::from_bits(self.memory.u8(map::DC_ACTIVATION));
         activation.extend_start_time || !self.config.features.dc_64bit
     }
 
-    /// The SYNC unit takes over its registers.
+    /// Applies the registers of the SYNC unit.
     fn activate_sync_unit(&mut self, now: SimTime) {
         let settings = SyncSettings {
             start: self.memory.u64(map::DC_START_TIME),
@@ -64,7 +64,7 @@ impl Controller {
         self.memory.set_u8(map::DC_ACTIVATION_STATUS, self.sync_unit.status().bits());
     }
 
-    /// The control loop takes a sample.
+    /// Passes a sample to the control loop.
     fn system_time_written(&mut self, received: u32, first_bit: SimTime) {
         let settings = LoopSettings {
             start: self.memory.u16(map::DC_SPEED_COUNTER_START),
@@ -79,7 +79,7 @@ impl Controller {
         self.memory.set_u16(map::DC_SPEED_COUNTER_DIFFERENCE, speed as u16);
     }
 
-    /// Fills in what is made when it is read; a part of a read never holds two of these.
+    /// Computes registers on reads; a part of a read contains at most one of them.
     pub(super) fn clock_read(&mut self, side: Side, at: u32, until: u32) {
         let is =
             |register: RegisterAddress, len: u32| at < u32::from(register.0) + len && u32::from(register.0) < until;
@@ -128,7 +128,7 @@ impl Controller {
         local.wrapping_add(self.memory.u64(map::DC_SYSTEM_TIME_OFFSET))
     }
 
-    /// System time in 64 bits also where the registers have 32: what the SYNC unit counts with.
+    /// System time in 64 bits, also if the registers have 32 bits; the SYNC unit uses it.
     fn unbounded_time(&self, now: SimTime) -> u64 {
         self.widened(self.clock.local(now))
     }
@@ -137,12 +137,12 @@ impl Controller {
         if self.config.features.dc_64bit { time } else { u64::from(time as u32) }
     }
 
-    /// Local clock plus DC_SYSTEM_TIME_OFFSET; 32 bits where the clock has no more.
+    /// Local clock plus DC_SYSTEM_TIME_OFFSET; 32 bits if the clock has only 32.
     pub fn system_time(&self, now: SimTime) -> u64 {
         self.in_width(self.widened(self.clock.local(now)))
     }
 
-    /// When SYNC0 comes next, at `now` or later; `None` when it does not.
+    /// Time of the next SYNC0 pulse at `now` or later; `None` if there is none.
     pub fn next_sync0(&self, now: SimTime) -> Option<SimTime> {
         let system = self.unbounded_time(now);
         let ahead = self.sync_unit.next_sync0(system)?.wrapping_sub(system);
@@ -154,12 +154,12 @@ impl Controller {
         self.sync_unit.pulses(self.unbounded_time(now))
     }
 
-    /// Whether SYNC0 is asked for and has not come yet.
-    pub fn waits_for_sync0(&self, now: SimTime) -> bool {
-        self.sync_unit.wants_sync0() && self.sync0_pulses(now) == 0
+    /// Whether SYNC0 is activated and has not occurred yet.
+    pub fn awaits_sync0(&self, now: SimTime) -> bool {
+        self.sync_unit.has_sync0() && self.sync0_pulses(now) == 0
     }
 
-    /// A buffer of a SyncManager was opened or handed over: the register keeps local time (protocol 3.12).
+    /// A buffer of a SyncManager was opened or handed over: the register stores the local time (protocol 3.12).
     pub(super) fn note_buffer_event(&mut self, register: RegisterAddress, at: SimTime) {
         if self.config.features.dc {
             self.memory.set_u32(register, self.clock.local(at) as u32);

@@ -1,9 +1,9 @@
-//! Effect of logical datagrams on this controller, computed once for all equal ones.
+//! Precomputed effect of equal logical datagrams on this controller.
 //!
 //! Input: a datagram's command, address and length, and the current FMMUs and SyncManagers. Output: the affected pieces
-//! of memory, which are then copied without a search. Only simple cases are compiled: whole bytes, each piece in one
-//! area of process RAM or the AL status, no byte both read and written. All others are handled by
-//! [`super::processing`]. A write to a relevant register discards all results.
+//! of memory, which are then copied without a search. Only simple cases are precomputed: whole bytes, each piece in one
+//! area of process RAM or the AL status, no byte both read and written. [`super::processing`] handles all others. A
+//! write to a relevant register discards all results.
 
 mod known;
 
@@ -19,8 +19,8 @@ use known::{AL_STATUS, FREE, Known, Move, PIECES};
 pub(super) use known::Compiled;
 
 impl Controller {
-    /// Copies the data of a logical datagram that concerns this controller. Returns what was read and what was written,
-    /// each if anything was; `None` for a case that is not simple.
+    /// Copies the data of a logical datagram that addresses this controller. Returns whether data was read and whether
+    /// data was written; `None` for a case that is not simple.
     pub(super) fn logical_compiled(&mut self, command: Command, address: u32, data: &mut [u8]) -> Option<(bool, bool)> {
         let len = u16::try_from(data.len()).ok()?;
         let known = match self.compiled.find(command, address, len) {
@@ -40,7 +40,7 @@ impl Controller {
                 self.memory.store(physical, data);
                 written = true;
             } else {
-                // Mostly a byte or two: a loop is faster than a call.
+                // Usually one or two bytes: a loop is faster than a call.
                 let from = self.memory.span(physical, data.len());
                 data.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
                 read = true;

@@ -1,6 +1,6 @@
-//! What a controller is made of: the parts that differ between types and devices.
+//! Properties of a controller that differ between types and devices.
 //!
-//! In: nothing. Out: [`ControllerConfig`] for [`super::Controller::new`], by default like an ET1100 with two ports.
+//! [`ControllerConfig`] is the input of [`super::Controller::new`]; its default is like an ET1100 with two ports.
 
 use core::time::Duration;
 
@@ -8,7 +8,7 @@ use ringcat_wire::register::{Features, PortKind};
 
 use super::clock::ClockErrors;
 
-/// Most FMMUs and SyncManagers of a controller (protocol 3.1).
+/// Maximum number of FMMUs and SyncManagers of a controller (protocol 3.1).
 pub const MAX_UNITS: u8 = 16;
 
 /// Hardware of a controller and its EEPROM.
@@ -22,13 +22,13 @@ pub struct ControllerConfig {
     pub build: u16,
     /// FMMU_COUNT (0x0004), at most [`MAX_UNITS`].
     pub fmmu_count: u8,
-    /// FMMUs work as they were written when the application last asked for it, instead of at once.
+    /// FMMU registers take effect when the application latches them, instead of at once.
     pub latches_fmmus: bool,
     /// SYNC_MANAGER_COUNT (0x0005), at most [`MAX_UNITS`].
     pub sync_manager_count: u8,
     /// RAM_SIZE (0x0006): KiB of process RAM from 0x1000, at most 60.
     pub ram_kib: u8,
-    /// PORT_DESCRIPTOR (0x0007): what stands at port 0..3.
+    /// PORT_DESCRIPTOR (0x0007): physical layer of port 0..3.
     pub ports: [PortKind; 4],
     /// FEATURES (0x0008).
     pub features: Features,
@@ -36,21 +36,21 @@ pub struct ControllerConfig {
     pub product_id: u64,
     /// EEPROM image; without one the device information is never loaded.
     pub sii: Vec<u8>,
-    /// How long one read or write command of the SII interface takes.
+    /// Duration of one read or write command of the SII interface.
     pub sii_busy: Duration,
-    /// How long loading the configuration from the EEPROM takes after power-on, reset and reload.
+    /// Duration of loading the configuration from the EEPROM after power-on, reset and reload.
     pub sii_load_time: Duration,
-    /// One read command yields 8 bytes (otherwise 4).
+    /// One read command returns 8 bytes (otherwise 4).
     pub eight_byte_reads: bool,
     /// Imperfections of the local clock.
     pub clock_errors: ClockErrors,
-    /// The local clock when power comes.
+    /// Value of the local clock at power-on.
     pub clock_start: u64,
     /// The controller has DC_LATCH_MODE (0x0936) and, while it is 0, does not latch the receive time of frames that
-    /// come in at another port than 0 before the processing unit has seen them (protocol 3.12, 7.5).
+    /// arrive at a port other than 0 before they pass the processing unit (protocol 3.12, 7.5).
     pub receive_time_latch_mode: bool,
     /// The controller does not distinguish frames when it latches receive times: a port has the time of the last frame
-    /// that arrived there before the latching one reaches the processing unit, or of the next one where none has
+    /// that arrived there before the latching frame reaches the processing unit, or of the next frame if none has
     /// arrived yet (protocol 7.1).
     pub latches_any_frame: bool,
 }

@@ -1,14 +1,14 @@
 //! ECAT and AL events, and the registers that mirror states: DL status and SyncManager status (protocol 2.3, 3.5).
 //!
-//! In: what happened. Out: registers 0x0110, 0x0210, 0x0220, 0x0805 + 8n, and the bits that the processing unit puts
-//! into the IRQ field of datagrams.
+//! Input: changes of state. Output: registers 0x0110, 0x0210, 0x0220, 0x0805 + 8n, and the bits that the processing
+//! unit writes to the IRQ field of datagrams.
 
 use ringcat_wire::register::{DlStatus, map};
 
 use super::Controller;
 use super::event_bits::{EVENT_DL_STATUS, EVENT_SYNC_MANAGER_ECAT, EVENT_SYNC_MANAGER_PDI, MIRRORED};
 
-/// Bits of ESC_CONFIGURATION that switch enhanced link detection on (protocol 2.8).
+/// Bits of ESC_CONFIGURATION that enable enhanced link detection (protocol 2.8).
 const ENHANCED_LINK_DETECTION: u8 = 0xF2;
 
 impl Controller {
@@ -28,7 +28,7 @@ impl Controller {
         }
     }
 
-    /// The bits for datagrams: pending and not masked (protocol 1.2).
+    /// The bits for datagrams: pending and enabled by the mask (protocol 1.2).
     pub(super) fn refresh_irq(&mut self) {
         self.irq = self.memory.u16(map::ECAT_EVENT) & self.memory.u16(map::ECAT_EVENT_MASK);
     }
@@ -41,7 +41,7 @@ impl Controller {
         self.memory.set_u32(map::AL_EVENT, self.memory.u32(map::AL_EVENT) & !bits);
     }
 
-    /// Brings DL_STATUS up to date and raises the event where it changed.
+    /// Updates DL_STATUS and raises the event if it changed.
     pub(super) fn refresh_dl_status(&mut self) {
         let loaded = self.memory.process_ram_open;
         let configuration = self.memory.u8(map::ESC_CONFIGURATION);
@@ -59,7 +59,7 @@ impl Controller {
         }
     }
 
-    /// Brings the status byte and the events of SyncManager `n` up to date.
+    /// Updates the status byte and the events of SyncManager `n`.
     pub(super) fn refresh_sync_manager(&mut self, n: usize) {
         let Some((status, ecat, pdi)) = self.sync_managers.show(n) else { return };
         let register = map::sync_manager(n as u8).offset(ringcat_wire::register::SyncManager::STATUS);

@@ -1,21 +1,21 @@
-//! FMMUs: which logical bits are which physical bits (protocol 3.10).
+//! FMMUs: map logical bits to physical bits (protocol 3.10).
 //!
-//! In: the FMMU registers and the bit range of a datagram. Out: the pieces of that range that this controller maps, in
-//! one direction, the lower-numbered FMMU winning where several hit. Moving the bits is [`super::access`]'s.
+//! Input: the FMMU registers and the bit range of a datagram. Output: the pieces of that range that this controller
+//! maps in one direction. If several FMMUs match, the lowest number takes precedence. [`super::access`] moves the bits.
 
 use ringcat_wire::register::{Fmmu, map};
 
-/// First bit behind the registers that do more than keep a value.
+/// First bit after the registers with side effects.
 const REGISTERS_END: u64 = map::DIGITAL_OUTPUTS.0 as u64 * 8;
 
-/// A piece of logical bits and where they are.
+/// A piece of logical bits and its physical position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Piece {
     /// First logical bit.
     pub logical: u64,
     /// First physical bit.
     pub physical: u64,
-    /// Bits.
+    /// Number of bits.
     pub len: u64,
 }
 
@@ -28,7 +28,7 @@ pub(super) enum Direction {
 
 #[derive(Clone, Copy, Debug)]
 struct Mapping {
-    /// First logical bit and the one behind the last.
+    /// First logical bit and the bit after the last.
     first: u64,
     end: u64,
     physical: u64,
@@ -40,11 +40,11 @@ struct Mapping {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fmmus {
     mappings: Vec<Mapping>,
-    /// Hull of all mapped bits, to dismiss a datagram quickly.
+    /// Range of all mapped bits, to skip a datagram quickly.
     hull: (u64, u64),
     reads: bool,
     writes: bool,
-    /// Registers that do more than keep a value can be written.
+    /// Whether registers with side effects can be written.
     reaches_registers: bool,
 }
 
@@ -55,7 +55,7 @@ impl Fmmus {
         (self.reads, self.writes, self.reaches_registers) = (false, false, false);
     }
 
-    /// Takes over the registers of the next FMMU, in the order of their numbers.
+    /// Adds the registers of the next FMMU, in the order of their numbers.
     pub fn push(&mut self, fmmu: &Fmmu, byte_oriented: bool) {
         let mut fmmu = *fmmu;
         if byte_oriented {
@@ -78,7 +78,7 @@ impl Fmmus {
         self.mappings.push(mapping);
     }
 
-    /// Whether some FMMU may hit these bits.
+    /// Whether an FMMU may match these bits.
     pub fn concern(&self, first: u64, end: u64) -> bool {
         first < self.hull.1 && self.hull.0 < end
     }
@@ -88,7 +88,7 @@ impl Fmmus {
         self.reads && self.writes
     }
 
-    /// Whether a logical write may change how the controller works.
+    /// Whether a logical write may change the behaviour of the controller.
     pub fn reach_registers(&self) -> bool {
         self.reaches_registers
     }
@@ -97,7 +97,7 @@ impl Fmmus {
         self.mappings.len()
     }
 
-    /// The first piece at or behind bit `from` and before `end` that mapping `n` and no lower one maps.
+    /// The first piece at or after bit `from` and before `end` that mapping `n`, and none with a lower number, maps.
     pub fn piece(&self, n: usize, direction: Direction, from: u64, end: u64) -> Option<Piece> {
         let mapping = self.mappings.get(n).filter(|mapping| mapping.has(direction))?;
         let mut start = from.max(mapping.first);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lower_numbered_fmmu_wins_and_leaves_the_rest() {
+    fn the_lower_numbered_fmmu_takes_precedence_and_leaves_the_rest() {
         let mut fmmus = Fmmus::default();
         fmmus.push(&fmmu(2, 1, (0, 7), 0x1000, 0), false);
         fmmus.push(&fmmu(0, 4, (0, 7), 0x1100, 0), false);

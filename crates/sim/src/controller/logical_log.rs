@@ -1,17 +1,18 @@
 //! A log of the logical datagrams that a SubDevice processed: evidence from inside the SubDevice, for checkers.
 //!
-//! Input: each logical datagram that the processing unit answered, with the marks by which a MainDevice recognises its
-//! frame. Output: the data of that datagram when it left the SubDevice. The log is off unless a checker enables it, and
-//! holds the newest accesses only.
+//! Input: each logical datagram processed by the processing unit, with the marks by which a MainDevice identifies its
+//! frame. Output: the data of that datagram when it left the SubDevice. The log is disabled unless a checker enables
+//! it, and contains only the newest accesses.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 
 use ringcat_wire::command::Command;
 
-/// Accesses that are kept.
+/// Capacity.
 const KEPT: usize = 64;
-/// Offset of the second byte of the source address, where a MainDevice keeps the number of a frame (protocol 9.7.1).
+/// Offset of the second byte of the source address, in which a MainDevice stores the number of a frame (protocol
+/// 9.7.1).
 const FRAME_ID_AT: usize = 7;
 
 /// A logical datagram that a SubDevice processed.
@@ -23,14 +24,14 @@ pub struct LogicalAccess {
     pub command: Command,
     /// Logical address of the first byte.
     pub address: u32,
-    /// The SubDevice put its inputs in.
+    /// Whether the SubDevice inserted inputs.
     pub read: bool,
-    /// The SubDevice took outputs.
+    /// Whether the SubDevice took outputs.
     pub written: bool,
-    /// The data as it left the SubDevice.
+    /// The data when the datagram left the SubDevice.
     pub data: Vec<u8>,
-    /// Copied pieces: a SubDevice increments the working counter once for all that it reads, whatever part its
-    /// SyncManagers refuse.
+    /// Copied pieces: a SubDevice increments the working counter once for all reads, even if SyncManagers refuse a
+    /// part.
     pub moved: Vec<Moved>,
 }
 
@@ -39,17 +40,17 @@ pub struct LogicalAccess {
 pub struct Moved {
     /// First byte in the data.
     pub at: usize,
-    /// Bytes, those included of which only bits were moved.
+    /// Bytes, including bytes of which only some bits were moved.
     pub len: usize,
-    /// Into the memory.
+    /// Whether data was written to the memory.
     pub write: bool,
 }
 
 impl LogicalAccess {
-    /// Whether all of some bytes of the data was moved in one direction.
+    /// Whether all of these bytes of the data were moved in one direction.
     pub fn has_moved(&self, bytes: Range<usize>, write: bool) -> bool {
         let mut at = bytes.start;
-        // Pieces may follow each other in any order.
+        // The pieces have no particular order.
         while at < bytes.end {
             let holds = |it: &&Moved| it.write == write && it.at <= at && at < it.at + it.len;
             let Some(end) = self.moved.iter().filter(holds).map(|it| it.at + it.len).max() else { return false };
@@ -63,7 +64,7 @@ impl LogicalAccess {
 #[derive(Clone, Debug, Default)]
 pub(super) struct LogicalLog {
     kept: Option<VecDeque<LogicalAccess>>,
-    /// What the datagram that is being processed has moved.
+    /// Moves of the datagram that is being processed.
     moved: Vec<Moved>,
 }
 
@@ -83,7 +84,7 @@ impl LogicalLog {
         }
     }
 
-    /// What has been moved since the last call.
+    /// Moves since the last call.
     pub fn take_moved(&mut self) -> Vec<Moved> {
         core::mem::take(&mut self.moved)
     }

@@ -1,18 +1,19 @@
-//! The address space of a controller: its bytes, what exists where, and which side may write it (protocol 3).
+//! The address space of a controller: bytes, existing ranges, and write access of each side (protocol 3).
 //!
-//! In: addresses. Out: runs of addresses with equal rights, and little-endian access to the bytes. What a write causes
-//! is in [`super::registers`]; SyncManagers, protection and the SII interface restrict further in [`super::access`].
+//! Input: addresses. Output: runs of addresses with equal rights, and little-endian access to the bytes.
+//! [`super::registers`] implements the effects of writes; SyncManagers, protection and the SII interface add
+//! restrictions in [`super::access`].
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::map;
 
 use super::config::{ControllerConfig, MAX_UNITS};
 
-/// First address of user RAM: below it, writes take over with a good FCS only (protocol 2.5).
+/// First address of user RAM: writes below it take effect only after a good FCS (protocol 2.5).
 pub(super) const USER_RAM: u32 = map::USER_RAM.0 as u32;
 /// First address of process RAM.
 pub(super) const PROCESS_RAM: u32 = map::PROCESS_RAM.0 as u32;
-/// Most process RAM that the address space has room for.
+/// Maximum size of process RAM in the address space.
 const MAX_RAM_KIB: u8 = 60;
 
 /// The side of an access.
@@ -81,7 +82,7 @@ const fn dc64(address: RegisterAddress, ecat_writes: bool) -> Region {
     region(address.offset(4), 4, ecat_writes, false, Needs::Dc64)
 }
 
-/// All registers up to user RAM, ascending. The blocks of FMMUs and SyncManagers are cut to size by their count.
+/// All registers up to user RAM, ascending. The blocks of FMMUs and SyncManagers are limited by their number.
 static REGIONS: [Region; 69] = [
     fixed(map::TYPE, 10),
     ecat(map::STATION_ADDRESS, 2),
@@ -154,7 +155,7 @@ static REGIONS: [Region; 69] = [
     dc(map::DC_ECAT_BUFFER_CHANGE, 4, false),
 ];
 
-/// The rest of [`REGIONS`], apart because nothing below it is optional.
+/// The rest of [`REGIONS`], separate because none of its registers is optional.
 static UPPER_REGIONS: [Region; 5] = [
     dc(map::DC_PDI_BUFFER_START, 8, false),
     fixed(map::PRODUCT_ID, 8),
@@ -163,11 +164,11 @@ static UPPER_REGIONS: [Region; 5] = [
     fixed(map::GPI, 8),
 ];
 
-/// Where the latter begin.
+/// First address of [`UPPER_REGIONS`].
 const UPPER_START: u32 = map::DC_PDI_BUFFER_START.0 as u32;
 
-/// For each address below user RAM, the place of the first region that ends behind it, in [`REGIONS`] or from where
-/// they begin on in [`UPPER_REGIONS`]: every read of a register looks here.
+/// For each address below user RAM, the index of the first region that ends after it, in [`REGIONS`] or, above
+/// [`UPPER_START`], in [`UPPER_REGIONS`]: every register read uses it.
 static NEXT_REGION: [u8; USER_RAM as usize] = {
     let mut next = [0; USER_RAM as usize];
     let (mut place, mut address) = (0, 0);
@@ -185,14 +186,14 @@ static NEXT_REGION: [u8; USER_RAM as usize] = {
     next
 };
 
-/// A run of addresses with equal rights, from where it was asked for.
+/// A run of addresses with equal rights, starting at the requested address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
-    /// First address behind the run.
+    /// First address after the run.
     pub end: u32,
-    /// Whether there is anything.
+    /// Whether the addresses exist.
     pub exists: bool,
-    /// Whether the asking side may write.
+    /// Whether the requesting side may write.
     pub writable: bool,
 }
 
@@ -205,7 +206,7 @@ pub(super) struct Memory {
     dc: bool,
     dc_64bit: bool,
     latch_mode: bool,
-    /// Process RAM can be accessed: the SII is loaded (protocol 3.13).
+    /// Whether process RAM can be accessed: the SII is loaded (protocol 3.13).
     pub process_ram_open: bool,
 }
 
@@ -237,7 +238,7 @@ impl Memory {
     #[inline]
     pub fn run(&self, address: u32, side: Side) -> Run {
         if address < UPPER_START {
-            // Most registers are always there: the way of nearly every access.
+            // Most registers always exist: the case of nearly every access.
             let place = usize::from(NEXT_REGION[address as usize]);
             return match REGIONS.get(place) {
                 Some(region) if region.needs == Needs::Nothing && u32::from(region.start) <= address => {
@@ -289,7 +290,7 @@ impl Memory {
         }
     }
 
-    /// The bytes from `address`; empty where they leave the address space.
+    /// The bytes from `address`; empty if they exceed the address space.
     pub fn span(&self, address: u32, len: usize) -> &[u8] {
         let start = address as usize;
         start.checked_add(len).and_then(|end| self.bytes.get(start..end)).unwrap_or(&[])
@@ -345,7 +346,7 @@ impl Memory {
         self.set_array(address, value.to_le_bytes());
     }
 
-    /// Counts an 8-bit counter up to 0xFF (protocol 2.5).
+    /// Increments an 8-bit counter up to 0xFF (protocol 2.5).
     pub fn count(&mut self, address: RegisterAddress) {
         self.set_u8(address, self.u8(address).saturating_add(1));
     }
@@ -387,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_of_addresses_finds_what_a_search_finds() {
+    fn the_address_table_matches_a_search() {
         for address in 0..USER_RAM {
             let all = if address < UPPER_START { &REGIONS[..] } else { &UPPER_REGIONS[..] };
             let next = all.partition_point(|region| u32::from(region.end) <= address);

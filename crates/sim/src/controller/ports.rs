@@ -1,16 +1,16 @@
-//! The four ports: links, loops, the order of travel, DL status (protocol 2.1, 2.2, 2.3).
+//! The four ports: links, loops, order of processing, DL status (protocol 2.1, 2.2, 2.3).
 //!
-//! In: link changes and loop modes. Out: which ports are open and the content of DL_STATUS. When a change raises an
-//! event or a counter is [`super::Controller`]'s matter.
+//! Input: link changes and loop settings. Output: the open ports and the content of DL_STATUS. [`super::Controller`]
+//! raises events and counts.
 
 use ringcat_wire::register::{LoopControl, PortKind, PortStatus};
 
 use crate::frame::Port;
 
-/// Port behind each port in the order of travel 0-3-1-2.
+/// Next port in the order 0-3-1-2.
 const NEXT: [Port; 4] = [Port::D, Port::C, Port::A, Port::B];
 
-/// The port behind `port` in the order of travel.
+/// The next port after `port` in the order 0-3-1-2.
 pub(super) const fn next(port: Port) -> Port {
     NEXT[port.index()]
 }
@@ -21,13 +21,13 @@ pub(super) struct Ports {
     usable: [bool; 4],
     link: [bool; 4],
     open: [bool; 4],
-    /// The ports that frames pass, bit by bit: those that are open, and port 0 as the way back in when none is
-    /// (protocol 2.2). At hand for every frame.
+    /// The ports that frames pass, one bit each: the open ports, and port 0 as return path if none is open (protocol
+    /// 2.2). Cached for every frame.
     passing: u8,
     modes: [LoopControl; 4],
-    /// The frame that closed loops by writing DL_CONTROL, and the loops: it may still come back through them.
+    /// The frame that closed loops by writing DL_CONTROL, and these loops: the frame may still return through them.
     closing: Option<(u64, [bool; 4])>,
-    /// Counts all changes that may change the path of a frame.
+    /// Counter of all changes that may change the path of a frame.
     changes: u32,
 }
 
@@ -44,7 +44,7 @@ impl Ports {
         }
     }
 
-    /// Takes all links away.
+    /// Removes all links.
     pub fn unplug(&mut self) {
         (self.link, self.open) = ([false; 4], [false; 4]);
         self.note_passing();
@@ -54,7 +54,7 @@ impl Ports {
         self.link[port.index()]
     }
 
-    /// Takes over a link state. Returns whether a lost link counts: it was open in mode Auto (protocol 2.5).
+    /// Sets a link state. Returns whether a lost link is counted: the port was open in mode Auto (protocol 2.5).
     pub fn set_link(&mut self, port: Port, up: bool) -> bool {
         let p = port.index();
         let lost = self.link[p] && !up && self.open[p] && self.modes[p] == LoopControl::Auto;
@@ -63,7 +63,7 @@ impl Ports {
         lost
     }
 
-    /// Takes over loop modes that were written, as by the frame `frame`.
+    /// Sets loop settings written by frame `frame`.
     pub fn set_modes(&mut self, modes: [LoopControl; 4], frame: Option<u64>) {
         let before = self.open;
         self.modes = modes;
@@ -72,7 +72,7 @@ impl Ports {
         self.closing = frame.map(|frame| (frame, closed));
     }
 
-    /// Opens a port that has auto-closed and on which a valid frame came in (protocol 2.2). Returns whether it did.
+    /// Opens a port in mode auto-close on which a valid frame arrived (protocol 2.2). Returns whether it opened.
     pub fn reopen(&mut self, port: Port) -> bool {
         let p = port.index();
         let opens = !self.open[p] && self.link[p] && self.modes[p] == LoopControl::AutoClose;
@@ -93,7 +93,7 @@ impl Ports {
         self.note_passing();
     }
 
-    /// Paths have to be computed again.
+    /// Marks paths as changed.
     pub fn note_change(&mut self) {
         self.changes = self.changes.wrapping_add(1);
     }
@@ -108,37 +108,37 @@ impl Ports {
         self.passing = if open == 0 { 1 } else { open };
     }
 
-    /// Whether the loop is closed, as DL status shows it.
+    /// Whether the loop is closed according to DL status.
     pub fn loop_closed(&self, port: Port) -> bool {
         !self.open[port.index()]
     }
 
-    /// Whether frames pass the port. Port 0 is the way back in when all loops are closed (protocol 2.2).
+    /// Whether frames pass the port. Port 0 is the return path if all loops are closed (protocol 2.2).
     pub fn passes(&self, port: Port) -> bool {
         self.passing & 1 << port.index() != 0
     }
 
-    /// Counts changes: equal counts mean equal paths, except for a frame that closed ports itself.
+    /// Counter of changes: equal counters mean equal paths, except for a frame that closed ports itself.
     pub const fn changes(&self) -> u32 {
         self.changes
     }
 
-    /// The ports that frames pass, bit by bit.
+    /// The ports that frames pass, one bit each.
     pub const fn passing(&self) -> u8 {
         self.passing
     }
 
-    /// Whether a frame passes the port although its loop is closed: it is the frame that closed it, on its way back.
+    /// Whether a frame passes the port although its loop is closed: it is the frame that closed the loop and returns.
     pub fn closed_by(&self, port: Port, frame: u64) -> bool {
         self.closing.is_some_and(|(id, closed)| id == frame && closed[port.index()])
     }
 
-    /// Whether the circulating-frame rule holds: port 0 is closed, but not by force (protocol 2.4).
+    /// Whether the rule for circulating frames applies: port 0 is closed, but not forced closed (protocol 2.4).
     pub fn breaks_circulation(&self) -> bool {
         matches!(self.modes[0], LoopControl::Auto | LoopControl::AutoClose) && !self.passes(Port::A)
     }
 
-    /// The ports as DL status shows them.
+    /// The ports according to DL status.
     pub fn status(&self) -> [PortStatus; 4] {
         core::array::from_fn(|p| PortStatus {
             link: self.link[p],

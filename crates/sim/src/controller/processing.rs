@@ -1,8 +1,8 @@
-//! The processing unit (EPU): what it does to a frame that passes (protocol 1.4, 1.5, 2.4, 2.6).
+//! The processing unit (EPU): effects on a passing frame (protocol 1.4, 1.5, 2.4, 2.6).
 //!
-//! In: a frame and the times at which its first and last bit came in. Out: the frame with data, working counters, ADP,
-//! event bits and marks as the commands want it, or its destruction. The frame's FCS decides at the end whether
-//! registers and buffers take over what it asked for.
+//! Input: a frame and the times at which its first and last bit arrived. Output: the frame with data, working counters,
+//! ADP, event bits and marks according to its commands, or its destruction. The FCS at the end of the frame determines
+//! whether writes to registers and buffers take effect.
 
 use core::mem;
 
@@ -29,7 +29,7 @@ const LENGTH_HIGH: usize = 7;
 const CIRCULATING_HIGH: u8 = (CIRCULATING >> 8) as u8;
 
 impl Controller {
-    /// Processes a frame. Returns whether it goes on.
+    /// Processes a frame. Returns whether it is forwarded.
     pub(super) fn process(&mut self, frame: &mut SimFrame, first_bit: SimTime, now: SimTime) -> bool {
         let rule = self.forwarding_rule;
         if frame.malformed {
@@ -65,13 +65,13 @@ impl Controller {
         true
     }
 
-    /// Sets the C bit in every datagram; `false` where one had it already or there is none to set (protocol 2.4).
+    /// Sets the C bit in every datagram; `false` if a datagram had it already or there is no datagram (protocol 2.4).
     fn mark_circulating(&mut self, frame: &mut SimFrame) -> bool {
         let SimFrame { bytes, datagrams, .. } = frame;
         let field = |place: &DatagramPlace| usize::from(place.header) + LENGTH_HIGH;
         let circulates = |place| bytes.get(field(place)).is_some_and(|high| high & CIRCULATING_HIGH != 0);
         if datagrams.is_empty() {
-            // What is left of a cut frame; it is counted already.
+            // The remnant of a truncated frame; it is counted already.
             return false;
         }
         if datagrams.iter().any(circulates) {
@@ -131,7 +131,7 @@ impl Controller {
         adp == self.station || (self.alias_enabled && adp == self.memory.u16(map::STATION_ALIAS))
     }
 
-    /// A command with a physical address. Returns what it adds to the working counter.
+    /// A command with a physical address. Returns the increment of the working counter.
     fn physical(&mut self, command: Command, matches: bool, ado: RegisterAddress, data: &mut [u8]) -> u16 {
         let at = u32::from(ado.0);
         let multiple = matches!(command, Command::Armw | Command::Frmw);
@@ -153,14 +153,13 @@ impl Controller {
         }
     }
 
-    /// Whether a BWR or FPWR to this address latches the receive times: it writes the first byte of them (protocol
-    /// 3.12).
+    /// Whether a BWR or FPWR to this address latches the receive times: it writes their first byte (protocol 3.12).
     fn latches(&self, at: u32, data: &[u8]) -> bool {
         let target = u32::from(map::DC_RECEIVE_TIME.0);
         at <= target && target < at + data.len() as u32 && self.config.features.dc
     }
 
-    /// The old value goes into the datagram, the data that came in goes into the memory, at an offset of its own.
+    /// Writes the old value to the datagram and the received data to the memory, at a separate offset.
     fn read_write(&mut self, command: Command, ado: RegisterAddress, data: &mut [u8]) -> u16 {
         if self.config.features.brw_unsupported {
             return 0;
@@ -174,7 +173,7 @@ impl Controller {
         u16::from(read) + 2 * u16::from(written)
     }
 
-    /// A command with a logical address. Returns what it adds to the working counter.
+    /// A command with a logical address. Returns the increment of the working counter.
     fn logical(&mut self, command: Command, address: u32, data: &mut [u8]) -> u16 {
         let first = u64::from(address) * 8;
         let end = first + data.len() as u64 * 8;
@@ -250,7 +249,7 @@ impl Controller {
         any
     }
 
-    /// The end of a frame: its effects are applied, or discarded.
+    /// End of a frame: its effects are applied or discarded.
     fn finish_frame(&mut self, good: bool, now: SimTime) {
         let mut left = self.pass.sync_managers;
         while left != 0 {
@@ -282,7 +281,7 @@ impl Controller {
         self.pass.clear();
     }
 
-    /// Carries out the frame's register writes in the order of its datagrams, then the SII command among them.
+    /// Applies the register writes of the frame in the order of its datagrams, then the SII command among them.
     fn apply_writes(&mut self, now: SimTime) {
         let mut pass = mem::replace(&mut self.pass, Pass::new());
         self.pass.start = pass.start;
@@ -303,7 +302,7 @@ fn ado(header: &[u8]) -> RegisterAddress {
     RegisterAddress(u16::from_le_bytes([header[4], header[5]]))
 }
 
-/// The marks of the processing unit outside of the datagrams: source address bit and cleared UDP checksum.
+/// Marks of the processing unit outside of datagrams: source address bit and cleared UDP checksum.
 fn mark_processed(frame: &mut SimFrame, rule: bool) {
     if rule && let Some(byte) = frame.bytes.get_mut(SOURCE) {
         *byte |= PROCESSED;

@@ -1,7 +1,7 @@
-//! What a write to registers does (protocol 2.2, 2.5, 3).
+//! Effects of writes to registers (protocol 2.2, 2.5, 3).
 //!
-//! In: bytes that take over, from a frame with a good FCS or from the PDI. Out: the registers' new content and its
-//! consequences in the other parts of the controller.
+//! Input: bytes that take effect, from a frame with a good FCS or from the PDI. Output: the new register contents and
+//! their effects on other parts of the controller.
 
 use core::time::Duration;
 
@@ -15,15 +15,15 @@ use super::memory::Side;
 use crate::frame::Port;
 use crate::time::SimTime;
 
-/// How long temporary loop settings hold (protocol 2.2).
+/// Duration of temporary loop settings (protocol 2.2).
 const TEMPORARY_LOOPS: Duration = Duration::from_secs(1);
-/// Bit 0 of ESC_CONFIGURATION: AL status follows AL control by itself (protocol 3.4).
+/// Bit 0 of ESC_CONFIGURATION: AL status follows AL control in hardware (protocol 3.4).
 const DEVICE_EMULATION: u8 = 0x01;
 /// Byte of DL_CONTROL with the loop settings.
 const DL_CONTROL_LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
 const TEMPORARY: u8 = 0x02;
 
-/// Registers that a write touches.
+/// Registers affected by a write.
 #[derive(Clone, Copy)]
 struct Touched {
     at: u32,
@@ -37,7 +37,7 @@ impl Touched {
 }
 
 impl Controller {
-    /// Carries out a write of (value, mask) bytes inside one run of registers; `frame` is the frame it came in.
+    /// Applies a write of (value, mask) bytes inside one run of registers; `frame` is the frame that contained it.
     pub(super) fn apply(&mut self, side: Side, at: u32, bytes: &[(u8, u8)], now: SimTime, frame: Option<u64>) {
         let touched = Touched { at, end: at + bytes.len() as u32 };
         let al_control_pending = !self.emulates() && self.al_event() & EVENT_AL_CONTROL != 0;
@@ -72,7 +72,7 @@ impl Controller {
         }
     }
 
-    /// Whether the byte keeps what is written to it.
+    /// Whether the byte stores written values.
     fn takes_value(&self, address: u32, al_control_pending: bool) -> bool {
         let block =
             |start: RegisterAddress, len: u32| (u32::from(start.0)..u32::from(start.0) + len).contains(&address);
@@ -84,7 +84,7 @@ impl Controller {
             0x01 => !(al_control_pending && block(map::AL_CONTROL, 2)),
             0x03 | 0x04 => !is_counter(address),
             0x05 => !block(map::SII_CONFIGURATION, 4),
-            // Start and length are writable only while the SyncManager is off (protocol 3.11).
+            // Start and length are writable only while the SyncManager is disabled (protocol 3.11).
             0x08 => address & 7 > 3 || !self.sync_managers.enabled((address as usize & 0xFF) / SyncManager::LEN),
             0x09 => !block(map::DC_RECEIVE_TIME, 16) && !block(map::DC_SYSTEM_TIME, 8),
             _ => true,
@@ -109,7 +109,7 @@ impl Controller {
             if touched.is(DL_CONTROL_LOOPS, 1) {
                 self.loops_written(now, frame);
             } else if self.memory.u8(map::DL_CONTROL) & TEMPORARY == 0 {
-                // The bit was taken back: the settings become lasting.
+                // The bit was cleared: the settings become permanent.
                 self.temporary_loops = None;
             }
         }
@@ -126,7 +126,7 @@ impl Controller {
         }
     }
 
-    /// Device emulation: no application answers state requests.
+    /// Device emulation: no application responds to state requests.
     fn emulates(&self) -> bool {
         self.memory.u8(map::ESC_CONFIGURATION) & DEVICE_EMULATION != 0
     }
@@ -144,7 +144,7 @@ impl Controller {
         self.refresh_dl_status();
     }
 
-    /// The loop settings from before the temporary ones return.
+    /// Restores the loop settings from before the temporary ones.
     pub(super) fn end_temporary_loops(&mut self) {
         let Some((_, loops)) = self.temporary_loops.take() else { return };
         let control = DlControl { loops, temporary: false, ..DlControl::decode(&self.memory.array(map::DL_CONTROL)) };
@@ -154,7 +154,7 @@ impl Controller {
         self.refresh_dl_status();
     }
 
-    /// Takes over divider and times of the watchdogs.
+    /// Applies divider and times of the watchdogs.
     pub(super) fn configure_watchdogs(&mut self) {
         let divider = self.memory.u16(map::WATCHDOG_DIVIDER);
         self.process_data_watchdog.configure(divider, self.memory.u16(map::WATCHDOG_TIME_PROCESS_DATA));
@@ -173,7 +173,7 @@ impl Controller {
         self.schedule();
     }
 
-    /// FMMUs that are latched take over their registers now; `active`: or are switched off.
+    /// Latched FMMUs take their register values now if `active`, otherwise they are disabled.
     pub(crate) fn latch_fmmus(&mut self, active: bool) {
         if !self.config.latches_fmmus {
             return;
@@ -207,8 +207,7 @@ impl Controller {
         }
     }
 
-    /// Latches the receive times of the ports at which the frame has come in, and of the processing unit (protocol
-    /// 3.12).
+    /// Latches the receive times of the ports at which the frame arrived, and of the processing unit (protocol 3.12).
     pub(super) fn latch_receive_times(&mut self, frame: u64, at_unit: SimTime) {
         let forwarding = !self.config.receive_time_latch_mode || self.memory.u8(map::DC_LATCH_MODE) & 1 != 0;
         for (port, at) in self.clock.latch(frame, at_unit, self.config.latches_any_frame) {
@@ -224,8 +223,8 @@ impl Controller {
         }
     }
 
-    /// The last frame that latched receive times, by its number in the simulation, and the time at which the processing
-    /// unit processed it: the exact values, which no MainDevice can see.
+    /// The last frame that latched receive times, by its number in the simulation, and the exact time at which the
+    /// processing unit processed it; a MainDevice cannot read these values.
     pub const fn latched(&self) -> Option<(u64, SimTime)> {
         self.clock.latched()
     }

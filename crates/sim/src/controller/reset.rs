@@ -1,8 +1,8 @@
 //! Power and resets (protocol 3.2, 4.7).
 //!
-//! In: power, and the sequence R, E, S written to ESC_RESET_ECAT or ESC_RESET_PDI in three frames. Out: registers at
-//! their reset values and a first loading of the EEPROM. Frames between those of the sequence that do not write the
-//! register do not matter; a wrong letter starts the sequence anew.
+//! Input: power, and the sequence R, E, S written to ESC_RESET_ECAT or ESC_RESET_PDI in three frames. Output: registers
+//! at their reset values and a first loading of the EEPROM. Other frames between those of the sequence are ignored; a
+//! wrong letter restarts the sequence.
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
@@ -11,7 +11,7 @@ use ringcat_wire::register::{DlControl, Information, LoopControl, PortDescriptor
 use super::Controller;
 use crate::time::SimTime;
 
-/// What has to be written to a reset register, in three frames.
+/// Values to write to a reset register, in three frames.
 const SEQUENCE: [u8; 3] = *b"RES";
 const WATCHDOG_DIVIDER_RESET: u16 = 0x09C2;
 const WATCHDOG_TIME_RESET: u16 = 0x03E8;
@@ -20,14 +20,14 @@ const FILTER_DEPTHS_RESET: u16 = 0x0C04;
 const AL_EVENT_MASK_RESET: u32 = 0x00FF_FF0F;
 
 impl Controller {
-    /// Power comes: everything at its reset values, no links yet, the EEPROM is being loaded.
+    /// Power-on: reset values, no links yet, EEPROM loading.
     pub fn power_on(&mut self, now: SimTime) {
         self.powered = true;
         self.ports.unplug();
         self.restart(now);
     }
 
-    /// Power goes, and with it the links.
+    /// Power-off, which also removes the links.
     pub fn power_off(&mut self, _now: SimTime) {
         self.powered = false;
         self.ports.unplug();
@@ -39,12 +39,12 @@ impl Controller {
         self.powered
     }
 
-    /// How often the controller has started, by power or by a reset. When it changes the application starts anew.
+    /// Number of starts of the controller by power-on or reset. If it changes, the application restarts.
     pub fn starts(&self) -> u32 {
         self.starts
     }
 
-    /// A letter of the reset sequence. A frame can bring one only.
+    /// A letter of the reset sequence. Each frame can contain only one.
     pub(super) fn reset_written(&mut self, register: RegisterAddress, letter: u8, now: SimTime, frame: Option<u64>) {
         if frame.is_some() && frame == self.reset_frame {
             return;
@@ -59,7 +59,7 @@ impl Controller {
         }
     }
 
-    /// Everything but the links starts anew.
+    /// Restarts everything except the links.
     fn restart(&mut self, now: SimTime) {
         self.starts = self.starts.wrapping_add(1);
         self.memory.clear();

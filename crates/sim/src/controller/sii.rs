@@ -1,7 +1,7 @@
 //! The SII interface: commands to the EEPROM, its owner, loading the configuration (protocol 3.8, 4.7).
 //!
-//! In: writes to 0x0500..0x050F and virtual time. Out: data, busy and error bits, and after loading the registers that
-//! come from the EEPROM. A command starts at the end of its frame and takes the configured time.
+//! Input: writes to 0x0500..0x050F and virtual time. Output: data, busy and error bits, and after loading the registers
+//! that come from the EEPROM. A command starts at the end of its frame and takes the configured time.
 
 mod interface;
 
@@ -18,22 +18,22 @@ use interface::Task;
 
 pub(super) use interface::SiiInterface;
 
-/// Bytes of words 0 to 7, which are loaded.
+/// Bytes of the loaded words 0 to 7.
 const CONFIGURATION_AREA: usize = 16;
-/// Bytes under the checksum.
+/// Bytes covered by the checksum.
 const CHECKED: usize = 14;
-/// Images that need two address bytes are larger than 16 KBit.
+/// Images larger than 16 KBit need two address bytes.
 const ONE_ADDRESS_BYTE: usize = 2048;
 /// Value of bytes beyond the end of the image.
 const ERASED: u8 = 0xFF;
 
 impl Controller {
-    /// The EEPROM's content.
+    /// The content of the EEPROM.
     pub fn sii_image(&self) -> &[u8] {
         &self.config.sii
     }
 
-    /// The EEPROM's content, to damage it. What has been loaded stays until the next loading.
+    /// The content of the EEPROM, for damage. Loaded values stay until the next loading.
     pub fn sii_image_mut(&mut self) -> &mut Vec<u8> {
         &mut self.config.sii
     }
@@ -50,7 +50,7 @@ impl Controller {
         self.memory.u8(map::SII_PDI_ACCESS) & 1 != 0
     }
 
-    /// Whether a side may write control, address and data: it owns the interface, which is not busy.
+    /// Whether a side may write control, address and data: it owns the interface, and the interface is not busy.
     pub(super) fn sii_writable(&self, side: Side) -> bool {
         let offered = self.memory.u8(map::SII_CONFIGURATION) & 1 != 0;
         let owner = match side {
@@ -60,7 +60,7 @@ impl Controller {
         owner && !self.sii.is_busy()
     }
 
-    /// Write enable holds for one frame (protocol 3.8).
+    /// Write enable applies to one frame (protocol 3.8).
     pub(super) fn clear_sii_write_enable(&mut self) {
         if self.sii.write_enabled {
             self.set_sii_write_enable(false);
@@ -73,7 +73,7 @@ impl Controller {
         self.memory.set_u8(map::SII_CONTROL, low & !1 | u8::from(enabled));
     }
 
-    /// Takes over a write to 0x0500..0x0503; address and data are plain registers.
+    /// Applies a write to 0x0500..0x0503; address and data are plain registers.
     pub(super) fn sii_written(&mut self, side: Side, at: u32, bytes: &[(u8, u8)], now: SimTime) {
         const CONFIGURATION: u32 = map::SII_CONFIGURATION.0 as u32;
         const PDI_ACCESS: u32 = map::SII_PDI_ACCESS.0 as u32;
@@ -100,14 +100,14 @@ impl Controller {
         }
     }
 
-    /// The PDI can accept the offered interface, and return it.
+    /// The PDI can accept the offered interface and return it.
     fn sii_pdi_access_written(&mut self, value: u8) {
         let wanted = SiiPdiAccess::from_bits(value).pdi_access;
         let offered = self.memory.u8(map::SII_CONFIGURATION) & 1 != 0;
         self.memory.set_u8(map::SII_PDI_ACCESS, u8::from(wanted && (offered || self.sii_owned_by_pdi())));
     }
 
-    /// Starts the command that was written, if any. Any valid command clears the error bits of the last one.
+    /// Starts a written command. Any valid command clears the error bits of the last one.
     pub(super) fn run_sii_command(&mut self, side: Side, now: SimTime) {
         let Some(command) = self.sii.command.take() else { return };
         let mut control = self.sii_control();
@@ -132,7 +132,7 @@ impl Controller {
         self.set_sii_control(SiiControl { busy: true, command, ..self.sii_control() });
     }
 
-    /// How long the next command takes.
+    /// Duration of the next command.
     fn sii_busy(&mut self) -> Duration {
         let (times, busy) = &mut self.sii.slow;
         match times.checked_sub(1) {
@@ -179,7 +179,7 @@ impl Controller {
         }
     }
 
-    /// Offset in the image of the word that SII_ADDRESS names.
+    /// Offset in the image of the word at SII_ADDRESS.
     fn sii_offset(&self) -> usize {
         usize::try_from(self.memory.u32(map::SII_ADDRESS)).map_or(usize::MAX, |word| word.saturating_mul(2))
     }
@@ -208,12 +208,12 @@ impl Controller {
         let word: [u8; 2] = self.memory.array(map::SII_DATA);
         match self.config.sii.get_mut(offset..offset.saturating_add(2)) {
             Some(bytes) => bytes.copy_from_slice(&word),
-            // No EEPROM answers beyond its end.
+            // An EEPROM does not respond to addresses beyond its end.
             None => self.set_sii_control(SiiControl { command_error: true, ..self.sii_control() }),
         }
     }
 
-    /// Takes over words 0 to 7, where their checksum is right. The alias counts only the first time (protocol 2.7).
+    /// Applies words 0 to 7 if their checksum is valid. The alias is applied only the first time (protocol 2.7).
     fn load_configuration(&mut self, first: bool) {
         let area =
             self.config.sii.get(..CONFIGURATION_AREA).and_then(|area| <[u8; CONFIGURATION_AREA]>::try_from(area).ok());

@@ -1,10 +1,10 @@
 //! A fault of an EEPROM.
 
-/// How a write to an EEPROM goes wrong.
+/// Failure of a write to an EEPROM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpoiltWrite {
-    /// It is acknowledged, and the word stays as it was: the EEPROM is write-protected.
+    /// The write is acknowledged, and the word stays unchanged: the EEPROM is write-protected.
     NotStored,
-    /// It is not acknowledged: the EEPROM is still busy inside.
+    /// The write is not acknowledged: the EEPROM is still busy internally.
     NotAcknowledged,
 }

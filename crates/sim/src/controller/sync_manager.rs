@@ -1,28 +1,29 @@
-//! SyncManagers: three buffers or a mailbox in front of a piece of RAM (protocol 3.11).
+//! SyncManagers: three buffers or a mailbox for an area of RAM (protocol 3.11).
 //!
-//! In: the register bytes of each SyncManager and accesses to its area. Out: whether an access is granted and to which
-//! bytes, and after complete accesses the status byte and events. An access by EtherCAT is complete only when its frame
-//! had a good FCS, so [`SyncManagers::finish_frame`] decides; the PDI's accesses are complete at once.
+//! Input: the register bytes of each SyncManager and accesses to its area. Output: whether an access is granted and its
+//! address, and after complete accesses the status byte and events. An access by EtherCAT is complete only after a good
+//! FCS of its frame: [`SyncManagers::finish_frame`] handles it. Accesses of the PDI are complete at once.
 //!
-//! Areas without a SyncManager are free. The area of a SyncManager that is disabled, by either side, is locked. The
-//! second and third buffer are not addressable. Areas of one byte, and areas in register space, have a single buffer.
+//! Areas without a SyncManager are freely accessible. The area of a SyncManager that is disabled, by either side, is
+//! locked. The second and third buffer are not addressable. Areas of one byte, and areas in register space, have a
+//! single buffer.
 
 use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode};
 
 use super::memory::{PROCESS_RAM, Side};
 
-/// Number of the last buffer while none has been written.
+/// Number of the last buffer before the first write.
 const NO_BUFFER: u8 = 3;
 const BUFFERS: u32 = 3;
 
-/// How the area is buffered.
+/// Buffering of the area.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Buffering {
     #[default]
     Three,
     Mailbox,
     Single,
-    /// A reserved mode or direction: nothing gets through.
+    /// A reserved mode or direction: all accesses are refused.
     Invalid,
 }
 
@@ -36,7 +37,7 @@ enum Role {
 /// Decision of the SyncManagers about an access that starts at an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Claim {
-    /// Up to this address no SyncManager is concerned.
+    /// Up to this address no SyncManager applies.
     Free(u32),
     /// Up to this address nothing is accessible.
     Locked(u32),
@@ -47,20 +48,20 @@ pub(super) enum Claim {
 /// An access that is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grant {
-    /// Where the bytes lie: in one of the buffers.
+    /// Address of the bytes, in one of the buffers.
     pub address: u32,
-    /// The access begins at the first byte of the area.
+    /// Whether the access begins at the first byte of the area.
     pub opened: bool,
-    /// The access ends with the last byte of an area that was begun at its first.
+    /// Whether the access ends at the last byte of an area that was opened at its first.
     pub completed: bool,
 }
 
 /// Result of a completed access.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Completion {
-    /// A complete write that triggers the process data watchdog.
+    /// Whether a complete write triggers the process data watchdog.
     pub triggers_watchdog: bool,
-    /// A buffer was handed over.
+    /// Whether a buffer was handed over.
     pub is_complete: bool,
 }
 
@@ -83,11 +84,11 @@ struct Unit {
     read_event: bool,
     writer_open: bool,
     reader_open: bool,
-    /// EtherCAT began reading or writing in this frame.
+    /// Whether EtherCAT began reading or writing in this frame.
     frame_opened: bool,
-    /// EtherCAT accessed the last byte in this frame.
+    /// Whether EtherCAT accessed the last byte in this frame.
     frame_completed: bool,
-    /// What the registers show: the status byte, the ECAT event, the AL event.
+    /// Current register values: the status byte, the ECAT event, the AL event.
     shown: Option<(u8, bool, bool)>,
 }
 
@@ -95,7 +96,7 @@ struct Unit {
 #[derive(Clone, Debug)]
 pub(super) struct SyncManagers {
     units: Vec<Unit>,
-    /// SyncManagers with a length, bit by bit: the only ones that concern an access.
+    /// SyncManagers with a length, one bit each: only these affect an access.
     configured: u16,
 }
 
@@ -113,8 +114,8 @@ impl SyncManagers {
         self.units.len()
     }
 
-    /// Takes over the registers of SyncManager `n`. Whatever changes its area or switches it resets its buffers.
-    /// Returns whether the activate byte has changed.
+    /// Applies the registers of SyncManager `n`. A change of its area or of its activation resets its buffers. Returns
+    /// whether the activate byte has changed.
     pub fn configure(&mut self, n: usize, registers: &SyncManager) -> bool {
         let Some(unit) = self.units.get_mut(n) else { return false };
         let old = *unit;
@@ -158,18 +159,18 @@ impl SyncManagers {
         }
     }
 
-    /// Asks for an access to `start..end` inside the area of SyncManager `n`; `None` where it is not allowed.
+    /// Requests an access to `start..end` inside the area of SyncManager `n`; `None` if it is not allowed.
     pub fn access(&mut self, n: usize, side: Side, write: bool, start: u32, end: u32) -> Option<Grant> {
         self.units[n].access(side, write, start, end)
     }
 
-    /// Whether the PDI is kept from reading while the process data watchdog is expired.
+    /// Whether the expired process data watchdog blocks reads of the PDI.
     pub fn guarded(&self, n: usize) -> bool {
         let unit = &self.units[n];
         unit.watchdog && unit.ecat_writes && unit.buffering != Buffering::Mailbox
     }
 
-    /// Ends what EtherCAT did to SyncManager `n` in this frame; with a bad FCS nothing was done.
+    /// Ends the accesses of EtherCAT to SyncManager `n` in this frame; with a bad FCS they have no effect.
     pub fn finish_frame(&mut self, n: usize, good: bool) -> Completion {
         let unit = &mut self.units[n];
         let role = if unit.ecat_writes { Role::Writer } else { Role::Reader };
@@ -182,13 +183,13 @@ impl SyncManagers {
         unit.finish(role, opened, completed)
     }
 
-    /// Ends what the PDI did to SyncManager `n` with a read or write.
+    /// Ends a read or write of the PDI to SyncManager `n`.
     pub fn finish_pdi(&mut self, n: usize, write: bool, grant: Grant) -> Completion {
         let role = if write { Role::Writer } else { Role::Reader };
         self.units[n].finish(role, grant.opened, grant.completed)
     }
 
-    /// The status byte (+5) and the bits for the ECAT event and the AL event, if they are not as they were shown last.
+    /// The status byte (+5) and the bits of the ECAT event and the AL event, if they differ from the last call.
     #[inline]
     pub fn show(&mut self, n: usize) -> Option<(u8, bool, bool)> {
         let unit = &mut self.units[n];
@@ -233,7 +234,7 @@ impl Unit {
         (self.start, self.length, self.enabled, self.ecat_writes, self.buffering)
     }
 
-    /// Whether `address`, behind the area, is in the second or third buffer.
+    /// Whether `address`, after the area, is in the second or third buffer.
     fn hides(&self, address: u32) -> bool {
         self.enabled && self.buffering == Buffering::Three && address < self.start + BUFFERS * self.length
     }
@@ -310,7 +311,7 @@ impl Unit {
         }
     }
 
-    /// Takes over that an access began or ended.
+    /// Applies the begin or end of an access.
     fn finish(&mut self, role: Role, opened: bool, completed: bool) -> Completion {
         if opened {
             match role {
@@ -340,7 +341,7 @@ impl Unit {
         }
     }
 
-    /// A buffer that holds neither the last complete value nor one that is being read.
+    /// A buffer that contains neither the last complete value nor the value being read.
     fn spare_buffer(&self) -> u8 {
         let taken = |b: u8| b == self.last_buffer || (self.reader_open && b == self.read_buffer);
         (0..NO_BUFFER).find(|&b| !taken(b)).unwrap_or(0)
@@ -355,7 +356,7 @@ impl Unit {
         (ecat && self.ecat_event, pdi && self.pdi_event)
     }
 
-    /// The bits of [`ringcat_wire::register::SyncManagerStatus`]: every access writes them.
+    /// The bits of [`ringcat_wire::register::SyncManagerStatus`], updated by every access.
     fn status(&self) -> u8 {
         let last_buffer = if self.buffering == Buffering::Mailbox { 0 } else { self.last_buffer };
         u8::from(self.write_event)
@@ -380,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn the_writer_never_meets_the_buffer_that_is_being_read() {
+    fn the_writer_never_uses_the_buffer_that_is_being_read() {
         let mut managers = managers(0x24, 4);
         let mut last = None;
         for round in 0..10 {
@@ -411,7 +412,7 @@ mod tests {
     fn after_a_reset_no_buffer_was_written() {
         let mut managers = SyncManagers::new(1);
         assert_eq!(managers.show(0), Some((0x30, false, false)));
-        assert_eq!(managers.show(0), None, "it is shown already");
+        assert_eq!(managers.show(0), None, "no change");
     }
 
     #[test]

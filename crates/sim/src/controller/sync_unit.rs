@@ -1,14 +1,14 @@
 //! SYNC and LATCH units (protocol 3.12, 7.3).
 //!
-//! In: the registers as they are when DC_ACTIVATION is written, the system time. Out: when pulses come, whether a start
-//! time was plausible, the times that edges at the LATCH pins leave in the registers.
+//! Input: the registers when DC_ACTIVATION is written, the system time. Output: times of pulses, plausibility of the
+//! start time, register values after edges at the LATCH pins.
 
 use ringcat_wire::register::{DcActivation, DcActivationStatus};
 
-/// What counts as near future where DC_ACTIVATION asks for it: 2^31 ns.
+/// Near future for the plausibility check, if DC_ACTIVATION selects it: 2^31 ns.
 const NEAR_FUTURE_NS: u64 = 1 << 31;
 
-/// What the registers say when the unit is activated.
+/// Register values at the activation of the unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct SyncSettings {
     /// DC_START_TIME.
@@ -17,9 +17,9 @@ pub(super) struct SyncSettings {
     pub sync0_cycle_ns: u32,
     /// DC_SYNC1_CYCLE.
     pub sync1_cycle_ns: u32,
-    /// The clock has 64 bits.
+    /// Whether the clock has 64 bits.
     pub wide: bool,
-    /// DC_PULSE_LENGTH is 0: a signal stays until it is acknowledged.
+    /// Whether DC_PULSE_LENGTH is 0: a signal stays until it is acknowledged.
     pub acknowledged: bool,
 }
 
@@ -28,15 +28,15 @@ pub(super) struct SyncSettings {
 pub(super) struct SyncUnit {
     activation: DcActivation,
     settings: SyncSettings,
-    /// System time of the first pulse, in 64 bits; `None` while it stands still or the time will not come.
+    /// System time of the first pulse, in 64 bits; `None` if the unit is inactive or the time will not occur.
     first: Option<u64>,
     implausible: bool,
-    /// Pulses of SYNC0 and SYNC1 that were acknowledged.
+    /// Numbers of acknowledged SYNC0 and SYNC1 pulses.
     seen: [u64; 2],
 }
 
 impl SyncUnit {
-    /// DC_ACTIVATION was written at this system time, in 64 bits.
+    /// Handles a write to DC_ACTIVATION at this system time, in 64 bits.
     pub fn activate(&mut self, activation: DcActivation, settings: SyncSettings, now: u64) {
         let runs = self.activation.cyclic_unit && activation.cyclic_unit;
         self.activation = activation;
@@ -50,7 +50,7 @@ impl SyncUnit {
         self.settings = settings;
         let extended = activation.extend_start_time || !settings.wide;
         let ahead = if extended {
-            // 32 bits: what is past comes again when the clock has wrapped.
+            // 32 bits: a time in the past occurs again after the clock wraps.
             u64::from((settings.start as u32).wrapping_sub(now as u32))
         } else {
             settings.start.wrapping_sub(now)
@@ -58,12 +58,12 @@ impl SyncUnit {
         let half = if extended { 1 << 31 } else { 1 << 63 };
         let limit = if activation.near_future_select { NEAR_FUTURE_NS } else { half };
         self.implausible = activation.start_plausibility && ahead >= limit;
-        // A 64-bit time that is past comes again in centuries.
+        // A 64-bit time in the past occurs again after centuries.
         let comes = extended || ahead < 1 << 63;
         self.first = (!self.implausible && comes).then(|| now.wrapping_add(ahead));
     }
 
-    /// Whether writing the start time activates the unit now.
+    /// Whether a write to the start time activates the unit.
     pub fn awaits_start_time(&self) -> bool {
         self.activation.auto_activation && !self.activation.cyclic_unit
     }
@@ -81,12 +81,12 @@ impl SyncUnit {
         pulses(first.wrapping_add(sync1.into()), cycle, now)
     }
 
-    /// Whether SYNC0 (0) or SYNC1 (1) waits to be acknowledged: DC_SYNC0_STATUS, DC_SYNC1_STATUS.
+    /// Whether SYNC0 (0) or SYNC1 (1) is not acknowledged: DC_SYNC0_STATUS, DC_SYNC1_STATUS.
     pub fn is_active(&self, signal: usize, now: u64) -> bool {
         self.settings.acknowledged && self.signal_pulses(signal, now) > self.seen[signal]
     }
 
-    /// The PDI has read the status of a signal.
+    /// Acknowledges a signal: the PDI has read its status.
     pub fn acknowledge(&mut self, signal: usize, now: u64) {
         self.seen[signal] = self.signal_pulses(signal, now);
     }
@@ -95,7 +95,7 @@ impl SyncUnit {
         if signal == 0 { self.pulses(now) } else { self.sync1_pulses(now) }
     }
 
-    /// System time of the first SYNC0 pulse at `now` or later; `None` when there will be none.
+    /// System time of the first SYNC0 pulse at `now` or later; `None` if there is none.
     pub fn next_sync0(&self, now: u64) -> Option<u64> {
         let first = self.first.filter(|_| self.activation.sync0)?;
         let since = now.wrapping_sub(first);
@@ -108,8 +108,8 @@ impl SyncUnit {
         }
     }
 
-    /// System time of the first SYNC1 pulse at `now` or later. It follows SYNC0 by DC_SYNC1_CYCLE, and comes again with
-    /// the first SYNC0 that is later than that.
+    /// System time of the first SYNC1 pulse at `now` or later. It follows SYNC0 after DC_SYNC1_CYCLE, and repeats with
+    /// the first SYNC0 after that.
     pub fn next_sync1(&self, now: u64) -> Option<u64> {
         let first = self.first.filter(|_| self.activation.sync1)?.wrapping_add(self.settings.sync1_cycle_ns.into());
         let since = now.wrapping_sub(first);
@@ -137,13 +137,13 @@ impl SyncUnit {
         }
     }
 
-    /// Whether SYNC0 is asked for.
-    pub fn wants_sync0(&self) -> bool {
+    /// Whether SYNC0 is activated.
+    pub fn has_sync0(&self) -> bool {
         self.activation.cyclic_unit && self.activation.sync0
     }
 }
 
-/// Pulses from the first one up to a time; a cycle of zero is a single one.
+/// Number of pulses from the first one up to a time; a cycle of zero means a single pulse.
 fn pulses(first: u64, cycle_ns: u32, now: u64) -> u64 {
     let since = now.wrapping_sub(first);
     match (since < 1 << 63, u64::from(cycle_ns)) {
@@ -153,20 +153,20 @@ fn pulses(first: u64, cycle_ns: u32, now: u64) -> u64 {
     }
 }
 
-/// Which edges a LATCH unit has seen.
+/// Edges detected by a LATCH unit.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LatchUnit {
     seen: [bool; 2],
 }
 
 impl LatchUnit {
-    /// An edge; `single`: only the first one counts until it was read. Whether its time is taken over.
+    /// An edge; `single`: only the first edge is latched until its time is read. Returns whether its time is latched.
     pub fn edge(&mut self, positive: bool, single: bool) -> bool {
         let seen = &mut self.seen[usize::from(!positive)];
         !core::mem::replace(seen, true) || !single
     }
 
-    /// The time of an edge was read.
+    /// The time of an edge has been read.
     pub fn read(&mut self, positive: bool) {
         self.seen[usize::from(!positive)] = false;
     }
@@ -201,7 +201,7 @@ mod tests {
 
     // covers: 7.3
     #[test]
-    fn pulses_begin_at_the_start_time_and_follow_the_cycle() {
+    fn pulses_begin_at_the_start_time_and_repeat_with_the_cycle() {
         let unit = started(10_000, 5_000, true, BOTH);
         assert_eq!((unit.pulses(9_999), unit.pulses(10_000), unit.pulses(12_500)), (0, 1, 3));
         assert_eq!((unit.next_sync0(5_000), unit.next_sync0(10_001)), (Some(10_000), Some(11_000)));
@@ -226,7 +226,7 @@ mod tests {
 
     // covers: 7.3
     #[test]
-    fn a_start_in_the_past_never_comes_or_comes_after_the_wrap() {
+    fn a_start_in_the_past_never_occurs_or_occurs_after_the_wrap() {
         assert_eq!(started(4_999, 5_000, true, BOTH).next_sync0(5_000), None);
         let narrow = started(4_999, 0x7_0000_1388, false, BOTH);
         assert_eq!(narrow.next_sync0(0x7_0000_1388), Some(0x8_0000_1387));
@@ -234,7 +234,7 @@ mod tests {
 
     // covers: 7.3, sim-clocks
     #[test]
-    fn an_implausible_start_is_refused_where_that_is_asked_for() {
+    fn an_implausible_start_is_refused_if_the_check_is_enabled() {
         let checked = DcActivation { start_plausibility: true, ..BOTH };
         let past = started(4_999, 5_000, true, checked);
         assert!(past.status().start_implausible && past.next_sync0(5_000).is_none());

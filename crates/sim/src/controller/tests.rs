@@ -1,5 +1,5 @@
 //! Tests of the controller through its ports and its PDI, with literal register contents. The bench sends one frame of
-//! one or more datagrams at a time and gives back what left the controller.
+//! one or more datagrams at a time and returns the outgoing frame.
 
 mod clock;
 mod commands;
@@ -32,7 +32,7 @@ fn image() -> Vec<u8> {
     image
 }
 
-/// Makes the checksum right.
+/// Writes a valid checksum.
 fn sign(image: &mut [u8]) {
     let mut checked = [0; 14];
     checked.copy_from_slice(&image[..14]);
@@ -46,7 +46,7 @@ fn config() -> ControllerConfig {
 /// A datagram to send: command, address as ADP and ADO, data.
 type Sent<'a> = (Command, u16, u16, &'a [u8]);
 
-/// Data and working counter of a datagram that came back.
+/// Data and working counter of a returned datagram.
 type Returned = (Vec<u8>, u16);
 
 fn target(command: Command, adp: u16, ado: u16) -> Target {
@@ -115,13 +115,13 @@ impl Bench {
         SimFrame::new(self.next_id, frame_bytes(datagrams))
     }
 
-    /// A frame comes in 10 us later.
+    /// Receives a frame 10 us later.
     fn receive(&mut self, frame: &mut SimFrame, port: Port) -> Passage {
         self.now += Duration::from_micros(10);
         self.controller.receive(frame, port, self.now)
     }
 
-    /// Sends one frame to port 0 and yields its datagrams.
+    /// Sends one frame to port 0 and returns its datagrams.
     fn exchange(&mut self, datagrams: &[Sent]) -> Vec<Returned> {
         let mut frame = self.frame(datagrams);
         assert_ne!(self.receive(&mut frame, Port::A), Passage::Destroyed);
@@ -132,7 +132,7 @@ impl Bench {
         self.exchange(&[datagram]).remove(0)
     }
 
-    /// The same with a damaged frame.
+    /// As `exchange`, with a damaged frame.
     fn damaged(&mut self, datagrams: &[Sent]) -> Vec<Returned> {
         let mut frame = self.frame(datagrams);
         frame.fcs = Fcs::Bad;
@@ -140,7 +140,7 @@ impl Bench {
         (0..datagrams.len()).map(|n| returned(&frame, n)).collect()
     }
 
-    /// Writes by APWR; the working counter.
+    /// Writes by APWR; returns the working counter.
     fn write(&mut self, ado: u16, data: &[u8]) -> u16 {
         self.one((Command::Apwr, 0, ado, data)).1
     }

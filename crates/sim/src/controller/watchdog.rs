@@ -1,7 +1,7 @@
 //! The process data and the PDI watchdog (protocol 3.7).
 //!
-//! In: triggers and the times in the registers. Out: states and the next expiry. Counters and events are
-//! [`super::Controller`]'s.
+//! Input: triggers and the times in the registers. Output: states and the next expiry. [`super::Controller`] handles
+//! counters and events.
 
 use core::time::Duration;
 
@@ -15,9 +15,9 @@ const TICK_NS: u64 = 40;
 enum State {
     /// Not triggered since the reset.
     Idle,
-    /// Triggered last at this time.
+    /// Last triggered at this time.
     Running(SimTime),
-    /// Too long ago.
+    /// Expired.
     Expired,
 }
 
@@ -25,7 +25,7 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watchdog {
     state: State,
-    /// Zero switches it off.
+    /// Zero disables the watchdog.
     limit: Duration,
 }
 
@@ -34,7 +34,7 @@ impl Watchdog {
         Watchdog { state: State::Idle, limit: Duration::ZERO }
     }
 
-    /// Takes over divider and time registers.
+    /// Applies divider and time registers.
     pub fn configure(&mut self, divider: u16, time: u16) {
         self.limit = Duration::from_nanos((u64::from(divider) + 2) * TICK_NS * u64::from(time));
     }
@@ -43,12 +43,12 @@ impl Watchdog {
         self.state = State::Running(now);
     }
 
-    /// Back to the state after a reset: it cannot expire before the next trigger.
+    /// Returns to the state after a reset: it cannot expire before the next trigger.
     pub fn rest(&mut self) {
         self.state = State::Idle;
     }
 
-    /// When it will expire by itself.
+    /// Time at which it expires without a trigger.
     pub fn deadline(&self) -> SimTime {
         match self.state {
             State::Running(since) if !self.limit.is_zero() => since + self.limit,
@@ -56,7 +56,7 @@ impl Watchdog {
         }
     }
 
-    /// Expires where it is time; whether it just did.
+    /// Expires if it is due; returns whether it expired now.
     pub fn expire(&mut self, now: SimTime) -> bool {
         let expires = now >= self.deadline() && self.deadline() != SimTime::NEVER;
         if expires {
@@ -69,7 +69,7 @@ impl Watchdog {
         self.state == State::Expired && !self.limit.is_zero()
     }
 
-    /// Running or switched off: bit 0 of WATCHDOG_STATUS.
+    /// Running or disabled: bit 0 of WATCHDOG_STATUS.
     pub fn ok(&self) -> bool {
         matches!(self.state, State::Running(_)) || self.limit.is_zero()
     }
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_reset_values_make_100_ms() {
+    fn the_reset_values_are_100_ms() {
         // protocol 3.7: (0x09C2 + 2) x 40 ns = 100 us, times 1000.
         let mut watchdog = Watchdog::new();
         watchdog.configure(0x09C2, 0x03E8);
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn time_zero_switches_it_off() {
+    fn time_zero_disables_the_watchdog() {
         let mut watchdog = Watchdog::new();
         watchdog.trigger(SimTime(0));
         assert!(watchdog.ok() && watchdog.deadline() == SimTime::NEVER);

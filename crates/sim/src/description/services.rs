@@ -1,5 +1,4 @@
-//! Services behind the mailbox of a device, besides its objects (protocol 6.4 to 6.8). The SII says which protocols
-//! exist.
+//! Mailbox services of a device, except its objects (protocol 6.4 to 6.8). The SII determines which protocols exist.
 
 use core::net::Ipv4Addr;
 use core::time::Duration;
@@ -24,15 +23,15 @@ pub struct Services {
 /// Files of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FoeDescription {
-    /// Files that it is delivered with.
+    /// Files on delivery.
     pub files: Vec<(String, Vec<u8>)>,
     /// Password that each transfer needs; 0 for none.
     pub password: u32,
-    /// Bytes for all files together.
+    /// Maximum number of bytes of all files together.
     pub capacity: usize,
-    /// Name of the firmware, which is written in BOOT alone and is the only file there.
+    /// Name of the firmware, which can only be written in BOOT and is the only file there.
     pub firmware: Option<String>,
-    /// Time that erasing the old firmware takes; until then the sender hears BUSY.
+    /// Time to erase the old firmware; until then the response is BUSY.
     pub erase_time: Duration,
 }
 
@@ -53,9 +52,9 @@ impl Default for FoeDescription {
 pub enum EoeEnd {
     /// An IP stack: answers ARP and ping, serves TCP.
     Stack,
-    /// Each frame comes back as it is.
+    /// Each frame is returned unchanged.
     Loop,
-    /// Frames disappear.
+    /// Frames are discarded.
     Nothing,
 }
 
@@ -64,17 +63,17 @@ pub enum EoeEnd {
 pub struct EoeDescription {
     /// The receiver.
     pub end: EoeEnd,
-    /// MAC address until another one is set.
+    /// MAC address until it is set.
     pub mac: [u8; 6],
-    /// IP address until another one is set.
+    /// IP address until it is set.
     pub address: Option<Ipv4Addr>,
-    /// Subnet mask until another one is set.
+    /// Subnet mask until it is set.
     pub mask: Option<Ipv4Addr>,
-    /// Default gateway until another one is set.
+    /// Default gateway until it is set.
     pub gateway: Option<Ipv4Addr>,
-    /// Addresses can be set and asked for.
+    /// Whether IP parameters can be set and read.
     pub ip_support: bool,
-    /// The address filter can be set and asked for.
+    /// Whether the address filter can be set and read.
     pub filter_support: bool,
 }
 
@@ -108,7 +107,7 @@ impl Default for SoeDescription {
 /// ADS of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AoeDescription {
-    /// Ports that answer.
+    /// Valid ADS ports.
     pub ports: Vec<u16>,
 }
 

@@ -1,4 +1,4 @@
-//! Devices through their controller's EtherCAT side: frames in, reactions out.
+//! Tests of devices through the EtherCAT side of their controller.
 
 mod aoe;
 mod bench;

@@ -1,4 +1,4 @@
-//! Segments put together in code: lines, rings and what branches off them.
+//! Builds segments in code: lines, rings and branches.
 
 use core::time::Duration;
 
@@ -10,10 +10,9 @@ use crate::device::Device;
 use crate::frame::Port;
 use crate::segment::SegmentError;
 
-/// Devices and cables of a segment to be.
+/// Devices and cables of a segment under construction.
 ///
-/// Devices are numbered in the order in which they are added: first those of the line or ring, then those of each
-/// branch.
+/// Devices are numbered in the order of addition: first those of the line or ring, then those of each branch.
 #[derive(Debug)]
 pub struct SegmentBuilder {
     devices: Vec<Device>,
@@ -23,7 +22,7 @@ pub struct SegmentBuilder {
 }
 
 impl SegmentBuilder {
-    /// Nothing yet.
+    /// An empty segment.
     pub fn new() -> SegmentBuilder {
         SegmentBuilder {
             devices: Vec::new(),
@@ -33,7 +32,7 @@ impl SegmentBuilder {
         }
     }
 
-    /// Devices one behind the other from the main link on: in at port 0, out at port 1.
+    /// Devices in a line from the main link: in at port 0, out at port 1.
     pub fn line(devices: Vec<Device>) -> SegmentBuilder {
         SegmentBuilder::new().chain(Endpoint::Host(HostLink::Main), devices)
     }
@@ -46,27 +45,27 @@ impl SegmentBuilder {
         line.cable(end, Endpoint::Host(HostLink::Redundant))
     }
 
-    /// Devices one behind the other from a port of a device on.
+    /// Devices in a line from a port of a device.
     #[must_use]
     pub fn branch(self, at: DeviceIndex, port: Port, devices: Vec<Device>) -> SegmentBuilder {
         self.chain(Endpoint::Device(at, port), devices)
     }
 
-    /// One more device without any cable.
+    /// Adds a device without any cable.
     #[must_use]
     pub fn device(mut self, device: Device) -> SegmentBuilder {
         self.devices.push(device);
         self
     }
 
-    /// One more cable.
+    /// Adds a cable.
     #[must_use]
     pub fn cable(mut self, a: Endpoint, b: Endpoint) -> SegmentBuilder {
         self.cables.push(CableSpec { a, b, delay: self.delay });
         self
     }
 
-    /// The delay of the cables, those that are there and those to come.
+    /// Sets the delay of all cables, existing and future ones.
     #[must_use]
     pub fn cable_delay(mut self, delay: Duration) -> SegmentBuilder {
         self.delay = delay;
@@ -83,7 +82,7 @@ impl SegmentBuilder {
         self
     }
 
-    /// Makes the segment.
+    /// Builds the segment.
     ///
     /// # Errors
     /// As [`Network::new`].

@@ -1,4 +1,4 @@
-//! Plugging in the cables: which cable leads away from which port, and what cannot be.
+//! Plugs in the cables: the outgoing cable of each port, and checks.
 
 use crate::cable::{CableId, CableSpec, Direction, Endpoint, LegId};
 use crate::device::Device;
@@ -6,7 +6,7 @@ use crate::segment::SegmentError;
 
 use ringcat_wire::register::PortKind;
 
-/// The direction of a cable that leads away from each port and from each interface of the MainDevice.
+/// The outgoing direction of the cable at each port and at each interface of the MainDevice.
 pub(super) struct Outlets {
     pub(super) devices: Vec<[Option<LegId>; 4]>,
     pub(super) hosts: [Option<LegId>; 2],

@@ -6,11 +6,11 @@ use crate::cable::{HostLink, LegId};
 /// A due event.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Event {
-    /// The last bit of a frame that changes no ways reaches the end of its first leg.
+    /// The last bit of a frame that changes no paths reaches the end of its first leg.
     Entry { slot: Slot, link: HostLink, leg: LegId },
-    /// The last bit of a frame reaches the end of a leg. `meddled`: the faults of the leg are already applied.
-    Arrival { slot: Slot, leg: LegId, meddled: bool },
-    /// The end of a leg detects a signal or its loss, unless it has changed again since.
+    /// The last bit of a frame reaches the end of a leg. `faults_applied`: the faults of the leg are already applied.
+    Arrival { slot: Slot, leg: LegId, faults_applied: bool },
+    /// The end of a leg detects a signal or its loss, unless the signal has changed again since.
     Detection { leg: LegId, epoch: u32 },
     /// A device has work without a frame.
     Wake { device: u32 },

@@ -1,4 +1,4 @@
-//! Faults: at once, or at a time.
+//! Injects faults, at once or at a scheduled time.
 
 use super::{Event, Network};
 use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegFaults};
@@ -7,10 +7,10 @@ use crate::queue::Lane;
 use crate::time::SimTime;
 
 impl Network {
-    /// Causes a fault at a time, or at once where that has passed.
+    /// Injects a fault at a time, or at once if that has passed.
     ///
     /// # Panics
-    /// When the device, the cable or the byte of the EEPROM does not exist.
+    /// If the device, the cable or the byte of the EEPROM does not exist.
     pub fn schedule(&mut self, at: SimTime, fault: Fault) {
         self.check(&fault);
         let free = self.scheduled.iter().position(Option::is_none).unwrap_or(self.scheduled.len());
@@ -21,10 +21,10 @@ impl Network {
         self.queue.push(Lane::Any, at.max(self.now), Event::Fault { number: free as u32 });
     }
 
-    /// Causes a fault now.
+    /// Injects a fault now.
     ///
     /// # Panics
-    /// When the device, the cable or the byte of the EEPROM does not exist.
+    /// If the device, the cable or the byte of the EEPROM does not exist.
     pub fn apply(&mut self, fault: Fault) {
         self.check(&fault);
         match fault {
@@ -78,8 +78,8 @@ impl Network {
         }
     }
 
-    /// A scheduled fault is due.
-    pub(super) fn strike(&mut self, number: usize) {
+    /// Applies a due scheduled fault.
+    pub(super) fn apply_scheduled(&mut self, number: usize) {
         if let Some(fault) = self.scheduled.get_mut(number).and_then(Option::take) {
             self.apply(fault);
         }
@@ -106,7 +106,7 @@ impl Network {
         }
     }
 
-    /// A fault on a missing cable or device is a mistake of the test, which must be reported.
+    /// A fault on a missing cable or device is an error of the test, which must be reported.
     fn check(&self, fault: &Fault) {
         match *fault {
             Fault::Cut(cable)

@@ -1,4 +1,4 @@
-//! Properties of a segment that belong to no single device.
+//! Options of a whole segment.
 
 use core::time::Duration;
 
@@ -7,13 +7,13 @@ use crate::device::Device;
 /// Handling of datagrams beyond the limit of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Beyond {
-    /// They come back unchanged.
+    /// They return unchanged.
     Unprocessed,
-    /// The whole frame does not come back.
+    /// The whole frame does not return.
     Dropped,
 }
 
-/// Largest number of processed datagrams in a frame, as in other simulators and some gateways.
+/// Maximum number of processed datagrams in a frame, as in other simulators and some gateways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DatagramLimit {
     /// The limit.
@@ -22,30 +22,29 @@ pub struct DatagramLimit {
     pub beyond: Beyond,
 }
 
-/// Properties of a segment that belong to no single device.
+/// Options of a whole segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkOptions {
-    /// Seed of random choices (the bit that a fault inverts).
+    /// Seed of random values (the bit that a fault inverts).
     pub seed: u64,
-    /// Detection time of a lost signal. Default 10 us (fast detection as DS1 demands it, protocol 2.8); plain PHYs take
+    /// Detection time of a lost signal. Default 10 us (fast detection required by DS1, protocol 2.8); plain PHYs take
     /// hundreds of milliseconds.
     pub link_down_delay: Duration,
-    /// Detection time of a returning signal. Default 10 us.
+    /// Detection time of a new signal. Default 10 us.
     pub link_up_delay: Duration,
-    /// Delay of a pass through a device with its processing unit, for devices without a value of their own. Default 300
-    /// ns.
+    /// Delay of a pass through a device with its processing unit, for devices without their own value. Default 300 ns.
     pub processing_delay: Duration,
-    /// Delay of a pass through a device without its processing unit, for devices without a value of their own. Default
-    /// 300 ns.
+    /// Delay of a pass through a device without its processing unit, for devices without their own value. Default 300
+    /// ns.
     pub forwarding_delay: Duration,
-    /// Frames that an interface of the MainDevice queues for sending. Default 256.
+    /// Size of the transmit queue of an interface of the MainDevice. Default 256.
     pub transmit_queue: usize,
-    /// Frames that an interface of the MainDevice keeps until they are fetched. Default 256.
+    /// Size of the receive queue of an interface of the MainDevice. Default 256.
     pub receive_queue: usize,
-    /// Largest number of processed datagrams in a frame. Default: as many as fit.
+    /// Maximum number of processed datagrams in a frame. Default: no limit.
     pub max_datagrams: Option<DatagramLimit>,
-    /// Frames move in one step where no other event occurs, instead of hop by hop. The observable result is the same,
-    /// bit for bit, at a fraction of the computing time. Default true.
+    /// Enables the fast path: frames move in one step if no other event occurs, instead of hop by hop. The observable
+    /// result is the same, bit for bit, at a fraction of the computing time. Default true.
     pub compiled: bool,
 }
 
@@ -74,7 +73,7 @@ impl NetworkOptions {
         self
     }
 
-    /// The same detection time for lost and for returning links.
+    /// The same detection time for lost and for new signals.
     #[must_use]
     pub const fn with_detection_delay(mut self, delay: Duration) -> NetworkOptions {
         self.link_down_delay = delay;
@@ -82,7 +81,7 @@ impl NetworkOptions {
         self
     }
 
-    /// Delay of a pass through a device, with its processing unit or without.
+    /// Delay of a pass through a device, with or without its processing unit.
     pub(super) fn passage(&self, device: &Device, processed: bool) -> Duration {
         if processed {
             device.description.processing_delay.unwrap_or(self.processing_delay)

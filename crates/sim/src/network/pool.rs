@@ -1,4 +1,4 @@
-//! Frames in the segment, in reused slots: after the largest number of frames at once, sending allocates no more.
+//! Frames in the segment, in reused slots: after the maximum number of simultaneous frames, sending does not allocate.
 
 use crate::frame::SimFrame;
 
@@ -19,7 +19,7 @@ pub(crate) struct FramePool {
 }
 
 impl FramePool {
-    /// A new frame with a number of its own.
+    /// Adds a new frame with a new number.
     pub(crate) fn put(&mut self, bytes: &[u8]) -> Slot {
         let slot = self.empty_slot();
         self.last_id += 1;
@@ -27,7 +27,7 @@ impl FramePool {
         slot
     }
 
-    /// A copy of a frame with a number of its own.
+    /// Adds a copy of a frame with a new number.
     pub(crate) fn put_copy(&mut self, of: Slot) -> Slot {
         let slot = self.empty_slot();
         self.last_id += 1;
@@ -47,23 +47,23 @@ impl FramePool {
         &mut self.frames[slot.0 as usize]
     }
 
-    /// Number of frames still in the segment.
+    /// Number of frames in the segment.
     pub(crate) fn under_way(&self) -> usize {
         self.frames.len() - self.free.len()
     }
 
-    /// The frame has reached its end.
+    /// Removes a frame.
     pub(crate) fn remove(&mut self, slot: Slot) {
         self.free.push(slot);
     }
 
-    /// The frame has reached its end; its bytes are returned.
+    /// Removes a frame and returns its bytes.
     pub(crate) fn remove_bytes(&mut self, slot: Slot) -> Vec<u8> {
         self.free.push(slot);
         core::mem::take(&mut self.frames[slot.0 as usize].bytes)
     }
 
-    /// Takes a buffer for later frames.
+    /// Stores a buffer for later frames.
     pub(crate) fn give_back(&mut self, bytes: Vec<u8>) {
         if self.spare.len() < SPARE_BUFFERS && bytes.capacity() > 0 {
             self.spare.push(bytes);
@@ -85,7 +85,7 @@ impl FramePool {
     }
 }
 
-/// Two different places of a slice at once.
+/// Two different elements of a slice.
 fn two_of<T>(items: &mut [T], one: usize, two: usize) -> (&mut T, &T) {
     if one < two {
         let (head, tail) = items.split_at_mut(two);
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slots_and_buffers_are_used_again() {
+    fn slots_and_buffers_are_reused() {
         let mut pool = FramePool::default();
         let first = pool.put(&[1; 60]);
         let bytes = pool.remove_bytes(first);

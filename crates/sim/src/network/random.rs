@@ -1,4 +1,4 @@
-//! Random numbers that depend on the segment's seed alone (SplitMix64).
+//! Random numbers that depend only on the segment's seed (SplitMix64).
 
 /// A source of random numbers.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number below `limit`; 0 when that is 0.
+    /// A number below `limit`; 0 if `limit` is 0.
     pub(crate) const fn below(&mut self, limit: usize) -> usize {
         if limit == 0 {
             return 0;
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sequence_is_that_of_splitmix64() {
+    fn the_sequence_matches_splitmix64() {
         let mut random = Random::new(1_234_567);
         let expected = [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423];
         assert_eq!([random.next(), random.next(), random.next()], expected);

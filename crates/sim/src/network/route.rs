@@ -1,8 +1,8 @@
-//! The path of frames through a segment without other events: computed once, then used in one step (`flight`).
+//! The path of frames through a segment without other events, computed once for the fast path.
 //!
-//! Hop by hop ([`super::traffic`]) a frame costs the same at every device, even where it only passes by on its way
-//! back. As long as cables and ports do not change, all frames of an interface take the same path, and the devices
-//! whose processing units they pass are known in advance.
+//! Hop by hop ([`super::traffic`]) a frame costs the same at every device, even if it only passes by on its way back.
+//! If cables and ports do not change, all frames of an interface take the same path, and the devices whose processing
+//! units they pass are known in advance.
 
 use ringcat_wire::command::Command;
 use ringcat_wire::register::map;
@@ -25,7 +25,7 @@ pub(super) struct Stop {
     /// Index among the hops.
     pub(super) hop: u32,
     pub(super) device: u32,
-    /// The device's ports are unchanged as long as this is.
+    /// The ports of the device are unchanged while this counter is equal.
     pub(super) port_changes: u32,
     pub(super) processed: bool,
 }
@@ -33,17 +33,17 @@ pub(super) struct Stop {
 /// The path of frames from an interface of the MainDevice.
 #[derive(Debug, Default)]
 pub(super) struct Route {
-    /// State of the wiring for which it was computed; `None` where there is no path, or it must be computed again.
+    /// State of the wiring for which it was computed; `None` if there is no path, or it must be computed again.
     pub(super) wiring: Option<u32>,
-    /// Frames whose first bit comes later than this are not affected by earlier events.
+    /// Frames with a first bit after this time are not affected by earlier events.
     pub(super) since: SimTime,
-    /// All hops, that into the interface at the end included.
+    /// All hops, including the hop into the interface at the end.
     pub(super) hops: Vec<Hop>,
     pub(super) stops: Vec<Stop>,
 }
 
 impl Route {
-    /// It must be computed again, if the ports of a device have changed.
+    /// Marks the route for a new computation, if the ports of a device have changed.
     pub(super) fn refuse(&mut self, changed: bool) {
         if changed {
             self.wiring = None;
@@ -55,9 +55,9 @@ impl Route {
     }
 }
 
-/// Whether a frame leaves all ports as they are and latches no receive times: it writes no register by its address.
-/// (Where it can do so by FMMUs there is no [`Way`](crate::controller::Way).)
-pub(super) fn leaves_ways(frame: &SimFrame) -> bool {
+/// Whether a frame changes no ports and latches no receive times: it writes no register by physical address. (If it can
+/// do so through FMMUs, there is no [`InternalPath`](crate::controller::InternalPath).)
+pub(super) fn leaves_paths_unchanged(frame: &SimFrame) -> bool {
     let harmless = |header: &[u8]| {
         let address = u16::from_le_bytes([header[4], header[5]]);
         match Command::from_code(header[0]) {

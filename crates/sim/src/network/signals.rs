@@ -9,7 +9,7 @@ use crate::frame::Port;
 use crate::queue::Lane;
 use crate::time::SimTime;
 
-/// The order in which a frame travels through a controller (protocol 2.1), as the successor of each port.
+/// The order of processing in a controller (protocol 2.1), as the successor of each port.
 const NEXT_PORT: [usize; 4] = [3, 2, 0, 1];
 
 impl Node {
@@ -25,7 +25,7 @@ impl Node {
         }
     }
 
-    /// A port notices that its link came or went.
+    /// A port detects a change of its link.
     fn link_changed(&mut self, port: Port, up: bool, now: SimTime) {
         let before = self.device.controller.loop_closed(port);
         self.device.controller.link_changed(port, up, now);
@@ -35,13 +35,14 @@ impl Node {
         }
     }
 
-    /// Whether the deadlines of the controller may have changed since the device was last settled without a run. Those
-    /// of the application change when it runs.
-    fn has_news(&self) -> bool {
+    /// Whether the deadlines of the controller may have changed since the device was last settled without a run. The
+    /// deadlines of the application change only in a run.
+    fn needs_schedule(&self) -> bool {
         self.arranged != Some(self.device.controller.schedules())
     }
 
-    /// Whether a port opened or closed while a frame passed from one port to another, first bit at `first_bit`.
+    /// Whether a port opened or closed while a frame passed from one port to another; `first_bit` is the time of its
+    /// first bit.
     pub(super) fn interrupted(&self, from: Port, to: Port, first_bit: SimTime) -> bool {
         if self.last_loop_change <= first_bit {
             return false;
@@ -60,7 +61,7 @@ impl Node {
 }
 
 impl Network {
-    /// Power on everywhere, links up.
+    /// Switches on the power of all devices, with links up.
     pub(super) fn start(&mut self) {
         for index in 0..self.nodes.len() {
             let node = &mut self.nodes[index];
@@ -74,12 +75,12 @@ impl Network {
         }
     }
 
-    /// Lets a device react to past events, and schedules its next wake-up.
+    /// Makes a device react to past events, and schedules its next wake-up.
     pub(super) fn settle(&mut self, index: usize) {
         let node = &mut self.nodes[index];
         if node.device.needs_run() {
             node.device.run(self.now);
-        } else if !node.has_news() {
+        } else if !node.needs_schedule() {
             return;
         }
         node.arranged = Some(node.device.controller.schedules());
@@ -88,10 +89,10 @@ impl Network {
         }
     }
 
-    /// Makes a device react to a frame when that has left the segment.
+    /// Makes a device react to a frame after that has left the segment.
     pub(super) fn settle_later(&mut self, index: usize, frame: u64) {
         let node = &mut self.nodes[index];
-        if !node.device.needs_run() && !node.has_news() {
+        if !node.device.needs_run() && !node.needs_schedule() {
             return;
         }
         if node.unsettled_by.replace(frame).is_none() {
@@ -112,7 +113,7 @@ impl Network {
         }
     }
 
-    /// Makes all devices react to frames that passed them during a leap of time.
+    /// Makes all devices react to frames that passed them in [`Network::advance_until_quiet`].
     pub fn settle_all(&mut self) {
         if self.unsettled.is_empty() {
             return;
@@ -124,8 +125,8 @@ impl Network {
         self.unsettled = unsettled;
     }
 
-    /// Wakes a device at a time, unless an earlier wake-up is scheduled. A deadline can have passed when it is set: a
-    /// watchdog time that was shortened, an application that hung meanwhile.
+    /// Schedules the wake-up of a device, unless an earlier wake-up is scheduled. A deadline can be in the past when it
+    /// is set: a watchdog time that was shortened, an application that hung meanwhile.
     pub(super) fn wake_at(&mut self, index: usize, at: SimTime) {
         let at = at.max(self.now);
         let node = &mut self.nodes[index];
@@ -135,8 +136,8 @@ impl Network {
         }
     }
 
-    /// The scheduled time has come. Deadlines may have moved meanwhile (a watchdog that was triggered), so the device
-    /// gives its deadline again.
+    /// Handles a wake-up. Deadlines may have moved meanwhile (a retriggered watchdog), so the device computes its
+    /// deadline again.
     pub(super) fn wake(&mut self, index: usize) {
         let node = &mut self.nodes[index];
         if node.wake_at > self.now {
@@ -145,7 +146,7 @@ impl Network {
         node.wake_at = SimTime::NEVER;
         node.device.run(self.now);
         if let Some(deadline) = node.device.next_deadline() {
-            // A deadline that the run did not meet must not stop time.
+            // A deadline that the run did not handle must not stop time.
             self.wake_at(index, deadline.max(self.now + Duration::from_nanos(1)));
         }
     }
@@ -153,32 +154,32 @@ impl Network {
     /// Cuts a cable.
     ///
     /// # Panics
-    /// When there is no cable with this number.
+    /// If there is no cable with this number.
     pub fn cut(&mut self, cable: CableId) {
         self.cables[cable.0].cut = true;
         self.refresh_signal(cable);
     }
 
-    /// Restores a cable.
+    /// Repairs a cable.
     ///
     /// # Panics
-    /// When there is no cable with this number.
+    /// If there is no cable with this number.
     pub fn heal(&mut self, cable: CableId) {
         self.cables[cable.0].cut = false;
         self.refresh_signal(cable);
     }
 
-    /// Restores a cable, with a later detection at one end.
+    /// Repairs a cable, with a later detection at one end.
     pub(super) fn heal_unevenly(&mut self, cable: CableId, later: Direction, by: Duration) {
         self.cables[cable.0].cut = false;
         self.refresh_signal_unevenly(cable, |direction| if direction == later { by } else { Duration::ZERO });
     }
 
-    /// Switches the power of a device off. Its ports are dead at once; its neighbours notice after their detection
-    /// delay.
+    /// Switches the power of a device off. Its ports have no signal at once; its neighbours detect it after their
+    /// detection delay.
     ///
     /// # Panics
-    /// When there is no device with this number.
+    /// If there is no device with this number.
     pub fn power_off(&mut self, device: DeviceIndex) {
         let node = &mut self.nodes[device.0];
         if !node.device.controller.is_powered() {
@@ -195,7 +196,7 @@ impl Network {
     /// Switches the power of a device on. Its links come up after their detection delay.
     ///
     /// # Panics
-    /// When there is no device with this number.
+    /// If there is no device with this number.
     pub fn power_on(&mut self, device: DeviceIndex) {
         let node = &mut self.nodes[device.0];
         if node.device.controller.is_powered() {
@@ -209,7 +210,7 @@ impl Network {
         self.settle(device.0);
     }
 
-    /// Takes an interface of the MainDevice down, or brings it back: the cable carries no signal meanwhile.
+    /// Takes an interface of the MainDevice down, or brings it up: while it is down, the cable has no signal.
     pub fn disconnect(&mut self, link: HostLink, disconnect: bool) {
         self.hosts[link as usize].disconnected = disconnect;
         if let Some(cable) = self.host_cable(link) {
@@ -224,12 +225,12 @@ impl Network {
         }
     }
 
-    /// Computes whether a cable carries a signal; after a change, its ends notice later.
+    /// Updates whether a cable carries a signal; after a change, its ends detect it later.
     fn refresh_signal(&mut self, id: CableId) {
         self.refresh_signal_unevenly(id, |_| Duration::ZERO);
     }
 
-    /// The same, where the receiving ends of both directions take longer than usual.
+    /// As `refresh_signal`, with additional detection time per direction.
     fn refresh_signal_unevenly(&mut self, id: CableId, longer: impl Fn(Direction) -> Duration) {
         let cable = &self.cables[id.0];
         let up = !cable.cut && self.has_power(cable.spec.a) && self.has_power(cable.spec.b);

@@ -4,25 +4,25 @@ use std::fmt;
 
 use crate::cable::HostLink;
 
-/// Why a frame was lost.
+/// Cause of a lost frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LossCause {
     /// It was sent on an interface without carrier or without cable.
     NoCarrier,
-    /// It was longer than an interface sends.
+    /// It was longer than the maximum of an interface.
     Oversized,
-    /// It held more datagrams than the segment takes
+    /// It contained more datagrams than the segment accepts
     /// ([`NetworkOptions::max_datagrams`](super::NetworkOptions::max_datagrams)).
     TooManyDatagrams,
     /// The transmit queue of the interface was full.
     TransmitQueueFull,
-    /// The cable was cut, or an end of it had no power, while the frame was on it.
+    /// The cable was cut, or an end had no power, while the frame was on it.
     DeadCable,
     /// A device sent it out of a port that was forced open and has no cable.
     OpenPort,
     /// It reached a port or interface that had not detected the link yet.
     NoLink,
-    /// A port on its way opened or closed while it passed (protocol 2.2: a running frame may be cut).
+    /// A port on its path opened or closed while it passed (protocol 2.2: a running frame may be cut).
     LoopChanged,
     /// The direction was blocked by a fault.
     Blocked,
@@ -30,9 +30,9 @@ pub enum LossCause {
     Dropped,
     /// A controller destroyed it: closed port, circulating frame or forwarding rule (protocol 2.2, 2.4, 2.6).
     Destroyed,
-    /// It came back with a wrong check sequence.
+    /// It returned with a wrong FCS.
     BadCheckSequence,
-    /// The received frames were not fetched, and their queue was full.
+    /// The receive queue was full because frames were not fetched.
     ReceiveQueueFull,
 }
 
@@ -43,12 +43,12 @@ impl fmt::Display for LossCause {
             LossCause::Oversized => "longer than an interface sends",
             LossCause::TransmitQueueFull => "transmit queue of the interface full",
             LossCause::TooManyDatagrams => "more datagrams than the segment takes",
-            LossCause::DeadCable => "on a cable that was cut or lost its power",
-            LossCause::OpenPort => "out of an open port without cable",
+            LossCause::DeadCable => "on a cable that was cut or had no power",
+            LossCause::OpenPort => "out of a port without cable",
             LossCause::NoLink => "link not detected yet",
             LossCause::LoopChanged => "a port opened or closed meanwhile",
             LossCause::Blocked => "direction blocked",
-            LossCause::Dropped => "dropped on order",
+            LossCause::Dropped => "dropped by a fault",
             LossCause::Destroyed => "destroyed by a SubDevice",
             LossCause::BadCheckSequence => "wrong check sequence",
             LossCause::ReceiveQueueFull => "receive queue of the interface full",
@@ -75,20 +75,20 @@ impl LossCause {
     ];
 }
 
-/// Traffic of one interface of the MainDevice. Bytes are those of the frames without check sequence.
+/// Traffic of one interface of the MainDevice. Bytes do not include the FCS.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatistics {
     /// Frames that went onto the wire.
     pub frames_sent: u64,
     /// Their bytes.
     pub bytes_sent: u64,
-    /// Frames received whole.
+    /// Frames received completely.
     pub frames_received: u64,
     /// Their bytes.
     pub bytes_received: u64,
 }
 
-/// Counters of a whole segment since it was made.
+/// Counters of a whole segment since its creation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     pub(crate) links: [LinkStatistics; 2],
@@ -107,8 +107,8 @@ impl Statistics {
         self.lost[cause as usize]
     }
 
-    /// Frames lost for any cause.
-    pub fn lost_in_all(&self) -> u64 {
+    /// Frames lost in total.
+    pub fn lost_total(&self) -> u64 {
         self.lost.iter().sum()
     }
 

@@ -1,10 +1,10 @@
-//! Frames in the segment: from an interface of the MainDevice through cables and devices back to one.
+//! Frames in the segment: from an interface of the MainDevice through cables and devices back to an interface.
 
 use core::time::Duration;
 
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN, MIN_FRAME};
 
-use super::route::leaves_ways;
+use super::route::leaves_paths_unchanged;
 use super::statistics::LossCause;
 use super::{Beyond, Event, Network, Slot};
 use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
@@ -18,7 +18,7 @@ use crate::time::SimTime;
 const PREAMBLE: u64 = 8;
 
 impl Network {
-    /// Puts a frame into the transmit queue of an interface, padded as every interface pads short ones.
+    /// Queues a frame on an interface, padded to the minimum length.
     pub(super) fn transmit(&mut self, link: HostLink, bytes: &[u8]) {
         let mut padded = [0; MIN_FRAME];
         let bytes = match padded.get_mut(..bytes.len()) {
@@ -50,17 +50,17 @@ impl Network {
         counters.frames_sent += 1;
         counters.bytes_sent += bytes.len() as u64;
         let at = last_bit + Duration::from_nanos(self.legs[out.index()].delay_ns);
-        if leaves_ways(self.frames.frame(slot)) {
+        if leaves_paths_unchanged(self.frames.frame(slot)) {
             self.queue.push(link.entry_lane(), at, Event::Entry { slot, link, leg: out });
         } else {
-            self.queue.push(Lane::Any, at, Event::Arrival { slot, leg: out, meddled: false });
+            self.queue.push(Lane::Any, at, Event::Arrival { slot, leg: out, faults_applied: false });
         }
     }
 
-    /// The last bit of a frame is due at the end of a leg. Returns its next arrival.
-    pub(super) fn arrive(&mut self, slot: Slot, id: LegId, meddled: bool) -> Option<(SimTime, Event)> {
-        if self.legs[id.index()].faulty && !meddled {
-            return self.meddle(slot, id);
+    /// Handles the arrival of a frame's last bit at the end of a leg. Returns its next arrival.
+    pub(super) fn arrive(&mut self, slot: Slot, id: LegId, faults_applied: bool) -> Option<(SimTime, Event)> {
+        if self.legs[id.index()].faulty && !faults_applied {
+            return self.apply_leg_faults(slot, id);
         }
         let first_bit = self.now.back_ns(self.frames.frame(slot).first_to_last_bit_ns());
         let leg = &self.legs[id.index()];
@@ -91,9 +91,9 @@ impl Network {
         self.statistics.hops += 1;
         let id = self.frames.frame(slot).id;
         if self.nodes[index].device.controller.may_process(from) {
-            // Turned round by a loop that closed meanwhile: the processing unit has not seen its beginning.
+            // A loop that closed meanwhile returned the frame: the processing unit has not received its beginning.
             let node = &self.nodes[index];
-            if node.device.controller.turns_round(from) && node.interrupted(from, Port::A, first_bit) {
+            if node.device.controller.returns_to_unit(from) && node.interrupted(from, Port::A, first_bit) {
                 return self.lose_hop(slot, LossCause::LoopChanged);
             }
             self.settle_before(index, id);
@@ -103,7 +103,7 @@ impl Network {
         let passage = node.device.controller.receive_between(frame, from, first_bit, self.now);
         // A frame that only passes by needs no reaction of the application.
         if !matches!(passage, Passage::Leaves { processed: false, .. }) {
-            if self.leaping {
+            if self.defers_settling {
                 self.settle_later(index, id);
             } else {
                 self.settle(index);
@@ -122,7 +122,7 @@ impl Network {
         let at = self.now
             + self.options.passage(&node.device, processed)
             + Duration::from_nanos(self.legs[leg.index()].delay_ns);
-        Some((at, Event::Arrival { slot, leg, meddled: false }))
+        Some((at, Event::Arrival { slot, leg, faults_applied: false }))
     }
 
     /// A frame reaches an interface of the MainDevice.
@@ -142,7 +142,7 @@ impl Network {
     }
 
     /// Applies the faults of a leg to a frame that is due at its end.
-    fn meddle(&mut self, slot: Slot, id: LegId) -> Option<(SimTime, Event)> {
+    fn apply_leg_faults(&mut self, slot: Slot, id: LegId) -> Option<(SimTime, Event)> {
         let leg = &mut self.legs[id.index()];
         if leg.faults.blocked {
             return self.lose_hop(slot, LossCause::Blocked);
@@ -165,9 +165,9 @@ impl Network {
         if doubled {
             let copy = self.frames.put_copy(slot);
             let behind = at + Duration::from_nanos(self.frames.frame(slot).occupies_ns());
-            self.queue.push(Lane::Any, behind, Event::Arrival { slot: copy, leg: id, meddled: true });
+            self.queue.push(Lane::Any, behind, Event::Arrival { slot: copy, leg: id, faults_applied: true });
         }
-        Some((at, Event::Arrival { slot, leg: id, meddled: true }))
+        Some((at, Event::Arrival { slot, leg: id, faults_applied: true }))
     }
 
     /// Inverts one bit of a frame.

@@ -11,17 +11,17 @@ use crate::controller::Wander;
 use crate::description::{DcDescription, DeviceDescription, TransitionTimes};
 use crate::network::Random;
 
-/// Most devices of a segment: station addresses are 16 bits wide.
+/// Maximum number of devices of a segment: station addresses are 16 bits wide.
 const MAX_DEVICES: usize = 65_535;
-/// Names that mean something else where a cable is plugged in.
+/// Names with a special meaning as cable ends.
 pub(super) const RESERVED: [&str; 3] = ["main", "redundant", "none"];
 
-/// A device, and which table of the file it comes from.
+/// A device, and its table in the file.
 pub(super) struct PlannedDevice {
     pub(super) description: DeviceDescription,
-    /// Number of the table.
+    /// Index of the table.
     pub(super) entry: usize,
-    /// It is the first one of its table.
+    /// Whether it is the first device of its table.
     pub(super) first: bool,
 }
 
@@ -54,10 +54,10 @@ pub(super) fn describe(
             description.name = if count > 1 { format!("{name}-{}", copy + 1) } else { name.clone() };
             check_name(&description.name, &plan)
                 .map_err(|message| error(message, entry.name.as_ref().map_or(here, |name| line(text, &name.span()))))?;
-            // Clocks that were switched on at different times (protocol 11.3).
+            // Clocks of devices that were switched on at different times (protocol 11.3).
             let start = random.next() >> 16;
             description.clock_start_ns = entry.clock_start_ns.unwrap_or(start);
-            // No two devices share a MAC address.
+            // Each device has a unique MAC address.
             let [.., high, low] = &mut description.services.eoe.mac;
             [*high, *low] = (plan.len() as u16).wrapping_add(1).to_be_bytes();
             plan.push(PlannedDevice { description, entry: number, first: copy == 0 });
@@ -66,7 +66,7 @@ pub(super) fn describe(
     Ok(plan)
 }
 
-/// Name of a device that may have none.
+/// Name of a device; generated if the table has none.
 fn name(entry: &DeviceEntry, number: usize) -> String {
     let stem = entry.kind.as_ref().or(entry.sii.as_ref()).map_or("device", |kind| kind.get_ref());
     let stem = Path::new(stem).file_stem().and_then(|stem| stem.to_str()).unwrap_or("device");
@@ -168,7 +168,7 @@ fn clock(entry: &DeviceEntry, description: &mut DeviceDescription) -> Result<(),
         description.clock_drift_ppb = drift;
     }
     if let Some(wander) = ppb(&entry.wander_ppm, "wander_ppm", 1e4)? {
-        // Temperature in a cabinet changes in minutes.
+        // Temperature in a cabinet changes within minutes.
         let period = Duration::from_secs(60);
         description.clock_wander = Wander { amplitude_ppb: wander, period };
     }

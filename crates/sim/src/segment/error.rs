@@ -1,42 +1,42 @@
-//! Why a segment cannot be made.
+//! Errors of segments.
 
 use core::fmt;
 use std::path::PathBuf;
 
-/// What is wrong with a segment file or a list of devices and cables, and where.
+/// An error in a segment file or in a list of devices and cables, with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SegmentError {
-    /// The file, where the segment comes from one.
+    /// The file, if the segment comes from a file.
     pub file: Option<PathBuf>,
     /// Line in the file, from 1.
     pub line: Option<usize>,
     /// Name of the device concerned.
     pub device: Option<String>,
-    /// What was expected and what is there.
+    /// Expected and actual value.
     pub message: String,
 }
 
 impl SegmentError {
-    /// An error without a place.
+    /// An error without a position.
     pub fn new(message: impl Into<String>) -> SegmentError {
         SegmentError { file: None, line: None, device: None, message: message.into() }
     }
 
-    /// The same error, about this device.
+    /// The error with the name of the device.
     #[must_use]
     pub fn about(mut self, device: impl Into<String>) -> SegmentError {
         self.device = Some(device.into());
         self
     }
 
-    /// The same error, at this line.
+    /// The error with a line.
     #[must_use]
     pub fn at_line(mut self, line: usize) -> SegmentError {
         self.line = Some(line);
         self
     }
 
-    /// The same error, in this file.
+    /// The error with a file.
     #[must_use]
     pub fn in_file(mut self, file: impl Into<PathBuf>) -> SegmentError {
         self.file = Some(file.into());
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_text_names_file_line_and_device() {
+    fn the_message_names_file_line_and_device() {
         let error = SegmentError::new("port 3 is taken").about("junction").at_line(12).in_file("a.toml");
         assert_eq!(error.to_string(), "a.toml:12: device \"junction\": port 3 is taken");
     }

@@ -1,4 +1,4 @@
-//! The keys of a segment file, as they are written.
+//! The keys of a segment file.
 
 use core::ops::Range;
 use core::time::Duration;
@@ -94,7 +94,7 @@ impl File {
     /// Reads the keys.
     pub(super) fn parse(text: &str) -> Result<File, SegmentError> {
         toml::from_str(text).map_err(|error| {
-            let message = SegmentError::new(in_words(error.message()));
+            let message = SegmentError::new(describe(error.message()));
             match error.span() {
                 Some(span) => {
                     let at = message.at_line(line(text, &span));
@@ -135,7 +135,7 @@ impl File {
 }
 
 impl Options {
-    /// How many datagrams a frame may hold, and what becomes of more.
+    /// Maximum number of datagrams in a frame, and handling of further ones.
     fn datagram_limit(&self, text: &str) -> Result<Option<DatagramLimit>, SegmentError> {
         let wrong = |span, message: &str| Err(SegmentError::new(message).at_line(line(text, &span)));
         let beyond = match &self.more_datagrams {
@@ -158,23 +158,23 @@ impl Options {
     }
 }
 
-/// A time that is written as a number of units of so many seconds.
+/// A time given as a number of units; `unit` is the unit in seconds.
 pub(super) fn duration(value: &Spanned<f64>, key: &str, unit: f64) -> Result<Duration, SegmentError> {
     let given = *value.get_ref();
     Duration::try_from_secs_f64(given * unit)
         .map_err(|_| SegmentError::new(format!("{key}: expected a time, not negative, got {given}")))
 }
 
-/// Number of the line, from 1, in which a span begins.
+/// Number of the line, from 1, of the beginning of a span.
 pub(super) fn line(text: &str, span: &Range<usize>) -> usize {
     let before = &text.as_bytes()[..span.start.min(text.len())];
     1 + before.iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// What to call the device whose table is around an offset of the text, though the file as a whole makes no sense.
+/// Name of the device whose table contains an offset of the text, for a file that cannot be parsed as a whole.
 fn device_around(text: &str, offset: usize) -> Option<String> {
     let offset = (0..=offset.min(text.len())).rev().find(|offset| text.is_char_boundary(*offset))?;
-    // The error may lie in the header itself.
+    // The error may be in the header itself.
     let line_end = text[offset..].find('\n').map_or(text.len(), |end| offset + end);
     let start = text[..line_end].rfind("[[device]]")?;
     let rest = &text[start..];
@@ -190,8 +190,8 @@ fn device_around(text: &str, offset: usize) -> Option<String> {
     Some(named.unwrap_or_else(|| format!("number {number}")))
 }
 
-/// What the reader of the file says, in one line and without names of Rust types.
-fn in_words(message: &str) -> String {
+/// The message of the TOML reader in one line and without names of Rust types.
+fn describe(message: &str) -> String {
     const TYPES: [&str; 12] = ["usize", "u8", "u16", "u32", "u64", "isize", "i8", "i16", "i32", "i64", "f32", "f64"];
     let words = message.split('\n').map(|line| {
         let words = line.split(' ').map(|word| if TYPES.contains(&word) { "a number of its range" } else { word });

@@ -1,4 +1,4 @@
-//! Keys of a device's table that concern its mailbox and what stands behind it.
+//! Keys of a device's table for its mailbox and the mailbox protocols.
 
 use core::net::Ipv4Addr;
 use std::path::Path;
@@ -6,12 +6,12 @@ use std::path::Path;
 use super::format::{DeviceEntry, Place, duration};
 use crate::description::{DeviceDescription, EoeDescription, EoeEnd, FoeDescription};
 
-/// Sizes of a mailbox: the least that an SDO needs, the most that a datagram carries.
+/// Sizes of a mailbox: minimum for an SDO, maximum data of a datagram.
 const MAILBOX_BYTES: core::ops::RangeInclusive<u16> = 24..=1486;
-/// Longest file that a device is delivered with.
+/// Maximum size of a file on delivery.
 const MAX_FILE_BYTES: u64 = 4 << 20;
 
-/// Reads them.
+/// Reads the keys.
 pub(super) fn services(
     entry: &DeviceEntry,
     description: &mut DeviceDescription,
@@ -36,7 +36,7 @@ pub(super) fn services(
     ethernet(entry, &mut description.services.eoe)
 }
 
-/// Files that the device is delivered with, and how it takes others.
+/// Files on delivery, and settings for writing files.
 fn files(entry: &DeviceEntry, foe: &mut FoeDescription, base_dir: &Path) -> Result<(), (String, Place)> {
     for file in &entry.files {
         let path = base_dir.join(file.get_ref());
@@ -56,7 +56,7 @@ fn files(entry: &DeviceEntry, foe: &mut FoeDescription, base_dir: &Path) -> Resu
     Ok(())
 }
 
-/// What stands behind EoE, and its addresses.
+/// The receiver of EoE frames, and its addresses.
 fn ethernet(entry: &DeviceEntry, eoe: &mut EoeDescription) -> Result<(), (String, Place)> {
     if let Some(end) = &entry.ethernet {
         eoe.end = match end.get_ref().as_str() {
@@ -87,7 +87,7 @@ fn ethernet(entry: &DeviceEntry, eoe: &mut EoeDescription) -> Result<(), (String
     Ok(())
 }
 
-/// Address and mask; `None` where no device can have the address.
+/// Address and mask; `None` if a device cannot have the address.
 fn network(text: &str) -> Option<(Ipv4Addr, Ipv4Addr)> {
     let (address, prefix) = text.split_once('/')?;
     let address: Ipv4Addr = address.parse().ok()?;

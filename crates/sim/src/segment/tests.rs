@@ -23,7 +23,7 @@ fn ends(segment: &Segment) -> Vec<(Endpoint, Endpoint)> {
 }
 
 #[test]
-fn devices_are_attached_one_behind_the_other_and_the_last_closes_the_ring() {
+fn devices_are_attached_in_a_line_and_the_last_closes_the_ring() {
     let segment = read(
         r#"
         [segment]
@@ -132,7 +132,7 @@ fn the_settings_of_a_device_reach_its_description() {
 }
 
 #[test]
-fn clocks_start_where_the_seed_says() {
+fn clocks_start_at_values_of_the_seed() {
     let starts = |seed: u64| {
         let text = format!("segment = {{ seed = {seed} }}\n[[device]]\ntype = \"servo\"\ncount = 3");
         read(&text).unwrap().devices.iter().map(|device| device.clock_start_ns).collect::<Vec<_>>()
@@ -143,7 +143,7 @@ fn clocks_start_where_the_seed_says() {
 }
 
 #[test]
-fn a_real_image_with_another_alias_keeps_a_valid_checksum() {
+fn a_real_image_with_another_alias_has_a_valid_checksum() {
     let directory = std::env::temp_dir().join(format!("ringcat-segment-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
     let mut terminal = crate::catalogue::by_name("digital-input-8").unwrap();
@@ -157,7 +157,7 @@ fn a_real_image_with_another_alias_keeps_a_valid_checksum() {
     assert_eq!((device.name.as_str(), again.alias, again.identity.serial), ("di-1", 300, 9));
 }
 
-/// Texts of segment files, and what is said of them; `{known}` is the list of all devices.
+/// Texts of segment files with their errors; `{known}` is the list of all devices.
 const REFUSED: &[(&str, &str)] = &[
     ("[segment]\nspeed = 3", "line 2: unknown field `speed`"),
     ("[[device]]\nname = \"x\"\ntyp = \"servo\"", "line 3: device \"x\": unknown field `typ`"),
@@ -243,7 +243,7 @@ fn errors_name_line_and_device() {
 }
 
 #[test]
-fn a_file_that_is_missing_is_named() {
+fn a_missing_file_is_named() {
     let error = Segment::load(Path::new("nowhere/none.toml")).unwrap_err();
     assert_eq!(error.file, Some(PathBuf::from("nowhere/none.toml")));
     assert!(error.to_string().starts_with("nowhere/none.toml: cannot be read"));
@@ -251,7 +251,7 @@ fn a_file_that_is_missing_is_named() {
 
 // covers: sim-files
 #[test]
-fn the_example_segments_of_this_crate_can_be_made() {
+fn the_example_segments_of_this_crate_are_valid() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("segments");
     let mut files: Vec<PathBuf> = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
@@ -298,7 +298,7 @@ mod any_text {
 
 // covers: sim-files
 #[test]
-fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
+fn mailbox_keys_change_sizes_times_and_services() {
     let segment = read(
         r#"
         [[device]]
@@ -334,7 +334,7 @@ fn mailbox_keys_change_sizes_times_and_what_stands_behind() {
 
 // covers: sim-files
 #[test]
-fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
+fn invalid_mailbox_keys_are_refused_with_the_valid_values() {
     let key = |key: &str| refused(&format!("[[device]]\ntype = \"all-protocols\"\n{key}\n"));
     for (line, part) in [
         ("mailbox_bytes = 12", "3: device \"all-protocols-1\": mailbox_bytes: expected 24 to 1486, got 12"),
@@ -354,7 +354,7 @@ fn mailbox_keys_that_make_no_sense_are_refused_with_what_would() {
 
 // covers: sim-files
 #[test]
-fn files_come_from_beside_the_segment_file() {
+fn files_are_relative_to_the_segment_file() {
     let text = "[[device]]\ntype = \"soe-drive\"\nfiles = [\"demo.toml\"]\n";
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("segments");
     let segment = Segment::from_toml(text, &beside).unwrap();
@@ -364,7 +364,7 @@ fn files_come_from_beside_the_segment_file() {
 
 // covers: sim-clocks
 #[test]
-fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
+fn clock_errors_are_read_from_the_file() {
     let text = r#"
         [[device]]
         type = "servo"
@@ -389,7 +389,7 @@ fn what_is_not_ideal_about_a_clock_is_written_in_the_file() {
 
 // covers: sim-faults
 #[test]
-fn how_many_datagrams_a_frame_may_hold_is_written_in_the_file() {
+fn the_limit_of_datagrams_is_read_from_the_file() {
     let limit = |keys: &str| {
         let text = format!("[segment]\n{keys}\n[[device]]\ntype = \"coupler\"\n");
         read(&text).map(|segment| segment.options.max_datagrams).map_err(|error| error.to_string())

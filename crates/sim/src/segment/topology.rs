@@ -12,11 +12,11 @@ use super::format::{DeviceEntry, File, line};
 use crate::cable::{CableSpec, DEFAULT_CABLE_DELAY, DeviceIndex, Endpoint, HostLink};
 use crate::frame::Port;
 
-/// Ports that lead further, in the order in which a device's next free one is looked for: OUT of a two-port device
-/// first, then in the order in which frames travel.
+/// Ports for further devices, in the order of the search for a free port: OUT of a two-port device first, then the
+/// order in which frames pass ports.
 const FURTHER: [Port; 3] = [Port::B, Port::D, Port::C];
 
-/// Cables on the table, and what they are plugged into.
+/// The cables planned so far.
 struct Plan<'a> {
     text: &'a str,
     devices: &'a [PlannedDevice],
@@ -26,7 +26,7 @@ struct Plan<'a> {
 /// All cables of the file.
 pub(super) fn plug(file: &File, text: &str, devices: &[PlannedDevice]) -> Result<Vec<CableSpec>, SegmentError> {
     let delay = |given: Option<u64>| given.or(file.segment.cable_ns).map_or(DEFAULT_CABLE_DELAY, Duration::from_nanos);
-    // Listed cables first: what is attached without a port looks for a free one.
+    // Listed cables first: devices attached without a port use a free one.
     let mut plan = Plan { text, devices, cables: Vec::new() };
     for cable in &file.cable {
         let cable = cable.get_ref();
@@ -54,7 +54,7 @@ impl Plan<'_> {
         &self.devices[device.0].description.name
     }
 
-    /// Attaches a device to the one before it, or to where its table says.
+    /// Attaches a device to the previous one, or to the endpoint in its table.
     fn attach(
         &mut self,
         index: usize,
@@ -95,7 +95,7 @@ impl Plan<'_> {
         self.join(end, Endpoint::Host(HostLink::Redundant), delay, span)
     }
 
-    /// "main", "redundant", "device.port", or "device" for its next free port.
+    /// Parses "main", "redundant", "device.port", or "device" for its next free port.
     fn endpoint(&self, text: &str, span: &Range<usize>) -> Result<Endpoint, SegmentError> {
         match text {
             "main" => return Ok(Endpoint::Host(HostLink::Main)),
@@ -124,7 +124,7 @@ impl Plan<'_> {
         free.map(|(_, endpoint)| endpoint).ok_or_else(|| self.error(message(), span))
     }
 
-    /// What an endpoint is joined to already.
+    /// The endpoint to which this endpoint is connected already.
     fn taken(&self, endpoint: Endpoint) -> Option<Endpoint> {
         self.cables.iter().find_map(|cable| match endpoint {
             _ if cable.a == endpoint => Some(cable.b),
@@ -143,25 +143,25 @@ impl Plan<'_> {
     fn join(&mut self, a: Endpoint, b: Endpoint, delay: Duration, span: &Range<usize>) -> Result<(), SegmentError> {
         if a == b {
             let message = format!("{} cannot be joined to itself", self.describe(a));
-            return Err(self.blame(self.error(message, span), a));
+            return Err(self.with_device(self.error(message, span), a));
         }
         for end in [a, b] {
             if let Some(other) = self.taken(end) {
                 let message = format!("{} is joined to {} already", self.describe(end), self.describe(other));
-                return Err(self.blame(self.error(message, span), end));
+                return Err(self.with_device(self.error(message, span), end));
             }
             if let Endpoint::Device(device, port) = end
                 && self.devices[device.0].description.ports[port.index()] == PortKind::NotImplemented
             {
                 let message = format!("{} does not exist", self.describe(end));
-                return Err(self.blame(self.error(message, span), end));
+                return Err(self.with_device(self.error(message, span), end));
             }
         }
         self.cables.push(CableSpec { a, b, delay });
         Ok(())
     }
 
-    fn blame(&self, error: SegmentError, end: Endpoint) -> SegmentError {
+    fn with_device(&self, error: SegmentError, end: Endpoint) -> SegmentError {
         match end {
             Endpoint::Device(device, _) => error.about(self.name(device)),
             Endpoint::Host(_) => error,

@@ -14,18 +14,18 @@ use crate::description::{
     data_type,
 };
 
-/// Time from a request to its answer for devices whose real one is not known.
+/// Response time of devices whose real value is not known.
 const RESPONSE_TIME: Duration = Duration::from_micros(200);
-/// A mailbox holds the header of a message (protocol 6.1).
+/// A mailbox must hold the header of a message (protocol 6.1).
 const SMALLEST_MAILBOX: u16 = 6;
-/// Bytes of an entry where an object with an entry per byte would have too many.
+/// Bytes of a substitute entry if an entry per byte would exceed the limit of an object.
 const CHUNK: u16 = 31;
-/// First objects of the PDOs that stand for those an image does not show.
+/// First objects of the PDOs that substitute PDOs missing in an image.
 const SUBSTITUTE_OUTPUTS: u16 = 0x7000;
 const SUBSTITUTE_INPUTS: u16 = 0x6000;
 
 impl DeviceDescription {
-    /// Description of the device whose EEPROM content this is. The image is kept as it is.
+    /// Description of the device with this EEPROM content. The image is kept unchanged.
     pub fn from_sii(image: Vec<u8>, name: &str) -> Result<DeviceDescription, DescriptionError> {
         let sii = Sii::parse(&image).map_err(DescriptionError::Sii)?;
         let header = *sii.header();
@@ -78,7 +78,7 @@ fn string(strings: &Strings<'_>, number: u8) -> String {
     strings.string(number).map(|bytes| String::from_utf8_lossy(bytes).into_owned()).unwrap_or_default()
 }
 
-/// Ports as the general category says; two MII ports where it says nothing.
+/// Ports of the general category; two MII ports if it contains none.
 fn ports(general: Option<General>) -> [PortKind; 4] {
     let declared = general.map(|general| general.ports()).unwrap_or([PhysicalPort::Unused; 4]);
     let ports = declared.map(|port| match port {
@@ -105,8 +105,8 @@ fn sync_managers(sii: &Sii<'_>) -> Vec<SyncManagerDescription> {
     entries.collect()
 }
 
-/// What a SyncManager is for. Where the image gives no type, its PDOs say so, then the control byte of one that is in
-/// use.
+/// Type of a SyncManager. If the image contains no type, its PDOs determine it, then the control byte of an enabled
+/// SyncManager.
 fn kind(sii: &Sii<'_>, number: usize, entry: &SiiSyncManager) -> SyncManagerKind {
     let has = |direction| sii.pdos(direction).any(|pdo| pdo.sync_manager.map(usize::from) == Some(number));
     match entry.kind {
@@ -123,7 +123,7 @@ fn kind(sii: &Sii<'_>, number: usize, entry: &SiiSyncManager) -> SyncManagerKind
     }
 }
 
-/// One that is assigned to a SyncManager for something else is not assigned.
+/// A PDO assigned to a SyncManager of another type is not assigned.
 fn pdos(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Vec<PdoDescription> {
     let strings = sii.strings();
     let mut found = Vec::new();
@@ -154,7 +154,7 @@ fn pdos(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Vec<PdoDescr
     found
 }
 
-/// As the fixed area says, where that is possible; a device that speaks may say it with its SyncManagers alone.
+/// The layout of the fixed area, if it is possible; otherwise the layout of the mailbox SyncManagers.
 fn mailbox(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Option<MailboxDescription> {
     let header = sii.header();
     let standard = Some(header.standard_mailbox).filter(is_possible);
@@ -164,7 +164,7 @@ fn mailbox(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Option<Ma
     let number = |kind| sync_managers.iter().position(|entry| entry.kind == kind);
     let numbers = number(SyncManagerKind::MailboxOut).zip(number(SyncManagerKind::MailboxIn));
     let (out, inward) = numbers.unwrap_or((0, 1));
-    // Without SyncManagers of its own it has the first two, unless they exchange process data.
+    // A device without SyncManagers for the mailbox uses the first two, unless they exchange process data.
     let exchanges = |number: usize| {
         sync_managers
             .get(number)
@@ -193,7 +193,8 @@ fn of_sync_managers(sync_managers: &[SyncManagerDescription]) -> Option<MailboxL
     })
 }
 
-/// Both mailboxes can hold a header, and lie apart in the process RAM. 0xFFFF is a field that was never written.
+/// Whether both mailboxes can hold a header and do not overlap in the process RAM. 0xFFFF is a field that was never
+/// written.
 fn is_possible(layout: &MailboxLayout) -> bool {
     let span = |start: u16, size: u16| u32::from(start)..u32::from(start) + u32::from(size);
     let out = span(layout.receive_offset, layout.receive_size);
@@ -209,7 +210,7 @@ fn clock(sii: &Sii<'_>) -> Option<DcDescription> {
     (!modes.is_empty()).then_some(DcDescription { wide: true, modes, minimum_cycle_ns: 0 })
 }
 
-/// An image with a mailbox but without entries for its SyncManagers: 0 and 1 are meant (protocol 3.11).
+/// An image with a mailbox but without entries for its SyncManagers: uses 0 and 1 (protocol 3.11).
 fn fill_mailbox_managers(description: &mut DeviceDescription) {
     let Some(mailbox) = description.mailbox else {
         return;
@@ -225,8 +226,8 @@ fn fill_mailbox_managers(description: &mut DeviceDescription) {
     ];
 }
 
-/// A SyncManager with a default length but without PDOs: the device has them in its dictionary only. Bytes stand for
-/// what the image does not show, so that the length and the dictionary agree.
+/// A SyncManager with a default length but without PDOs: the device has PDOs only in its dictionary. Byte entries
+/// substitute the missing PDOs, so that the length and the dictionary agree.
 fn substitute_pdos(description: &mut DeviceDescription) {
     let managers = description.sync_managers.clone();
     for (number, entry) in (0u8..).zip(managers) {
@@ -255,7 +256,7 @@ fn substitute_pdos(description: &mut DeviceDescription) {
     }
 }
 
-/// Entries of so many bytes in all: one per byte, or as few as it takes.
+/// Entries of this number of bytes in total: one per byte, or as few as possible.
 fn substitutes(length: u16, index: u16) -> Vec<PdoEntryDescription> {
     let width = if length < u16::from(u8::MAX) { 1 } else { CHUNK };
     let starts = (0..length).step_by(usize::from(width));

@@ -6,7 +6,7 @@ use crate::catalogue;
 use crate::description::{DeviceDescription, PdoEntryDescription};
 
 #[test]
-fn the_image_of_a_coupler_has_these_bytes_in_front() {
+fn the_image_of_a_coupler_begins_with_the_expected_bytes() {
     let mut description = catalogue::by_name("coupler").unwrap();
     description.alias = 0x1234;
     let image = build(&description);
@@ -35,7 +35,7 @@ fn a_real_image_is_kept_byte_for_byte() {
 }
 
 #[test]
-fn a_real_image_gets_the_alias_and_serial_number_of_its_description() {
+fn a_real_image_receives_alias_and_serial_number_of_its_description() {
     let image = build(&catalogue::by_name("servo").unwrap());
     let mut description = DeviceDescription::from_sii(image.clone(), "copy").unwrap();
     description.alias = 0x0042;
@@ -47,7 +47,7 @@ fn a_real_image_gets_the_alias_and_serial_number_of_its_description() {
 }
 
 #[test]
-fn a_broken_checksum_is_refused_with_a_reason() {
+fn a_wrong_checksum_is_refused_with_a_reason() {
     let mut image = build(&catalogue::by_name("servo").unwrap());
     image[14] ^= 0xFF;
     let error = DeviceDescription::from_sii(image, "broken").unwrap_err();
@@ -66,7 +66,7 @@ fn more_sync_managers_than_the_controller_has_are_refused() {
 }
 
 #[test]
-fn content_that_needs_more_room_makes_the_image_grow() {
+fn the_image_grows_with_its_content() {
     let mut description = catalogue::by_name("digital-output-16").unwrap();
     description.sii_size_bytes = 128;
     let image = build(&description);
@@ -75,7 +75,7 @@ fn content_that_needs_more_room_makes_the_image_grow() {
 }
 
 #[test]
-fn strings_that_are_too_long_are_cut_at_a_character() {
+fn strings_that_are_too_long_are_truncated_at_a_character() {
     let mut description = DeviceDescription::plain(&"ä".repeat(200), Identity::default());
     description.group = "x".repeat(300);
     let image = build(&description);
@@ -85,7 +85,7 @@ fn strings_that_are_too_long_are_cut_at_a_character() {
 }
 
 #[test]
-fn pdos_stand_for_those_that_a_coe_device_keeps_in_its_dictionary() {
+fn substitute_pdos_replace_pdos_that_are_only_in_the_dictionary() {
     let mut description = catalogue::by_name("servo").unwrap();
     description.pdos.clear();
     let again = DeviceDescription::from_sii(build(&description), "silent").unwrap();
@@ -96,7 +96,7 @@ fn pdos_stand_for_those_that_a_coe_device_keeps_in_its_dictionary() {
 
 proptest! {
     #[test]
-    fn any_pdo_comes_back(entries in prop::collection::vec((any::<u16>(), any::<u8>(), any::<u8>(), 1u8..), 0..40)) {
+    fn any_pdo_round_trips(entries in prop::collection::vec((any::<u16>(), any::<u8>(), any::<u8>(), 1u8..), 0..40)) {
         let mut description = catalogue::by_name("digital-output-8").unwrap();
         description.pdos.truncate(1);
         let entries = entries.into_iter().map(|(index, sub_index, data_type, bit_length)| PdoEntryDescription {
@@ -109,12 +109,12 @@ proptest! {
 
     // covers: robust
     #[test]
-    fn any_image_makes_a_device_or_an_error(
+    fn any_image_results_in_a_device_or_an_error(
         mut image in prop::collection::vec(any::<u8>(), 128..700),
         small in any::<bool>()
     ) {
         if small {
-            // Make the chain of categories plausible more often.
+            // Increase the probability of valid categories.
             for place in (0x80..image.len().saturating_sub(1)).step_by(20) {
                 image[place] = [10, 30, 40, 41, 50, 51, 60][place % 7];
                 image[place + 1] = 0;

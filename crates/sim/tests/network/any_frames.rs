@@ -1,4 +1,4 @@
-//! Nothing that a MainDevice sends brings the simulator down, and what comes back is of the length that was sent.
+//! No frame of a MainDevice crashes the simulator, and returned frames have the length of the sent ones.
 
 use core::time::Duration;
 
@@ -23,7 +23,7 @@ fn everything() -> Network {
     network
 }
 
-/// Registers where things happen, and anywhere.
+/// Registers with side effects, and any others.
 fn place() -> impl Strategy<Value = u16> {
     prop_oneof![
         prop::sample::select(
@@ -65,7 +65,7 @@ fn frame(datagrams: &[(u8, u16, u16, Vec<u8>)]) -> Vec<u8> {
     buffer
 }
 
-/// Sends frames with a little time between them and returns the lengths of those that come back.
+/// Sends frames at short intervals and returns the lengths of the returned ones.
 fn exchange(network: &mut Network, frames: &[Vec<u8>]) -> Vec<usize> {
     for frame in frames {
         for link in HostLink::ALL {
@@ -85,14 +85,16 @@ proptest! {
 
     // covers: robust
     #[test]
-    fn any_bytes_are_survived(frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..6)) {
+    fn any_bytes_do_not_crash_the_simulator(
+        frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 1..6),
+    ) {
         let mut network = everything();
         exchange(&mut network, &frames);
     }
 
     // covers: robust
     #[test]
-    fn any_datagrams_are_survived(
+    fn any_datagrams_do_not_crash_the_simulator(
         frames in prop::collection::vec(prop::collection::vec(datagram(), 1..6), 1..12),
         corrupted in 0u32..4,
     ) {

@@ -16,7 +16,7 @@ use ringcat_wire::time::DcTime32;
 
 use crate::wiring::{SETTLE, command, endpoint};
 
-/// The tree of protocol 7.1: every pass takes 300 ns, each cable what is written behind it.
+/// The tree of protocol 7.1: every pass takes 300 ns; each cable has the given delay.
 const CABLES: [(&str, &str, u64); 7] = [
     ("main", "1.0", 50),
     ("1.1", "2.0", 100),
@@ -43,7 +43,7 @@ fn tree(clock_start_ns: impl Fn(usize) -> u64) -> Network {
     network
 }
 
-/// Lets all devices latch their receive times.
+/// Makes all devices latch their receive times.
 fn latch(network: &mut Network) {
     network.send(Main, &command(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), &[0; 4]));
     network.advance_by(SETTLE);
@@ -65,20 +65,20 @@ fn check(network: &mut Network) {
     }
 }
 
-/// Device, port, time after its own port 0.
+/// Device, port, time relative to its own port 0.
 const EXPECTED: [(usize, u16, i32); 6] =
     [(1, 1, 3_880), (1, 2, 4_880), (2, 3, 1_460), (2, 1, 3_080), (5, 1, 720), (3, 1, 780)];
 
 // covers: sim-clocks
 #[test]
-fn receive_times_are_those_of_the_model() {
+fn receive_times_match_the_model() {
     check(&mut tree(|_| 0));
 }
 
 // covers: sim-clocks
 #[test]
-fn receive_times_survive_clocks_that_wrap_between_two_ports() {
-    // The first bit reaches devices 2 and 3 this long after the start.
+fn receive_times_are_correct_if_a_clock_wraps_between_two_ports() {
+    // Time at which the first bit reaches devices 2 and 3.
     let first_bit_at_2 = SETTLE.as_nanos() as u64 + 50 + 300 + 100;
     let first_bit_at_3 = first_bit_at_2 + 300 + 1_160 + 300 + 120;
     let mut network = tree(|number| match number {

@@ -12,7 +12,7 @@ use ringcat_wire::register::map;
 
 use crate::wiring::{command, probe, ring, segment, segment_with, shortest};
 
-/// FNV-1a over everything that came back, with its time.
+/// FNV-1a of all received frames with their times.
 fn digest(network: &mut Network, digest: &mut u64) {
     let mut feed = |bytes: &[u8]| {
         for byte in bytes {
@@ -29,7 +29,7 @@ fn digest(network: &mut Network, digest: &mut u64) {
     }
 }
 
-/// A run with all kinds of faults; damaged writes to process RAM leave what the seed chose.
+/// A run with all kinds of faults; damaged writes to process RAM depend on the seed.
 fn run(seed: u64) -> u64 {
     let cables = format!("{} 2.2-9.0 9.1-10.0 3.3-11.0", ring(8));
     let mut network = segment_with(&cables, NetworkOptions { seed, ..NetworkOptions::default() });
@@ -90,7 +90,7 @@ fn steps_of_any_size_give_the_same_run() {
 }
 
 #[test]
-fn buffers_that_are_given_back_are_used_again() {
+fn returned_buffers_are_reused() {
     let mut network = segment(&ring(4));
     let mut buffers = Vec::new();
     for _ in 0..50 {

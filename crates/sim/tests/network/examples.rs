@@ -1,4 +1,4 @@
-//! The example segments do what they are there to show.
+//! The example segments have the intended properties.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,8 +19,8 @@ fn example(name: &str) -> Network {
     network
 }
 
-/// Processing units that a frame meets, and where it comes back.
-fn met(network: &mut Network, link: HostLink) -> Option<(HostLink, usize)> {
+/// Number of processing units that a frame passes, and the interface at which it returns.
+fn processed_by(network: &mut Network, link: HostLink) -> Option<(HostLink, usize)> {
     network.send(link, &shortest());
     network.advance_by(SETTLE);
     HostLink::ALL.into_iter().find_map(|back_on| {
@@ -32,17 +32,18 @@ fn met(network: &mut Network, link: HostLink) -> Option<(HostLink, usize)> {
 }
 
 #[test]
-fn the_demo_is_a_straight_ring_that_any_one_cable_may_leave() {
+fn the_demo_is_a_straight_ring_that_tolerates_any_single_cut() {
     let mut network = example("demo.toml");
     let count = network.devices().len();
     assert!(count >= 16);
-    assert_eq!(met(&mut network, Main), Some((Redundant, count)));
-    assert_eq!(met(&mut network, Redundant), Some((Main, 0)));
+    assert_eq!(processed_by(&mut network, Main), Some((Redundant, count)));
+    assert_eq!(processed_by(&mut network, Redundant), Some((Main, 0)));
     let cables = network.cables().len();
     for cable in (0..cables).map(CableId) {
         network.cut(cable);
         network.advance_by(SETTLE);
-        let halves = HostLink::ALL.map(|link| met(&mut network, link).map_or(0, |(_, met)| met));
+        let halves =
+            HostLink::ALL.map(|link| processed_by(&mut network, link).map_or(0, |(_, processed_by)| processed_by));
         assert_eq!(halves.iter().sum::<usize>(), count, "{cable:?}");
         network.heal(cable);
         network.advance_by(SETTLE);
@@ -52,10 +53,10 @@ fn the_demo_is_a_straight_ring_that_any_one_cable_may_leave() {
 }
 
 #[test]
-fn the_local_ring_of_the_junction_serves_everybody_with_any_of_its_cables_cut() {
+fn the_local_ring_of_the_junction_tolerates_any_single_cut() {
     let mut network = example("junction-ring.toml");
     let count = network.devices().len();
-    assert_eq!(met(&mut network, Main), Some((Main, count)));
+    assert_eq!(processed_by(&mut network, Main), Some((Main, count)));
     let ring = ["member-1", "member-2", "member-3"];
     let inside = |network: &Network, endpoint: Endpoint| match endpoint {
         Endpoint::Device(device, _) => ring.contains(&network.device(device).name()),
@@ -71,7 +72,7 @@ fn the_local_ring_of_the_junction_serves_everybody_with_any_of_its_cables_cut() 
     for cable in cables {
         network.cut(cable);
         network.advance_by(SETTLE);
-        assert_eq!(met(&mut network, Main), Some((Main, count)), "{cable:?}");
+        assert_eq!(processed_by(&mut network, Main), Some((Main, count)), "{cable:?}");
         network.heal(cable);
         network.advance_by(SETTLE);
     }
@@ -82,6 +83,6 @@ fn the_tree_and_the_long_line_reach_all_their_devices() {
     for (name, count) in [("tree.toml", 7), ("line-1000.toml", 1_000)] {
         let mut network = example(name);
         assert_eq!(network.devices().len(), count);
-        assert_eq!(met(&mut network, Main), Some((Main, count)), "{name}");
+        assert_eq!(processed_by(&mut network, Main), Some((Main, count)), "{name}");
     }
 }

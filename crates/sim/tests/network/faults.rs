@@ -1,4 +1,4 @@
-//! Each fault of the script does what it says (issue 2, part 3).
+//! Effects of each injected fault (issue 2, part 3).
 
 use core::time::Duration;
 
@@ -17,13 +17,13 @@ use crate::wiring::{SETTLE, command, endpoint, journey, probe, ring, segment, sh
 
 const MILLISECOND: Duration = Duration::from_millis(1);
 
-/// The cable behind port 1 of device 1; its end `a` is device 1.
+/// The cable at port 1 of device 1; its end `a` is device 1.
 fn first_cable(network: &Network) -> CableId {
     network.cable_at(endpoint("1.1")).unwrap()
 }
 
-fn met(network: &mut Network, link: ringcat_sim::cable::HostLink) -> Option<Vec<u16>> {
-    travel(network, link).map(|journey| journey.met)
+fn processed_by(network: &mut Network, link: ringcat_sim::cable::HostLink) -> Option<Vec<u16>> {
+    travel(network, link).map(|journey| journey.processed_by)
 }
 
 #[test]
@@ -31,20 +31,20 @@ fn dropped_frames_are_counted_per_direction() {
     let mut network = segment(&ring(2));
     let cable = first_cable(&network);
     network.apply(Fault::Drop { cable, direction: Some(Direction::AToB), count: 2 });
-    assert_eq!(met(&mut network, Redundant), Some(vec![]));
-    assert_eq!(met(&mut network, Main), None);
-    assert_eq!(met(&mut network, Main), None);
-    assert_eq!(met(&mut network, Main), Some(vec![1, 2]));
+    assert_eq!(processed_by(&mut network, Redundant), Some(vec![]));
+    assert_eq!(processed_by(&mut network, Main), None);
+    assert_eq!(processed_by(&mut network, Main), None);
+    assert_eq!(processed_by(&mut network, Main), Some(vec![1, 2]));
     network.apply(Fault::Drop { cable, direction: None, count: 1 });
-    assert_eq!(met(&mut network, Redundant), None);
-    assert_eq!(met(&mut network, Main), None);
-    assert_eq!(met(&mut network, Redundant), Some(vec![]));
+    assert_eq!(processed_by(&mut network, Redundant), None);
+    assert_eq!(processed_by(&mut network, Main), None);
+    assert_eq!(processed_by(&mut network, Redundant), Some(vec![]));
     assert_eq!(network.statistics().lost(LossCause::Dropped), 4);
 }
 
 // covers: sim-faults
 #[test]
-fn a_doubled_frame_comes_back_twice_one_wire_time_apart() {
+fn a_duplicated_frame_returns_twice_one_wire_time_apart() {
     let mut network = segment(&ring(2));
     let cable = first_cable(&network);
     network.apply(Fault::Duplicate { cable, direction: Some(Direction::AToB), count: 1 });
@@ -54,7 +54,7 @@ fn a_doubled_frame_comes_back_twice_one_wire_time_apart() {
     assert_eq!(one.bytes, two.bytes);
     assert_eq!((two.at - one.at).as_nanos(), 84 * 80);
     assert_eq!(network.receive(Redundant), None);
-    assert_eq!(met(&mut network, Main), Some(vec![1, 2]));
+    assert_eq!(processed_by(&mut network, Main), Some(vec![1, 2]));
 }
 
 #[test]
@@ -62,17 +62,17 @@ fn a_corrupted_frame_is_counted_by_the_controllers_and_refused_by_the_interface(
     let mut network = segment(&ring(3));
     let cable = first_cable(&network);
     network.apply(Fault::Corrupt { cable, direction: Some(Direction::AToB), count: 1 });
-    assert_eq!(met(&mut network, Main), None);
+    assert_eq!(processed_by(&mut network, Main), None);
     assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
     let register = |device: usize, address| network.device(DeviceIndex(device)).controller.register(address, 1)[0];
     assert_eq!([0, 1, 2].map(|device| register(device, map::RX_ERROR_COUNTER)), [0, 1, 0]);
     assert_eq!([0, 1, 2].map(|device| register(device, map::FORWARDED_RX_ERROR_COUNTER)), [0, 0, 1]);
-    assert_eq!(met(&mut network, Main), Some(vec![1, 2, 3]));
+    assert_eq!(processed_by(&mut network, Main), Some(vec![1, 2, 3]));
 }
 
 // covers: 2.5, sim-counters
 #[test]
-fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are_in() {
+fn symbol_errors_are_counted_at_the_receiver_and_damage_only_their_frames() {
     let mut network = segment(&ring(3));
     let cable = first_cable(&network);
     let counted = |network: &Network, device: usize| {
@@ -81,9 +81,9 @@ fn symbol_errors_are_counted_where_they_arrive_and_hurt_only_the_frames_they_are
     network.apply(Fault::IdleSymbolErrors { cable, direction: None, count: 300 });
     assert_eq!(counted(&network, 0), [0, 0, 0, 0xFF, 0, 0, 0, 0]);
     assert_eq!(counted(&network, 1), [0, 0xFF, 0, 0, 0, 0, 0, 0]);
-    assert_eq!(met(&mut network, Main), Some(vec![1, 2, 3]));
+    assert_eq!(processed_by(&mut network, Main), Some(vec![1, 2, 3]));
     network.apply(Fault::SymbolErrors { cable, direction: Some(Direction::AToB), count: 1 });
-    assert_eq!(met(&mut network, Main), None);
+    assert_eq!(processed_by(&mut network, Main), None);
     assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
     assert_eq!(counted(&network, 1), [1, 0xFF, 0, 0, 0, 0, 0, 0]);
     assert_eq!(counted(&network, 2), [0; 8]);
@@ -146,7 +146,7 @@ fn a_cable_that_works_one_way_keeps_its_links() {
 
 // covers: sim-faults
 #[test]
-fn a_device_without_power_breaks_the_ring_at_both_its_ports_and_comes_back_reset() {
+fn a_device_without_power_breaks_the_ring_and_returns_after_a_reset() {
     let mut network = segment(&ring(3));
     let address = command(Command::Bwr, Target::Broadcast(map::STATION_ADDRESS), &[0x34, 0x12]);
     network.send(Main, &address);
@@ -164,7 +164,7 @@ fn a_device_without_power_breaks_the_ring_at_both_its_ports_and_comes_back_reset
 }
 
 #[test]
-fn a_scheduled_fault_strikes_at_its_time() {
+fn a_scheduled_fault_occurs_at_its_time() {
     let mut network = segment(&ring(2));
     let cable = network.host_cable(Main).unwrap();
     let at = network.now() + MILLISECOND;
@@ -179,7 +179,7 @@ fn a_scheduled_fault_strikes_at_its_time() {
     assert_eq!(carriers, [true, false, false, true]);
 }
 
-/// Requests a state of the first device and says what AL status and AL status code are a while later.
+/// Requests a state of the first device and returns its later AL status and AL status code.
 fn request(network: &mut Network, control: u16) -> (u16, u16) {
     let write = command(Command::Apwr, Target::Position(Position(0), map::AL_CONTROL), &control.to_le_bytes());
     network.send(Main, &write);
@@ -197,7 +197,7 @@ fn al_status(network: &Network) -> (u16, u16) {
 }
 
 #[test]
-fn a_refused_transition_shows_the_chosen_code_as_often_as_told() {
+fn a_refused_transition_has_the_chosen_code_for_the_chosen_number_of_times() {
     let mut network = segment("main-1.0");
     let code = AlStatusCode(0x8123);
     network.apply(Fault::RefuseTransition { device: DeviceIndex(0), to: AlState::PreOp, code, times: 1 });
@@ -207,7 +207,7 @@ fn a_refused_transition_shows_the_chosen_code_as_often_as_told() {
 }
 
 #[test]
-fn a_hung_application_answers_when_it_goes_on() {
+fn a_hung_application_answers_after_it_continues() {
     let mut network = segment("main-1.0");
     network.apply(Fault::Hang(DeviceIndex(0), true));
     assert_eq!(request(&mut network, 0x02), (0x01, 0));
@@ -237,6 +237,6 @@ fn a_corrupted_eeprom_is_not_loaded_after_the_next_power_cycle() {
 
 #[test]
 #[should_panic(expected = "no cable 7 among 3")]
-fn a_fault_on_a_cable_that_does_not_exist_is_a_mistake() {
+fn a_fault_on_a_missing_cable_is_an_error() {
     segment(&ring(2)).apply(Fault::Cut(CableId(7)));
 }

@@ -1,4 +1,4 @@
-//! The mailbox of a device in a segment: answers that need no frame to become ready, mail that goes wrong at a time.
+//! The mailbox of a device in a segment: responses become ready without a frame, scheduled mailbox faults.
 
 use core::time::Duration;
 
@@ -29,7 +29,7 @@ fn exchange(network: &mut Network, code: Command, address: RegisterAddress, data
     let target = Target::Position(Position(SERVO.0 as u16), address);
     network.send(Main, &command(code, target, data));
     network.advance_by(MILLISECOND);
-    let received = network.receive(Redundant).expect("a frame came back");
+    let received = network.receive(Redundant).expect("a frame returned");
     let frame = Frame::parse(&received.bytes).unwrap();
     let datagram = frame.datagrams().next().unwrap();
     (datagram.wkc.0, datagram.data.to_vec())
@@ -49,8 +49,8 @@ fn ready() -> Network {
     network
 }
 
-/// Puts a request into the mailbox; the working counter.
-fn ask(network: &mut Network, counter: u8) -> u16 {
+/// Writes a request to the mailbox; returns the working counter.
+fn request(network: &mut Network, counter: u8) -> u16 {
     let mut mail = [0; MAILBOX];
     let request = SdoRequest::Upload { index: 0x1018, sub_index: 0, complete_access: false };
     let length = request.encode(&mut mail[Header::LEN..]).unwrap();
@@ -70,21 +70,25 @@ fn answers(mail: Option<Vec<u8>>) -> bool {
 
 // covers: 6.1, sim-mail-faults
 #[test]
-fn mail_goes_wrong_at_a_time_in_a_segment() {
+fn mail_faults_occur_at_their_time_in_a_segment() {
     let mut network = ready();
-    assert_eq!(ask(&mut network, 1), 1);
+    assert_eq!(request(&mut network, 1), 1);
     assert!(answers(fetch(&mut network)));
     let at = network.now() + 5 * MILLISECOND;
     network.schedule(at, Fault::Mail(SERVO, MailFault::Full { during: 20 * MILLISECOND }));
-    assert_eq!(ask(&mut network, 2), 1);
+    assert_eq!(request(&mut network, 2), 1);
     assert!(answers(fetch(&mut network)), "not yet");
     network.advance_by(5 * MILLISECOND);
-    assert_eq!([ask(&mut network, 3), ask(&mut network, 4)], [1, 0], "it takes one and stays full");
+    assert_eq!(
+        [request(&mut network, 3), request(&mut network, 4)],
+        [1, 0],
+        "the mailbox accepts one message and stays full"
+    );
     assert!(!answers(fetch(&mut network)));
     network.advance_by(20 * MILLISECOND);
     assert!(answers(fetch(&mut network)));
     network.apply(Fault::Mail(SERVO, MailFault::LoseAnswers { count: 1 }));
-    assert_eq!(ask(&mut network, 5), 1);
+    assert_eq!(request(&mut network, 5), 1);
     assert!(fetch(&mut network).is_none());
 }
 

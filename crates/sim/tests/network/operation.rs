@@ -1,4 +1,4 @@
-//! A terminal brought to OP by frames alone, and its watchdog, which needs no frame.
+//! A terminal brought to OP by frames only, and its watchdog, which needs no frame.
 
 use core::time::Duration;
 
@@ -20,7 +20,7 @@ const TERMINAL: DeviceIndex = DeviceIndex(1);
 const OUTPUTS: LogicalAddress = LogicalAddress(0x0001_0000);
 const MILLISECOND: Duration = Duration::from_millis(1);
 
-/// Writes to the terminal and waits for the answer.
+/// Writes to the terminal and waits for the returned frame.
 fn write(network: &mut Network, register: RegisterAddress, data: &[u8]) {
     let target = Target::Position(Position(TERMINAL.0 as u16), register);
     network.send(Main, &command(Command::Apwr, target, data));
@@ -28,7 +28,7 @@ fn write(network: &mut Network, register: RegisterAddress, data: &[u8]) {
     assert_eq!(wkc(network), Some(1), "{register}");
 }
 
-/// Working counter of the next frame that is back.
+/// Working counter of the next returned frame.
 fn wkc(network: &mut Network) -> Option<u16> {
     let received = network.receive(Redundant)?;
     Some(Frame::parse(&received.bytes).unwrap().datagrams().next().unwrap().wkc.0)
@@ -54,9 +54,9 @@ fn operational() -> Network {
     network.advance_by(SETTLE);
     write(&mut network, map::AL_CONTROL, &[0x02, 0]);
     assert_eq!(al_status(&network), (0x02, 0));
-    // SyncManager 0: 0x1000, one byte, buffered, ECAT writes, PDI event, watchdog, on.
+    // SyncManager 0: 0x1000, one byte, buffered, ECAT writes, PDI event, watchdog, enabled.
     write(&mut network, map::sync_manager(0), &[0x00, 0x10, 0x01, 0x00, 0x64, 0x00, 0x01, 0x00]);
-    // FMMU 0: logical 0x10000, one byte, to 0x1000, writes, on.
+    // FMMU 0: logical 0x10000, one byte, to 0x1000, write, enabled.
     write(&mut network, map::fmmu(0), &[0, 0, 1, 0, 1, 0, 0, 7, 0x00, 0x10, 0, 2, 1, 0, 0, 0]);
     write(&mut network, map::AL_CONTROL, &[0x04, 0]);
     assert_eq!(al_status(&network), (0x04, 0));
@@ -85,7 +85,7 @@ fn outputs_written_by_frames_reach_the_terminal() {
 fn without_frames_the_watchdog_takes_the_terminal_to_safeop_after_100_ms() {
     let mut network = operational();
     assert_eq!(cycle(&mut network, 0xFF), Some(1));
-    // The last write was a little less than a cycle ago.
+    // The last write was slightly less than a cycle ago.
     network.advance_by(98 * MILLISECOND);
     assert_eq!(al_status(&network), (0x08, 0));
     network.advance_by(3 * MILLISECOND);
@@ -94,7 +94,7 @@ fn without_frames_the_watchdog_takes_the_terminal_to_safeop_after_100_ms() {
 }
 
 #[test]
-fn next_event_tells_when_the_watchdog_strikes() {
+fn next_event_is_the_expiry_of_the_watchdog() {
     let mut network = operational();
     assert_eq!(cycle(&mut network, 0xFF), Some(1));
     let start = network.now();
@@ -107,14 +107,14 @@ fn next_event_tells_when_the_watchdog_strikes() {
 }
 
 #[test]
-fn a_shorter_watchdog_time_that_has_passed_already_strikes_now_and_not_in_the_past() {
+fn a_shortened_watchdog_time_that_has_passed_expires_now_and_not_in_the_past() {
     let mut network = operational();
     assert_eq!(cycle(&mut network, 0xFF), Some(1));
     network.advance_by(50 * MILLISECOND);
-    // 5 units of 100 us: over for long when the frame comes.
+    // 5 units of 100 us: this time has already passed when the frame arrives.
     let time = Target::Position(Position(1), map::WATCHDOG_TIME_PROCESS_DATA);
     network.send(Main, &command(Command::Apwr, time, &[5, 0]));
-    // Time that goes back is a failed assertion of the network.
+    // Time that goes backwards is a failed assertion of the network.
     network.advance_by(MILLISECOND);
     assert_eq!(al_status(&network), (0x14, 0x001B));
 }
@@ -143,7 +143,7 @@ fn a_cut_ring_keeps_the_terminal_in_op() {
 
 // covers: sim-faults
 #[test]
-fn an_interface_pads_short_frames_so_that_their_writes_count() {
+fn an_interface_pads_short_frames_so_that_their_writes_take_effect() {
     // APWR 0x1234 to the station address of position 1; some MainDevices leave the padding to the interface, and
     // a veth pair does not pad.
     let short = [

@@ -9,10 +9,10 @@ use ringcat_sim::network::NetworkOptions;
 
 use crate::wiring::{CABLE, Journey, SETTLE, build, travel};
 
-/// A place for a plug: device from 1 and port, or device 0 with port 0 for MAIN and 1 for RED.
+/// A plug position: device from 1 and port, or device 0 with port 0 for MAIN and 1 for RED.
 type Plug = (usize, usize);
 
-/// The model: what is joined to what.
+/// The model: the connections between plugs.
 #[derive(Clone, Debug, Default)]
 struct Walk {
     joined: BTreeMap<Plug, Plug>,
@@ -23,10 +23,10 @@ impl Walk {
         Walk { joined: cables.iter().flat_map(|&(a, b)| [(a, b), (b, a)]).collect() }
     }
 
-    /// The journey of a frame that leaves on a link.
+    /// The path of a frame sent on a link.
     fn journey(&self, link: HostLink) -> Option<Journey> {
         const ORDER: [usize; 4] = [0, 3, 1, 2];
-        let mut journey = Journey { back_on: link, met: Vec::new(), flags: 0, circulating: false };
+        let mut journey = Journey { back_on: link, processed_by: Vec::new(), flags: 0, circulating: false };
         if link == HostLink::Redundant {
             journey.flags = 0x08;
         }
@@ -44,7 +44,7 @@ impl Walk {
                     journey.circulating = true;
                 }
                 journey.flags |= 0x02;
-                journey.met.push(node as u16);
+                journey.processed_by.push(node as u16);
             }
             let place = ORDER.iter().position(|other| *other == port).unwrap();
             port = ORDER[(place + 1) % 4];
@@ -52,12 +52,12 @@ impl Walk {
                 (node, port) = *next;
             }
         }
-        panic!("a frame that does not end: {journey:?}");
+        panic!("an endless path: {journey:?}");
     }
 }
 
-/// Cables of a random segment: a tree whose devices are entered at random ports, now and then closed to the redundant
-/// link and by cables between any two free ports.
+/// Cables of a random segment: a tree with random entry ports, sometimes closed to the redundant link and by cables
+/// between any two free ports.
 fn cables() -> impl Strategy<Value = Vec<(Plug, Plug)>> {
     let device = (any::<prop::sample::Index>(), prop_oneof![3 => Just(0usize), 1 => 0usize..4]);
     let closing = prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 0..3);
@@ -91,8 +91,8 @@ fn endpoint((node, port): Plug) -> Endpoint {
     }
 }
 
-/// Both copies of a frame are where the model says after each of the cuts and heals.
-fn agree(cables: &[(Plug, Plug)], changes: &[Vec<usize>]) -> Result<(), TestCaseError> {
+/// Checks both copies of a frame against the model after each of the cuts and repairs.
+fn compare(cables: &[(Plug, Plug)], changes: &[Vec<usize>]) -> Result<(), TestCaseError> {
     let specs = cables.iter().map(|&(a, b)| CableSpec { a: endpoint(a), b: endpoint(b), delay: CABLE });
     let mut network = build(specs.collect(), NetworkOptions::default());
     for cuts in changes {
@@ -107,10 +107,10 @@ fn agree(cables: &[(Plug, Plug)], changes: &[Vec<usize>]) -> Result<(), TestCase
         for link in HostLink::ALL {
             let expected = model.journey(link);
             if let Some(journey) = &expected {
-                let mut once = journey.met.clone();
+                let mut once = journey.processed_by.clone();
                 once.sort_unstable();
                 once.dedup();
-                prop_assert_eq!(once.len(), journey.met.len(), "a processing unit was met twice");
+                prop_assert_eq!(once.len(), journey.processed_by.len(), "a SubDevice processed the frame twice");
             }
             prop_assert_eq!(travel(&mut network, link), expected, "{:?} sent on {}", left, link);
         }
@@ -123,7 +123,7 @@ proptest! {
 
     // covers: sim-frames
     #[test]
-    fn frames_take_the_way_of_the_model(
+    fn frames_take_the_path_of_the_model(
         cables in cables(),
         picks in prop::collection::vec(prop::collection::vec(any::<prop::sample::Index>(), 0..4), 1..4),
     ) {
@@ -131,19 +131,23 @@ proptest! {
             .iter()
             .map(|cuts| cuts.iter().map(|cut| cut.index(cables.len())).collect())
             .collect();
-        agree(&cables, &changes)?;
+        compare(&cables, &changes)?;
     }
 
     // covers: sim-frames
     #[test]
-    fn in_a_straight_ring_a_single_break_hides_nobody(count in 1usize..40, cut in any::<prop::sample::Index>()) {
+    fn in_a_straight_ring_a_single_break_isolates_no_subdevice(
+        count in 1usize..40,
+        cut in any::<prop::sample::Index>(),
+    ) {
         let mut cables: Vec<(Plug, Plug)> = vec![((0, 0), (1, 0))];
         cables.extend((1..count).map(|number| ((number, 1), (number + 1, 0))));
         cables.push(((count, 1), (0, 1)));
         cables.remove(cut.index(cables.len()));
         let model = Walk::new(&cables);
-        let met: usize = HostLink::ALL.iter().filter_map(|link| model.journey(*link)).map(|back| back.met.len()).sum();
-        prop_assert_eq!(met, count);
-        agree(&cables, &[Vec::new()])?;
+        let journeys = HostLink::ALL.iter().filter_map(|link| model.journey(*link));
+        let total: usize = journeys.map(|back| back.processed_by.len()).sum();
+        prop_assert_eq!(total, count);
+        compare(&cables, &[Vec::new()])?;
     }
 }

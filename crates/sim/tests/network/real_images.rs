@@ -1,4 +1,4 @@
-//! Devices made from the EEPROM images of real ones, where `../shared/data` lies beside the repository.
+//! Devices from the EEPROM images of real devices, if `../shared/data` exists beside the repository.
 
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,7 @@ fn read_sii(network: &mut Network, word: u32) -> Vec<u8> {
 
 // covers: sim-files
 #[test]
-fn a_device_from_a_real_image_shows_this_image_on_the_wire() {
+fn a_device_from_a_real_image_returns_this_image_on_the_wire() {
     let Some((directory, names)) = images() else { return };
     let mut made = 0;
     for name in names {

@@ -1,4 +1,4 @@
-//! When frames arrive, when links are noticed, and what a cut catches under way (protocol 1.3, 2.2, 11.4).
+//! Arrival times of frames, detection of links, and frames on a cable during a cut (protocol 1.3, 2.2, 11.4).
 
 use core::time::Duration;
 
@@ -14,7 +14,7 @@ use ringcat_wire::register::map;
 
 use crate::wiring::{SETTLE, command, cut, endpoint, ring, segment, segment_with, shortest, travel};
 
-/// A shortest frame takes this long from its first to its last bit: 72 byte times.
+/// Time from the first to the last bit of a shortest frame: 72 byte times.
 const WIRE_NS: u64 = 5_760;
 
 fn ns(time: u64) -> Duration {
@@ -25,7 +25,7 @@ fn options() -> NetworkOptions {
     NetworkOptions { processing_delay: ns(400), forwarding_delay: ns(200), ..NetworkOptions::default() }
 }
 
-/// Times of the frames received on a link, counted from `since`.
+/// Arrival times of the frames received on a link, relative to `since`.
 fn arrivals(network: &mut Network, link: HostLink, since: SimTime) -> Vec<u64> {
     std::iter::from_fn(|| network.receive(link)).map(|received| (received.at - since).as_nanos() as u64).collect()
 }
@@ -36,7 +36,7 @@ fn a_frame_needs_its_wire_time_the_hops_and_the_cables() {
     let mut network = segment_with("main-1.0 1.1-2.0", options());
     let start = network.now();
     network.send(Main, &shortest());
-    // To 1; processed and on to 2; processed and back to 1; forwarded and home.
+    // To 1; processed and to 2; processed and back to 1; forwarded and back to the MainDevice.
     let expected = WIRE_NS + 100 + (400 + 100) + (400 + 100) + (200 + 100);
     network.advance(start + ns(expected - 1));
     assert_eq!(network.receive(Main), None);
@@ -47,7 +47,7 @@ fn a_frame_needs_its_wire_time_the_hops_and_the_cables() {
 
 // covers: sim-faults
 #[test]
-fn frames_sent_at_once_leave_one_behind_the_other() {
+fn frames_sent_at_once_leave_one_after_the_other() {
     let mut network = segment(&ring(3));
     let start = network.now();
     let long = command(Command::Nop, Target::None, &[0; 1486]);
@@ -84,7 +84,7 @@ fn a_full_transmit_queue_loses_frames() {
 }
 
 #[test]
-fn frames_that_nobody_fetches_fill_a_bounded_queue() {
+fn frames_that_are_not_fetched_fill_a_bounded_queue() {
     let mut network = segment_with(&ring(1), NetworkOptions { receive_queue: 2, ..NetworkOptions::default() });
     for _ in 0..3 {
         network.send(Main, &shortest());
@@ -96,7 +96,7 @@ fn frames_that_nobody_fetches_fill_a_bounded_queue() {
 
 // covers: sim-faults
 #[test]
-fn both_ends_notice_a_cut_and_a_heal_after_their_delays() {
+fn both_ends_detect_a_cut_and_a_repair_after_their_delays() {
     let options =
         NetworkOptions { link_down_delay: ns(20_000), link_up_delay: ns(70_000), ..NetworkOptions::default() };
     let mut network = segment_with(&ring(2), options);
@@ -121,7 +121,7 @@ fn both_ends_notice_a_cut_and_a_heal_after_their_delays() {
 }
 
 #[test]
-fn a_flap_shorter_than_the_detection_is_not_noticed() {
+fn a_link_flap_shorter_than_the_detection_is_not_detected() {
     let mut network = segment(&ring(2));
     let cable = network.cable_at(endpoint("1.1")).unwrap();
     network.cut(cable);
@@ -135,7 +135,7 @@ fn a_flap_shorter_than_the_detection_is_not_noticed() {
 }
 
 #[test]
-fn until_a_cut_is_noticed_frames_are_lost_and_then_they_turn_round() {
+fn frames_are_lost_until_a_cut_is_detected_and_then_return() {
     let mut network = segment_with(&ring(3), NetworkOptions::default().with_detection_delay(ns(1_000_000)));
     let cable = network.cable_at(endpoint("1.1")).unwrap();
     let start = network.now();
@@ -146,7 +146,8 @@ fn until_a_cut_is_noticed_frames_are_lost_and_then_they_turn_round() {
         network.send(Redundant, &shortest());
     }
     network.advance_by(SETTLE);
-    // Steps 0 to 9 are before the detection; the frame of step 10 leaves at it and reaches the port after it.
+    // Steps 0 to 9 are before the detection; the frame of step 10 is sent at the detection and reaches the port after
+    // it.
     assert_eq!(arrivals(&mut network, Main, start).len(), 10);
     assert_eq!(arrivals(&mut network, Redundant, start).len(), 10);
     assert_eq!(network.statistics().lost(LossCause::DeadCable), 20);
@@ -169,7 +170,7 @@ fn invalid_and_forwarded(network: &Network, device: usize) -> (u8, u8) {
 }
 
 #[test]
-fn a_cut_before_the_frame_enters_the_cable_leaves_no_trace_behind_it() {
+fn a_cut_before_the_frame_enters_the_cable_causes_no_error_counts() {
     // The first bit enters the cable from 1 to 2 at 100 (cable) + 400 (device 1) = 500 ns.
     let network = cut_under_way(499);
     assert_eq!(invalid_and_forwarded(&network, 1), (0, 0));
@@ -178,7 +179,7 @@ fn a_cut_before_the_frame_enters_the_cable_leaves_no_trace_behind_it() {
 
 // covers: sim-faults
 #[test]
-fn a_cut_while_the_frame_is_in_the_cable_leaves_a_damaged_rest() {
+fn a_cut_while_the_frame_is_in_the_cable_leaves_a_damaged_remnant() {
     let mut network = cut_under_way(3_000);
     assert_eq!(network.receive(Redundant), None);
     assert_eq!(network.statistics().lost(LossCause::BadCheckSequence), 1);
@@ -188,15 +189,15 @@ fn a_cut_while_the_frame_is_in_the_cable_leaves_a_damaged_rest() {
 }
 
 #[test]
-fn a_cut_behind_the_frame_does_not_touch_it() {
+fn a_cut_after_the_frame_does_not_affect_it() {
     // The last bit leaves the cable at 500 + 100 + 5760 ns.
     let mut network = cut_under_way(500 + 100 + WIRE_NS);
-    assert_eq!(network.statistics().lost_in_all(), 0);
+    assert_eq!(network.statistics().lost_total(), 0);
     assert_eq!(network.receive(Redundant).unwrap().bytes[6], 0x02);
 }
 
 #[test]
-fn a_port_that_opens_cuts_the_frame_that_runs_through_it() {
+fn a_port_that_opens_interrupts_the_passing_frame() {
     let mut network = segment(&ring(2));
     let cable = cut(&mut network, "1.1");
     let start = network.now();
@@ -206,13 +207,13 @@ fn a_port_that_opens_cuts_the_frame_that_runs_through_it() {
     network.send(Redundant, &shortest());
     network.advance_by(SETTLE);
     assert_eq!(network.statistics().lost(LossCause::LoopChanged), 2);
-    assert_eq!(travel(&mut network, Main).unwrap().met, [1, 2]);
+    assert_eq!(travel(&mut network, Main).unwrap().processed_by, [1, 2]);
 }
 
 #[test]
-fn a_loop_that_closes_under_a_frame_turns_no_beginning_of_it_round() {
+fn a_loop_that_closes_during_a_frame_does_not_return_its_remnant() {
     const SENT: u64 = 5_000;
-    let (mut met, mut interrupted) = (0, 0);
+    let (mut returned, mut interrupted) = (0, 0);
     for cut_at in (0..20_000).step_by(100) {
         let mut network = segment_with(&ring(4), options().with_detection_delay(ns(1_000)));
         let cable = network.cable_at(endpoint("1.1")).unwrap();
@@ -231,17 +232,17 @@ fn a_loop_that_closes_under_a_frame_turns_no_beginning_of_it_round() {
         network.advance_by(SETTLE);
         let has_it =
             |device: &usize| network.device(DeviceIndex(*device)).controller.register(map::USER_RAM, 1) == [0xA5];
-        let who: Vec<usize> = (0..4).filter(has_it).collect();
+        let processed_by: Vec<usize> = (0..4).filter(has_it).collect();
         if network.statistics().lost(LossCause::LoopChanged) == 1 {
             interrupted += 1;
-            assert_eq!(who, [], "cut at {cut_at} ns: device 2 has seen the rest of a frame");
+            assert_eq!(processed_by, [], "cut at {cut_at} ns: device 2 has processed the rest of a frame");
         } else if network.receive(Redundant).is_some() {
-            met += 1;
-            assert_eq!(who, [1, 2, 3], "cut at {cut_at} ns: the frame came after the loop had closed");
+            returned += 1;
+            assert_eq!(processed_by, [1, 2, 3], "cut at {cut_at} ns: the frame arrived after the loop had closed");
         }
     }
-    // As long as the frame takes, and until its first bit is there.
-    assert!(interrupted > 40 && met > 0, "{interrupted} interrupted, {met} turned round");
+    // The duration of the frame, and the time until its first bit arrives.
+    assert!(interrupted > 40 && returned > 0, "{interrupted} interrupted, {returned} returned");
 }
 
 #[test]
@@ -255,27 +256,27 @@ fn an_interface_without_carrier_sends_nothing() {
 
 // covers: sim-interfaces
 #[test]
-fn time_leaps_to_the_moment_the_last_frame_has_left_and_not_beyond() {
-    let mut leaping = segment(&ring(3));
+fn time_advances_to_the_exit_of_the_last_frame_and_not_beyond() {
+    let mut quiet = segment(&ring(3));
     let mut waiting = segment(&ring(3));
-    let start = leaping.now();
-    for network in [&mut leaping, &mut waiting] {
+    let start = quiet.now();
+    for network in [&mut quiet, &mut waiting] {
         network.send(Main, &shortest());
         network.send(Main, &shortest());
     }
     waiting.advance_by(SETTLE);
     let expected = arrivals(&mut waiting, Redundant, start);
-    leaping.advance_until_quiet(start + SETTLE);
-    assert_eq!(leaping.now(), start + ns(expected[1]));
-    assert_eq!(arrivals(&mut leaping, Redundant, start), expected);
-    // Nothing is under way: time stands still.
-    leaping.advance_until_quiet(start + SETTLE);
-    assert_eq!(leaping.now(), start + ns(expected[1]));
+    quiet.advance_until_quiet(start + SETTLE);
+    assert_eq!(quiet.now(), start + ns(expected[1]));
+    assert_eq!(arrivals(&mut quiet, Redundant, start), expected);
+    // No frame is in the segment: time does not advance.
+    quiet.advance_until_quiet(start + SETTLE);
+    assert_eq!(quiet.now(), start + ns(expected[1]));
 }
 
 // covers: sim-interfaces
 #[test]
-fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
+fn an_advance_until_quiet_ends_at_its_limit_and_the_next_one_continues() {
     let mut network = segment(&ring(3));
     let start = network.now();
     network.send(Main, &shortest());
@@ -288,7 +289,7 @@ fn a_leap_ends_at_its_limit_and_the_next_one_goes_on() {
 
 // covers: sim-interfaces
 #[test]
-fn devices_react_to_what_passed_in_a_leap_on_demand_or_before_the_next_frame() {
+fn devices_react_on_demand_or_before_the_next_frame() {
     let request = |state: u8| command(Command::Bwr, Target::Broadcast(map::AL_CONTROL), &[state, 0]);
     let status = |network: &Network| network.device(DeviceIndex(0)).al_status();
     let mut network = segment(&ring(2));
@@ -298,7 +299,7 @@ fn devices_react_to_what_passed_in_a_leap_on_demand_or_before_the_next_frame() {
     network.send(Main, &request(2));
     network.advance_until_quiet(limit);
     assert!(network.receive(Redundant).is_some());
-    assert_eq!(network.next_event(), None, "nobody has begun a transition");
+    assert_eq!(network.next_event(), None, "no transition has begun");
     network.settle_all();
     assert!(network.next_event().is_some());
     network.advance_by(SETTLE);
@@ -307,5 +308,5 @@ fn devices_react_to_what_passed_in_a_leap_on_demand_or_before_the_next_frame() {
     network.send(Main, &request(1));
     network.send(Main, &shortest());
     network.advance_until_quiet(network.now() + SETTLE);
-    assert!(network.next_event().is_some(), "the second frame met devices that had begun the transition");
+    assert!(network.next_event().is_some(), "the devices begin the transition before the second frame");
 }

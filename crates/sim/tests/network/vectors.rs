@@ -6,7 +6,7 @@ use crate::wiring::{Journey, cut, journey, ring, segment, travel};
 
 const RING: &str = "main-1.0 1.1-2.0 2.1-3.0 3.1-4.0 4.1-red";
 
-/// The journeys of the MAIN and the RED copy after these cuts.
+/// The paths of the MAIN and the RED copy after these cuts.
 fn copies(cables: &str, cuts: &[&str]) -> [Option<Journey>; 2] {
     let mut network = segment(cables);
     for place in cuts {
@@ -24,35 +24,35 @@ fn an_intact_ring_is_processed_once_and_crossed_once() {
 }
 
 #[test]
-fn a_break_in_the_middle_sends_both_copies_home_with_their_own_half() {
+fn a_break_in_the_middle_returns_each_copy_with_its_half() {
     let [main, red] = copies(RING, &["2.1"]);
     assert_eq!(main, journey(Main, &[1, 2], 0x02, false));
     assert_eq!(red, journey(Redundant, &[3, 4], 0x0A, true));
 }
 
 #[test]
-fn a_break_at_the_main_link_leaves_everything_to_the_red_copy() {
+fn a_break_at_the_main_link_leaves_all_subdevices_to_the_red_copy() {
     let [main, red] = copies(RING, &["main"]);
     assert_eq!(main, None);
     assert_eq!(red, journey(Redundant, &[1, 2, 3, 4], 0x0A, true));
 }
 
 #[test]
-fn a_break_at_the_redundant_link_leaves_everything_to_the_main_copy() {
+fn a_break_at_the_redundant_link_leaves_all_subdevices_to_the_main_copy() {
     let [main, red] = copies(RING, &["red"]);
     assert_eq!(main, journey(Main, &[1, 2, 3, 4], 0x02, false));
     assert_eq!(red, None);
 }
 
 #[test]
-fn two_breaks_isolate_what_is_between_them() {
+fn two_breaks_isolate_the_subdevices_between_them() {
     let [main, red] = copies(RING, &["2.1", "3.1"]);
     assert_eq!(main, journey(Main, &[1, 2], 0x02, false));
     assert_eq!(red, journey(Redundant, &[4], 0x0A, true));
 }
 
 #[test]
-fn a_branch_on_port_3_is_served_by_the_main_copy() {
+fn the_main_copy_processes_a_branch_on_port_3() {
     let [main, red] = copies(&format!("{RING} 2.3-5.0"), &[]);
     assert_eq!(main, journey(Redundant, &[1, 2, 5, 3, 4], 0x02, false));
     assert_eq!(red, journey(Main, &[], 0x08, false));
@@ -60,7 +60,7 @@ fn a_branch_on_port_3_is_served_by_the_main_copy() {
 
 // covers: sim-frames
 #[test]
-fn a_branch_on_port_2_is_served_by_the_red_copy() {
+fn the_red_copy_processes_a_branch_on_port_2() {
     let branched = format!("{RING} 2.2-5.0");
     let [main, red] = copies(&branched, &[]);
     assert_eq!(main, journey(Redundant, &[1, 2, 3, 4], 0x02, false));
@@ -75,7 +75,7 @@ fn a_branch_on_port_2_is_served_by_the_red_copy() {
 
 // covers: sim-frames
 #[test]
-fn a_device_cabled_backwards_is_served_by_the_red_copy() {
+fn the_red_copy_processes_a_device_cabled_backwards() {
     let crossed = "main-1.0 1.1-2.0 2.1-3.1 3.0-4.0 4.1-red";
     let [main, red] = copies(crossed, &[]);
     assert_eq!(main, journey(Redundant, &[1, 2, 4], 0x02, false));
@@ -93,16 +93,17 @@ fn a_line_that_ends_in_an_unconnected_port_0_sets_the_c_bit() {
 
 // covers: CR-02, CR-03, sim-frames
 #[test]
-fn every_single_break_shares_the_devices_among_the_copies() {
+fn every_single_break_divides_the_devices_between_the_copies() {
     for count in [1, 2, 5, 16] {
         let mut network = segment(&ring(count));
         for cable in 0..=count {
             let cable = ringcat_sim::cable::CableId(cable);
             network.cut(cable);
             network.advance_by(crate::wiring::SETTLE);
-            let met = [Main, Redundant].map(|link| travel(&mut network, link).map_or(Vec::new(), |back| back.met));
+            let processed_by =
+                [Main, Redundant].map(|link| travel(&mut network, link).map_or(Vec::new(), |back| back.processed_by));
             let expected: Vec<u16> = (1..=count as u16).collect();
-            assert_eq!(met.concat(), expected, "{count} devices, cable {cable:?}");
+            assert_eq!(processed_by.concat(), expected, "{count} devices, cable {cable:?}");
             network.heal(cable);
             network.advance_by(crate::wiring::SETTLE);
             let [main, red] = [travel(&mut network, Main), travel(&mut network, Redundant)];
@@ -112,13 +113,13 @@ fn every_single_break_shares_the_devices_among_the_copies() {
     }
 }
 
-/// Device 1, then the junction 2 with a local ring of 3, 4, 5 from port `start` back to port `back`.
+/// Device 1, then junction 2 with a local ring of 3, 4, 5 from port `start` back to port `back`.
 fn junction(start: u8, back: u8) -> String {
     format!("main-1.0 1.1-2.0 2.{start}-3.0 3.1-4.0 4.1-5.0 5.1-2.{back}")
 }
 
 #[test]
-fn a_local_ring_from_an_earlier_to_a_later_port_is_always_served() {
+fn a_local_ring_from_an_earlier_to_a_later_port_is_always_processed() {
     for (start, back) in [(3, 1), (3, 2), (1, 2)] {
         let cables = junction(start, back);
         let all = [1, 2, 3, 4, 5];
@@ -133,16 +134,16 @@ fn a_local_ring_from_an_earlier_to_a_later_port_is_always_served() {
 }
 
 #[test]
-fn a_local_ring_from_a_later_to_an_earlier_port_runs_backwards_until_it_breaks() {
+fn a_local_ring_from_a_later_to_an_earlier_port_runs_in_reverse_until_it_breaks() {
     for (start, back) in [(2, 1), (2, 3), (1, 3)] {
         let cables = junction(start, back);
         let main = |cuts: &[&str]| copies(&cables, cuts)[0].clone();
         assert_eq!(main(&[]), journey(Main, &[1, 2], 0x02, false), "{start} -> {back}");
         let broken = main(&["3.1"]).unwrap();
         assert!(broken.circulating);
-        let mut met = broken.met.clone();
-        met.sort_unstable();
-        assert_eq!(met, [1, 2, 3, 4, 5], "{start} -> {back}");
+        let mut processed_by = broken.processed_by.clone();
+        processed_by.sort_unstable();
+        assert_eq!(processed_by, [1, 2, 3, 4, 5], "{start} -> {back}");
     }
 }
 

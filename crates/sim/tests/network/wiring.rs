@@ -1,4 +1,4 @@
-//! Segments from one line of text, and a frame that records the SubDevices that it passes.
+//! Segments from one line of text, and a frame that records the SubDevices that process it.
 
 use core::time::Duration;
 
@@ -15,12 +15,12 @@ use ringcat_wire::frame::{Frame, FrameBuilder, MAX_FRAME, MacAddress};
 use ringcat_wire::register::{PortKind, map};
 use ringcat_wire::sii::Identity;
 
-/// Longer than any device needs to load its EEPROM, and than any frame here is under way.
+/// Longer than the loading of any EEPROM and the path of any frame here.
 pub const SETTLE: Duration = Duration::from_millis(50);
 /// Delay of all cables here.
 pub const CABLE: Duration = Duration::from_nanos(100);
 
-/// Device `number` (from 1) of a test: four ports, nothing behind them, its number as alias.
+/// Device `number` (from 1) of a test: four ports, no process data, its number as alias.
 pub fn device(number: usize) -> Device {
     let mut description = DeviceDescription::plain(&format!("S{number}"), Identity::default());
     description.ports = [PortKind::Mii; 4];
@@ -41,7 +41,7 @@ pub fn endpoint(text: &str) -> Endpoint {
     }
 }
 
-/// A segment from cables like "main-1.0 1.1-2.0 2.1-red", its EEPROMs loaded.
+/// A segment from cables such as "main-1.0 1.1-2.0 2.1-red", with EEPROMs loaded.
 pub fn segment(cables: &str) -> Network {
     segment_with(cables, NetworkOptions::default())
 }
@@ -58,7 +58,7 @@ pub fn segment_with(cables: &str, options: NetworkOptions) -> Network {
     build(specs, options)
 }
 
-/// A segment of as many devices as the cables name, its EEPROMs loaded.
+/// A segment with as many devices as the cables name, with EEPROMs loaded.
 pub fn build(cables: Vec<CableSpec>, options: NetworkOptions) -> Network {
     let devices = cables.iter().flat_map(|cable| [cable.a, cable.b]).map(|endpoint| match endpoint {
         Endpoint::Device(device, _) => device.0 + 1,
@@ -76,7 +76,7 @@ pub fn ring(count: usize) -> String {
     format!("main-1.0 {} {count}.1-red", inner.join(" "))
 }
 
-/// Cuts the cable that is plugged in at `place` and waits for its detection.
+/// Cuts the cable at `place` and waits for its detection.
 pub fn cut(network: &mut Network, place: &str) -> CableId {
     let cable = network.cable_at(endpoint(place)).unwrap();
     network.cut(cable);
@@ -84,25 +84,25 @@ pub fn cut(network: &mut Network, place: &str) -> CableId {
     cable
 }
 
-/// What a probe tells when it is back.
+/// Result of a probe frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Journey {
-    /// Where it came back.
+    /// Interface at which it returned.
     pub back_on: HostLink,
-    /// Aliases of the devices in the order in which their processing units were met.
-    pub met: Vec<u16>,
-    /// First byte of its source address: 0x08 sent on the redundant link, 0x02 processed (protocol 9.7.1).
+    /// Aliases of the devices in the order in which they processed the frame.
+    pub processed_by: Vec<u16>,
+    /// First byte of the source address: 0x08 sent on the redundant link, 0x02 processed (protocol 9.7.1).
     pub flags: u8,
-    /// Its C bit.
+    /// C bit.
     pub circulating: bool,
 }
 
-/// A journey, from numbers.
-pub fn journey(back_on: HostLink, met: &[u16], flags: u8, circulating: bool) -> Option<Journey> {
-    Some(Journey { back_on, met: met.to_vec(), flags, circulating })
+/// A journey from numbers.
+pub fn journey(back_on: HostLink, processed_by: &[u16], flags: u8, circulating: bool) -> Option<Journey> {
+    Some(Journey { back_on, processed_by: processed_by.to_vec(), flags, circulating })
 }
 
-/// A frame that counts its processing units and reads the alias of the first `places` of them.
+/// A frame that counts processing units and reads the alias of the first `places` of them.
 pub fn probe(link: HostLink, places: u16) -> Vec<u8> {
     let flags = if link == HostLink::Redundant { 0x08 } else { 0 };
     let mut buffer = vec![0; MAX_FRAME];
@@ -117,31 +117,35 @@ pub fn probe(link: HostLink, places: u16) -> Vec<u8> {
     buffer
 }
 
-/// Reads a probe that came back.
+/// Decodes a returned probe.
 pub fn read(back_on: HostLink, received: &Received) -> Journey {
     let frame = Frame::parse(&received.bytes).unwrap();
     let mut datagrams = frame.datagrams();
     let count = datagrams.next().unwrap();
-    let met: Vec<u16> = datagrams
+    let processed_by: Vec<u16> = datagrams
         .take_while(|datagram| datagram.wkc.0 == 1)
         .map(|datagram| u16::from_le_bytes([datagram.data[0], datagram.data[1]]))
         .collect();
-    assert_eq!((count.header.adp(), count.wkc.0), (met.len() as u16, met.len() as u16), "visits are counted alike");
-    Journey { back_on, met, flags: received.bytes[6], circulating: count.header.circulating }
+    assert_eq!(
+        (count.header.adp(), count.wkc.0),
+        (processed_by.len() as u16, processed_by.len() as u16),
+        "ADP and working counter are equal"
+    );
+    Journey { back_on, processed_by, flags: received.bytes[6], circulating: count.header.circulating }
 }
 
-/// Sends a probe and waits for it; `None` if it is lost.
+/// Sends a probe and waits for its return; `None` if it is lost.
 pub fn travel(network: &mut Network, link: HostLink) -> Option<Journey> {
     let places = network.devices().len() as u16 + 1;
     network.send(link, &probe(link, places));
     network.advance_by(SETTLE);
     let mut journeys = HostLink::ALL.iter().filter_map(|link| Some(read(*link, &network.receive(*link)?)));
     let journey = journeys.next();
-    assert_eq!(journeys.next(), None, "one frame does not come back twice");
+    assert_eq!(journeys.next(), None, "one frame does not return twice");
     journey
 }
 
-/// A frame with a single datagram and this data.
+/// A frame with a single datagram.
 pub fn command(command: Command, target: Target, data: &[u8]) -> Vec<u8> {
     let mut buffer = vec![0; MAX_FRAME];
     let source = MacAddress([0, 0, 0, 0, 0, 1]);

@@ -1,6 +1,6 @@
-//! SDO information: lists, objects and entries, in fragments where they do not fit (protocol 6.3).
+//! SDO information: lists, objects and entries, in fragments if they do not fit (protocol 6.3).
 //!
-//! In: a request. Out: one message per fragment, or an error with an abort code.
+//! Input: a request. Output: one message per fragment, or an error with an abort code.
 
 use ringcat_wire::mailbox::coe::{
     AccessRights, DataType, EntryDescription, EntryRequest, InformationOpcode, ListType, ObjectDescription,
@@ -12,7 +12,7 @@ use ringcat_wire::mailbox::{ErrorReply, PayloadError};
 use super::Answer;
 use crate::application::dictionary::{Dictionary, Object};
 
-/// Bytes of an object or entry description beside name and values.
+/// Bytes of an object or entry description in addition to name and values.
 const DESCRIPTION_ROOM: usize = 16;
 
 /// Serves one request.
@@ -46,7 +46,7 @@ fn respond(payload: &[u8], dictionary: &Dictionary) -> Result<(InformationOpcode
     })
 }
 
-/// The rights that an object of a list has in at least one of its entries.
+/// The access rights that an object of a list has in at least one of its entries.
 const fn rights(list: ListType) -> u16 {
     match list {
         ListType::RxMappable => AccessRights::RX_MAPPABLE,
@@ -124,8 +124,8 @@ fn entry(request: EntryRequest, dictionary: &Dictionary) -> Data {
     Ok(bytes)
 }
 
-/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object read each sub
-/// index up to the last, and take an error for a fault of the device.
+/// A gap between two entries of a record: an entry without type and bits. MainDevices that list an object read each
+/// subindex up to the last, and treat an error as a fault of the device.
 fn gap(request: EntryRequest) -> Data {
     let EntryRequest { index, sub_index, value_info } = request;
     let name = format!("SubIndex {sub_index:03}");
@@ -148,7 +148,7 @@ fn gap(request: EntryRequest) -> Data {
     Ok(bytes)
 }
 
-/// The data in the number of messages needed. Each has an even number of bytes, so that no index is split.
+/// The data in the required number of messages. Each has an even number of bytes, so that no index is split.
 fn fragments(opcode: InformationOpcode, data: &[u8], room: usize) -> Answer {
     let most = (room.saturating_sub(SdoInformation::OVERHEAD) & !1).max(2);
     let pieces: Vec<&[u8]> = if data.is_empty() { vec![data] } else { data.chunks(most).collect() };

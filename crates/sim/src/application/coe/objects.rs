@@ -12,10 +12,10 @@ pub struct Objects<'a> {
     pub dictionary: &'a mut Dictionary,
     /// Values of mapped objects.
     pub process_data: &'a ProcessData,
-    /// Present state; some objects are writable in PREOP alone.
+    /// Current state; some objects are writable in PREOP only.
     pub state: AlState,
-    /// Complete access is supported.
+    /// Whether complete access is supported.
     pub complete_access: bool,
-    /// SDO information is supported.
+    /// Whether SDO information is supported.
     pub information: bool,
 }

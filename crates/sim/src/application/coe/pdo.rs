@@ -1,7 +1,7 @@
-//! PDOs by mailbox instead of with the process data (protocol 6.3).
+//! PDOs in mailbox messages instead of process data (protocol 6.3).
 //!
-//! Input: an RxPDO, whose values go to the mapped objects; a request for a TxPDO or RxPDO. Output: that PDO with the
-//! present values. An RxPDO has no answer. The number of the CoE header is the distance of the PDO from 0x1600 or
+//! Input: an RxPDO, which sets the mapped objects, or a request for a TxPDO or RxPDO. Output: the requested PDO with
+//! the current values. An RxPDO has no response. The number in the CoE header is the offset of the PDO from 0x1600 or
 //! 0x1A00.
 
 use ringcat_wire::al::AlState;
@@ -16,7 +16,7 @@ use crate::application::dictionary::{MappedEntry, ObjectRole};
 const RX_BASE: u16 = 0x1600;
 const TX_BASE: u16 = 0x1A00;
 
-/// Takes an RxPDO.
+/// Accepts an RxPDO.
 pub fn receive(number: u16, data: &[u8], objects: &mut Objects<'_>) -> Answer {
     let Some(mapped) = mapping(RX_BASE + number, PdoDirection::Rx, objects) else {
         return Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED);
@@ -65,7 +65,7 @@ pub fn send(service: CoeService, number: u16, room: usize, objects: &Objects<'_>
     if payload.len() > room { Answer::Error(ErrorReply::INVALID_SIZE) } else { Answer::payload(payload) }
 }
 
-/// The mapping of a PDO; `None` where there is no such PDO.
+/// The mapping of a PDO; `None` if there is no such PDO.
 fn mapping(index: u16, direction: PdoDirection, objects: &Objects<'_>) -> Option<Vec<MappedEntry>> {
     objects.dictionary.object(index).filter(|object| object.role == ObjectRole::Mapping(direction))?;
     Some(objects.dictionary.mapped(index).collect())

@@ -1,4 +1,4 @@
-//! SDO transfers: expedited, normal and in segments, complete access, aborts (protocol 6.3).
+//! SDO transfers: expedited, normal and segmented, complete access, aborts (protocol 6.3).
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
@@ -25,14 +25,14 @@ struct Open {
     toggle: bool,
     /// All data of an upload, the received data of a download.
     data: Vec<u8>,
-    way: Way,
+    kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum Kind {
     /// Bytes sent.
     Upload { sent: usize },
-    /// Announced bytes.
+    /// Announced number of bytes.
     Download { total: usize },
 }
 
@@ -68,8 +68,8 @@ impl Transfer {
                 }
                 match check_download(index, sub_index, complete_access, total, objects) {
                     Ok(()) => {
-                        let (data, way) = (data.to_vec(), Way::Download { total });
-                        self.open = Some(Open { index, sub_index, complete_access, toggle: false, data, way });
+                        let (data, kind) = (data.to_vec(), Kind::Download { total });
+                        self.open = Some(Open { index, sub_index, complete_access, toggle: false, data, kind });
                         encode(&SdoResponse::DownloadDone { index, sub_index })
                     }
                     Err(code) => abort(index, sub_index, code),
@@ -107,8 +107,8 @@ impl Transfer {
         let first = SdoResponse::UploadNormal { index, sub_index, complete_access, total, data: &data[..sent] };
         let answer = encode(&first);
         if sent < data.len() {
-            let way = Way::Upload { sent };
-            self.open = Some(Open { index, sub_index, complete_access, toggle: false, data, way });
+            let kind = Kind::Upload { sent };
+            self.open = Some(Open { index, sub_index, complete_access, toggle: false, data, kind });
         }
         answer
     }
@@ -117,11 +117,11 @@ impl Transfer {
         let Some(open) = &mut self.open else {
             return abort(0, 0, AbortCode::UNKNOWN_COMMAND);
         };
-        let Way::Upload { sent } = &mut open.way else {
-            return self.give_up(AbortCode::UNKNOWN_COMMAND);
+        let Kind::Upload { sent } = &mut open.kind else {
+            return self.abort_transfer(AbortCode::UNKNOWN_COMMAND);
         };
         if toggle != open.toggle {
-            return self.give_up(AbortCode::TOGGLE_NOT_ALTERNATED);
+            return self.abort_transfer(AbortCode::TOGGLE_NOT_ALTERNATED);
         }
         let rest = &open.data[*sent..];
         let piece = &rest[..rest.len().min(room.saturating_sub(SEGMENT_OVERHEAD).max(SEGMENT_MIN_DATA))];
@@ -139,20 +139,20 @@ impl Transfer {
         let Some(open) = &mut self.open else {
             return abort(0, 0, AbortCode::UNKNOWN_COMMAND);
         };
-        let Way::Download { total } = open.way else {
-            return self.give_up(AbortCode::UNKNOWN_COMMAND);
+        let Kind::Download { total } = open.kind else {
+            return self.abort_transfer(AbortCode::UNKNOWN_COMMAND);
         };
         if toggle != open.toggle {
-            return self.give_up(AbortCode::TOGGLE_NOT_ALTERNATED);
+            return self.abort_transfer(AbortCode::TOGGLE_NOT_ALTERNATED);
         }
         if open.data.len() + data.len() > total {
-            return self.give_up(AbortCode::LENGTH_TOO_LONG);
+            return self.abort_transfer(AbortCode::LENGTH_TOO_LONG);
         }
         open.data.extend_from_slice(data);
         open.toggle = !toggle;
         if last {
             if open.data.len() != total {
-                return self.give_up(AbortCode::LENGTH_TOO_SHORT);
+                return self.abort_transfer(AbortCode::LENGTH_TOO_SHORT);
             }
             let (index, sub_index, complete_access) = (open.index, open.sub_index, open.complete_access);
             let data = core::mem::take(&mut open.data);
@@ -164,14 +164,14 @@ impl Transfer {
         encode(&SdoResponse::DownloadSegmentDone { toggle })
     }
 
-    /// Ends the transfer with an abort.
-    fn give_up(&mut self, code: AbortCode) -> Answer {
+    /// Aborts the transfer.
+    fn abort_transfer(&mut self, code: AbortCode) -> Answer {
         let (index, sub_index) = self.open.take().map_or((0, 0), |open| (open.index, open.sub_index));
         abort(index, sub_index, code)
     }
 }
 
-/// Whether a download in segments is possible, before its data arrives.
+/// Whether a segmented download is possible, checked before its data arrives.
 fn check_download(
     index: u16,
     sub_index: u8,
@@ -219,7 +219,7 @@ fn check_complete(sub_index: u8, objects: &Objects<'_>) -> Result<(), AbortCode>
     if sub_index > 1 { Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST) } else { Ok(()) }
 }
 
-/// The value in the process data overrides the one in the dictionary.
+/// A value in the process data takes precedence over the value in the dictionary.
 fn read(index: u16, sub_index: u8, objects: &Objects<'_>) -> Result<Vec<u8>, AbortCode> {
     let mut value = objects.dictionary.read(index, sub_index)?.to_vec();
     if let Some(current) = objects.process_data.value(index, sub_index) {

@@ -1,14 +1,14 @@
 //! Messages of the device in the diagnosis history of its dictionary, object 0x10F3 (protocol 6.3, ETG.1020).
 //!
 //! Input: messages, acknowledgements of the MainDevice. Output: the entries of the object. Without the flag
-//! "acknowledge" a full history overwrites its oldest message, with it the new one is lost.
+//! "acknowledge" a full history overwrites its oldest message, with the flag the new message is lost.
 
 use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisHistory, DiagnosisKind};
 
 use super::Dictionary;
 
 impl Dictionary {
-    /// Keeps a message; false where there is no history, its flags keep such messages out, or it is full.
+    /// Stores a message; false if there is no history, its flags exclude such messages, or it is full.
     pub fn diagnose(&mut self, kind: DiagnosisKind, message: &[u8]) -> bool {
         let Some(flags) = self.diagnosis_flags() else {
             return false;
@@ -39,7 +39,7 @@ impl Dictionary {
         true
     }
 
-    /// Flags of the history; `None` where there is none.
+    /// Flags of the history; `None` if there is no history.
     pub fn diagnosis_flags(&self) -> Option<DiagnosisFlags> {
         let flags = self.object(DiagnosisHistory::INDEX)?.entry(DiagnosisHistory::FLAGS)?;
         flags.value.first_chunk().map(|bytes| DiagnosisFlags(u16::from_le_bytes(*bytes)))
@@ -67,7 +67,7 @@ impl Dictionary {
             self.unacknowledged = self.unacknowledged.min(behind);
         }
         self.set_history(DiagnosisHistory::NEW_AVAILABLE, &[u8::from(self.unacknowledged > 0)]);
-        // There is room for messages again: no further ones are lost.
+        // There is room for messages again: no further messages are lost.
         let flags = self.diagnosis_flags().unwrap_or_default().0 & !DiagnosisFlags::LOST;
         self.set_history(DiagnosisHistory::FLAGS, &flags.to_le_bytes());
     }

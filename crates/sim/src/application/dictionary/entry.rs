@@ -9,37 +9,37 @@ pub const MAX_TRANSFER_BYTES: usize = 1 << 20;
 /// Longest value that has a default and a range: one number.
 const MAX_NUMBER: usize = 8;
 
-/// When an entry may be read and written.
+/// Access rights of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Never written.
+    /// Cannot be written.
     ReadOnly,
-    /// Written in each state with a mailbox.
+    /// Writable in every state with a mailbox.
     ReadWrite,
-    /// Written in PREOP.
+    /// Writable in PREOP.
     ReadWritePreOp,
-    /// Written in each state with a mailbox, never read.
+    /// Writable in every state with a mailbox, not readable.
     WriteOnly,
 }
 
-/// One sub index of an object.
+/// One subindex of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Sub index.
+    /// Subindex.
     pub sub_index: u8,
     /// Data type code of CoE.
     pub data_type: u8,
-    /// When it may be written.
+    /// Access rights.
     pub access: Access,
     /// The value, little-endian, of fixed length except for a domain.
     pub value: Vec<u8>,
-    /// Name; empty: that of the object.
+    /// Name; if empty, the name of the object applies.
     pub name: String,
-    /// Rights besides those of the access: mappable, backup, setting.
+    /// Access rights in addition to `access`: mappable, backup, setting.
     more_rights: u16,
     /// Smallest and largest value of a number.
     range: Option<(i64, i64)>,
-    /// The only allowed numbers, where these are few.
+    /// The only allowed numbers, if there are few.
     choices: &'static [i64],
     /// Unit for SDO information.
     unit: Option<u16>,
@@ -47,7 +47,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// An entry. The value is the default value too.
+    /// An entry. The value is also the default value.
     pub fn new(sub_index: u8, data_type: u8, access: Access, value: &[u8]) -> Entry {
         let default = (1..=MAX_NUMBER).contains(&value.len()).then(|| value.to_vec());
         let value = value.into();
@@ -65,37 +65,37 @@ impl Entry {
         }
     }
 
-    /// The same at another sub index.
+    /// The same entry at another subindex.
     pub fn at(self, sub_index: u8) -> Entry {
         Entry { sub_index, ..self }
     }
 
-    /// The same with a name.
+    /// The same entry with a name.
     pub fn named(self, name: &str) -> Entry {
         Entry { name: name.into(), ..self }
     }
 
-    /// The same with rights that the access does not give: bits of [`AccessRights`].
+    /// The same entry with additional access rights: bits of [`AccessRights`].
     pub fn allow(self, rights: u16) -> Entry {
         Entry { more_rights: self.more_rights | rights, ..self }
     }
 
-    /// The same, a number that is only written within this range.
+    /// The same entry as a number that can only be written within this range.
     pub fn within(self, minimum: i64, maximum: i64) -> Entry {
         Entry { range: Some((minimum, maximum)), ..self }
     }
 
-    /// The same, a number that accepts only one of these values.
+    /// The same entry as a number that accepts only one of these values.
     pub fn one_of(self, choices: &'static [i64]) -> Entry {
         Entry { choices, ..self }
     }
 
-    /// The same with a unit: prefix (a power of ten) and unit of ETG.1004, as in 0xFD03 for milliseconds.
+    /// The same entry with a unit: prefix (a power of ten) and unit of ETG.1004, for example 0xFD03 for milliseconds.
     pub fn in_unit(self, unit: u16) -> Entry {
         Entry { unit: Some(unit), ..self }
     }
 
-    /// The unit, where there is one.
+    /// The unit, if there is one.
     pub const fn unit(&self) -> Option<u16> {
         self.unit
     }
@@ -105,7 +105,7 @@ impl Entry {
         DataType(self.data_type.into())
     }
 
-    /// Length of the value in bits; 0 where it changes (domains) or SDO information has no room for it.
+    /// Length of the value in bits; 0 if it varies (domains) or exceeds the field in SDO information.
     pub fn bit_length(&self) -> u16 {
         if self.data_type() == DataType::DOMAIN {
             return 0;
@@ -114,7 +114,7 @@ impl Entry {
         self.data_type().bits().unwrap_or(bits)
     }
 
-    /// Rights in the form of SDO information.
+    /// Access rights in the format of SDO information.
     pub fn rights(&self) -> AccessRights {
         let by_access = match self.access {
             Access::ReadOnly => AccessRights::READ,
@@ -125,7 +125,7 @@ impl Entry {
         AccessRights(by_access | self.more_rights)
     }
 
-    /// Default value, where it has as many bytes as the type.
+    /// Default value, if it has the length of the type.
     pub fn default_bytes(&self) -> Option<&[u8]> {
         self.default.as_deref().filter(|default| default.len() == usize::from(self.bit_length()).div_ceil(8))
     }
@@ -138,7 +138,7 @@ impl Entry {
         Some((bytes(minimum)?, bytes(maximum)?))
     }
 
-    /// Whether this number of bytes may be written in `state`, whatever their values.
+    /// Whether this number of bytes may be written in `state`, for any values.
     pub(super) fn check_access(&self, length: usize, state: AlState) -> Result<(), AbortCode> {
         match self.access {
             Access::ReadOnly => return Err(AbortCode::READ_ONLY),

@@ -1,7 +1,6 @@
-//! The diagnosis history, object 0x10F3: messages kept in a ring (protocol 6.3, ETG.1020).
+//! The diagnosis history, object 0x10F3: a ring buffer of messages (protocol 6.3, ETG.1020).
 //!
-//! In: messages of the device, acknowledgements of the MainDevice. Out: the entries of the object. Without the flag
-//! "acknowledge" a full history overwrites its oldest message, with it the new one is lost.
+//! Creates the object and checks acknowledgements; [`super::diagnosis`] stores messages.
 
 use ringcat_wire::mailbox::coe::DiagnosisHistory;
 use ringcat_wire::mailbox::sdo::AbortCode;
@@ -10,7 +9,7 @@ use super::entry::{Access, Entry};
 use super::object::{Object, ObjectRole};
 use crate::data_type;
 
-/// An empty history with room for so many messages, 1 to 250.
+/// An empty history for this number of messages, 1 to 250.
 pub fn history(messages: u8) -> Object {
     let messages = messages.clamp(1, u8::MAX - DiagnosisHistory::FIRST_MESSAGE + 1);
     let last = DiagnosisHistory::FIRST_MESSAGE - 1 + messages;
@@ -29,7 +28,7 @@ pub fn history(messages: u8) -> Object {
     Object { index: DiagnosisHistory::INDEX, name: "Diagnosis history".into(), role: ObjectRole::History, entries }
 }
 
-/// What sub index 3 takes: 0, or the place of a message.
+/// Checks a value for subindex 3: 0, or the position of a message.
 pub(super) fn check_acknowledge(object: &Object, sub_index: u8, data: &[u8]) -> Result<(), AbortCode> {
     let value = match (sub_index, data) {
         (DiagnosisHistory::NEWEST_ACKNOWLEDGED, [value]) if *value != 0 => *value,

@@ -1,4 +1,4 @@
-//! Objects as a description and a dictionary have them: a name, rules, entries (protocol 6.3).
+//! Objects of descriptions and dictionaries: a name, rules, entries (protocol 6.3).
 
 use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
 use ringcat_wire::sii::PdoDirection;
@@ -6,22 +6,22 @@ use ringcat_wire::sii::PdoDirection;
 use super::entry::{Access, Entry};
 use crate::data_type;
 
-/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n higher.
+/// Index of the PDO assignment of SyncManager 0; the index for SyncManager n is n higher.
 pub const ASSIGNMENT_BASE: u16 = 0x1C10;
 
-/// Largest number of entries of a configurable mapping.
+/// Maximum number of entries of a configurable mapping.
 pub(super) const MAX_MAPPED_ENTRIES: usize = 32;
 
-/// Rules beyond the access of the entries.
+/// Rules in addition to the access rights of the entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ObjectRole {
     /// None.
     Plain,
-    /// A list of PDOs of this direction: sub index 0 must be 0 while the others are written.
+    /// A list of PDOs of this direction: subindex 0 must be 0 while the others are written.
     Assignment(PdoDirection),
-    /// A list of mapped entries of this direction, same rule.
+    /// A list of mapped entries of this direction, with the same rule.
     Mapping(PdoDirection),
-    /// The diagnosis history: writing sub index 3 acknowledges or clears.
+    /// The diagnosis history: a write to subindex 3 acknowledges or clears.
     History,
 }
 
@@ -30,22 +30,22 @@ pub enum ObjectRole {
 pub struct Object {
     /// Index.
     pub index: u16,
-    /// Name for people.
+    /// Name.
     pub name: String,
     /// Extra rules.
     pub role: ObjectRole,
-    /// Its entries, sub indices ascending.
+    /// Its entries, subindices ascending.
     pub entries: Vec<Entry>,
 }
 
 impl Object {
-    /// An object with one value at sub index 0.
+    /// An object with one value at subindex 0.
     pub fn variable(index: u16, name: &str, data_type: u8, access: Access, value: &[u8]) -> Object {
         let entries = vec![Entry::new(0, data_type, access, value)];
         Object { index, name: name.into(), role: ObjectRole::Plain, entries }
     }
 
-    /// An array or record: sub index 0 is added and is the number of the entries, which follow each other from 1.
+    /// An array or record: subindex 0, the number of entries, is added; the entries follow from subindex 1.
     pub fn record(index: u16, name: &str, entries: Vec<Entry>) -> Object {
         let count = entries.last().map_or(0, |entry| entry.sub_index);
         let mut all = vec![Entry::new(0, data_type::U8, Access::ReadOnly, &[count])];
@@ -64,7 +64,7 @@ impl Object {
         if alike && !matches!(self.role, ObjectRole::Mapping(_)) { ObjectCode::Array } else { ObjectCode::Record }
     }
 
-    /// Data type of the object as a whole: that of its entries where they are alike.
+    /// Data type of the whole object: that of its entries if they are equal.
     pub fn data_type(&self) -> DataType {
         match (self.code(), self.role, self.index) {
             (_, ObjectRole::Mapping(_), _) => DataType::PDO_MAPPING,
@@ -74,7 +74,7 @@ impl Object {
         }
     }
 
-    /// Looks an entry up.
+    /// Finds an entry.
     pub fn entry(&self, sub_index: u8) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.sub_index == sub_index)
     }
@@ -83,7 +83,7 @@ impl Object {
         self.entries.iter_mut().find(|entry| entry.sub_index == sub_index)
     }
 
-    /// Value of sub index 0 of a list.
+    /// Value of subindex 0 of a list.
     pub(super) fn count(&self) -> usize {
         self.entry(0).and_then(|entry| entry.value.first()).map_or(0, |count| usize::from(*count))
     }
@@ -99,7 +99,7 @@ impl Object {
 pub struct MappedEntry {
     /// Object index, 0 for a gap.
     pub index: u16,
-    /// Sub index.
+    /// Subindex.
     pub sub_index: u8,
     /// Length in bits.
     pub bit_length: u8,

@@ -23,7 +23,7 @@ pub(super) fn build(description: &DeviceDescription) -> Vec<Object> {
     objects.into_values().collect()
 }
 
-/// The vendor's name of the device: the order code, not its name in the segment.
+/// The order code of the device, not its name in the segment.
 pub fn type_name(description: &DeviceDescription) -> &str {
     if description.order_code.is_empty() { &description.name } else { &description.order_code }
 }
@@ -90,7 +90,7 @@ fn mapping(description: &DeviceDescription, pdo: &PdoDescription) -> Object {
     list(pdo.index, &pdo.name, ObjectRole::Mapping(pdo.direction), access, data_type::U32, slots, values)
 }
 
-/// A list object with `slots` places of which the first ones are filled.
+/// A list object with `slots` entries; the first ones have values.
 fn list(
     index: u16,
     name: &str,
@@ -112,7 +112,7 @@ fn list(
     Object { index, name: name.into(), role, entries }
 }
 
-/// The objects behind the mapped entries: outputs can be written, inputs only read.
+/// The objects of the mapped entries: outputs are writable, inputs read-only.
 fn mapped_objects(description: &DeviceDescription) -> Vec<Object> {
     let mut found: BTreeMap<u16, BTreeMap<u8, Entry>> = BTreeMap::new();
     let mut names = BTreeMap::new();

@@ -1,18 +1,18 @@
-//! Synchronisation parameters, objects 0x1C32 and 0x1C33 (ETG.1020): set by a MainDevice, and updated from distributed
-//! clocks.
+//! Synchronisation parameters, objects 0x1C32 and 0x1C33 (ETG.1020): written by a MainDevice and updated from
+//! distributed clocks.
 
 use super::Dictionary;
 
-/// Sub indices and bits of the objects.
+/// Subindices and bits of the objects.
 #[derive(Debug)]
 pub struct SyncParameters;
 
 impl SyncParameters {
-    /// Sub index: synchronisation type.
+    /// Subindex: synchronisation type.
     pub const TYPE: u8 = 1;
-    /// Sub index: cycle time in nanoseconds.
+    /// Subindex: cycle time in nanoseconds.
     pub const CYCLE: u8 = 2;
-    /// Sub index: cycle of SYNC0 in nanoseconds.
+    /// Subindex: cycle of SYNC0 in nanoseconds.
     pub const SYNC0_CYCLE: u8 = 10;
     /// Supported type: free run.
     pub const FREE_RUN: u16 = 1 << 0;
@@ -27,7 +27,7 @@ impl SyncParameters {
 }
 
 impl Dictionary {
-    /// SAFEOP is entered with SYNC0 of this cycle, or without SYNC signals.
+    /// Updates the objects when SAFEOP is entered with SYNC0 of this cycle, or without SYNC signals.
     pub fn note_sync0(&mut self, cycle_ns: Option<u32>) {
         for index in SyncParameters::OBJECTS {
             let kept = self.read(index, SyncParameters::TYPE).ok().and_then(<[u8]>::first_chunk).copied();

@@ -17,7 +17,7 @@ fn standard_objects_follow_from_the_description() {
 }
 
 #[test]
-fn a_list_shows_only_what_is_assigned() {
+fn a_list_contains_only_assigned_pdos() {
     let dictionary = dictionary("analog-input-4");
     assert_eq!(dictionary.assigned(3).collect::<Vec<_>>(), [0x1A00, 0x1A02, 0x1A04, 0x1A06]);
     let expected = [4, 0, 0x00, 0x1A, 0x02, 0x1A, 0x04, 0x1A, 0x06, 0x1A];
@@ -26,7 +26,7 @@ fn a_list_shows_only_what_is_assigned() {
 }
 
 #[test]
-fn a_terminal_without_mailbox_knows_its_process_data_too() {
+fn a_terminal_without_mailbox_has_its_process_data_in_the_dictionary() {
     let dictionary = dictionary("digital-output-16");
     assert_eq!(dictionary.assigned_bits(0), 16);
     assert_eq!(dictionary.mapped(0x160F).next().unwrap().index, 0x70F0);

@@ -1,8 +1,8 @@
-//! The addresses of a device behind EoE.
+//! The IP parameters of an EoE device.
 
 use core::net::Ipv4Addr;
 
-/// The addresses as they are set now.
+/// The current addresses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Addresses {
     /// MAC address.
@@ -20,8 +20,9 @@ pub struct Addresses {
 }
 
 impl Addresses {
-    /// A unicast MAC address, a unicast IP address or none, a mask of ones and then zeros.
-    pub(super) fn make_sense(&self) -> bool {
+    /// Whether MAC and IP address are unicast (or no IP address is set) and the mask consists of ones followed by
+    /// zeros.
+    pub(super) fn are_valid(&self) -> bool {
         let mac = self.mac[0] & 0x01 == 0 && self.mac != [0; 6];
         let unicast = |address: Ipv4Addr| !address.is_multicast() && !address.is_broadcast();
         let mask = u32::from(self.mask);

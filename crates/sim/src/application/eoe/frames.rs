@@ -1,25 +1,25 @@
-//! Frames into and out of an IP stack (smoltcp).
+//! Frame queues of an IP stack (smoltcp).
 
 use std::collections::VecDeque;
 
 use smoltcp::phy::{Device, DeviceCapabilities, Medium, RxToken, TxToken};
 use smoltcp::time::Instant;
 
-/// Longest frame without check sequence.
+/// Longest frame without FCS.
 const MAX_FRAME: usize = 1514;
 
-/// Two queues that form an interface of a stack. The code that fills the input queue bounds it.
+/// Two queues that form an interface of a stack. The code that fills the input queue limits it.
 #[derive(Debug)]
 pub struct Frames {
-    /// Into the stack.
+    /// Frames to the stack.
     pub received: VecDeque<Vec<u8>>,
-    /// Out of it.
+    /// Frames from the stack.
     pub sent: VecDeque<Vec<u8>>,
     ready: usize,
 }
 
 impl Frames {
-    /// Empty queues. While this number of frames waits for collection, the stack starts no new one by itself.
+    /// Empty queues. While this number of frames waits in `sent`, the stack starts no new frame.
     pub const fn new(ready: usize) -> Frames {
         Frames { received: VecDeque::new(), sent: VecDeque::new(), ready }
     }

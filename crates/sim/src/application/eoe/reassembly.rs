@@ -5,7 +5,7 @@
 
 use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
 
-/// Longest frame, VLAN tag included, rounded up to blocks.
+/// Longest frame including a VLAN tag, rounded up to blocks.
 const MAX_FRAME: usize = 48 * BLOCK;
 /// Frame numbers.
 const FRAMES: usize = 16;
@@ -20,12 +20,12 @@ pub struct Reassembly {
 struct Partial {
     data: Vec<u8>,
     next: u8,
-    /// Length that fragment 0 announced, rounded up to blocks.
+    /// Length announced by fragment 0, rounded up to blocks.
     announced: usize,
 }
 
 impl Reassembly {
-    /// Takes a fragment; returns the frame when it was the last missing one.
+    /// Adds a fragment; returns the frame if the fragment completes it.
     pub fn take(&mut self, fragment: &EoeFragment<'_>) -> Option<Vec<u8>> {
         let place = &mut self.frames[usize::from(fragment.frame) % FRAMES];
         if fragment.number == 0 {
@@ -56,7 +56,7 @@ mod tests {
 
     // covers: 6.5
     #[test]
-    fn frames_whose_fragments_mix_are_told_apart() {
+    fn frames_with_interleaved_fragments_are_distinguished() {
         let mut reassembly = Reassembly::default();
         assert_eq!(reassembly.take(&fragment(1, 0, 2, false, &[1; 32])), None);
         assert_eq!(reassembly.take(&fragment(2, 0, 2, false, &[2; 32])), None);
@@ -75,14 +75,14 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_follow_or_grows_too_long_is_discarded() {
+    fn out_of_order_or_oversized_fragments_are_discarded() {
         let mut reassembly = Reassembly::default();
         reassembly.take(&fragment(1, 0, 3, false, &[1; 32]));
         assert_eq!(reassembly.take(&fragment(1, 2, 2, true, &[1; 1])), None);
         reassembly.take(&fragment(1, 0, 3, false, &[1; 32]));
         assert_eq!(reassembly.take(&fragment(1, 1, 2, true, &[1; 1])), None, "wrong offset");
         assert_eq!(reassembly.take(&fragment(1, 0, 1, true, &[1; 64])), None, "more than announced");
-        assert_eq!(reassembly.take(&fragment(1, 0, 63, true, &[1; 1600])), None, "no frame is so long");
+        assert_eq!(reassembly.take(&fragment(1, 0, 63, true, &[1; 1600])), None, "longer than any frame");
         assert_eq!(reassembly.take(&fragment(1, 0, 3, false, &[1; 31])), None, "no whole blocks");
         assert_eq!(reassembly.take(&fragment(1, 1, 1, true, &[1; 1])), None);
     }

@@ -1,8 +1,8 @@
-//! An IP stack behind an EoE device (smoltcp): answers ARP and ping, serves TCP.
+//! The IP stack of an EoE device (smoltcp): answers ARP and ping, serves TCP.
 //!
 //! Input: frames, virtual time. Output: frames. Port 7 echoes; port 80 answers `GET /bytes/N` with N bytes and any
-//! other request with the device's name. No random numbers are used: the seed of the sequence numbers is the MAC
-//! address.
+//! other request with the device's name. No random numbers are used: the MAC address is the seed of the sequence
+//! numbers.
 
 use core::fmt;
 use core::fmt::Write as _;
@@ -18,22 +18,22 @@ use super::addresses::Addresses;
 use super::frames::Frames;
 use crate::time::SimTime;
 
-/// Frames that wait for the stack; more are dropped, as a network does.
+/// Maximum number of frames waiting for the stack; further frames are dropped, as in a network.
 const MAX_RECEIVED: usize = 16;
-/// Frames that it may have ready for sending.
+/// Maximum number of frames ready for sending.
 const MAX_READY: usize = 16;
-/// Connections at a time, of each service.
+/// Maximum number of connections of each service.
 const CONNECTIONS: usize = 4;
 const BUFFER: usize = 16 * 1024;
 const ECHO_PORT: u16 = 7;
 const WEB_PORT: u16 = 80;
 /// Longest request that is evaluated.
 const MAX_REQUEST: usize = 1024;
-/// Most bytes of an answer.
+/// Maximum number of bytes of an answer.
 const MAX_BYTES: usize = 1 << 26;
-/// Shortest time between two steps that the stack requests itself.
+/// Minimum time between two steps requested by the stack.
 const LEAST_WAIT: Duration = Duration::from_micros(10);
-/// Largest number of rounds of the stack for one frame.
+/// Maximum number of processing rounds of the stack per frame.
 const MAX_ROUNDS: usize = 8;
 
 /// The stack.
@@ -45,7 +45,7 @@ pub struct Stack {
     frames: Frames,
 }
 
-/// One socket and what it serves.
+/// One socket and its service.
 struct Connection {
     handle: SocketHandle,
     port: u16,
@@ -55,7 +55,7 @@ struct Connection {
 }
 
 impl Clone for Stack {
-    /// A stack with the same addresses, without its connections.
+    /// A stack with the same addresses and without connections.
     fn clone(&self) -> Stack {
         Stack::new(&self.addresses)
     }
@@ -88,7 +88,7 @@ impl Stack {
         stack
     }
 
-    /// Sets other, valid addresses.
+    /// Sets new, valid addresses.
     pub fn set_addresses(&mut self, addresses: &Addresses) {
         self.addresses = addresses.clone();
         self.interface.set_hardware_addr(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
@@ -107,7 +107,7 @@ impl Stack {
         }
     }
 
-    /// A frame has come.
+    /// Adds a received frame.
     pub fn receive(&mut self, frame: Vec<u8>) {
         if self.frames.received.len() < MAX_RECEIVED {
             self.frames.received.push_back(frame);
@@ -136,7 +136,7 @@ impl Stack {
         Some(SimTime(micros.saturating_mul(1000)).max(now + LEAST_WAIT))
     }
 
-    /// Moves data between sockets and services; true where any moved.
+    /// Moves data between sockets and services; true if any data was moved.
     fn serve(&mut self) -> bool {
         let mut moved = false;
         for connection in &mut self.connections {
@@ -155,7 +155,7 @@ impl Connection {
             return socket.listen(self.port).is_ok();
         }
         let moved = if self.port == ECHO_PORT { echo(socket) } else { self.serve_web(socket, addresses) };
-        // The other end has closed, and all requests are answered.
+        // The peer has closed, and all requests are answered.
         let over = socket.state() == tcp::State::CloseWait && !socket.can_recv() && self.answer.is_none();
         if over {
             socket.close();
@@ -216,12 +216,12 @@ fn echo(socket: &mut tcp::Socket<'_>) -> bool {
     moved
 }
 
-/// A byte of the answer to `/bytes/N`: it differs from its neighbours.
+/// A byte of the answer to `/bytes/N`; neighbouring bytes differ.
 fn body_byte(number: usize) -> u8 {
     b'!' + (number % 89) as u8
 }
 
-/// Head of the answer to a request, and which bytes of the body follow.
+/// Head of the answer to a request, and the range of body bytes that follows.
 fn answer(request: &[u8], addresses: &Addresses) -> (Vec<u8>, Range<usize>) {
     let text = String::from_utf8_lossy(request);
     let wanted = text.strip_prefix("GET /bytes/").and_then(|rest| rest.split_whitespace().next()?.parse().ok());

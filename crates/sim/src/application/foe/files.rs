@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::description::FoeDescription;
 
-/// Largest number of files.
+/// Maximum number of files.
 const MAX_FILES: usize = 64;
 
 /// Files by name, and the running firmware.
@@ -28,7 +28,7 @@ enum Firmware {
 }
 
 impl FileStore {
-    /// The files at delivery.
+    /// The files on delivery.
     pub fn new(description: &FoeDescription) -> FileStore {
         let files = description.files.iter().map(|(name, data)| (name.clone().into_bytes(), data.clone())).collect();
         FileStore { files, capacity: description.capacity, firmware: Firmware::Original }
@@ -50,7 +50,7 @@ impl FileStore {
         self.capacity.saturating_sub(others)
     }
 
-    /// Stores a file, replacing one of this name; false without a free entry or space.
+    /// Stores a file and replaces a file of this name; false without a free entry or space.
     pub fn keep(&mut self, name: &[u8], data: Vec<u8>) -> bool {
         let fits = data.len() <= self.room_for(name);
         let fits = fits && (self.files.len() < MAX_FILES || self.files.contains_key(name));
@@ -68,7 +68,7 @@ impl FileStore {
         }
     }
 
-    /// There is a valid firmware.
+    /// Whether there is valid firmware.
     pub fn has_firmware(&self) -> bool {
         self.firmware != Firmware::Erased
     }

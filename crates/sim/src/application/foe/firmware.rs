@@ -1,12 +1,12 @@
 //! Firmware images that the boot loader of simulated devices accepts.
 //!
-//! Magic `RCFW`, length of the version (u8), version, program, sum of all bytes before (u32, little-endian).
+//! Magic `RCFW`, length of the version (u8), version, program, sum of all preceding bytes (u32, little-endian).
 
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 
 const MAGIC: &[u8; 4] = b"RCFW";
 
-/// An image with this version, of at most 255 bytes, around a program.
+/// An image with this version (at most 255 bytes) and a program.
 pub fn image(version: &str, program: &[u8]) -> Vec<u8> {
     let end = (0..=version.len().min(255)).rev().find(|end| version.is_char_boundary(*end)).unwrap_or(0);
     let version = &version.as_bytes()[..end];
@@ -18,7 +18,7 @@ pub fn image(version: &str, program: &[u8]) -> Vec<u8> {
     image
 }
 
-/// The version of an image, or why the boot loader refuses it.
+/// The version of an image, or the reason for which the boot loader refuses it.
 pub(super) fn check(image: &[u8]) -> Result<String, (FoeErrorCode, &'static str)> {
     let foreign = (FoeErrorCode::FIRMWARE_DOES_NOT_FIT, "no firmware of this device");
     let (content, checksum) = image.split_last_chunk().ok_or(foreign)?;

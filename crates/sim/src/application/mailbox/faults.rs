@@ -1,7 +1,7 @@
 //! Faults of a device's mail for tests (issue 4).
 //!
-//! Input: [`MailFault`]s from a test. Output: their effect on the next messages. Faults outlive the mailbox: they hold
-//! until they are used up, or until [`MailFault::Heal`].
+//! Input: [`MailFault`]s from a test. Output: their effect on the next messages. Faults stay across a reopening of the
+//! mailbox, until they are used up or cleared by [`MailFault::Heal`].
 
 use core::time::Duration;
 
@@ -27,33 +27,33 @@ pub enum MailFault {
         /// Number of requests.
         count: u32,
     },
-    /// The next answers are sent twice, with the same counter.
+    /// The next responses are sent twice, with the same counter.
     RepeatAnswers {
         /// Number of answers.
         count: u32,
     },
-    /// The next answers are delayed; later answers may overtake them.
+    /// The next responses are delayed; later responses may overtake them.
     DelayAnswers {
         /// Number of answers.
         count: u32,
         /// Delay.
         by: Duration,
     },
-    /// The next answers have this counter, without an effect on the count.
+    /// The next responses have this counter; the counter sequence is not affected.
     WrongCounter {
         /// Number of answers.
         count: u32,
         /// The counter, 0..=7.
         counter: u8,
     },
-    /// An emergency directly precedes the next answers.
+    /// An emergency directly precedes the next responses.
     EmergencyBefore {
         /// Number of answers.
         count: u32,
         /// Error code of the emergency.
         code: u16,
     },
-    /// The next requests are answered with an error reply of the mailbox.
+    /// The next requests are answered with a mailbox error reply.
     Refuse {
         /// Number of requests.
         count: u32,
@@ -77,7 +77,7 @@ pub enum MailFault {
         /// Error code.
         code: FoeErrorCode,
     },
-    /// No message is taken from the mailbox for a while: it stays full.
+    /// The device takes no message from the mailbox for some time: it stays full.
     Full {
         /// Duration.
         during: Duration,
@@ -86,20 +86,20 @@ pub enum MailFault {
     Heal,
 }
 
-/// Effect on an answer.
+/// Effect on a response.
 #[derive(Clone, Debug, Default)]
 pub struct Fate {
     /// Delay.
     pub delay: Duration,
-    /// It is sent twice.
+    /// Whether it is sent twice.
     pub twice: bool,
-    /// It has this counter.
+    /// Counter, if replaced.
     pub counter: Option<u8>,
-    /// This CoE message precedes it.
+    /// CoE message sent before it.
     pub before: Option<Vec<u8>>,
 }
 
-/// Faults that wait for their messages.
+/// Faults for the next messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MailFaults {
     lose_answers: u32,
@@ -110,13 +110,13 @@ pub struct MailFaults {
     emergency: (u32, u16),
     refuse: (u32, u16),
     abort: (u32, Option<AbortCode>),
-    /// Number left, and total.
+    /// Remaining number, and total.
     busy: (u32, u32),
     fail: Option<FoeErrorCode>,
     full_until: Option<SimTime>,
 }
 
-/// Content of a BUSY.
+/// `entire` field of a BUSY message.
 const BUSY_ENTIRE: u16 = 100;
 
 impl MailFaults {
@@ -143,12 +143,12 @@ impl MailFaults {
         self.full_until
     }
 
-    /// Time advances.
+    /// Ends faults that have expired.
     pub fn advance(&mut self, now: SimTime) {
         self.full_until = self.full_until.filter(|until| *until > now);
     }
 
-    /// The answer to a request that is not served; `None` for one that is.
+    /// The response to a request that is not served; `None` if the request is served.
     pub fn instead_of_serving(&mut self, protocol: Protocol, payload: &[u8]) -> Option<Answer> {
         if use_up(&mut self.lose_requests) {
             return Some(Answer::Silence);
@@ -189,7 +189,7 @@ impl MailFaults {
             let done = u16::try_from(done).unwrap_or(BUSY_ENTIRE);
             FoeMessage::Busy { done, entire: BUSY_ENTIRE, text: b"erasing" }
         } else {
-            FoeMessage::Error { code: self.fail.take()?, text: b"told to fail" }
+            FoeMessage::Error { code: self.fail.take()?, text: b"injected failure" }
         };
         let mut bytes = vec![0; 32];
         let length = message.encode(&mut bytes)?;
@@ -197,7 +197,7 @@ impl MailFaults {
         Some(Answer::payload(bytes))
     }
 
-    /// Effect on an answer; `None` where it is lost.
+    /// Effect on a response; `None` if the response is lost.
     pub fn answer(&mut self) -> Option<Fate> {
         if use_up(&mut self.lose_answers) {
             return None;
@@ -212,7 +212,7 @@ impl MailFaults {
     }
 }
 
-/// Decrements; true where the count was not zero. The largest number never decreases.
+/// Decrements the counter; true if it was not zero. The maximum value never decreases.
 fn use_up(count: &mut u32) -> bool {
     if *count != u32::MAX {
         *count = match count.checked_sub(1) {

@@ -5,7 +5,7 @@ use ringcat_wire::mailbox::Protocol;
 
 use crate::time::SimTime;
 
-/// A request that was served.
+/// A served request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServedMail {
     /// Time.

@@ -1,4 +1,4 @@
-//! Homing: searches for a limit switch or an index pulse, which gives the origin of the positions.
+//! Homing: searches for a limit switch or an index pulse, which defines the origin of the positions.
 
 use super::Servo;
 use super::axis::{INCREMENTS_PER_REVOLUTION, INDEX_PULSE, LIMIT_SWITCH};
@@ -38,12 +38,12 @@ impl Servo {
         }
     }
 
-    /// Moving to the home position.
+    /// Whether the axis moves to the home position.
     pub(super) const fn is_homing(&self) -> bool {
         matches!(self.homing, Homing::ToSwitch(_) | Homing::FromSwitch(_) | Homing::ToIndex(_))
     }
 
-    pub(super) fn look_for_home(&mut self, before: f64) {
+    pub(super) fn search_home(&mut self, before: f64) {
         let revolution = f64::from(INCREMENTS_PER_REVOLUTION);
         let turn = |position: f64| ((position - INDEX_PULSE) / revolution).floor();
         let (last, now) = (turn(before), turn(self.motor.position));
@@ -51,7 +51,7 @@ impl Servo {
             Homing::ToSwitch(side) if self.on_switch(side) => Homing::FromSwitch(side),
             Homing::FromSwitch(side) if !self.on_switch(side) => self.found(side * LIMIT_SWITCH),
             Homing::ToIndex(_) if last != now => self.found(INDEX_PULSE + revolution * last.max(now)),
-            Homing::Stopping if self.stands_still() => Homing::Done,
+            Homing::Stopping if self.is_at_standstill() => Homing::Done,
             stage => stage,
         };
     }

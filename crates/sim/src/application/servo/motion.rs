@@ -6,16 +6,16 @@ use super::axis::{
     MODE_PROFILE_VELOCITY, PEAK_TORQUE, STEP,
 };
 
-/// Speed follows the set-point with this gain, position with that, per second.
+/// Gains of the velocity loop and of the position loop, per second.
 const VELOCITY_GAIN: f64 = 2_000.0;
 const POSITION_GAIN: f64 = 250.0;
-/// Part of the torque that the position loop assumes near its set-point.
+/// Fraction of the torque that the position loop assumes near its set-point.
 const BRAKING_RESERVE: f64 = 0.8;
-/// Part of the deceleration that is assumed before a software limit.
+/// Fraction of the deceleration that is assumed before a software limit.
 const LIMIT_RESERVE: f64 = 0.9;
 
 impl Servo {
-    /// Moves the set-point as the mode says and returns the torque for it.
+    /// Moves the set-point according to the mode and returns the torque for it.
     pub(super) fn follow(&mut self) -> f64 {
         let p = &self.parameters;
         let (acceleration, deceleration, quick) = (p.acceleration, p.deceleration, p.quick_stop_deceleration);
@@ -54,7 +54,7 @@ impl Servo {
                 let (slope, offset) = if self.mode == MODE_CST { (f64::INFINITY, torque_offset) } else { (slope, 0.0) };
                 self.set_torque += (aim - self.set_torque).clamp(-slope, slope);
                 self.track_motor(self.motor.velocity);
-                // A velocity loop takes over where the axis would exceed its speed or position limits.
+                // A velocity loop takes over if the axis would exceed its speed or position limits.
                 let wanted = self.set_torque + offset;
                 let torque = wanted.clamp(self.velocity_loop(low), self.velocity_loop(high));
                 self.limited |= torque != wanted;
@@ -95,7 +95,7 @@ impl Servo {
         }
     }
 
-    /// Straight to the goal in the remaining steps.
+    /// Linear to the goal in the remaining steps.
     pub(super) fn interpolate(&mut self) {
         let goal = self.goal.map_or(self.set_position, |goal| self.within_limits(goal));
         let fastest = self.parameters.max_motor_speed;
@@ -106,10 +106,10 @@ impl Servo {
         self.steps_left = self.steps_left.saturating_sub(1);
     }
 
-    /// Torque for the set-point: returns as fast as the loop allows, limited to speeds from which the motor can brake.
+    /// Torque for the set-point: returns as fast as the loop allows, at speeds from which the motor can brake.
     pub(super) fn position_loop(&self, velocity_offset: f64) -> f64 {
         let p = &self.parameters;
-        // The step of the set-point is done, that of the motor follows.
+        // The set-point has made this step already, the motor follows.
         let error = self.following_error() - self.set_velocity * STEP;
         let torque = p.max_torque.min(p.positive_torque).min(p.negative_torque).min(PEAK_TORQUE);
         let most = braking_speed(error.abs(), BRAKING_RESERVE * torque * ACCELERATION);
@@ -135,7 +135,7 @@ impl Servo {
         inside
     }
 
-    /// Speeds from which the axis still stops before its software limits.
+    /// Speeds from which the axis can stop before its software limits.
     pub(super) fn velocity_limits(&self, position: f64, deceleration: f64) -> (f64, f64) {
         let fastest = self.parameters.max_motor_speed;
         let speed = |distance: f64| braking_speed(distance.max(0.0), LIMIT_RESERVE * deceleration).min(fastest);
@@ -146,7 +146,7 @@ impl Servo {
     }
 }
 
-/// The highest speed from which a set-point that moves in steps stops within a distance.
+/// The highest speed from which a set-point that moves in steps can stop within a distance.
 fn braking_speed(distance: f64, deceleration: f64) -> f64 {
     let step = deceleration * STEP;
     let speed = (step * step / 4.0 + 2.0 * deceleration * distance).sqrt() - step / 2.0;

@@ -17,7 +17,7 @@ impl Motor {
             let most = BRAKE_TORQUE * ACCELERATION * STEP;
             velocity -= velocity.clamp(-most, most);
         }
-        // The mean of both speeds: the work of the torque is exactly the energy that the load gains.
+        // Mean of both speeds: the work of the torque equals the energy gained by the load exactly.
         self.position += (self.velocity + velocity) / 2.0 * STEP;
         (self.velocity, self.torque) = (velocity, torque);
     }

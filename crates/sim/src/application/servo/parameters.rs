@@ -1,4 +1,4 @@
-//! Parameters of a drive: objects that it reads, from the outputs where they are mapped, else from the dictionary.
+//! Parameters of a drive: objects read from the outputs if they are mapped, otherwise from the dictionary.
 //!
 //! Input: objects as index, sub index and value. Output: numbers in the units of the drive: increments, seconds,
 //! thousandths of the rated torque. Objects that the drive does not read are ignored.
@@ -68,7 +68,7 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    /// Takes over an object; `value` has the bits of the object from bit 0 on.
+    /// Sets an object; `value` contains the bits of the object from bit 0 on.
     pub fn set(&mut self, index: u16, sub_index: u8, value: u64) {
         let word = value as u16 as i16;
         let thousandths = f64::from(value as u16 as i16);
@@ -76,7 +76,7 @@ impl Parameters {
         let positive = f64::from(value as u32);
         let milliseconds = f64::from(value as u16) / 1e3;
         let window = (value as u32 != u32::MAX).then_some(positive);
-        // Otherwise no motion could start or stop.
+        // A rate of zero would not allow any motion to start or stop.
         let rate = positive.max(1.0);
         match (index, sub_index) {
             (0x6007, 0) => self.abort_connection_option = word,

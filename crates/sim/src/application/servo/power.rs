@@ -1,12 +1,12 @@
-//! The power state machine of CiA 402: controlword in, state and its bits of the statusword out.
+//! The power state machine of CiA 402: converts the controlword into a state and its bits of the statusword.
 //!
-//! The transitions of the standard are numbered in [`next`]. Those that wait for the motor to stand still (out of quick
-//! stop, fault reaction, and out of operation with a ramp) are made by the [`Servo`](super::Servo).
+//! [`next`] contains the numbered transitions of the standard. The [`Servo`](super::Servo) makes the transitions that
+//! wait for standstill (out of quick stop, fault reaction, and out of operation with a ramp).
 
 /// State of the power state machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriveState {
-    /// The drive tests itself after power-on.
+    /// The drive runs its self-test after power-on.
     #[default]
     NotReadyToSwitchOn,
     /// Power cannot be switched on yet.
@@ -17,16 +17,16 @@ pub enum DriveState {
     SwitchedOn,
     /// The drive follows its targets.
     OperationEnabled,
-    /// Stops, or stands still, after a quick stop.
+    /// Stopping or at standstill after a quick stop.
     QuickStopActive,
-    /// Stops because of a fault.
+    /// Stopping because of a fault.
     FaultReactionActive,
     /// Waits for a fault reset.
     Fault,
 }
 
 impl DriveState {
-    /// Its bits in the statusword, under the mask 0x006F.
+    /// The state bits of the statusword, mask 0x006F.
     pub const fn status_bits(self) -> u16 {
         match self {
             DriveState::NotReadyToSwitchOn => 0x0000,
@@ -40,13 +40,13 @@ impl DriveState {
         }
     }
 
-    /// The power stage makes torque and the brake is open.
+    /// Whether the power stage produces torque and the brake is open.
     pub const fn has_torque(self) -> bool {
         matches!(self, DriveState::OperationEnabled | DriveState::QuickStopActive | DriveState::FaultReactionActive)
     }
 }
 
-/// What a controlword asks for.
+/// Command in a controlword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriveCommand {
     /// Power off at once.
@@ -56,7 +56,7 @@ pub enum DriveCommand {
     QuickStop,
     /// Ready to switch on.
     Shutdown,
-    /// Switched on; out of operation: disable operation.
+    /// Switched on; from operation: disable operation.
     SwitchOn,
     /// Follow the targets.
     EnableOperation,
@@ -75,13 +75,13 @@ impl DriveCommand {
     }
 }
 
-/// The state after a command. One controlword makes one transition: enable operation leads from ready to switch on to
-/// switched on, and with the next controlword on.
+/// The state after a command. One controlword causes one transition: enable operation changes from ready to switch on
+/// to switched on, and the next controlword to operation.
 pub const fn next(state: DriveState, command: DriveCommand) -> DriveState {
     use DriveCommand as C;
     use DriveState as S;
     match (state, command) {
-        // 0, 1, 13, 14 come from inside, 15 from the fault reset.
+        // Transitions 0, 1, 13, 14 are internal, 15 is the fault reset.
         (S::NotReadyToSwitchOn | S::FaultReactionActive | S::Fault, _) => state,
         (S::SwitchOnDisabled, C::Shutdown) => S::ReadyToSwitchOn, // 2
         (S::SwitchOnDisabled, _) => S::SwitchOnDisabled,
@@ -91,7 +91,7 @@ pub const fn next(state: DriveState, command: DriveCommand) -> DriveState {
         (S::SwitchedOn, C::SwitchOn) => S::SwitchedOn,
         (S::SwitchedOn, C::Shutdown) => S::ReadyToSwitchOn, // 6
         (S::ReadyToSwitchOn | S::SwitchedOn, C::QuickStop | C::DisableVoltage) => S::SwitchOnDisabled, // 7, 10
-        // 5 and 8 are due as soon as the motor has stopped as option codes 0x605C and 0x605B say.
+        // 5 and 8 are due as soon as the motor has stopped according to option codes 0x605C and 0x605B.
         (S::OperationEnabled, C::EnableOperation | C::SwitchOn | C::Shutdown) => S::OperationEnabled,
         (S::OperationEnabled | S::QuickStopActive, C::DisableVoltage) => S::SwitchOnDisabled, // 9, 12
         (S::OperationEnabled, C::QuickStop) => S::QuickStopActive,                            // 11

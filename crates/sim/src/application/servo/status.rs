@@ -16,7 +16,7 @@ impl Servo {
     pub(super) fn is_in_window(&self) -> bool {
         let p = &self.parameters;
         match self.mode {
-            _ if self.controlword & HALT != 0 => self.stands_still(),
+            _ if self.controlword & HALT != 0 => self.is_at_standstill(),
             MODE_PROFILE_POSITION | MODE_CSP => self.goal.is_some_and(|goal| {
                 p.position_window.is_none_or(|window| (goal - self.motor.position).abs() <= window)
             }),
@@ -31,7 +31,9 @@ impl Servo {
         let window_time = match self.mode {
             MODE_PROFILE_POSITION | MODE_CSP => p.position_window_time,
             MODE_PROFILE_VELOCITY => p.velocity_window_time,
-            MODE_HOMING => return !matches!(self.homing, Homing::Stopping) && self.stands_still() && !self.is_homing(),
+            MODE_HOMING => {
+                return !matches!(self.homing, Homing::Stopping) && self.is_at_standstill() && !self.is_homing();
+            }
             _ => 0.0,
         };
         self.is_in_window() && self.settled >= window_time
@@ -62,7 +64,7 @@ impl Servo {
             | bit(bit_13, BIT_13)
     }
 
-    /// Fills in the inputs as they are now.
+    /// Updates the inputs.
     pub fn report(&mut self, now: SimTime, mapping: &Mapping, inputs: &mut [u8]) {
         self.advance(now);
         for entry in mapping.entries() {

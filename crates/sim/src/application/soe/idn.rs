@@ -1,4 +1,4 @@
-//! One IDN of a simulated drive: its elements, what may be written, procedure commands (protocol 6.6; IEC 61491).
+//! One IDN of a simulated drive: elements, write conditions, procedure commands (protocol 6.6; IEC 61491).
 
 use core::time::Duration;
 
@@ -11,29 +11,29 @@ use crate::time::SimTime;
 const SIGNED: u8 = 2;
 /// Value of a procedure command that is set and enabled.
 const COMMAND_START: u16 = 0x0003;
-/// Data states of a procedure command: not set, at work, done.
+/// Data states of a procedure command: not set, running, done.
 const STATE_VALID: u16 = 0x0000;
 const STATE_RUNNING: u16 = 0x0007;
 const STATE_DONE: u16 = 0x0003;
-/// Bytes of the two lengths before a list.
+/// Bytes of the two length fields before a list.
 const LIST_HEAD: usize = 4;
 
 /// An IDN with its elements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IdnObject {
-    /// Which one.
+    /// IDN.
     pub idn: Idn,
-    /// Name for people.
+    /// Name.
     pub name: String,
     /// Attribute.
     pub attribute: IdnAttribute,
-    /// Unit, where there is one.
+    /// Unit, if there is one.
     pub unit: Option<String>,
     /// Smallest and largest value of a number.
     pub range: Option<(i64, i64)>,
-    /// The value; a list without its two lengths.
+    /// The value; a list without its two length fields.
     pub value: Vec<u8>,
-    /// Most bytes of a list.
+    /// Maximum number of bytes of a list.
     capacity: usize,
     default: Option<Vec<u8>>,
     writable: bool,
@@ -74,29 +74,29 @@ impl IdnObject {
         IdnObject { attribute, value: value.into(), default: None, capacity, ..number }
     }
 
-    /// A procedure command that takes its time.
+    /// A procedure command with a duration.
     pub fn command(idn: Idn, name: &str, takes: Duration) -> IdnObject {
         let number = IdnObject::number(idn, name, 2, 0);
         let command = Some(Command { takes, until: None, state: STATE_VALID });
         IdnObject { attribute: number.attribute.command(), default: None, command, ..number }
     }
 
-    /// The same with a unit.
+    /// The same IDN with a unit.
     pub fn unit(self, unit: &str) -> IdnObject {
         IdnObject { unit: Some(unit.into()), ..self }
     }
 
-    /// The same, a number that is only written within this range.
+    /// The same IDN as a number that can only be written within this range.
     pub fn within(self, minimum: i64, maximum: i64) -> IdnObject {
         IdnObject { range: Some((minimum, maximum)), ..self }
     }
 
-    /// The same, never written.
+    /// The same IDN, not writable.
     pub fn read_only(self) -> IdnObject {
         IdnObject { writable: false, ..self }
     }
 
-    /// The same, with bits of the attribute set.
+    /// The same IDN with bits of the attribute set.
     pub fn with_attribute(self, bits: u32) -> IdnObject {
         IdnObject { attribute: IdnAttribute(self.attribute.0 | bits), ..self }
     }
@@ -162,7 +162,7 @@ impl IdnObject {
         Ok(())
     }
 
-    /// The value in the data, if it is one.
+    /// The value in the data, if it is valid.
     fn check(&self, data: &[u8]) -> Result<Vec<u8>, SoeErrorCode> {
         if let IdnLength::List(bytes) = self.attribute.length() {
             let (&[low, high, _, _], list) =
@@ -201,7 +201,7 @@ impl IdnObject {
         Ok(data.to_vec())
     }
 
-    /// A procedure command is set or taken back.
+    /// Sets or cancels a procedure command.
     fn steer(&mut self, value: &[u8], now: SimTime) -> Result<(), SoeErrorCode> {
         let Some(command) = &mut self.command else {
             return Ok(());
@@ -221,12 +221,12 @@ impl IdnObject {
         Ok(())
     }
 
-    /// When the procedure command that is at work ends.
+    /// Time at which a running procedure command ends.
     pub(super) fn running_until(&self) -> Option<SimTime> {
         self.command.and_then(|command| command.until)
     }
 
-    /// Ends the procedure command if it is due; true where it ended.
+    /// Ends the procedure command if it is due; true if it ended.
     pub(super) fn ends(&mut self, now: SimTime) -> bool {
         let Some(command) = &mut self.command else {
             return false;
@@ -246,7 +246,7 @@ impl IdnObject {
     }
 }
 
-/// Bytes with their number and the largest number of bytes before them.
+/// Bytes after their number and the maximum number of bytes.
 fn counted(bytes: &[u8], capacity: usize) -> Vec<u8> {
     let number = |length: usize| u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes();
     let mut data = number(bytes.len()).to_vec();

@@ -1,26 +1,26 @@
-//! The control loop behind DC_SYSTEM_TIME (protocol 7.2.1); `docs/dc.md` says which parts are documented and which are
-//! a model.
+//! The control loop of DC_SYSTEM_TIME (protocol 7.2.1); `docs/dc.md` states which parts are documented and which are a
+//! model.
 //!
-//! In: the difference between the local copy of the system time and the received one, at each write of 0x0910. Out: how
-//! the local clock is steered until the next sample, and the contents of 0x092C and 0x0932.
+//! Input: the difference between the local copy of the system time and the received time, at each write of 0x0910.
+//! Output: the correction of the local clock until the next sample, and the contents of 0x092C and 0x0932.
 
 use super::oscillator::FRACTION;
 
-/// The clock's own tick in nanoseconds: it is corrected by adding or leaving out one nanosecond in a tick.
+/// Tick of the clock in nanoseconds: the clock is corrected by adding or omitting one nanosecond in a tick.
 const TICK_NS: i128 = 10;
-/// Part of the filtered difference that is corrected in phase until the next sample, as a shift.
+/// Fraction of the filtered difference that is corrected in phase until the next sample, as a shift.
 const PHASE_SHIFT: u32 = 6;
-/// Part of the filtered difference, in nanoseconds, by which the speed counter difference moves per sample, as a shift
-/// to the left beside the depth of the speed filter to the right: 8 / 2^12.
+/// Fraction of the filtered difference, in nanoseconds, by which the speed counter difference changes per sample, as a
+/// left shift, in addition to the right shift by the depth of the speed filter: 8 / 2^12.
 const SPEED_SHIFT: u32 = 3;
-/// The speed counter difference moves by at most so much per sample.
+/// Maximum change of the speed counter difference per sample.
 const MAX_SPEED_STEP: i128 = 8;
 /// Limits of DC_SPEED_COUNTER_START.
 const START: (i128, i128) = (0x0080, 0x3FFF);
-/// Filter depths beyond this are no use: the filters are sums of 31 bits.
+/// Larger filter depths have no effect: the filters are sums of 31 bits.
 const MAX_DEPTH: u8 = 15;
 
-/// Registers that set the loop up.
+/// Registers of the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::controller) struct LoopSettings {
     /// DC_SPEED_COUNTER_START.
@@ -36,27 +36,27 @@ pub(in crate::controller) struct LoopSettings {
 pub(super) struct ControlLoop {
     /// Filtered difference in nanoseconds, with fraction. Positive: the local clock is ahead.
     mean: i128,
-    /// Speed counter difference, with fraction. Positive: the local period is too long, the clock is sped up.
+    /// Speed counter difference, with fraction. Positive: the local period is too long, the clock is accelerated.
     difference: i128,
 }
 
-/// How the clock is steered from one sample to the next.
+/// Correction of the clock from one sample to the next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Steering {
     /// Relative correction of the speed, as a fraction.
     numerator: i128,
     denominator: i128,
-    /// Nanoseconds, with fraction, that are added bit by bit.
+    /// Nanoseconds, with fraction, that are added gradually.
     phase: i128,
-    /// Nanoseconds of the clock for one nanosecond of phase.
+    /// Nanoseconds of the clock per nanosecond of phase correction.
     ns_per_phase_ns: i128,
 }
 
 impl Steering {
-    /// A clock that runs free.
+    /// No correction.
     pub const FREE: Steering = Steering { numerator: 0, denominator: 1, phase: 0, ns_per_phase_ns: 1 };
 
-    /// What is added while the free clock counts `counted`, with fraction.
+    /// Correction added while the free-running clock counts `counted`, with fraction.
     pub fn added(&self, counted: i128) -> i128 {
         let phase = (counted.max(0) / self.ns_per_phase_ns).min(self.phase.abs());
         counted * self.numerator / self.denominator + phase * self.phase.signum()
@@ -64,7 +64,7 @@ impl Steering {
 }
 
 impl ControlLoop {
-    /// Takes a sample: local copy minus received time, in nanoseconds with fraction.
+    /// Processes a sample: local copy minus received time, in nanoseconds with fraction.
     pub fn sample(&mut self, dt: i128, settings: LoopSettings) {
         let limit = limit(settings) << FRACTION;
         self.mean += (dt - self.mean) >> settings.difference_depth.min(MAX_DEPTH);
@@ -73,7 +73,7 @@ impl ControlLoop {
         self.difference = (self.difference - step.clamp(-most, most)).clamp(-limit, limit);
     }
 
-    /// How the clock is steered from now on.
+    /// The correction from now on.
     pub fn steering(&self, settings: LoopSettings) -> Steering {
         let start = start(settings);
         // deviation = Diff / (5 (Start + Diff + 2) (Start - Diff + 2)), with the fraction of Diff kept.
@@ -87,7 +87,7 @@ impl ControlLoop {
         }
     }
 
-    /// DC_SYSTEM_TIME_DIFFERENCE: magnitude, and bit 31 where the local copy is not behind.
+    /// DC_SYSTEM_TIME_DIFFERENCE: magnitude, and bit 31 if the local copy is not behind.
     pub fn difference_register(&self) -> u32 {
         let rounded = (self.mean + (1 << (FRACTION - 1))) >> FRACTION;
         let magnitude = rounded.unsigned_abs().min(0x7FFF_FFFF) as u32;
@@ -133,10 +133,10 @@ mod tests {
 
     // covers: 7.2.1
     #[test]
-    fn phase_is_corrected_by_one_nanosecond_in_start_ticks_and_no_further_than_asked() {
+    fn phase_is_corrected_by_one_nanosecond_per_start_ticks_up_to_its_amount() {
         let steering = ControlLoop { mean: 640 * NS, difference: 0 }.steering(RESET);
         let added = |us: i128| steering.added(us * 1_000 * NS) / NS;
-        // 4096 ticks of 10 ns for each nanosecond, 640 / 64 nanoseconds in all.
+        // 4096 ticks of 10 ns for each nanosecond, 640 / 64 nanoseconds in total.
         assert_eq!((added(205), added(410), added(10_000)), (-5, -10, -10));
     }
 

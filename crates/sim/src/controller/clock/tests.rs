@@ -1,4 +1,4 @@
-//! The clock by itself: drift, jitter, and the control loop closed around it (protocol 7.2.1).
+//! Tests of the clock: drift, jitter, and the closed control loop (protocol 7.2.1).
 
 use super::*;
 
@@ -10,7 +10,8 @@ fn drifting(ppm: i64) -> Clock {
     clock
 }
 
-/// Feeds the clock with ideal time every `period_ns` for `samples` samples; worst difference of the last tenth.
+/// Writes ideal time to the clock every `period_ns` for `samples` samples; returns the largest difference of the last
+/// tenth.
 fn follow(clock: &mut Clock, from: SimTime, period_ns: u64, samples: u64) -> (SimTime, i64) {
     let (mut now, mut worst) = (from, 0);
     let correction = 0u64.wrapping_sub(77);
@@ -37,12 +38,12 @@ fn a_drift_of_100_ppm_is_100_us_in_a_second() {
 
 // covers: 7.2, sim-clocks
 #[test]
-fn fifteen_thousand_fast_samples_take_any_drift_out() {
+fn fifteen_thousand_fast_samples_compensate_any_drift() {
     for ppm in [-100, -50, -1, 0, 10, 50, 100] {
         let mut clock = drifting(ppm);
         let (now, worst) = follow(&mut clock, SimTime::ZERO, 66_667, 15_000);
         assert!(worst <= 20, "{ppm} ppm: {worst} ns after a second");
-        // And at a cycle of 1 ms it stays so.
+        // At a cycle of 1 ms the difference stays within the limit.
         let (_, worst) = follow(&mut clock, now, 1_000_000, 5_000);
         assert!(worst <= 20, "{ppm} ppm: {worst} ns at 1 ms");
         let ppb = i64::from(clock.loop_registers().1) * 12;
@@ -61,7 +62,7 @@ fn one_sample_per_millisecond_is_enough_within_seconds() {
 
 // covers: 7.2.1
 #[test]
-fn a_restart_of_the_filters_forgets_the_drift() {
+fn a_restart_of_the_filters_clears_the_drift_compensation() {
     let mut clock = drifting(50);
     let (now, _) = follow(&mut clock, SimTime::ZERO, 66_667, 15_000);
     let before = clock.local(now);
@@ -72,7 +73,7 @@ fn a_restart_of_the_filters_forgets_the_drift() {
 
 // covers: 7.5, sim-clocks
 #[test]
-fn a_payload_of_zero_drags_the_clock_to_its_limit() {
+fn a_payload_of_zero_drives_the_clock_to_its_limit() {
     let mut clock = drifting(0);
     let mut now = SimTime(1_000_000_000);
     for _ in 0..1_000 {
@@ -83,7 +84,7 @@ fn a_payload_of_zero_drags_the_clock_to_its_limit() {
 }
 
 #[test]
-fn jitter_delays_a_stamp_by_up_to_its_bound_and_not_the_clock() {
+fn jitter_delays_a_time_stamp_up_to_its_limit_and_not_the_clock() {
     let errors = ClockErrors { receive_jitter: Duration::from_nanos(40), ..ClockErrors::default() };
     let clock = Clock::new(9, errors);
     let late: Vec<u64> =
@@ -95,7 +96,7 @@ fn jitter_delays_a_stamp_by_up_to_its_bound_and_not_the_clock() {
 }
 
 #[test]
-fn the_time_of_a_local_time_is_found() {
+fn a_local_time_is_converted_to_virtual_time() {
     let mut clock = drifting(100);
     let (now, _) = follow(&mut clock, SimTime::ZERO, 1_000_000, 50);
     let at = clock.when(clock.local(now) + 12_345_678, now);

@@ -1,30 +1,29 @@
-//! Kinds of logical datagrams that were compiled, and the moves of memory that each of them makes.
+//! Kinds of precomputed logical datagrams, and the memory moves of each.
 
 use ringcat_wire::command::Command;
 
-/// Number of datagrams remembered: those of a cycle.
+/// Number of stored datagrams: those of a cycle.
 const REMEMBERED: usize = 4;
 
-/// Most pieces of one.
+/// Maximum number of pieces of a datagram.
 pub(super) const PIECES: usize = 4;
 
-/// In place of a SyncManager's number: none is there.
+/// In place of a SyncManager number: no SyncManager.
 pub(super) const FREE: u8 = u8::MAX;
 
-/// In place of a SyncManager's number: it is the first byte of AL_STATUS, which MainDevices like to have with process
-/// data.
+/// In place of a SyncManager number: the first byte of AL_STATUS, which MainDevices often map with process data.
 pub(super) const AL_STATUS: u8 = u8::MAX - 1;
 
-/// A piece of a datagram's data and where it lies.
+/// A piece of a datagram's data and its address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Move {
     pub(super) write: bool,
-    /// SyncManager whose area it lies in, [`FREE`] or [`AL_STATUS`].
+    /// SyncManager of its area, [`FREE`] or [`AL_STATUS`].
     pub(super) sync_manager: u8,
     /// Offset in the datagram's data.
     pub(super) at: u16,
     pub(super) len: u16,
-    /// First byte by address.
+    /// Physical address of the first byte.
     pub(super) physical: u16,
 }
 
@@ -34,7 +33,7 @@ pub(super) struct Known {
     pub(super) command: Command,
     pub(super) address: u32,
     pub(super) len: u16,
-    /// Number of its moves; `None` where each datagram must be evaluated.
+    /// Number of moves; `None` if each datagram must be evaluated.
     pub(super) count: Option<u8>,
     pub(super) moves: [Move; PIECES],
 }
@@ -47,7 +46,7 @@ pub(in crate::controller) struct Compiled {
 }
 
 impl Compiled {
-    /// The results are no longer valid.
+    /// Discards the results.
     pub fn forget(&mut self) {
         self.known = [None; REMEMBERED];
     }

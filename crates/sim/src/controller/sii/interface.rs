@@ -1,4 +1,4 @@
-//! Activity of the SII interface, besides its registers.
+//! State of the SII interface in addition to its registers.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::time::SimTime;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Task {
     Idle,
-    /// Loading the configuration, for the first time since the reset or again.
+    /// Loading the configuration: the first time since the reset, or again.
     Load {
         first: bool,
     },
@@ -19,16 +19,16 @@ pub(super) enum Task {
     Write,
 }
 
-/// State of the interface beside its registers.
+/// State of the interface in addition to its registers.
 #[derive(Clone, Debug)]
 pub(in crate::controller) struct SiiInterface {
     pub(super) task: Task,
     pub(super) until: SimTime,
-    /// A command that was written in this frame.
+    /// A command written in this frame.
     pub(super) command: Option<SiiCommand>,
-    /// Bit 0 of SII_CONTROL, at hand for every frame.
+    /// Bit 0 of SII_CONTROL, cached for every frame.
     pub(super) write_enabled: bool,
-    /// Number and duration of the next commands with another duration.
+    /// Number and duration of the next commands with a different duration.
     pub(super) slow: (u32, Duration),
     /// Number and fault of the next failing writes.
     pub(super) spoilt: (u32, SpoiltWrite),
@@ -46,7 +46,7 @@ impl SiiInterface {
         }
     }
 
-    /// When the running command ends.
+    /// Time at which the running command ends.
     pub const fn deadline(&self) -> SimTime {
         self.until
     }

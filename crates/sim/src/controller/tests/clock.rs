@@ -17,14 +17,14 @@ fn latch(bench: &mut Bench, command: Command) -> SimFrame {
     bench.frame(&[(command, 0, 0x0900, &[0; 4])])
 }
 
-/// Local time at the first bit of a shortest frame whose last bit comes in now.
+/// Local time at the first bit of a shortest frame whose last bit arrives now.
 fn local_first_bit(bench: &Bench) -> u64 {
     bench.controller.local_time(SimTime(bench.now.0 - FIRST_BIT))
 }
 
 // covers: 3.12
 #[test]
-fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at() {
+fn a_write_to_0x0900_latches_every_port_at_which_the_frame_arrives() {
     let mut bench = Bench::with(ControllerConfig { clock_start: 0xFFFF_F000, clock_errors: drift(20_000), ..config() });
     bench.link(Port::B, true);
     let mut frame = latch(&mut bench, Command::Bwr);
@@ -43,7 +43,7 @@ fn a_write_to_0x0900_latches_every_port_the_frame_comes_in_at() {
 
 // covers: 3.12, sim-clocks
 #[test]
-fn only_bwr_and_fpwr_latch_though_others_count() {
+fn only_bwr_and_fpwr_latch_although_others_increment_the_counter() {
     let mut bench = Bench::new();
     for command in [Command::Apwr, Command::Brw, Command::Aprw, Command::Armw, Command::Frmw, Command::Fprw] {
         let mut frame = latch(&mut bench, command);
@@ -67,7 +67,7 @@ fn a_damaged_frame_latches_nothing() {
 
 // covers: 7.1
 #[test]
-fn a_frame_entering_at_port_1_is_latched_where_it_came_in() {
+fn a_frame_entering_at_port_1_is_latched_at_port_1() {
     for (latch_mode, expected) in [(false, true), (true, false)] {
         let mut bench = Bench::with(ControllerConfig { receive_time_latch_mode: latch_mode, ..config() });
         bench.link(Port::A, false);
@@ -93,14 +93,14 @@ fn system_time_is_local_time_plus_offset_at_the_start_of_the_frame() {
     let expected = local_first_bit(&bench) + 0x0011_2233_4455_6677;
     assert_eq!((data, wkc), (expected.to_le_bytes().to_vec(), 1));
     assert_eq!(bench.controller.system_time(SimTime(bench.now.0 - FIRST_BIT)), expected);
-    // The PDI reads it when it reads it.
+    // The PDI reads the time of its read.
     let now = bench.controller.system_time(bench.now);
     assert_eq!(bench.pdi_read(0x0910, 8), Some(now.to_le_bytes().to_vec()));
 }
 
 // covers: 3.12
 #[test]
-fn a_negative_offset_is_one_in_twos_complement() {
+fn a_negative_offset_is_in_twos_complement() {
     let mut bench = Bench::new();
     let local = bench.controller.local_time(bench.now);
     bench.write(0x0920, &(-1_000i64).to_le_bytes());
@@ -109,7 +109,7 @@ fn a_negative_offset_is_one_in_twos_complement() {
 
 // covers: 3.12
 #[test]
-fn a_write_to_system_time_counts_and_is_not_stored() {
+fn a_write_to_system_time_increments_the_counter_and_is_not_stored() {
     let mut bench = Bench::new();
     assert_eq!(bench.one((Command::Frmw, 0x7777, 0x0910, &[9; 8])).1, 1);
     assert_eq!(u64::from_le_bytes(bench.read(0x0910, 8).0.try_into().unwrap()), local_first_bit(&bench));
@@ -117,7 +117,7 @@ fn a_write_to_system_time_counts_and_is_not_stored() {
 
 // covers: 3.12, sim-clocks
 #[test]
-fn a_32_bit_clock_answers_four_bytes_and_one_without_clock_none() {
+fn a_32_bit_clock_has_four_bytes_and_a_controller_without_clock_none() {
     let mut config = config();
     config.features.dc_64bit = false;
     let mut bench = Bench::with(ControllerConfig { clock_start: 0x1_0000_0000, ..config.clone() });
@@ -149,7 +149,7 @@ fn the_loop_takes_its_sample_at_the_start_of_a_good_frame() {
     assert_eq!(bench.register(0x092C), 0u32.to_le_bytes());
     bench.now.0 -= 10_000;
     assert_eq!(bench.one((Command::Frmw, 0x7777, 0x0910, &payload)).1, 1);
-    // 1,600 ns ahead of what was received plus the delay; a sixteenth of it is in the mean.
+    // 1,600 ns ahead of the received time plus the delay; a sixteenth of it is in the mean.
     assert_eq!(bench.register(0x092C), (0x8000_0000u32 | 100).to_le_bytes());
     bench.write(0x0930, &0x1000u16.to_le_bytes());
     assert_eq!(bench.register(0x092C), [0; 4]);
@@ -158,7 +158,7 @@ fn the_loop_takes_its_sample_at_the_start_of_a_good_frame() {
 
 // covers: 7.5
 #[test]
-fn the_addressed_controller_of_a_multiple_write_does_not_move_itself() {
+fn the_addressed_controller_of_a_multiple_write_does_not_correct_itself() {
     let mut bench = Bench::new();
     for _ in 0..50 {
         assert_eq!(bench.one((Command::Armw, 0, 0x0910, &[0; 8])).1, 1);
@@ -168,7 +168,7 @@ fn the_addressed_controller_of_a_multiple_write_does_not_move_itself() {
 
 // covers: 7.3, sim-clocks
 #[test]
-fn sync0_comes_at_its_start_time_in_system_time() {
+fn sync0_occurs_at_its_start_time_in_system_time() {
     for bits64 in [true, false] {
         let mut config = config();
         config.features.dc_64bit = bits64;
@@ -196,13 +196,13 @@ fn sync0_comes_at_its_start_time_in_system_time() {
 
 // covers: 3.12, sim-clocks
 #[test]
-fn edges_at_latch_pins_leave_their_time() {
+fn edges_at_latch_pins_are_time_stamped() {
     let mut bench = Bench::new();
     bench.write(0x09A8, &[0x01]);
     let first = bench.controller.system_time(bench.now);
     bench.controller.latch_edge(LatchPin::Latch0, true, bench.now);
     bench.wait(Duration::from_micros(50));
-    // A single event keeps its first time until it is read; the other edge has no such limit.
+    // A single event keeps its first time until it is read; the other edge is not limited.
     bench.controller.latch_edge(LatchPin::Latch0, true, bench.now);
     bench.controller.latch_edge(LatchPin::Latch0, false, bench.now);
     let second = bench.controller.system_time(bench.now);
@@ -225,7 +225,7 @@ fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status(
     bench.write(0x0981, &[0x07]);
     assert_eq!(bench.read(0x098E, 2).0, [0, 0]);
     bench.wait(Duration::from_micros(5_100));
-    assert_eq!(bench.read(0x098E, 2).0, [1, 0], "EtherCAT reads it and changes nothing");
+    assert_eq!(bench.read(0x098E, 2).0, [1, 0], "a read by EtherCAT changes nothing");
     assert_eq!(bench.pdi_read(0x098E, 1), Some(vec![1]));
     assert_eq!(bench.pdi_read(0x098E, 1), Some(vec![0]));
     bench.wait(Duration::from_millis(1));
@@ -234,7 +234,7 @@ fn a_sync_signal_without_a_pulse_length_stays_until_the_pdi_has_read_its_status(
 
 // covers: 3.12, sim-clocks
 #[test]
-fn the_start_time_activates_a_sync_unit_that_waits_for_it() {
+fn a_write_to_the_start_time_activates_a_waiting_sync_unit() {
     for (bits64, activation) in [(true, 0x0A), (true, 0x1A), (false, 0x0A)] {
         let mut config = config();
         config.features.dc_64bit = bits64;
@@ -250,14 +250,14 @@ fn the_start_time_activates_a_sync_unit_that_waits_for_it() {
             bench.write(0x0990, &start.to_le_bytes());
         }
         assert_eq!((bench.register(0x0984), bench.register(0x0981)), ([1], [activation | 1]));
-        let first = bench.controller.next_sync0(bench.now).expect("it comes");
+        let first = bench.controller.next_sync0(bench.now).expect("SYNC0 is active");
         assert_eq!(bench.controller.system_time(first), start);
     }
 }
 
 // covers: 3.12, sim-clocks
 #[test]
-fn buffer_changes_of_sync_managers_leave_their_time() {
+fn buffer_changes_of_sync_managers_are_time_stamped() {
     let mut bench = Bench::with(ControllerConfig { clock_start: 77, ..config() });
     bench.write(0x0810, &[0x00, 0x11, 4, 0, 0x24, 0, 1, 0]);
     let time = |bench: &Bench, at: u16| u32::from_le_bytes(bench.register(at));

@@ -4,7 +4,7 @@ use super::*;
 
 // covers: 1.4
 #[test]
-fn auto_increment_meets_zero_only_and_counts_up() {
+fn auto_increment_matches_zero_only_and_counts_up() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Aprd, 0, 0x0000, &[0xEE]), (Command::Aprd, 0xFFFF, 0x0000, &[0xEE])]);
     bench.receive(&mut frame, Port::A);
@@ -30,7 +30,7 @@ fn broadcasts_count_up_and_combine_by_or() {
 
 // covers: 1.4
 #[test]
-fn brw_writes_what_came_in_and_returns_the_or_with_the_old_value() {
+fn brw_writes_the_received_data_and_returns_the_or_with_the_old_value() {
     let mut bench = Bench::new();
     bench.write(0x0F80, &[0x0F]);
     assert_eq!(bench.one((Command::Brw, 0, 0x0F80, &[0x30])), (vec![0x3F], 3));
@@ -65,7 +65,7 @@ fn read_write_takes_the_old_value_and_counts_3() {
     bench.write(0x0F90, &[1, 2]);
     assert_eq!(bench.one((Command::Aprw, 0, 0x0F90, &[3, 4])), (vec![1, 2], 3));
     assert_eq!(bench.one((Command::Fprw, 0, 0x0F90, &[5, 6])), (vec![3, 4], 3));
-    // Read-only registers count the read alone, write-only ones the write alone.
+    // Read-only registers increment for the read only, write-only ones for the write only.
     assert_eq!(bench.one((Command::Aprw, 0, 0x0000, &[0x55])), (vec![0x11], 1));
 }
 
@@ -104,12 +104,12 @@ fn nop_and_reserved_commands_change_nothing() {
 
 // covers: 1.4, sim-controller
 #[test]
-fn bytes_that_are_not_there_change_nothing_but_the_others_count() {
+fn bytes_that_do_not_exist_change_nothing_but_the_others_count() {
     let mut bench = Bench::new();
     // 0x000A..0x000F do not exist.
     assert_eq!(bench.one((Command::Aprd, 0, 0x0009, &[0xEE, 0xEE])), (vec![0x00, 0xEE], 1));
     assert_eq!(bench.one((Command::Aprd, 0, 0x000A, &[0xEE, 0xEE])), (vec![0xEE, 0xEE], 0));
-    // AL status cannot be written, the station address before the alias can.
+    // AL status cannot be written; the station address at the beginning of the second write can.
     assert_eq!(bench.write(0x0130, &[4, 0]), 0);
     assert_eq!(bench.write(0x0010, &[1, 0, 0xAA, 0xAA]), 1);
     assert_eq!(bench.register(0x0010), [1, 0, 0x34, 0x12]);
@@ -120,7 +120,7 @@ fn bytes_that_are_not_there_change_nothing_but_the_others_count() {
 
 // covers: 1.4
 #[test]
-fn lrw_and_brw_do_nothing_where_the_features_say_so() {
+fn lrw_and_brw_do_nothing_if_the_features_exclude_them() {
     let mut config = config();
     (config.features.brw_unsupported, config.features.lrw_unsupported) = (true, true);
     let mut bench = Bench::with(config);
@@ -143,7 +143,7 @@ fn the_working_counter_wraps() {
 
 // covers: 2.5, sim-controller
 #[test]
-fn registers_take_over_at_the_end_of_the_frame() {
+fn register_writes_take_effect_at_the_end_of_the_frame() {
     let mut bench = Bench::new();
     bench.write(0x0010, &[5, 0]);
     let answers = bench.exchange(&[(Command::Bwr, 0, 0x0010, &[6, 0]), (Command::Brd, 0, 0x0010, &[0, 0])]);
@@ -162,7 +162,7 @@ fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram() {
     ]);
     assert!(answers.iter().all(|answer| answer.1 == 1));
     assert_eq!((bench.register(0x0010), bench.register(0x0F80), bench.register(0x1000)), ([0, 0], [1], [2]));
-    // The read of DL status has to leave its event.
+    // The read of DL status must not clear its event.
     assert_eq!(bench.register(0x0210), [0x04, 0x00]);
     bench.damaged(&[(Command::Brd, 0, 0x0110, &[0, 0])]);
     assert_eq!(bench.register(0x0210), [0x04, 0x00]);
@@ -172,7 +172,7 @@ fn a_bad_fcs_has_no_side_effects_on_registers_but_on_ram() {
 
 // covers: 2.5
 #[test]
-fn a_frame_whose_last_datagram_leaves_it_is_an_epu_error_without_effects() {
+fn a_frame_with_a_datagram_beyond_its_end_is_an_epu_error_without_effects() {
     let mut bench = Bench::new();
     let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0010, &[5, 0]), (Command::Nop, 0, 0, &[0; 30])]);
     let header = usize::from(frame.datagrams[1].header);

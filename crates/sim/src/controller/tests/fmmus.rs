@@ -13,7 +13,7 @@ fn fmmu(logical: u16, length: u16, bits: (u8, u8), physical: (u16, u8), kind: u8
 
 // covers: 3.10, sim-controller
 #[test]
-fn fourteen_output_bits_go_to_their_place_and_no_further() {
+fn fourteen_output_bits_are_written_to_their_position_only() {
     let mut bench = Bench::new();
     // Logical 0x00010011 bit 3 to 0x0F01 bit 1; the data sheet's example.
     bench.write(0x0600, &[0x11, 0x00, 0x01, 0x00, 3, 0, 3, 0, 0x01, 0x0F, 1, 2, 1]);
@@ -57,7 +57,7 @@ fn lrw_counts_1_and_2_once_per_direction_not_per_fmmu() {
 
 // covers: 1.4
 #[test]
-fn lrw_writes_what_came_in_and_reads_what_was_there() {
+fn lrw_writes_the_received_data_and_reads_the_old_data() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[1, 2]);
     bench.write(0x0600, &fmmu(0, 2, (0, 7), (0x1000, 0), READ | WRITE));
@@ -67,7 +67,7 @@ fn lrw_writes_what_came_in_and_reads_what_was_there() {
 
 // covers: 3.10, sim-controller
 #[test]
-fn the_lower_numbered_fmmu_wins() {
+fn the_lower_numbered_fmmu_takes_precedence() {
     let mut bench = Bench::new();
     bench.write(0x1000, &[1, 2, 3, 4]);
     bench.write(0x0600, &fmmu(1, 1, (0, 7), (0x1003, 0), READ | WRITE));
@@ -113,7 +113,7 @@ fn fmmu_data_obeys_the_sync_manager() {
     let mut bench = Bench::new();
     bench.write(0x0800, &[0x00, 0x10, 4, 0, 0x24, 0, 1, 0]);
     bench.write(0x0600, &fmmu(0, 4, (0, 7), (0x1000, 0), WRITE));
-    // Two bytes from the second one on: the buffer was not begun.
+    // Two bytes from the second one on: the buffer was not opened.
     assert_eq!(bench.one((Command::Lwr, 1, 1, &[9, 9])).1, 0);
     assert_eq!(bench.one((Command::Lwr, 0, 1, &[1, 2, 3, 4])).1, 1);
     assert_eq!(bench.pdi_read(0x1000, 4), Some(vec![1, 2, 3, 4]));

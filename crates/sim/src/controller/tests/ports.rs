@@ -122,7 +122,7 @@ fn a_forced_open_port_sends_without_link() {
 
 // covers: 2.2
 #[test]
-fn a_forced_closed_port_takes_no_frames() {
+fn a_forced_closed_port_accepts_no_frames() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0x0C]);
     assert_eq!((pass(&mut bench, Port::A), pass(&mut bench, Port::B)), (leaves(Port::A, true), Passage::Destroyed));
@@ -130,7 +130,7 @@ fn a_forced_closed_port_takes_no_frames() {
 
 // covers: 2.2
 #[test]
-fn the_frame_that_closes_a_port_still_comes_back_through_it() {
+fn the_frame_that_closes_a_port_still_returns_through_it() {
     let mut bench = with_links(&[Port::A, Port::B]);
     let mut frame = bench.frame(&[(Command::Bwr, 0, 0x0101, &[0x0C])]);
     assert_eq!(bench.receive(&mut frame, Port::A), leaves(Port::B, true));
@@ -140,7 +140,7 @@ fn the_frame_that_closes_a_port_still_comes_back_through_it() {
 
 // covers: 2.2, sim-frames
 #[test]
-fn temporary_loops_return_after_a_second() {
+fn temporary_loops_end_after_a_second() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0100, &[0x03, 0x0C]);
     bench.wait(Duration::from_millis(999));
@@ -152,7 +152,7 @@ fn temporary_loops_return_after_a_second() {
 
 // covers: 2.2, sim-frames
 #[test]
-fn when_all_loops_are_closed_port_0_is_the_way_back_in() {
+fn when_all_loops_are_closed_port_0_is_the_return_path() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0101, &[0xFF]);
     assert_eq!(bench.register(0x0110), [0x37, 0x5F]);
@@ -198,7 +198,7 @@ fn port_0_closed_by_force_neither_marks_nor_destroys() {
 
 // covers: SM-06, 2.6, sim-frames
 #[test]
-fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest() {
+fn forwarding_rule_1_marks_ethercat_and_destroys_other_frames() {
     let mut bench = with_links(&[Port::A, Port::B]);
     let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0])]);
     bench.receive(&mut frame, Port::A);
@@ -206,7 +206,7 @@ fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest() {
     let mut other = foreign(&mut bench);
     assert_eq!(bench.receive(&mut other, Port::A), Passage::Destroyed);
     assert_eq!(bench.register(0x030C), [1]);
-    // Network variables pass, other protocols do in the direction without processing unit.
+    // Network variables are forwarded; other protocols are forwarded only in the direction without processing unit.
     let mut variables = bench.frame(&[(Command::Nop, 0, 0, &[0])]);
     variables.bytes[15] = 0x40;
     let mut variables = SimFrame::new(variables.id, variables.bytes);
@@ -217,7 +217,7 @@ fn forwarding_rule_1_marks_ethercat_and_destroys_the_rest() {
 
 // covers: 2.6, sim-frames
 #[test]
-fn forwarding_rule_0_passes_everything_unmarked() {
+fn forwarding_rule_0_forwards_all_frames_unmarked() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.write(0x0100, &[0x00]);
     let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0])]);
@@ -231,13 +231,13 @@ fn forwarding_rule_0_passes_everything_unmarked() {
 
 // covers: 2.5, sim-counters
 #[test]
-fn a_symbol_error_in_a_frame_is_counted_once_beside_the_frame() {
+fn a_symbol_error_in_a_frame_is_counted_once_in_addition_to_the_frame() {
     let (mut first, mut second) = (with_links(&[Port::A, Port::B]), with_links(&[Port::A, Port::B]));
     let mut frame = first.frame(&[(Command::Nop, 0, 0, &[0])]);
     (frame.fcs, frame.symbol_error) = (Fcs::Bad, true);
     first.receive(&mut frame, Port::A);
     second.receive(&mut frame, Port::A);
-    // On the cable back, another one in a frame that is damaged already.
+    // On the return path, another symbol error in a frame that is damaged already.
     frame.symbol_error = true;
     first.receive(&mut frame, Port::B);
     assert_eq!(first.register(0x0300), [1, 1, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0]);
@@ -256,7 +256,7 @@ fn the_first_controller_counts_an_invalid_frame_the_next_a_forwarded_error() {
     first.receive(&mut frame, Port::B);
     assert_eq!(first.register(0x0300), [1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0]);
     assert_eq!(second.register(0x0300), [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
-    // A write to any clears the group, and stores nothing.
+    // A write to any counter clears the group and stores nothing.
     assert_eq!(first.write(0x0305, &[0x77]), 1);
     assert_eq!(first.register(0x0300), [0; 12]);
 }
@@ -280,7 +280,7 @@ fn a_lost_link_counts_in_mode_auto_only_and_stops_at_255() {
 
 // covers: 2.5, sim-counters
 #[test]
-fn groups_of_counters_are_cleared_apart() {
+fn groups_of_counters_are_cleared_separately() {
     let mut bench = with_links(&[Port::A]);
     let mut other = foreign(&mut bench);
     bench.receive(&mut other, Port::A);
@@ -292,7 +292,7 @@ fn groups_of_counters_are_cleared_apart() {
 
 // covers: 2.5, sim-counters
 #[test]
-fn pdi_errors_count_beside_their_code_and_any_write_clears_both() {
+fn pdi_errors_are_counted_with_their_code_and_any_write_clears_both() {
     let mut bench = with_links(&[Port::A]);
     bench.controller.count_pdi_error(0x04);
     bench.controller.count_pdi_error(0x21);
@@ -307,7 +307,7 @@ fn pdi_errors_count_beside_their_code_and_any_write_clears_both() {
 
 // covers: 2.8, sim-counters
 #[test]
-fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says() {
+fn dl_status_shows_enhanced_link_detection_of_the_eeprom() {
     for (configuration, shown) in [(0x00, 0), (0x01, 0), (0x02, 4), (0x10, 4), (0x80, 4), (0x0C, 0)] {
         let mut sii = image();
         sii[1] = configuration;
@@ -324,7 +324,7 @@ fn dl_status_shows_enhanced_link_detection_as_the_eeprom_says() {
 
 // covers: 3.9, sim-counters
 #[test]
-fn registers_that_are_not_modelled_do_not_answer() {
+fn registers_that_are_not_modelled_are_not_accessible() {
     let mut bench = with_links(&[Port::A]);
     assert_eq!(bench.read(0x0510, 12).1, 0, "MII management");
     assert_eq!(bench.write(0x0510, &[0, 1]), 0);
@@ -332,7 +332,7 @@ fn registers_that_are_not_modelled_do_not_answer() {
 }
 
 #[test]
-fn without_power_frames_end_and_links_are_gone() {
+fn without_power_frames_are_lost_and_links_are_down() {
     let mut bench = with_links(&[Port::A, Port::B]);
     bench.controller.power_off(bench.now);
     assert_eq!(pass(&mut bench, Port::A), Passage::Destroyed);
@@ -343,8 +343,8 @@ fn without_power_frames_end_and_links_are_gone() {
 
 // covers: 2.4
 #[test]
-fn a_remnant_that_can_carry_no_c_bit_ends_where_port_0_has_closed() {
-    // A cable was cut while the frame passed; in a loop of controllers the remnant would travel for ever.
+fn a_remnant_without_a_c_bit_ends_at_an_auto_closed_port_0() {
+    // A cable was cut while the frame passed; in a loop of controllers the remnant would circulate endlessly.
     let mut bench = with_links(&[Port::B, Port::D]);
     let mut frame = bench.frame(&[(Command::Brd, 0, 0, &[0])]);
     frame.truncate(20);

@@ -1,9 +1,9 @@
-//! Properties of any frame: no panic, and only fields that a controller may change are changed (protocol 1.5).
+//! Properties for any frame: no panic, and only fields that a controller may change are changed (protocol 1.5).
 
 use super::*;
 use proptest::prelude::*;
 
-/// Any frame: noise, or EtherCAT with datagrams whose addresses are often where something is.
+/// Any frame: noise, or EtherCAT with datagrams that often address existing registers.
 fn frames() -> impl Strategy<Value = Vec<u8>> {
     let address = prop_oneof![0u16..0x0200, 0x0300u16..0x0A00, 0x0F00u16..0x1040, any::<u16>()];
     let adp = prop_oneof![Just(0u16), any::<u16>()];
@@ -28,7 +28,7 @@ fn fcs() -> impl Strategy<Value = Fcs> {
     prop_oneof![4 => Just(Fcs::Good), 1 => Just(Fcs::Bad), 1 => Just(Fcs::Marked)]
 }
 
-/// Clears what a processing unit may change, so that the rest can be compared.
+/// Clears the fields that a processing unit may change, so that the rest can be compared.
 fn fixed_part(frame: &SimFrame) -> Vec<u8> {
     let mut bytes = frame.bytes.clone();
     if bytes.len() > 6 {
@@ -58,7 +58,7 @@ proptest! {
 
     // covers: 1.5
     #[test]
-    fn any_frames_pass_without_panic_and_keep_what_is_not_the_controllers(
+    fn any_frames_pass_without_panic_and_keep_all_other_fields(
         run in prop::collection::vec((frames(), fcs(), 0usize..4, any::<bool>()), 1..40),
         links in any::<[bool; 4]>(),
     ) {
@@ -87,7 +87,7 @@ proptest! {
 
     // covers: 2.1
     #[test]
-    fn a_frame_ends_or_meets_the_processing_unit_at_most_once(
+    fn a_frame_ends_or_passes_the_processing_unit_at_most_once(
         links in any::<[bool; 4]>(),
         loops in any::<u8>(),
         port in 0usize..4,

@@ -13,13 +13,13 @@ fn protected_registers_need_the_enable_in_the_same_frame() {
     assert_eq!([answers[0].1, answers[1].1, answers[2].1], [0, 1, 1]);
     assert_eq!(bench.register(0x0010), [7, 0]);
     assert_eq!(bench.write(0x0010, &[5, 0]), 0);
-    // Memory from 0x0F80 on is not concerned.
+    // The protection does not cover memory from 0x0F80 on.
     assert_eq!((bench.write(0x0F7F, &[1]), bench.write(0x0F80, &[1]), bench.write(0x1000, &[1])), (0, 1, 1));
 }
 
 // covers: 3.2, sim-controller
 #[test]
-fn esc_protection_concerns_all_memory() {
+fn esc_protection_covers_all_memory() {
     let mut bench = Bench::new();
     bench.write(0x0031, &[1]);
     assert_eq!((bench.write(0x0010, &[5, 0]), bench.write(0x0F80, &[1]), bench.write(0x1000, &[1])), (0, 0, 0));

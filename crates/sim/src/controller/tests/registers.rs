@@ -15,7 +15,7 @@ fn information_registers_show_the_configuration() {
 
 // covers: 3
 #[test]
-fn ethercat_may_write_what_the_register_table_says() {
+fn ethercat_may_write_the_writable_registers_of_the_table() {
     for info in ringcat_wire::register::table().iter().filter(|info| info.group != RegisterGroup::Mii) {
         let config = ControllerConfig { receive_time_latch_mode: true, ..config() };
         let mut bench = Bench::with(config);
@@ -55,21 +55,21 @@ fn al_status_written_by_the_application_is_an_ecat_event_until_read() {
 
 // covers: 3.4, sim-states
 #[test]
-fn with_device_emulation_al_status_follows_at_once() {
+fn with_device_emulation_al_status_follows_al_control_at_once() {
     let mut sii = image();
     sii[1] |= 1;
     sign(&mut sii);
     let mut bench = Bench::with(ControllerConfig { sii, ..config() });
     bench.write(0x0120, &[0x02, 0x00]);
     assert_eq!((bench.register(0x0130), bench.controller.al_event()), ([0x02, 0x00], 0));
-    // The acknowledge bit shows up as the error bit.
+    // The acknowledge bit appears as the error bit.
     bench.write(0x0120, &[0x14, 0x00]);
     assert_eq!(bench.register(0x0130), [0x14, 0x00]);
 }
 
 // covers: 1.2, sim-controller
 #[test]
-fn events_go_into_every_datagram_where_the_mask_lets_them() {
+fn events_are_written_to_every_datagram_if_the_mask_enables_them() {
     let mut bench = Bench::new();
     let irq = |bench: &mut Bench| {
         let mut frame = bench.frame(&[(Command::Nop, 0, 0, &[0]), (Command::Aprd, 5, 0, &[0])]);
@@ -130,7 +130,7 @@ fn res_in_one_frame_or_with_a_wrong_letter_resets_nothing() {
         bench.write(0x0040, letter);
     }
     assert_eq!((bench.controller.starts(), bench.register(0x0040)), (starts, [0]));
-    // The PDI has its own.
+    // The PDI has its own reset register.
     for letter in [b"R", b"E", b"S"] {
         bench.pdi_write(0x0041, letter);
     }

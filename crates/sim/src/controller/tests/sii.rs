@@ -10,7 +10,7 @@ fn status(bench: &mut Bench) -> [u8; 2] {
 
 // covers: 3.8
 #[test]
-fn a_read_is_busy_and_then_yields_eight_bytes() {
+fn a_read_is_busy_and_then_returns_eight_bytes() {
     let mut bench = Bench::new();
     assert_eq!(bench.write(0x0502, &[0x00, 0x01, 0x08, 0, 0, 0]), 1);
     assert_eq!(status(&mut bench), [0x40, 0x81]);
@@ -21,7 +21,7 @@ fn a_read_is_busy_and_then_yields_eight_bytes() {
 
 // covers: 3.8
 #[test]
-fn a_controller_with_short_reads_yields_four_bytes() {
+fn a_controller_with_short_reads_returns_four_bytes() {
     let mut bench = Bench::with(ControllerConfig { eight_byte_reads: false, ..config() });
     bench.write(0x0502, &[0x00, 0x01, 0x08, 0, 0, 0]);
     bench.wait(BUSY);
@@ -60,7 +60,7 @@ fn a_write_without_enable_is_an_error_until_the_next_command() {
     assert_eq!(status(&mut bench), [0x40, 0x40]);
     bench.write(0x0502, &[0x00, 0x00]);
     assert_eq!(status(&mut bench), [0x40, 0x00]);
-    // The enable does not last until the next frame, even when that brings the command alone.
+    // The enable does not last until the next frame, even if that contains only the command.
     bench.write(0x0502, &[0x01]);
     bench.write(0x0503, &[0x02]);
     assert_eq!(status(&mut bench), [0x40, 0x40]);
@@ -90,7 +90,7 @@ fn a_damaged_frame_starts_no_command() {
 
 // covers: 3.8, sim-controller
 #[test]
-fn the_pdi_takes_what_is_offered_and_can_be_forced_out() {
+fn the_pdi_takes_the_offered_eeprom_and_loses_it_by_force() {
     let mut bench = Bench::new();
     bench.pdi_write(0x0501, &[1]);
     assert_eq!(bench.register(0x0501), [0]);
@@ -104,7 +104,7 @@ fn the_pdi_takes_what_is_offered_and_can_be_forced_out() {
     assert_eq!(bench.controller.next_deadline(), Some(bench.now + BUSY));
     bench.wait(BUSY);
     assert_eq!(bench.controller.sii_image()[16..18], [0x99, 0x99]);
-    // Taking back the offer alone does not help, force does.
+    // Withdrawing the offer has no effect, force has.
     bench.write(0x0500, &[0]);
     assert_eq!(bench.write(0x0504, &[1]), 0);
     bench.write(0x0500, &[2]);
@@ -114,7 +114,7 @@ fn the_pdi_takes_what_is_offered_and_can_be_forced_out() {
 
 // covers: 4.7
 #[test]
-fn loading_takes_over_the_configuration_area() {
+fn loading_applies_the_configuration_area() {
     let bench = Bench::new();
     assert_eq!(bench.register(0x0140), [0x05, 0x0E]);
     assert_eq!((bench.register(0x0150), bench.register(0x0982)), ([0x03, 0x44], [0x64, 0x00]));

@@ -1,4 +1,4 @@
-//! SyncManagers seen from both sides (protocol 3.5, 3.11).
+//! SyncManagers from both sides (protocol 3.5, 3.11).
 
 use super::*;
 
@@ -55,7 +55,7 @@ fn a_mailbox_write_has_to_reach_the_last_byte() {
     assert_eq!(bench.register(0x0805), [0x80]);
     assert_eq!(bench.write(0x100F, &[9]), 1);
     assert_eq!(bench.register(0x0805), [0x09]);
-    // Not begun at the first byte: no access.
+    // No access, because it does not begin at the first byte.
     bench.pdi_read(0x1000, 16);
     assert_eq!(bench.write(0x1004, &[1; 12]), 0);
     assert_eq!(bench.register(0x0805), [0x02]);
@@ -91,7 +91,7 @@ fn the_reader_always_gets_the_last_complete_buffer() {
     assert_eq!(bench.pdi_read(0x1100, 4), None);
     for value in 1..=5 {
         assert_eq!(bench.write(0x1100, &[value; 4]), 1);
-        // Damaged or incomplete data is never seen.
+        // Damaged or incomplete data is never read.
         bench.damaged(&[(Command::Apwr, 0, 0x1100, &[0xBB; 4])]);
         assert_eq!(bench.write(0x1100, &[0xCC; 3]), 1);
         assert_eq!(bench.pdi_read(0x1100, 4), Some(vec![value; 4]));
@@ -104,17 +104,17 @@ fn the_reader_always_gets_the_last_complete_buffer() {
 
 // covers: 3.1, 3.11, sim-controller
 #[test]
-fn sequential_mode_is_not_announced_and_its_bit_changes_nothing() {
+fn sequential_mode_is_no_feature_and_its_bit_changes_nothing() {
     let mut bench = buffers();
     let [features] = bench.register(0x0009);
-    assert_eq!(features & 0x10, 0, "controllers may have it and say so; this one does not");
+    assert_eq!(features & 0x10, 0, "the feature is not declared");
     bench.write(0x0814, &[0xA4]);
     bench.write(0x081C, &[0xA0]);
     assert_eq!((bench.register(0x0814), bench.register(0x081C)), ([0xA4], [0xA0]));
     for value in 1..=5 {
         assert_eq!(bench.write(0x1100, &[value; 4]), 1);
         assert_eq!(bench.write(0x1100, &[value + 10; 4]), 1);
-        assert_eq!(bench.pdi_read(0x1100, 4), Some(vec![value + 10; 4]), "the last one, whatever was read");
+        assert_eq!(bench.pdi_read(0x1100, 4), Some(vec![value + 10; 4]), "the last value, independent of reads");
         assert!(bench.pdi_write(0x1180, &[value; 4]) && bench.pdi_write(0x1180, &[value + 20; 4]));
         assert_eq!(bench.read(0x1180, 4), (vec![value + 20; 4], 1));
     }
@@ -122,7 +122,7 @@ fn sequential_mode_is_not_announced_and_its_bit_changes_nothing() {
 
 // covers: 3.11
 #[test]
-fn inputs_that_were_never_written_are_not_there() {
+fn inputs_that_were_never_written_cannot_be_read() {
     let mut bench = buffers();
     assert_eq!(bench.register(0x081D), [0x30]);
     assert_eq!(bench.read(0x1180, 4).1, 0);
@@ -146,7 +146,7 @@ fn the_area_of_a_deactivated_sync_manager_is_locked() {
     bench.write(0x0816, &[0]);
     assert_eq!((bench.write(0x1100, &[2; 4]), bench.read(0x1100, 4).1), (0, 0));
     assert_eq!(bench.pdi_read(0x1100, 4), None);
-    // Activated again it starts empty.
+    // After activation it is empty.
     bench.write(0x0816, &[1]);
     assert_eq!(bench.pdi_read(0x1100, 4), None);
     assert!(bench.pdi_write(0x0817, &[1]));
@@ -204,7 +204,7 @@ fn an_activation_change_is_an_al_event_until_the_pdi_reads_the_register() {
 
 // covers: 6.2, sim-controller
 #[test]
-fn toggling_repeat_keeps_what_the_mailbox_holds() {
+fn toggling_repeat_keeps_the_content_of_the_mailbox() {
     let mut bench = mailboxes();
     bench.pdi_write(0x1080, &[7; 16]);
     bench.write(0x080E, &[0x03]);
@@ -213,7 +213,7 @@ fn toggling_repeat_keeps_what_the_mailbox_holds() {
 
 // covers: 3.5, sim-controller
 #[test]
-fn ecat_events_mirror_sync_managers_that_ask_for_it() {
+fn ecat_events_mirror_sync_managers_that_enable_them() {
     let mut bench = Bench::new();
     bench.write(0x0808, &[0x80, 0x10, 16, 0, 0x12, 0, 1, 0]);
     bench.read(0x0110, 2);

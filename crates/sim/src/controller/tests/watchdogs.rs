@@ -77,7 +77,7 @@ fn the_counters_are_cleared_together_and_stop_at_255() {
 
 // covers: 3.7
 #[test]
-fn the_pdi_watchdog_runs_from_when_the_application_stops() {
+fn the_pdi_watchdog_starts_when_the_application_stops() {
     let mut bench = Bench::new();
     assert_eq!(bench.register::<2>(0x0110)[0] & 2, 2);
     bench.controller.set_pdi_alive(false, bench.now);

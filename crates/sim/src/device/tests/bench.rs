@@ -1,4 +1,4 @@
-//! One device on a bench: sends datagrams to it and lets virtual time pass.
+//! A test bench for one device: sends datagrams to it and advances virtual time.
 
 use core::time::Duration;
 
@@ -26,7 +26,7 @@ pub struct Bench {
     pub device: Device,
     pub now: SimTime,
     frames: u64,
-    /// Use the mailboxes of BOOT, not those of PREOP.
+    /// Use the mailboxes of BOOT instead of those of PREOP.
     bootstrap: bool,
 }
 
@@ -36,7 +36,7 @@ impl Bench {
         Bench::new(catalogue::by_name(name).unwrap())
     }
 
-    /// A device in INIT, its SII loaded.
+    /// A device in INIT with its SII loaded.
     pub fn new(description: DeviceDescription) -> Bench {
         let mut bench =
             Bench { device: Device::new(description), now: SimTime::from_millis(1), frames: 0, bootstrap: false };
@@ -44,7 +44,7 @@ impl Bench {
         bench
     }
 
-    /// Power and link come; the SII is loaded.
+    /// Switches power and link on; the SII is loaded.
     pub fn power_on(&mut self) {
         self.device.power_on(self.now);
         self.device.controller.link_changed(Port::A, true, self.now);
@@ -52,25 +52,25 @@ impl Bench {
         assert!(self.device.controller.pdi_operational());
     }
 
-    /// Power goes and comes again.
+    /// Switches the power off and on.
     pub fn power_cycle(&mut self) {
         self.device.power_off(self.now);
         self.now += Duration::from_millis(100);
         self.power_on();
     }
 
-    /// A device that has gone up to `state` with the right settings.
+    /// A device brought up to `state` with valid settings.
     pub fn up_to(description: DeviceDescription, state: AlState) -> Bench {
         let mut bench = Bench::new(description);
         bench.climb(state);
         bench
     }
 
-    /// Goes up to `state` with the right settings.
+    /// Brings the device up to `state` with valid settings.
     pub fn climb(&mut self, state: AlState) {
-        let way = [AlState::PreOp, AlState::SafeOp, AlState::Op];
-        let steps = way.iter().position(|step| *step == state).unwrap() + 1;
-        for step in &way[..steps] {
+        let states = [AlState::PreOp, AlState::SafeOp, AlState::Op];
+        let steps = states.iter().position(|step| *step == state).unwrap() + 1;
+        for step in &states[..steps] {
             match step {
                 AlState::PreOp => self.set_mailbox(),
                 AlState::SafeOp => self.set_process_data(),
@@ -82,7 +82,7 @@ impl Bench {
         }
     }
 
-    /// Sends one datagram and lets the device react.
+    /// Sends one datagram and runs the device.
     pub fn exchange(&mut self, command: Command, target: Target, data: &[u8]) -> (Vec<u8>, u16) {
         let mut buffer = vec![0; 1514];
         let source = MacAddress([0x0C, 0, 0, 0, 0, 1]);
@@ -168,12 +168,12 @@ impl Bench {
         self.status()
     }
 
-    /// From now on uses the mailboxes of BOOT, or those of PREOP.
+    /// Uses the mailboxes of BOOT, or those of PREOP, from now on.
     pub fn use_bootstrap(&mut self, bootstrap: bool) {
         self.bootstrap = bootstrap;
     }
 
-    /// A SyncManager as the description and the default assignment want it.
+    /// A SyncManager according to the description and the default assignment.
     pub fn right(&self, number: u8) -> SyncManager {
         let description = &self.device.description;
         let entry = description.sync_managers[usize::from(number)];
@@ -196,7 +196,7 @@ impl Bench {
         }
     }
 
-    /// Writes a SyncManager: switched off first, as its start and length can only be changed so.
+    /// Writes a SyncManager: disabled first, because its start and length are writable only then.
     pub fn set_sync_manager(&mut self, number: u8, manager: &SyncManager) {
         let address = map::sync_manager(number);
         self.write(address.offset(SyncManager::ACTIVATE), &[0]);
@@ -204,7 +204,7 @@ impl Bench {
         self.write(address.offset(SyncManager::ACTIVATE), &manager.activate.encode());
     }
 
-    /// Writes all SyncManagers right, wherever they can be written.
+    /// Writes valid settings to all writable SyncManagers.
     pub fn try_set_all(&mut self) {
         for number in (0u8..).take(self.device.description.sync_managers.len()) {
             let manager = self.right(number);
@@ -233,7 +233,7 @@ impl Bench {
         self.set_kinds([SyncManagerKind::Outputs, SyncManagerKind::Inputs]);
     }
 
-    /// Numbers of the SyncManagers of a kind that are in use.
+    /// Numbers of the enabled SyncManagers of a type.
     pub fn numbers(&self, kind: SyncManagerKind) -> Vec<u8> {
         let managers = (0u8..).zip(&self.device.description.sync_managers);
         let used = managers.filter(|(number, entry)| entry.kind == kind && self.right(*number).length != 0);
@@ -248,21 +248,21 @@ impl Bench {
         }
     }
 
-    /// Writes the outputs of the first SyncManager for outputs.
+    /// Writes the outputs of the first output SyncManager.
     pub fn output(&mut self, data: &[u8]) {
         let number = self.numbers(SyncManagerKind::Outputs)[0];
         let start = self.right(number).start;
         self.write(RegisterAddress(start), data);
     }
 
-    /// Reads the inputs of the first SyncManager for inputs.
+    /// Reads the inputs of the first input SyncManager.
     pub fn input(&mut self) -> Vec<u8> {
         let number = self.numbers(SyncManagerKind::Inputs)[0];
         let manager = self.right(number);
         self.read(RegisterAddress(manager.start), usize::from(manager.length))
     }
 
-    /// Puts a message into the mailbox; false where the mailbox is full.
+    /// Writes a message to the mailbox; false if the mailbox is full.
     pub fn send_mail(&mut self, header: Header, payload: &[u8]) -> bool {
         let manager = self.right(self.numbers(SyncManagerKind::MailboxOut)[0]);
         let mut message = header.encode().to_vec();
@@ -271,7 +271,7 @@ impl Bench {
         self.try_write(RegisterAddress(manager.start), &message) == 1
     }
 
-    /// Takes what is in the mailbox.
+    /// Reads the message in the mailbox.
     pub fn fetch_mail(&mut self) -> Option<(Header, Vec<u8>)> {
         let manager = self.right(self.numbers(SyncManagerKind::MailboxIn)[0]);
         let (data, wkc) = self.try_read(RegisterAddress(manager.start), usize::from(manager.length));

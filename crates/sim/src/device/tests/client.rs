@@ -1,4 +1,4 @@
-//! A MainDevice's end of the mailbox: sends requests, waits for answers, transfers objects.
+//! The MainDevice side of the mailbox: sends requests, waits for responses, transfers objects.
 
 use core::time::Duration;
 
@@ -11,10 +11,10 @@ use super::bench::Bench;
 use crate::catalogue;
 use crate::description::DeviceDescription;
 
-/// More than a device takes to answer.
+/// Longer than the response time of a device.
 pub const ANSWER: Duration = Duration::from_millis(1);
 
-/// A MainDevice's end of the mailbox.
+/// The MainDevice side of the mailbox.
 pub struct Client {
     pub bench: Bench,
     pub counter: u8,
@@ -25,12 +25,12 @@ impl Client {
         Client::of(catalogue::by_name(name).unwrap(), state)
     }
 
-    /// A client of a device that was changed.
+    /// A client for a modified device.
     pub fn of(description: DeviceDescription, state: AlState) -> Client {
         Client::on(Bench::up_to(description, state))
     }
 
-    /// A client of a device on its bench.
+    /// A client for a device on its bench.
     pub fn on(bench: Bench) -> Client {
         Client { bench, counter: 0 }
     }

@@ -1,4 +1,4 @@
-//! Protocol 6.3 as a MainDevice sees them: transfers in segments, SDO information, emergencies, diagnosis history.
+//! Protocol 6.3 from the view of a MainDevice: segmented transfers, SDO information, emergencies, diagnosis history.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{
@@ -25,7 +25,7 @@ fn respond(client: &mut Client, request: &SdoRequest<'_>) -> Vec<u8> {
     payload
 }
 
-/// Reads an object whatever its size; `tamper` is asked before each segment whether its toggle shall be wrong.
+/// Reads an object of any size; `tamper` returns for each segment whether its toggle is wrong.
 fn upload(
     client: &mut Client,
     index: u16,
@@ -103,7 +103,7 @@ fn an_object_of_100_kb_is_uploaded_in_segments() {
 #[test]
 fn any_length_is_downloaded_and_read_back() {
     let mut client = client();
-    // Around the ends of the first message and of the segments, whole and one short of it.
+    // Around the limits of the first message and of the segments, complete and one byte less.
     for length in [5, 1007, 1008, 1009, 1010, 2022, 2023, 2024, 3038, 3039, 60_000] {
         let data: Vec<u8> = (0..length).map(|place| (place * 7 % 253) as u8).collect();
         assert_eq!(download(&mut client, LARGE, length, &data), Ok(()), "{length}");
@@ -123,7 +123,7 @@ fn a_wrong_toggle_ends_the_transfer() {
 }
 
 #[test]
-fn a_download_has_as_many_bytes_as_it_announced() {
+fn a_download_has_the_announced_number_of_bytes() {
     let mut client = client();
     assert_eq!(download(&mut client, LARGE, 3000, &[1; 2500]), Err(AbortCode::LENGTH_TOO_SHORT));
     assert_eq!(download(&mut client, LARGE, 2000, &[1; 2500]), Err(AbortCode::LENGTH_TOO_LONG));
@@ -170,7 +170,7 @@ fn ranges_and_rights_of_an_entry_are_kept() {
     assert_eq!(client.upload(0x2003, 3), Err(AbortCode::WRITE_ONLY));
 }
 
-/// Asks for SDO information and puts the fragments together.
+/// Requests SDO information and reassembles the fragments.
 fn information(client: &mut Client, opcode: InformationOpcode, data: &[u8]) -> (InformationOpcode, Vec<u8>, usize) {
     let mut payload = [0; 64];
     let length = SdoInformation::whole(opcode, data).encode(&mut payload).unwrap();
@@ -194,7 +194,7 @@ fn indices(bytes: &[u8]) -> Vec<u16> {
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn lists_of_objects_are_told_by_their_rights() {
+fn lists_of_objects_follow_their_access_rights() {
     let mut client = client();
     let mut list = |kind: ListType| {
         let (opcode, data, _) = information(&mut client, InformationOpcode::ListRequest, &kind.code().to_le_bytes());
@@ -214,13 +214,13 @@ fn lists_of_objects_are_told_by_their_rights() {
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn a_list_that_does_not_fit_comes_in_fragments() {
+fn a_list_that_does_not_fit_is_sent_in_fragments() {
     let mut client = Client::new("servo", AlState::PreOp);
     let (_, data, fragments) = information(&mut client, InformationOpcode::ListRequest, &[1, 0]);
     let dictionary = client.bench.device.application.dictionary();
     let expected: Vec<u16> = dictionary.objects().iter().map(|object| object.index).collect();
     assert_eq!(indices(&data)[1..], expected);
-    assert_eq!(fragments, data.len().div_ceil(116), "128 bytes without 6 of the mailbox and 6 of the message");
+    assert_eq!(fragments, data.len().div_ceil(116), "128 bytes minus 6 of the mailbox header and 6 of the message");
     let mut client = self::client();
     let (_, data, fragments) = information(&mut client, InformationOpcode::ObjectRequest, &[0x04, 0x20]);
     assert_eq!((data.len(), fragments), (6 + 300, 1));
@@ -258,7 +258,7 @@ fn objects_and_entries_are_described() {
     assert!(ramp.access.has(AccessRights::READ | AccessRights::WRITE_PREOP | AccessRights::BACKUP));
     assert!(!ramp.access.has(AccessRights::WRITE_OP));
     let (_, bytes, _) = entry(0x2003, 2, ValueInfo(0));
-    assert_eq!(EntryDescription::decode(&bytes).unwrap().default, None, "only what was asked for");
+    assert_eq!(EntryDescription::decode(&bytes).unwrap().default, None, "only the requested parts");
     let (_, bytes, _) = entry(LARGE, 0, ValueInfo::ALL);
     assert_eq!(EntryDescription::decode(&bytes).unwrap().bit_length, 0, "a domain has any length");
     let (_, bytes, _) = entry(0x7000, 1, ValueInfo::ALL);
@@ -267,7 +267,7 @@ fn objects_and_entries_are_described() {
 
 // covers: 6.3
 #[test]
-fn what_sdo_information_cannot_tell_is_an_error_with_a_code() {
+fn invalid_sdo_information_requests_are_errors_with_a_code() {
     let mut client = client();
     let mut error = |opcode, data: &[u8]| {
         let (opcode, bytes, _) = information(&mut client, opcode, data);
@@ -293,7 +293,7 @@ fn is_emergency(mail: &(Header, Vec<u8>), code: u16) -> bool {
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn an_emergency_comes_between_a_request_and_its_answer() {
+fn an_emergency_is_sent_between_a_request_and_its_response() {
     let mut client = client();
     client.post_sdo(&SdoRequest::Upload { index: 0x1000, sub_index: 0, complete_access: false });
     assert!(client.bench.device.application.emergency(&emergency(0x3210)));
@@ -340,13 +340,13 @@ fn history(client: &mut Client, sub_index: u8) -> Vec<u8> {
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn the_diagnosis_history_is_a_ring_that_is_acknowledged() {
+fn the_diagnosis_history_is_a_ring_buffer_with_acknowledgement() {
     let mut client = client();
     assert_eq!((history(&mut client, 1), history(&mut client, 2)), (vec![20], vec![0]));
     for code in 1..=22 {
         assert!(diagnose(&mut client, code));
     }
-    assert_eq!((history(&mut client, 2), history(&mut client, 4)), (vec![7], vec![1]), "two beyond the end");
+    assert_eq!((history(&mut client, 2), history(&mut client, 4)), (vec![7], vec![1]), "two entries after the wrap");
     assert_eq!(history(&mut client, 5), DiagnosisFlags::LOST.to_le_bytes());
     let bytes = history(&mut client, 7);
     let newest = DiagnosisMessage::decode(&bytes).unwrap();
@@ -355,7 +355,7 @@ fn the_diagnosis_history_is_a_ring_that_is_acknowledged() {
     assert_eq!(newest.parameters().collect::<Vec<_>>(), [DiagnosisParameter::Ascii(b"axis 3")]);
     assert_eq!(client.download(DiagnosisHistory::INDEX, 3, &[5]), Err(AbortCode::VALUE_TOO_LOW));
     assert_eq!(client.download(DiagnosisHistory::INDEX, 3, &[25]), Ok(Vec::new()));
-    assert_eq!(history(&mut client, 4), [1], "two are newer than that");
+    assert_eq!(history(&mut client, 4), [1], "two messages are newer");
     client.download(DiagnosisHistory::INDEX, 3, &[7]).unwrap();
     assert_eq!((history(&mut client, 4), history(&mut client, 5)), (vec![0], vec![0, 0]));
     client.download(DiagnosisHistory::INDEX, 3, &[0]).unwrap();
@@ -364,7 +364,7 @@ fn the_diagnosis_history_is_a_ring_that_is_acknowledged() {
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn flags_of_the_diagnosis_history_keep_messages_out_or_send_emergencies() {
+fn flags_of_the_diagnosis_history_exclude_messages_or_send_emergencies() {
     let mut client = client();
     let flags = |client: &mut Client, bits: u16| client.download(DiagnosisHistory::INDEX, 5, &bits.to_le_bytes());
     flags(&mut client, DiagnosisFlags::NO_WARNINGS).unwrap();
@@ -377,7 +377,7 @@ fn flags_of_the_diagnosis_history_keep_messages_out_or_send_emergencies() {
         assert!(diagnose(&mut client, code));
         client.answer();
     }
-    assert!(!diagnose(&mut client, 22), "full of messages that nobody acknowledged");
+    assert!(!diagnose(&mut client, 22), "full of unacknowledged messages");
     client.download(DiagnosisHistory::INDEX, 3, &[6]).unwrap();
     assert!(diagnose(&mut client, 23));
 }
@@ -392,7 +392,7 @@ fn pdo(client: &mut Client, service: CoeService, number: u16, data: &[u8]) -> Op
 
 // covers: 6.3, sim-mailbox
 #[test]
-fn pdos_come_and_go_by_mailbox() {
+fn pdos_are_sent_and_received_by_mailbox() {
     let mut client = Client::new("servo", AlState::PreOp);
     // Controlword, target position, target velocity, mode, gap.
     let command = [0x0F, 0, 0x44, 0x33, 0x22, 0x11, 0, 0, 0, 0, 8, 0];

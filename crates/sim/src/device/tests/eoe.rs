@@ -1,5 +1,4 @@
-//! Protocol 6.5 as a MainDevice sees them: frames in fragments, an IP stack behind them, addresses, filter, time
-//! stamps.
+//! Protocol 6.5 from the view of a MainDevice: frames in fragments, an IP stack, addresses, filter, time stamps.
 
 use core::net::Ipv4Addr;
 use core::time::Duration;
@@ -55,7 +54,7 @@ fn send_frame(client: &mut Client, number: u8, frame: &[u8]) {
     }
 }
 
-/// Frames that wait in the mailbox.
+/// Frames waiting in the mailbox.
 fn fetch_frames(client: &mut Client, reassembly: &mut Reassembly) -> Vec<Vec<u8>> {
     let mut frames = Vec::new();
     while let Some((header, payload)) = client.bench.fetch_mail() {
@@ -73,7 +72,7 @@ fn answer(client: &mut Client) -> Vec<u8> {
     client.answer().1
 }
 
-/// A second IP stack, on the MainDevice's side.
+/// A second IP stack on the MainDevice side.
 struct Host {
     interface: Interface,
     sockets: SocketSet<'static>,
@@ -92,7 +91,7 @@ impl Host {
         Host { interface, sockets, frames, reassembly: Reassembly::default(), number: 0 }
     }
 
-    /// Moves frames both ways, then lets half a millisecond pass.
+    /// Moves frames in both directions, then advances half a millisecond.
     fn step(&mut self, client: &mut Client) {
         let now = Instant::from_micros((client.bench.now.0 / 1000) as i64);
         self.interface.poll(now, &mut self.frames, &mut self.sockets);
@@ -126,7 +125,7 @@ fn arp_request() -> Vec<u8> {
     frame
 }
 
-/// Sum of 16-bit words as IP and ICMP have it.
+/// Checksum of 16-bit words of IP and ICMP.
 fn checksum(bytes: &[u8]) -> [u8; 2] {
     let words = bytes.chunks(2).map(|pair| u32::from(pair[0]) << 8 | u32::from(pair.get(1).copied().unwrap_or(0)));
     let sum: u32 = words.sum();
@@ -232,7 +231,7 @@ fn a_loop_sends_frames_back_in_its_own_fragments() {
 
 // covers: 6.5, sim-mailbox
 #[test]
-fn addresses_are_set_and_told() {
+fn addresses_are_set_and_read() {
     let mut client = addressed();
     post(&mut client, EoeBody::GetIp);
     let bytes = answer(&mut client);
@@ -262,7 +261,7 @@ fn addresses_are_set_and_told() {
 
 // covers: 6.5
 #[test]
-fn what_is_not_supported_is_told() {
+fn unsupported_eoe_requests_are_refused_with_their_result() {
     let mut description = terminal();
     description.services.eoe.ip_support = false;
     description.services.eoe.filter_support = false;
@@ -283,7 +282,7 @@ fn what_is_not_supported_is_told() {
 
 // covers: 6.5
 #[test]
-fn a_filter_is_set_and_told() {
+fn a_filter_is_set_and_read() {
     let mut client = with_end(EoeEnd::Nothing);
     let filter = AddressFilter::new(&[[2; 6], [4; 6]], &[[0xF0; 6]], true).unwrap();
     post(&mut client, EoeBody::SetFilter(filter));
@@ -296,7 +295,7 @@ fn a_filter_is_set_and_told() {
 
 // covers: 6.5
 #[test]
-fn a_time_stamp_is_told_when_it_is_asked_for() {
+fn a_time_stamp_is_sent_on_request() {
     let mut client = with_end(EoeEnd::Nothing);
     let fragment =
         EoeFragment { frame: 9, number: 0, blocks: 2, last: true, time_requested: true, time_ns: None, data: &[1; 60] };
@@ -311,7 +310,7 @@ fn a_time_stamp_is_told_when_it_is_asked_for() {
 
 // covers: sim-mailbox
 #[test]
-fn frames_that_nobody_reads_stop_the_stack_and_nothing_else() {
+fn frames_that_are_not_read_stop_only_the_stack() {
     let mut client = addressed();
     let mac = client.bench.device.description.services.eoe.mac;
     send_frame(&mut client, 1, &arp_request());

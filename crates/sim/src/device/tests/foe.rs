@@ -1,4 +1,4 @@
-//! Protocol 6.4 as a MainDevice sees them: files read and written, BUSY, errors, firmware through BOOT.
+//! Protocol 6.4 from the view of a MainDevice: reading and writing files, BUSY, errors, firmware update in BOOT.
 
 use core::time::Duration;
 
@@ -21,8 +21,8 @@ fn client() -> Client {
     Client::new("all-protocols", AlState::PreOp)
 }
 
-/// Sends a message and fetches the answer; `None` where there is none.
-fn say(client: &mut Client, message: &FoeMessage<'_>) -> Option<Vec<u8>> {
+/// Sends a message and reads the response; `None` if there is none.
+fn send(client: &mut Client, message: &FoeMessage<'_>) -> Option<Vec<u8>> {
     let mut payload = vec![0; 1018];
     let length = message.encode(&mut payload).unwrap();
     client.post(Protocol::Foe, &payload[..length]);
@@ -32,8 +32,8 @@ fn say(client: &mut Client, message: &FoeMessage<'_>) -> Option<Vec<u8>> {
     Some(payload)
 }
 
-fn ask(client: &mut Client, message: &FoeMessage<'_>) -> Vec<u8> {
-    say(client, message).expect("an answer")
+fn request(client: &mut Client, message: &FoeMessage<'_>) -> Vec<u8> {
+    send(client, message).expect("an answer")
 }
 
 fn failure(bytes: &[u8]) -> (FoeErrorCode, String) {
@@ -43,9 +43,9 @@ fn failure(bytes: &[u8]) -> (FoeErrorCode, String) {
     }
 }
 
-/// Writes a file; the number of BUSY answers on the way.
+/// Writes a file; returns the number of BUSY responses.
 fn write(client: &mut Client, name: &[u8], data: &[u8], most: usize) -> Result<usize, (FoeErrorCode, String)> {
-    let first = ask(client, &FoeMessage::Write { password: 0, name });
+    let first = request(client, &FoeMessage::Write { password: 0, name });
     if FoeMessage::decode(&first) != Ok(FoeMessage::Acknowledge { packet: 0 }) {
         return Err(failure(&first));
     }
@@ -56,7 +56,7 @@ fn write(client: &mut Client, name: &[u8], data: &[u8], most: usize) -> Result<u
     let mut busy = 0;
     for (packet, piece) in (1..).zip(pieces) {
         loop {
-            let answer = ask(client, &FoeMessage::Data { packet, data: piece });
+            let answer = request(client, &FoeMessage::Data { packet, data: piece });
             match FoeMessage::decode(&answer).unwrap() {
                 FoeMessage::Acknowledge { packet: acknowledged } => {
                     assert_eq!(acknowledged, packet);
@@ -76,7 +76,7 @@ fn write(client: &mut Client, name: &[u8], data: &[u8], most: usize) -> Result<u
 /// Reads a file.
 fn read(client: &mut Client, name: &[u8], most: usize) -> Result<Vec<u8>, (FoeErrorCode, String)> {
     let mut file = Vec::new();
-    let mut answer = ask(client, &FoeMessage::Read { password: 0, name });
+    let mut answer = request(client, &FoeMessage::Read { password: 0, name });
     for number in 1.. {
         let FoeMessage::Data { packet, data } = FoeMessage::decode(&answer).unwrap() else {
             return Err(failure(&answer));
@@ -85,10 +85,10 @@ fn read(client: &mut Client, name: &[u8], most: usize) -> Result<Vec<u8>, (FoeEr
         file.extend_from_slice(data);
         let acknowledge = FoeMessage::Acknowledge { packet };
         if data.len() < most {
-            assert_eq!(say(client, &acknowledge), None, "the last packet is acknowledged and that is all");
+            assert_eq!(send(client, &acknowledge), None, "the last acknowledgement has no response");
             break;
         }
-        answer = ask(client, &acknowledge);
+        answer = request(client, &acknowledge);
     }
     Ok(file)
 }
@@ -106,7 +106,7 @@ fn files_of_any_size_are_written_and_read_back() {
 
 // covers: sim-mailbox
 #[test]
-fn files_outlive_a_power_cycle() {
+fn files_are_kept_over_a_power_cycle() {
     let mut client = client();
     write(&mut client, b"kept", b"still here", PACKET).unwrap();
     client.bench.power_cycle();
@@ -118,9 +118,9 @@ fn files_outlive_a_power_cycle() {
 
 // covers: 6.4, sim-mailbox
 #[test]
-fn what_cannot_be_done_is_told_with_code_and_text() {
+fn refused_file_requests_have_code_and_text() {
     let mut client = client();
-    let mut error = |message: &FoeMessage<'_>| failure(&ask(&mut client, message));
+    let mut error = |message: &FoeMessage<'_>| failure(&request(&mut client, message));
     let read = |name| FoeMessage::Read { password: 0, name };
     let write = |name| FoeMessage::Write { password: 0, name };
     assert_eq!(error(&read(b"nothing")), (FoeErrorCode::NOT_FOUND, "no such file".into()));
@@ -134,13 +134,13 @@ fn what_cannot_be_done_is_told_with_code_and_text() {
 #[test]
 fn a_wrong_packet_number_ends_the_transfer() {
     let mut client = client();
-    ask(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
-    let error = ask(&mut client, &FoeMessage::Data { packet: 2, data: &[1] });
+    request(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
+    let error = request(&mut client, &FoeMessage::Data { packet: 2, data: &[1] });
     assert_eq!(failure(&error).0, FoeErrorCode::PACKET_NUMBER_WRONG);
-    let over = ask(&mut client, &FoeMessage::Data { packet: 1, data: &[1] });
+    let over = request(&mut client, &FoeMessage::Data { packet: 1, data: &[1] });
     assert_eq!(failure(&over).0, FoeErrorCode::ILLEGAL);
-    ask(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
-    let error = ask(&mut client, &FoeMessage::Acknowledge { packet: 3 });
+    request(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
+    let error = request(&mut client, &FoeMessage::Acknowledge { packet: 3 });
     assert_eq!(failure(&error).0, FoeErrorCode::PACKET_NUMBER_WRONG);
 }
 
@@ -157,48 +157,48 @@ fn a_file_that_is_too_large_fills_the_disk() {
 
 // covers: 6.4
 #[test]
-fn a_password_is_asked_for() {
+fn a_password_is_required() {
     let mut description = catalogue::by_name("all-protocols").unwrap();
     description.services.foe.password = 0x1234;
     let mut client = Client::of(description, AlState::PreOp);
-    let error = ask(&mut client, &FoeMessage::Read { password: 0x1235, name: b"log.txt" });
+    let error = request(&mut client, &FoeMessage::Read { password: 0x1235, name: b"log.txt" });
     assert_eq!(failure(&error).0, FoeErrorCode::ACCESS_DENIED);
-    let right = ask(&mut client, &FoeMessage::Read { password: 0x1234, name: b"log.txt" });
+    let right = request(&mut client, &FoeMessage::Read { password: 0x1234, name: b"log.txt" });
     assert!(matches!(FoeMessage::decode(&right), Ok(FoeMessage::Data { packet: 1, .. })));
 }
 
 // covers: 6.4, sim-mailbox
 #[test]
-fn busy_and_errors_come_on_demand() {
+fn busy_and_errors_are_injected_on_demand() {
     let mut client = client();
-    ask(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
+    request(&mut client, &FoeMessage::Write { password: 0, name: b"a" });
     let now = client.bench.now;
     client.bench.device.disturb_mail(MailFault::BusyFoe { count: 3 }, now);
     let mut progress = Vec::new();
     for _ in 0..3 {
-        let answer = ask(&mut client, &FoeMessage::Data { packet: 1, data: b"x" });
+        let answer = request(&mut client, &FoeMessage::Data { packet: 1, data: b"x" });
         let Ok(FoeMessage::Busy { done, entire: 100, text: b"erasing" }) = FoeMessage::decode(&answer) else {
             panic!("{answer:?}");
         };
         progress.push(done);
     }
     assert!(progress.is_sorted_by(|a, b| a < b), "{progress:?}");
-    let answer = ask(&mut client, &FoeMessage::Data { packet: 1, data: b"x" });
+    let answer = request(&mut client, &FoeMessage::Data { packet: 1, data: b"x" });
     assert_eq!(FoeMessage::decode(&answer), Ok(FoeMessage::Acknowledge { packet: 1 }));
     client.bench.device.disturb_mail(MailFault::FailFoe { code: FoeErrorCode::PROGRAM_ERROR }, now);
-    let error = ask(&mut client, &FoeMessage::Read { password: 0, name: b"a" });
-    assert_eq!(failure(&error), (FoeErrorCode::PROGRAM_ERROR, "told to fail".into()));
+    let error = request(&mut client, &FoeMessage::Read { password: 0, name: b"a" });
+    assert_eq!(failure(&error), (FoeErrorCode::PROGRAM_ERROR, "injected failure".into()));
 }
 
 // covers: 6.4
 #[test]
-fn a_reader_that_is_busy_gets_the_packet_again() {
+fn a_busy_reader_receives_the_packet_again() {
     let mut client = client();
-    let first = ask(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
-    assert_eq!(ask(&mut client, &FoeMessage::Busy { done: 0, entire: 0, text: b"" }), first);
+    let first = request(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
+    assert_eq!(request(&mut client, &FoeMessage::Busy { done: 0, entire: 0, text: b"" }), first);
     let cancel = FoeMessage::Error { code: FoeErrorCode::NOT_DEFINED, text: b"enough" };
-    assert_eq!(say(&mut client, &cancel), None);
-    let over = ask(&mut client, &FoeMessage::Acknowledge { packet: 1 });
+    assert_eq!(send(&mut client, &cancel), None);
+    let over = request(&mut client, &FoeMessage::Acknowledge { packet: 1 });
     assert_eq!(failure(&over).0, FoeErrorCode::ILLEGAL);
 }
 
@@ -224,11 +224,11 @@ fn leave_boot(client: &mut Client) -> (u16, AlStatusCode) {
 
 // covers: 6.4, sim-mailbox
 #[test]
-fn firmware_goes_through_boot_and_changes_the_version() {
+fn firmware_is_written_in_boot_and_changes_the_version() {
     let mut client = booted();
     let image = firmware::image("2.7.1", &[0x5A; 4 * BOOT_PACKET]);
     let busy = write(&mut client, FIRMWARE, &image, BOOT_PACKET).unwrap();
-    assert!(busy > 10, "{busy}: it takes a while to erase the old one");
+    assert!(busy > 10, "{busy}: erasing takes time");
     assert_eq!(leave_boot(&mut client), (0x0002, AlStatusCode::NO_ERROR));
     assert_eq!(client.upload(0x100A, 0), Ok(b"2.7.1".to_vec()));
     client.bench.power_cycle();
@@ -240,7 +240,7 @@ fn firmware_goes_through_boot_and_changes_the_version() {
 
 // covers: 5.5, sim-mailbox
 #[test]
-fn firmware_that_does_not_arrive_whole_leaves_none() {
+fn incomplete_firmware_leaves_the_device_without_firmware() {
     let mut client = booted();
     let image = firmware::image("2.7.1", &[0x5A; 4 * BOOT_PACKET]);
     let mut broken = image.clone();
@@ -263,7 +263,7 @@ fn firmware_that_does_not_arrive_whole_leaves_none() {
 #[test]
 fn only_the_firmware_is_served_in_boot() {
     let mut client = booted();
-    let error = ask(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
+    let error = request(&mut client, &FoeMessage::Read { password: 0, name: b"log.txt" });
     assert_eq!(failure(&error).0, FoeErrorCode::NOT_BOOTSTRAP);
     client.post(Protocol::Coe, &[0, 0x20, 0x40, 0, 0x10, 0, 0, 0, 0, 0]);
     client.bench.pass(Duration::from_millis(1));

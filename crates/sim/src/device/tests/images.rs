@@ -1,4 +1,4 @@
-//! Devices made from real SII images, where such are present.
+//! Devices from real SII images, if present.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ fn image_files() -> Vec<PathBuf> {
     files
 }
 
-/// Length that a MainDevice finds in the SII for a SyncManager: the PDOs assigned to it, or its own entry.
+/// Length of a SyncManager according to the SII: the PDOs assigned to it, or its own entry.
 fn length_from_sii(sii: &Sii<'_>, number: u8, entry: &SiiSyncManager) -> u16 {
     use ringcat_wire::sii::PdoDirection::{Rx, Tx};
     let assigned = [Rx, Tx].into_iter().flat_map(|direction| sii.pdos(direction));
@@ -29,7 +29,7 @@ fn length_from_sii(sii: &Sii<'_>, number: u8, entry: &SiiSyncManager) -> u16 {
 
 // covers: sim-files
 #[test]
-fn each_real_image_makes_a_device_that_goes_to_op_or_is_refused_with_a_reason() {
+fn each_real_image_results_in_a_device_in_op_or_a_refusal_with_a_reason() {
     let files = image_files();
     if files.is_empty() {
         println!("no real SII images here: skipped");

@@ -1,4 +1,4 @@
-//! Mail that goes wrong on purpose.
+//! Injected faults of the mailbox.
 
 use core::time::Duration;
 
@@ -18,7 +18,7 @@ fn disturbed(fault: MailFault) -> Client {
     client
 }
 
-/// Posts the request; the counter of the answer if one comes within a millisecond.
+/// Sends the request; returns the counter of the response if one arrives within a millisecond.
 fn counter(client: &mut Client) -> Option<u8> {
     client.post_sdo(&REQUEST);
     client.bench.pass(ANSWER);
@@ -27,7 +27,7 @@ fn counter(client: &mut Client) -> Option<u8> {
 
 // covers: sim-mail-faults
 #[test]
-fn a_lost_answer_leaves_the_request_done_and_a_lost_request_does_not() {
+fn a_request_with_a_lost_response_is_executed_and_a_lost_request_is_not() {
     for (fault, value) in [(MailFault::LoseAnswers { count: 1 }, 7), (MailFault::LoseRequests { count: 1 }, 1)] {
         let mut client = disturbed(fault);
         let data = 7u32.to_le_bytes();
@@ -45,7 +45,7 @@ fn a_lost_answer_leaves_the_request_done_and_a_lost_request_does_not() {
 }
 
 #[test]
-fn a_device_may_never_answer_again_until_it_is_healed() {
+fn a_device_may_stop_answering_until_the_fault_is_cleared() {
     let mut client = disturbed(MailFault::LoseAnswers { count: u32::MAX });
     for _ in 0..20 {
         assert_eq!(counter(&mut client), None);
@@ -57,7 +57,7 @@ fn a_device_may_never_answer_again_until_it_is_healed() {
 
 // covers: sim-mail-faults
 #[test]
-fn an_answer_comes_twice_with_one_counter() {
+fn a_repeated_response_has_the_same_counter() {
     let mut client = disturbed(MailFault::RepeatAnswers { count: 1 });
     client.post_sdo(&REQUEST);
     let first = client.answer();
@@ -68,7 +68,7 @@ fn an_answer_comes_twice_with_one_counter() {
 
 // covers: sim-mail-faults
 #[test]
-fn a_late_answer_is_overtaken_by_the_next() {
+fn a_delayed_response_is_overtaken_by_the_next() {
     let mut client = disturbed(MailFault::DelayAnswers { count: 1, by: Duration::from_millis(50) });
     assert_eq!(counter(&mut client), None);
     assert_eq!(client.upload(0x1018, 0), Ok(vec![4]));
@@ -76,13 +76,13 @@ fn a_late_answer_is_overtaken_by_the_next() {
     assert!(client.bench.fetch_mail().is_none());
     client.bench.pass(Duration::from_millis(3));
     let (header, payload) = client.bench.fetch_mail().unwrap();
-    assert_eq!(header.counter, 2, "counted as it leaves");
+    assert_eq!(header.counter, 2, "the counter is assigned when the response is sent");
     assert!(matches!(SdoResponse::decode(&payload), Ok(SdoResponse::UploadExpedited { sub_index: 1, .. })));
 }
 
 // covers: sim-mail-faults
 #[test]
-fn a_wrong_counter_disturbs_the_count_once() {
+fn a_wrong_counter_affects_one_response_only() {
     let mut client = disturbed(MailFault::WrongCounter { count: 1, counter: 5 });
     assert_eq!([counter(&mut client), counter(&mut client)], [Some(5), Some(1)]);
 }
@@ -104,7 +104,7 @@ fn requests_are_refused_or_aborted() {
 
 // covers: 6.1, sim-mail-faults
 #[test]
-fn a_full_mailbox_takes_nothing_for_a_while() {
+fn a_full_mailbox_accepts_nothing_for_some_time() {
     let mut client = disturbed(MailFault::Full { during: Duration::from_millis(30) });
     client.post_sdo(&REQUEST);
     client.bench.pass(Duration::from_millis(20));
@@ -117,7 +117,7 @@ fn a_full_mailbox_takes_nothing_for_a_while() {
 
 // covers: 6.3, sim-mail-faults
 #[test]
-fn an_emergency_comes_right_before_an_answer() {
+fn an_emergency_directly_precedes_a_response() {
     let mut client = disturbed(MailFault::EmergencyBefore { count: 1, code: 0x8130 });
     client.post_sdo(&REQUEST);
     let (first, emergency) = client.answer();

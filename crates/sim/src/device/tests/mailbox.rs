@@ -1,4 +1,4 @@
-//! Protocol 6.1, 6.2, 6.3 as a MainDevice sees them.
+//! Protocol 6.1, 6.2, 6.3 from the view of a MainDevice.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
@@ -36,7 +36,7 @@ fn expedited_and_normal_downloads_are_kept() {
 }
 
 #[test]
-fn what_cannot_be_done_is_aborted_with_its_code() {
+fn refused_sdo_requests_are_aborted_with_their_code() {
     let mut client = Client::new("analog-input-4", AlState::SafeOp);
     assert_eq!(client.upload(0x5000, 0), Err(AbortCode::OBJECT_DOES_NOT_EXIST));
     assert_eq!(client.upload(0x1018, 5), Err(AbortCode::SUB_INDEX_DOES_NOT_EXIST));
@@ -50,7 +50,7 @@ fn what_cannot_be_done_is_aborted_with_its_code() {
 
 // covers: sim-mailbox
 #[test]
-fn a_changed_assignment_changes_the_length_that_safeop_asks_for() {
+fn a_changed_assignment_changes_the_length_required_for_safeop() {
     let mut client = Client::new("analog-input-4", AlState::PreOp);
     assert_eq!(client.download(0x1C13, 1, &0x1A01u16.to_le_bytes()), Err(AbortCode::SUB_INDEX_0_FIRST));
     assert_eq!(client.download(0x1C13, 0, &[0]), Ok(Vec::new()));
@@ -100,7 +100,7 @@ fn a_mapping_can_be_configured() {
     let inputs = SyncManager { length: 6, ..client.bench.right(3) };
     client.bench.set_sync_manager(3, &inputs);
     assert_eq!(client.bench.request(AlState::SafeOp).0.bits(), 0x0004);
-    assert_eq!(client.bench.device.inputs()[4..], [0x50, 0x00], "statusword behind the position");
+    assert_eq!(client.bench.device.inputs()[4..], [0x50, 0x00], "statusword after the position");
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn mapped_outputs_are_read_from_the_process_data_and_not_written_in_op() {
 }
 
 #[test]
-fn a_message_with_the_counter_of_the_one_before_is_dropped() {
+fn a_message_with_the_counter_of_the_previous_message_is_dropped() {
     let mut client = Client::new("servo", AlState::PreOp);
     client.upload(0x1000, 0).unwrap();
     client.counter -= 1;
@@ -175,7 +175,7 @@ fn a_lost_answer_is_repeated_with_its_counter() {
 }
 
 #[test]
-fn a_waiting_answer_goes_behind_the_repeated_one() {
+fn a_waiting_response_follows_the_repeated_one() {
     let mut client = Client::new("servo", AlState::PreOp);
     client.post_sdo(&SdoRequest::Upload { index: 0x1018, sub_index: 1, complete_access: false });
     let lost = client.answer();
@@ -190,7 +190,7 @@ fn a_waiting_answer_goes_behind_the_repeated_one() {
 }
 
 #[test]
-fn a_repeat_bit_that_is_set_before_preop_is_no_request() {
+fn a_repeat_bit_set_before_preop_is_no_request() {
     let mut bench = Bench::named("servo");
     for number in [0, 1] {
         let mut manager = bench.right(number);
@@ -203,7 +203,7 @@ fn a_repeat_bit_that_is_set_before_preop_is_no_request() {
 }
 
 #[test]
-fn requests_in_a_row_are_answered_in_order_and_a_full_queue_leaves_the_mailbox_full() {
+fn consecutive_requests_are_answered_in_order_and_a_full_queue_fills_the_mailbox() {
     let mut client = Client::new("servo", AlState::PreOp);
     let mut payload = [0; 16];
     let mut accepted = 0;

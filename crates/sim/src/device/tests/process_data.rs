@@ -37,7 +37,7 @@ fn outputs_are_latched_in_op_alone() {
 }
 
 #[test]
-fn inputs_are_read_as_they_were_set() {
+fn inputs_are_read_as_set() {
     for (name, data) in
         [("digital-input-4", vec![0x0A]), ("digital-input-8", vec![0x5A]), ("digital-input-16", vec![0x78, 0x56])]
     {
@@ -52,7 +52,7 @@ fn inputs_are_read_as_they_were_set() {
 }
 
 #[test]
-fn inputs_set_before_safeop_are_there_in_safeop() {
+fn inputs_set_before_safeop_are_valid_in_safeop() {
     let mut bench = Bench::named("digital-input-8");
     bench.device.set_inputs(&[0x77]);
     bench.climb(AlState::SafeOp);
@@ -60,7 +60,7 @@ fn inputs_set_before_safeop_are_there_in_safeop() {
 }
 
 #[test]
-fn inputs_that_are_a_function_of_time_are_made_anew_by_each_read() {
+fn inputs_that_are_a_function_of_time_are_computed_at_each_read() {
     let mut bench = Bench::up_to(described("digital-input-8"), AlState::Op);
     bench.device.set_input_source(InputSource::Function(counter_10_ms));
     let reads: Vec<u8> = (0..4)
@@ -134,7 +134,7 @@ fn cycle(bench: &mut Bench, control: u16, position: i32) -> (u16, i32) {
 
 // covers: sim-devices
 #[test]
-fn a_servo_walks_its_state_machine_and_follows_the_target() {
+fn a_servo_passes_its_state_machine_and_follows_the_target() {
     let mut bench = Bench::up_to(described("servo"), AlState::Op);
     for (control, status) in [(0x0000, 0x0040), (0x0006, 0x0021), (0x0007, 0x0023), (0x000F, 0x0027)] {
         assert_eq!(cycle(&mut bench, control, 0).0 & 0x006F, status, "controlword {control:#06x}");
@@ -142,7 +142,7 @@ fn a_servo_walks_its_state_machine_and_follows_the_target() {
     for step in 1..=10 {
         cycle(&mut bench, 0x000F, 100 * step);
     }
-    // The load has inertia and needs a moment to settle.
+    // The load has inertia and needs time to settle.
     for _ in 0..50 {
         cycle(&mut bench, 0x000F, 1000);
     }

@@ -1,4 +1,4 @@
-//! A device neither panics nor leaves its states, whatever a MainDevice writes.
+//! A device neither panics nor enters an invalid state, whatever a MainDevice writes.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use super::bench::Bench;
 use super::client::Client;
 use crate::catalogue;
 
-/// A possible access of a MainDevice, reasonable or not.
+/// A possible access of a MainDevice, valid or not.
 #[derive(Clone, Debug)]
 enum Act {
     Write(u16, Vec<u8>),
@@ -48,7 +48,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     // covers: robust
     #[test]
-    fn any_sequence_of_writes_leaves_a_device_in_a_state(
+    fn any_sequence_of_writes_keeps_a_device_in_a_valid_state(
         name in prop::sample::select(catalogue::names().collect::<Vec<_>>()),
         acts in prop::collection::vec(act(), 0..60),
     ) {
@@ -78,7 +78,7 @@ proptest! {
     }
 }
 
-/// A message of any protocol, with a beginning that has a chance to mean something.
+/// A message of any protocol with a beginning that may be valid.
 fn mail() -> impl Strategy<Value = (Protocol, Vec<u8>)> {
     let protocols = (0u8..16).prop_map(Protocol::from_code);
     let beginnings = prop::sample::select(vec![
@@ -118,13 +118,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
     // covers: 6, robust, sim-mailbox
     #[test]
-    fn any_mail_is_answered_within_bounds_and_the_device_goes_on(
+    fn any_mail_is_answered_within_limits_and_the_device_continues(
         letters in prop::collection::vec((mail(), any::<bool>()), 0..60),
     ) {
         let mut client = Client::new("all-protocols", AlState::PreOp);
         for ((protocol, payload), fetch) in letters {
             let counter = next_counter(client.counter);
-            // A full mailbox is an answer too, but it has not seen the counter.
+            // A full mailbox is a valid result too, but the device has not received the counter.
             if client.bench.send_mail(Header::new(protocol, counter, payload.len() as u16), &payload) {
                 client.counter = counter;
             }
@@ -137,7 +137,7 @@ proptest! {
             client.bench.pass(Duration::from_micros(300));
             client.bench.fetch_mail().is_none()
         });
-        prop_assert!(waiting.is_some(), "the device never stops talking");
+        prop_assert!(waiting.is_some(), "the device sends without end");
         prop_assert_eq!(client.upload(0x1018, 0), Ok(vec![4]));
     }
 }

@@ -1,4 +1,4 @@
-//! The drive judged from its process image: power states, modes, homing, limits, and the physics of motor and load.
+//! Tests of the drive through its process image: power states, modes, homing, limits, physics of motor and load.
 
 mod homing;
 mod limits;
@@ -14,7 +14,7 @@ use super::client::Client;
 use crate::catalogue::{self, parts};
 use crate::description::{DeviceDescription, data_type};
 
-/// Bits of the statusword that say the power state.
+/// State bits of the statusword.
 const STATE: u16 = 0x006F;
 const SWITCH_ON_DISABLED: u16 = 0x0040;
 const READY_TO_SWITCH_ON: u16 = 0x0021;
@@ -36,7 +36,7 @@ const SWITCH_ON: u16 = 0x0007;
 const NEW_SET_POINT: u16 = 0x0010;
 const HALT: u16 = 0x0100;
 
-/// What the inputs said.
+/// Values of the inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Feedback {
     status: u16,
@@ -71,7 +71,7 @@ struct Axis {
     last: Feedback,
 }
 
-/// The drive with process data that has everything a test looks at.
+/// The drive with process data for all values that the tests check.
 fn described() -> DeviceDescription {
     use data_type::{I8, I16, I32, U8, U16};
     let mut described = catalogue::by_name("servo").unwrap();
@@ -115,7 +115,7 @@ impl Axis {
         Axis { client, control: 0, mode: 0, position: 0, velocity: 0, torque: 0, last: Feedback::default() }
     }
 
-    /// The same, enabled in a mode at its position.
+    /// The same drive, enabled in a mode at its position.
     fn enabled(mode: i8, objects: &[(u16, u8, i64, usize)]) -> Axis {
         let mut axis = Axis::with(objects);
         axis.mode = mode;
@@ -131,7 +131,7 @@ impl Axis {
         assert_eq!(self.cycle().state(), OPERATION_ENABLED);
     }
 
-    /// One cycle: outputs, 1 ms, inputs as they were when the outputs came.
+    /// One cycle: outputs, 1 ms, inputs as of the time of the outputs.
     fn cycle(&mut self) -> Feedback {
         let mut data = self.control.to_le_bytes().to_vec();
         data.extend(self.position.to_le_bytes());
@@ -139,7 +139,7 @@ impl Axis {
         data.extend(self.torque.to_le_bytes());
         data.extend(self.mode.to_le_bytes());
         self.client.bench.output(&data);
-        // Two datagrams of 20 us are part of the cycle.
+        // The two datagrams take 40 us of the cycle.
         self.client.bench.pass(Duration::from_micros(960));
         self.look()
     }
@@ -162,12 +162,12 @@ impl Axis {
         self.last
     }
 
-    /// So many cycles with the same outputs, and what came back in each.
+    /// A number of cycles with the same outputs; returns the inputs of each.
     fn run(&mut self, cycles: usize) -> Vec<Feedback> {
         (0..cycles).map(|_| self.cycle()).collect()
     }
 
-    /// Cycles until something holds; panics after `most`.
+    /// Runs cycles until a condition holds; panics after `most`.
     fn until(&mut self, most: usize, what: &str, holds: impl Fn(&Feedback) -> bool) -> Vec<Feedback> {
         let mut seen = Vec::new();
         for _ in 0..most {
@@ -179,7 +179,7 @@ impl Axis {
         panic!("not {what} after {most} ms: {:?}", self.last);
     }
 
-    /// Moves evenly in CSV until the motor has that speed.
+    /// Moves in CSV until the motor has this speed.
     fn at_speed(velocity: i32, objects: &[(u16, u8, i64, usize)]) -> Axis {
         let mut axis = Axis::enabled(crate::application::servo::MODE_CSV, objects);
         axis.velocity = velocity;
@@ -188,7 +188,7 @@ impl Axis {
     }
 }
 
-/// Highest and lowest value of something.
+/// Lowest and highest value.
 fn bounds(seen: &[Feedback], value: impl Fn(&Feedback) -> i32) -> (i32, i32) {
     let values = || seen.iter().map(&value);
     (values().min().unwrap(), values().max().unwrap())

@@ -1,4 +1,4 @@
-//! The objects of the drive and of analogue terminals: those that drivers read exist, are described, and check their
+//! The objects of the drive and of analogue terminals: objects used by drivers exist, are described, and check their
 //! values.
 
 use ringcat_wire::al::AlState;
@@ -31,7 +31,7 @@ fn information(client: &mut Client, opcode: InformationOpcode, data: &[u8]) -> (
 
 // covers: sim-drive
 #[test]
-fn the_drive_has_the_objects_that_drivers_ask_for() {
+fn the_drive_has_the_objects_that_drivers_read() {
     let mut client = Client::new("servo", AlState::PreOp);
     let variables = [
         (0x603F, DataType::UNSIGNED16),
@@ -83,7 +83,7 @@ fn the_drive_has_the_objects_that_drivers_ask_for() {
 
 // covers: sim-drive
 #[test]
-fn values_are_checked_with_the_abort_code_of_what_is_wrong() {
+fn invalid_values_are_refused_with_their_abort_code() {
     use AbortCode as A;
     let mut client = Client::new("servo", AlState::PreOp);
     type Row = (u16, u8, i64, usize, Result<(), AbortCode>);
@@ -113,7 +113,7 @@ fn values_are_checked_with_the_abort_code_of_what_is_wrong() {
         let done = client.download(index, sub_index, &value.to_le_bytes()[..length]).map(drop);
         assert_eq!(done, expected, "{index:#06x}:{sub_index} = {value}");
     }
-    assert_eq!(client.upload(0x6060, 0), Ok(vec![8]), "what was refused changed nothing");
+    assert_eq!(client.upload(0x6060, 0), Ok(vec![8]), "refused values change nothing");
 }
 
 // covers: sim-drive
@@ -177,7 +177,7 @@ fn sync_parameters_follow_the_distributed_clocks() {
 
 // covers: sim-drive
 #[test]
-fn without_process_data_the_drive_still_says_what_it_does() {
+fn without_process_data_the_drive_still_reports_its_status() {
     let mut client = Client::new("servo", AlState::PreOp);
     assert_eq!(client.upload(0x6041, 0), Ok(vec![0x50, 0x00]), "switch on disabled");
     assert_eq!(client.upload(0x60FE, 1), Ok(vec![1, 0, 0, 0]), "brake closed");
@@ -185,7 +185,7 @@ fn without_process_data_the_drive_still_says_what_it_does() {
 
 // covers: sim-drive
 #[test]
-fn a_device_has_the_name_of_its_type_whatever_its_segment_calls_it() {
+fn a_device_has_the_name_of_its_type_not_of_its_segment() {
     for kind in ["servo", "analog-input-4", "all-protocols"] {
         let mut described = catalogue::by_name(kind).unwrap();
         described.name = "axis-7".into();
@@ -196,14 +196,14 @@ fn a_device_has_the_name_of_its_type_whatever_its_segment_calls_it() {
 
 // covers: sim-drive
 #[test]
-fn analogue_terminals_describe_their_objects_as_real_ones_do() {
+fn analogue_terminals_describe_their_objects_like_real_ones() {
     for (name, index, expected) in
         [("analog-input-4", 0x6000u16, "Channel 1"), ("analog-output-4", 0x7010, "Channel 2")]
     {
         let mut client = Client::new(name, AlState::PreOp);
         let beyond = EntryRequest { index: 0x1018, sub_index: 5, value_info: ValueInfo::ALL }.encode();
         let (opcode, data) = information(&mut client, InformationOpcode::EntryRequest, &beyond);
-        assert_eq!((opcode, data), (InformationOpcode::Error, vec![0x11, 0, 0x09, 0x06]), "behind the last entry");
+        assert_eq!((opcode, data), (InformationOpcode::Error, vec![0x11, 0, 0x09, 0x06]), "after the last entry");
         let (opcode, list) = information(&mut client, InformationOpcode::ListRequest, &[1, 0]);
         assert_eq!(opcode, InformationOpcode::ListResponse, "{name}");
         let objects: Vec<u16> = list[2..].chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();

@@ -1,4 +1,5 @@
-//! Protocol 6.6 as a MainDevice sees them: elements of IDNs, fragments both ways, errors, procedure commands.
+//! Protocol 6.6 from the view of a MainDevice: elements of IDNs, fragments in both directions, errors, procedure
+//! commands.
 
 use core::time::Duration;
 
@@ -23,7 +24,7 @@ fn post(client: &mut Client, message: &SoeMessage<'_>) {
     client.post(Protocol::Soe, &payload[..length]);
 }
 
-/// Fetches an answer and puts its fragments together.
+/// Reads a response and reassembles its fragments.
 fn answer(client: &mut Client, operation: SoeOperation) -> Result<Vec<u8>, SoeErrorCode> {
     let mut data = Vec::new();
     let mut left = None;
@@ -87,7 +88,7 @@ fn every_element_of_an_idn_is_read() {
 
 // covers: 6.6
 #[test]
-fn drives_have_values_of_their_own() {
+fn drives_have_separate_values() {
     let mut client = client();
     let idn = Idn::standard(0, 36);
     assert_eq!(write(&mut client, 1, idn, &(-5i32).to_le_bytes()), Ok(Vec::new()));
@@ -98,7 +99,7 @@ fn drives_have_values_of_their_own() {
 
 // covers: 6.6, sim-mailbox
 #[test]
-fn long_values_come_and_go_in_fragments() {
+fn long_values_are_read_and_written_in_fragments() {
     let mut client = client();
     let value = read(&mut client, 0, CHARACTERISTIC, VALUE).unwrap();
     assert_eq!((value.len(), &value[..6]), (5004, &[0x88, 0x13, 0x20, 0x4E, 0, 1][..]));
@@ -113,7 +114,7 @@ fn long_values_come_and_go_in_fragments() {
 
 // covers: 6.6, sim-mailbox
 #[test]
-fn what_cannot_be_done_is_told_with_its_code() {
+fn refused_soe_requests_are_reported_with_their_code() {
     let mut client = client();
     let idn = Idn::standard(0, 36);
     assert_eq!(read(&mut client, 0, Idn::standard(0, 999), VALUE), Err(SoeErrorCode::NO_IDN));
@@ -135,7 +136,7 @@ fn what_cannot_be_done_is_told_with_its_code() {
 
 // covers: 6.6
 #[test]
-fn configuration_is_written_in_preop_alone() {
+fn configuration_is_written_in_preop_only() {
     let telegram = Idn::standard(0, 15);
     let mut client = client();
     assert_eq!(write(&mut client, 0, telegram, &[5, 0]), Ok(Vec::new()));
@@ -161,7 +162,7 @@ fn the_list_of_all_idns_is_complete() {
 
 // covers: 6.6, sim-mailbox
 #[test]
-fn a_procedure_command_takes_its_time_and_is_notified() {
+fn a_procedure_command_has_a_duration_and_is_notified() {
     let mut client = client();
     let reset = Idn::standard(0, 99);
     let state = |client: &mut Client| read(client, 0, reset, SoeElements::DATA_STATE).unwrap()[0];
@@ -180,7 +181,7 @@ fn a_procedure_command_takes_its_time_and_is_notified() {
 
 // covers: 6.6
 #[test]
-fn a_procedure_command_can_be_taken_back() {
+fn a_procedure_command_can_be_cancelled() {
     let mut client = client();
     let reset = Idn::standard(0, 99);
     write(&mut client, 1, reset, &[3, 0]).unwrap();

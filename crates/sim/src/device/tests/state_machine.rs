@@ -1,4 +1,4 @@
-//! Protocol 5.2, 5.3, 5.5 as a MainDevice sees them.
+//! Protocol 5.2, 5.3, 5.5 from the view of a MainDevice.
 
 use core::time::Duration;
 
@@ -24,7 +24,7 @@ fn up_to(name: &str, state: AlState) -> Bench {
     Bench::up_to(catalogue::by_name(name).unwrap(), state)
 }
 
-/// Every way a process data SyncManager can be wrong in, with the code it gives.
+/// All invalid settings of a process data SyncManager, with the resulting code.
 fn wrong_settings(right: SyncManager, outputs: bool) -> Vec<(&'static str, SyncManager, u16)> {
     let code = if outputs { 0x001D } else { 0x001E };
     let change = |change: fn(&mut SyncManager)| {
@@ -50,7 +50,7 @@ fn wrong_settings(right: SyncManager, outputs: bool) -> Vec<(&'static str, SyncM
 
 // covers: sim-devices
 #[test]
-fn each_device_of_the_catalogue_goes_up_to_op_and_back() {
+fn each_device_of_the_catalogue_reaches_op_and_returns() {
     for name in catalogue::names() {
         let mut bench = up_to(name, AlState::Op);
         for state in [AlState::SafeOp, AlState::PreOp, AlState::Init] {
@@ -110,7 +110,7 @@ fn wrong_mailbox_sync_managers_are_0x0016() {
 #[test]
 fn overlapping_buffers_are_0x0017() {
     let mut description = catalogue::by_name("block").unwrap();
-    // Three buffers of 400 bytes reach up to 0x14B0.
+    // Three buffers of 400 bytes end at 0x14B0.
     description.sync_managers[1].start = 0x14A0;
     let mut bench = Bench::up_to(description, AlState::PreOp);
     bench.set_process_data();
@@ -123,7 +123,7 @@ fn overlapping_buffers_are_0x0017() {
 
 #[test]
 fn buffers_beyond_the_ram_are_0x0017() {
-    // The controller was made with the usual RAM.
+    // The controller was created with the usual RAM.
     let mut bench = Bench::up_to(catalogue::by_name("block").unwrap(), AlState::PreOp);
     bench.device.description.sync_managers[1].start = 0x2C00;
     bench.set_process_data();
@@ -163,14 +163,14 @@ fn clock_settings_are_checked() {
 }
 
 #[test]
-fn refused_requests_name_their_reason_and_need_an_acknowledge() {
+fn refused_requests_have_a_code_and_need_an_acknowledge() {
     let mut bench = Bench::named("digital-output-8");
     assert_eq!(bench.request(AlState::Op), error(AlState::Init, 0x0011));
     assert_eq!(bench.request(AlState::PreOp), error(AlState::Init, 0x0011), "not acknowledged");
-    assert_eq!(bench.acknowledge(AlState::PreOp), ok(AlState::PreOp), "acknowledge and request in one");
+    assert_eq!(bench.acknowledge(AlState::PreOp), ok(AlState::PreOp), "acknowledge and request in one write");
     let unknown = AlControl { state: 7, ..AlControl::new(AlState::Init) };
     assert_eq!(bench.control(unknown), error(AlState::PreOp, 0x0012));
-    assert_eq!(bench.request(AlState::Init), ok(AlState::Init), "INIT acknowledges by itself");
+    assert_eq!(bench.request(AlState::Init), ok(AlState::Init), "a request for INIT acknowledges");
     assert_eq!(bench.request(AlState::Boot), error(AlState::Init, 0x0013));
 }
 
@@ -197,7 +197,7 @@ fn boot_needs_its_own_mailbox_settings() {
 
 // covers: sim-states
 #[test]
-fn a_transition_takes_its_time() {
+fn a_transition_has_a_duration() {
     let mut description = catalogue::by_name("digital-input-8").unwrap();
     description.transitions = TransitionTimes::all(Duration::from_millis(5));
     let mut bench = Bench::new(description);
@@ -234,7 +234,7 @@ fn a_refused_transition_has_the_chosen_code_and_works_afterwards() {
 }
 
 #[test]
-fn a_hanging_application_changes_no_state_until_it_goes_on() {
+fn a_hanging_application_changes_no_state_until_it_continues() {
     let mut bench = Bench::named("digital-input-8");
     bench.device.hang(true, bench.now);
     assert_eq!(bench.request(AlState::PreOp), ok(AlState::Init));
@@ -245,7 +245,7 @@ fn a_hanging_application_changes_no_state_until_it_goes_on() {
 }
 
 #[test]
-fn without_outputs_op_is_refused_with_0x0019_after_a_while() {
+fn without_outputs_op_is_refused_with_0x0019_after_a_time_limit() {
     let mut bench = up_to("digital-output-8", AlState::SafeOp);
     assert_eq!(bench.request(AlState::Op), ok(AlState::SafeOp));
     bench.pass(Duration::from_millis(1_100));
@@ -294,7 +294,7 @@ fn a_switched_off_watchdog_keeps_op() {
 }
 
 #[test]
-fn a_sync_manager_switched_off_at_run_time_ends_in_preop_or_init() {
+fn disabling_a_sync_manager_at_run_time_causes_preop_or_init() {
     for (number, expected) in [
         (2, error(AlState::PreOp, 0x001D)),
         (3, error(AlState::PreOp, 0x001E)),
@@ -332,7 +332,7 @@ fn the_identification_is_in_the_status_code() {
 }
 
 #[test]
-fn a_reset_through_ethercat_starts_the_application_anew() {
+fn a_reset_through_ethercat_restarts_the_application() {
     let mut bench = up_to("digital-output-8", AlState::Op);
     bench.output(&[0xFF]);
     for byte in *b"RES" {

@@ -1,4 +1,4 @@
-//! Protocol 6.8 as a MainDevice sees them, and all protocols side by side.
+//! Protocol 6.8 from the view of a MainDevice, and all protocols together.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::{Idn, SoeElements, SoeMessage, SoeOperation};
@@ -16,7 +16,7 @@ fn message(vendor_id: u32, data: &[u8]) -> Vec<u8> {
 
 // covers: 6.8, sim-mailbox
 #[test]
-fn messages_of_the_vendor_come_back() {
+fn messages_of_the_vendor_are_echoed() {
     let mut client = Client::new("all-protocols", AlState::PreOp);
     for size in [0, 1, 1012] {
         let payload = message(VENDOR_ID, &vec![0xA5; size]);
@@ -32,7 +32,7 @@ fn messages_of_the_vendor_come_back() {
 
 // covers: 6.1, robust, sim-mailbox
 #[test]
-fn protocols_side_by_side_answer_in_the_order_of_the_requests() {
+fn several_protocols_answer_in_the_order_of_the_requests() {
     let mut client = Client::new("all-protocols", AlState::PreOp);
     let mut read = [0; 4];
     let request = SoeMessage::whole(SoeOperation::ReadRequest, 0, SoeElements::VALUE, Idn::standard(0, 11), &[]);
@@ -57,7 +57,7 @@ fn protocols_side_by_side_answer_in_the_order_of_the_requests() {
 
 // covers: 6.1, robust, sim-mailbox
 #[test]
-fn a_protocol_that_the_sii_does_not_announce_is_refused() {
+fn a_protocol_missing_in_the_sii_is_refused() {
     for name in ["servo", "ethernet-terminal", "soe-drive"] {
         let protocols = catalogue::by_name(name).unwrap().mailbox.unwrap().protocols;
         let mut client = Client::new(name, AlState::PreOp);
@@ -71,7 +71,7 @@ fn a_protocol_that_the_sii_does_not_announce_is_refused() {
             (Protocol::Other(9), false),
         ] {
             client.counter = next_counter(client.counter);
-            // A length that is too short for each of them.
+            // A length that is too short for every protocol.
             let header = Header::new(protocol, client.counter, 1);
             assert!(client.bench.send_mail(header, &[0]));
             let (header, payload) = client.answer();

@@ -1,4 +1,4 @@
-//! Homing methods 17, 18, 33, 34, 35, 37: where the origin is afterwards, and what the statusword says meanwhile.
+//! Homing methods 17, 18, 33, 34, 35, 37: position of the origin, and the statusword during homing.
 
 use super::*;
 use crate::application::servo::{
@@ -13,7 +13,7 @@ fn homing(method: i8) -> Axis {
     Axis::enabled(MODE_HOMING, &[(0x6098, 0, method.into(), 1), (0x607C, 0, HOME_OFFSET.into(), 4)])
 }
 
-/// Starts, and goes on until homing is done.
+/// Starts homing and runs until it is done.
 fn home(axis: &mut Axis) -> Vec<Feedback> {
     axis.control = ENABLE | NEW_SET_POINT;
     let done = |seen: &Feedback| seen.has(BIT_12 | TARGET_REACHED);
@@ -21,23 +21,23 @@ fn home(axis: &mut Axis) -> Vec<Feedback> {
     axis.until(20_000, "homed", done)
 }
 
-/// The place on the machine that has the home offset now.
+/// The machine position that now has the home offset.
 fn home_on_machine(seen: &Feedback) -> i32 {
     seen.machine - seen.position + HOME_OFFSET
 }
 
 // covers: sim-drive
 #[test]
-fn each_method_finds_its_place_to_the_increment() {
+fn each_method_finds_its_position_to_the_increment() {
     let table = [(17, -EDGE), (18, EDGE), (33, INDEX - INCREMENTS_PER_REVOLUTION), (34, INDEX), (35, 0), (37, 0)];
     for (method, place) in table {
         let mut axis = homing(method);
         let seen = home(&mut axis);
         assert_eq!(home_on_machine(&axis.last), place, "method {method}");
         assert!(seen.iter().all(|seen| !seen.has(BIT_13) && seen.state() == OPERATION_ENABLED), "method {method}");
-        // It stands beside the place, not on it: slow, and stopped by a ramp.
+        // The axis stops close to the position, not at it: slow, and stopped by a ramp.
         assert!((axis.last.machine - place).abs() < 200, "method {method}: {:?}", axis.last);
-        // And goes to it in another mode.
+        // It moves to the position in another mode.
         axis.mode = MODE_PROFILE_POSITION;
         axis.control = ENABLE;
         axis.cycle();
@@ -57,7 +57,7 @@ fn the_switch_is_approached_quickly_and_left_slowly() {
     assert!((-510_000..=-499_000).contains(&lowest), "{lowest}");
     assert!((49_000..=56_000).contains(&highest), "{highest}");
     let overrun = bounds(&seen, |seen| seen.machine).0 + EDGE;
-    // v*v/2a of 500,000 and 1e7, and what the loops lag.
+    // v*v/2a of 500,000 and 1e7, and the lag of the loops.
     assert!((-14_500..=-12_000).contains(&overrun), "{overrun}");
 }
 
@@ -66,7 +66,7 @@ fn the_switch_is_approached_quickly_and_left_slowly() {
 fn a_drive_on_its_switch_leaves_it_at_once() {
     let mut axis = homing(18);
     home(&mut axis);
-    // Onto the switch, in units of the application.
+    // Moves onto the switch, in units of the application.
     axis.mode = MODE_PROFILE_POSITION;
     axis.control = ENABLE;
     axis.cycle();
@@ -78,13 +78,13 @@ fn a_drive_on_its_switch_leaves_it_at_once() {
     axis.control = ENABLE;
     axis.cycle();
     let seen = home(&mut axis);
-    assert!(bounds(&seen, |seen| seen.machine).1 <= EDGE + 30_005, "no farther");
+    assert!(bounds(&seen, |seen| seen.machine).1 <= EDGE + 30_005, "not beyond the switch");
     assert_eq!(home_on_machine(&axis.last), EDGE);
 }
 
 // covers: sim-drive
 #[test]
-fn status_bits_tell_how_far_homing_is() {
+fn status_bits_show_the_progress_of_homing() {
     let status = |axis: &Axis| axis.last.status & (BIT_13 | BIT_12 | TARGET_REACHED);
     let mut axis = homing(34);
     assert_eq!(status(&axis), TARGET_REACHED, "not started");
@@ -100,7 +100,7 @@ fn status_bits_tell_how_far_homing_is() {
     assert!(order.is_sorted(), "0, found but moving, done: {order:?}");
     axis.control = ENABLE;
     axis.run(5);
-    assert_eq!(status(&axis), BIT_12 | TARGET_REACHED, "it stays homed");
+    assert_eq!(status(&axis), BIT_12 | TARGET_REACHED, "the axis stays homed");
 }
 
 // covers: sim-drive

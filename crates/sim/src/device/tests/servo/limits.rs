@@ -8,7 +8,7 @@ use crate::application::servo::{
 
 const LOW: i32 = -200_000;
 const HIGH: i32 = 300_000;
-/// Beyond a software limit for as long as the loops take to come back.
+/// Overrun of a software limit until the loops return the axis.
 const OVERRUN: i32 = 60;
 
 fn limited(mode: i8) -> Axis {
@@ -28,11 +28,15 @@ fn no_mode_leaves_the_software_limits() {
             axis.control = ENABLE | NEW_SET_POINT;
             let seen = axis.run(1_500);
             let (low, high) = bounds(&seen, |seen| seen.position);
-            // In CSP the set-point stands at the limit at once, and the motor that could not follow runs past it.
+            // In CSP the set-point jumps to the limit at once, and the motor, which could not follow, overruns it.
             let overrun = if mode == MODE_CSP { 60_000 } else { OVERRUN };
             assert!(low >= LOW - overrun && high <= HIGH + overrun, "mode {mode}: {low} to {high}");
             let beside = if mode == MODE_CSP || mode == MODE_PROFILE_POSITION { 0 } else { OVERRUN };
-            assert!((axis.last.position - limit).abs() <= beside, "mode {mode}: it goes to the limit, {:?}", axis.last);
+            assert!(
+                (axis.last.position - limit).abs() <= beside,
+                "mode {mode}: the axis moves to the limit, {:?}",
+                axis.last
+            );
             assert!(axis.last.has(INTERNAL_LIMIT) && axis.last.velocity.abs() <= 1_000, "mode {mode}: {:?}", axis.last);
             assert_eq!(axis.last.state(), OPERATION_ENABLED, "mode {mode}");
         }
@@ -41,7 +45,7 @@ fn no_mode_leaves_the_software_limits() {
 
 // covers: sim-drive
 #[test]
-fn a_limit_lets_the_axis_back() {
+fn an_axis_returns_from_a_limit() {
     for mode in [MODE_CSV, MODE_CST, MODE_PROFILE_VELOCITY, MODE_PROFILE_TORQUE] {
         let mut axis = limited(mode);
         (axis.velocity, axis.torque) = (2_000_000, 500);
@@ -115,11 +119,11 @@ fn a_following_error_is_a_fault_after_its_time_out() {
 
 // covers: sim-drive
 #[test]
-fn a_following_error_that_ends_in_time_is_no_fault() {
+fn a_following_error_that_ends_before_the_time_out_is_no_fault() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 5_000, 4), (0x6066, 0, 100, 2)]);
     axis.position = 100_000;
     let seen = axis.run(300);
-    assert!(bounds(&seen, |seen| seen.following_error).1 > 5_000, "it was beyond");
+    assert!(bounds(&seen, |seen| seen.following_error).1 > 5_000, "the error was beyond the window");
     assert_eq!((axis.last.state(), axis.last.position), (OPERATION_ENABLED, 100_000));
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, -1, 4), (0x6066, 0, 0, 2)]);
     axis.position = 3_000_000;
@@ -141,7 +145,7 @@ fn one_in(many: u64, state: &mut u64) -> bool {
 #[test]
 fn any_outputs_and_objects_leave_motor_and_load_within_their_physics() {
     use crate::application::servo::{ACCELERATION, BRAKE_TORQUE, PEAK_TORQUE};
-    // Speed, where the motor has the highest of its limits, and what a cycle can add to it.
+    // Speed at the highest limit of the motor, and the possible increase in a cycle.
     let fastest = 10_200_000;
     let most = ((PEAK_TORQUE + BRAKE_TORQUE) * ACCELERATION / 1_000.0) as i32;
     for seed in 0..40 {
@@ -174,7 +178,7 @@ fn any_outputs_and_objects_leave_motor_and_load_within_their_physics() {
             let seen = axis.cycle();
             assert!(seen.velocity.abs() <= fastest, "seed {seed}, cycle {cycle}: {seen:?}");
             assert!(f64::from(seen.torque.abs()) <= PEAK_TORQUE, "seed {seed}, cycle {cycle}: {seen:?}");
-            // A mail takes two more milliseconds of the cycle at most.
+            // Mail takes at most two more milliseconds of the cycle.
             let gained = (seen.velocity - before.velocity).abs();
             assert!(gained <= 4 * most, "seed {seed}, cycle {cycle}: {before:?} {seen:?}");
         }

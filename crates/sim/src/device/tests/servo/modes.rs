@@ -1,4 +1,4 @@
-//! Each mode of operation: what the motor does, and the bits of the statusword that belong to the mode.
+//! Modes of operation: motion of the motor, and mode-specific bits of the statusword.
 
 use super::*;
 use crate::application::servo::{
@@ -7,21 +7,21 @@ use crate::application::servo::{
 
 // covers: sim-drive
 #[test]
-fn csp_follows_set_points_between_which_it_interpolates() {
+fn csp_interpolates_between_set_points() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 20_000, 4)]);
     let mut seen = Vec::new();
     for step in 1..=200 {
         axis.position = 1_000 * step;
         seen.push(axis.cycle());
     }
-    // One million increments per second: one cycle to the set-point, and a lag that the loops take back.
+    // One million increments per second: one cycle to the set-point, and a lag that the loops compensate.
     for (step, at) in seen.iter().enumerate().skip(60) {
         assert!((at.position - 1_000 * step as i32).abs() <= 10, "step {step}: {at:?}");
         assert!((at.velocity - 1_000_000).abs() < 2_000 && at.following_error.abs() <= 10, "step {step}: {at:?}");
         assert!(at.has(BIT_12) && !at.has(BIT_13), "follows: {at:?}");
     }
     let (_, lag) = bounds(&seen, |seen| seen.following_error.abs());
-    assert!((10..=8_000).contains(&lag), "inertia makes a lag at the start: {lag}");
+    assert!((10..=8_000).contains(&lag), "inertia causes a lag at the start: {lag}");
     axis.run(100);
     assert_eq!((axis.last.position, axis.last.velocity, axis.last.torque), (200_000, 0, 0), "settled");
     assert!(axis.last.has(TARGET_REACHED));
@@ -30,11 +30,11 @@ fn csp_follows_set_points_between_which_it_interpolates() {
 
 // covers: sim-drive
 #[test]
-fn csp_takes_as_long_to_a_set_point_as_0x60c2_says() {
+fn csp_reaches_a_set_point_in_the_time_of_0x60c2() {
     for (value, index, cycles) in [(8i64, -3i64, 8), (40, -4, 4), (2, -2, 20)] {
         let mut axis = Axis::enabled(MODE_CSP, &[(0x60C2, 1, value, 1), (0x60C2, 2, index, 1), (0x6065, 0, 20_000, 4)]);
         axis.run(20);
-        // One set-point, and looks without another.
+        // One set-point, and checks without another one.
         axis.position = 4_000;
         axis.cycle();
         let speeds: Vec<i32> = (0..cycles + 6)
@@ -70,7 +70,7 @@ fn offsets_add_to_the_targets_of_the_cyclic_modes() {
 
 // covers: sim-drive
 #[test]
-fn csv_keeps_its_speed_and_loses_no_part_of_an_increment() {
+fn csv_keeps_its_speed_without_rounding_errors() {
     let mut axis = Axis::enabled(MODE_CSV, &[]);
     axis.velocity = -333;
     axis.run(500);
@@ -85,7 +85,7 @@ fn csv_keeps_its_speed_and_loses_no_part_of_an_increment() {
 
 // covers: sim-drive
 #[test]
-fn cst_makes_the_torque_that_is_asked_for_in_the_next_step() {
+fn cst_produces_the_requested_torque_in_the_next_step() {
     let mut axis = Axis::enabled(MODE_CST, &[]);
     for torque in [10, -2_000, 0, 3_000, -3_000] {
         axis.torque = torque;
@@ -107,7 +107,7 @@ fn profile_position_is_a_trapezoid_and_ends_exactly_at_its_target() {
     axis.cycle();
     assert!(!axis.last.has(BIT_12), "ready for the next");
     let seen = axis.until(2_000, "at its target", |seen| seen.has(TARGET_REACHED));
-    // 100 ms up, 250 ms down, 87,500 increments on the way of both, the rest at 500,000 per second: 425 ms.
+    // 100 ms acceleration, 250 ms deceleration, 87,500 increments during both, the rest at 500,000 per second: 425 ms.
     assert!((765..=785).contains(&seen.len()), "{} ms, expected 775", seen.len());
     let (_, fastest) = bounds(&seen, |seen| seen.velocity);
     assert!((499_000..=506_000).contains(&fastest), "{fastest}");
@@ -122,7 +122,7 @@ fn profile_position_is_a_trapezoid_and_ends_exactly_at_its_target() {
 
 // covers: sim-drive
 #[test]
-fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
+fn profile_position_buffers_one_set_point_or_applies_it_at_once() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
     let give = |axis: &mut Axis, position: i32, bits: u16| {
         axis.position = position;
@@ -138,8 +138,8 @@ fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
     assert!(axis.last.has(BIT_12), "the buffer is full");
     let seen = axis.until(3_000, "at 200,000", |seen| seen.has(TARGET_REACHED) && seen.position < 300_000);
     let (_, farthest) = bounds(&seen, |seen| seen.position);
-    assert!((499_990..=500_050).contains(&farthest), "first to 500,000, without a stop between: {farthest}");
-    // Relative to where the set-point is, at once instead of the one before.
+    assert!((499_990..=500_050).contains(&farthest), "first to 500,000, without an intermediate stop: {farthest}");
+    // Relative to the current set-point, at once instead of the previous target.
     assert!(give(&mut axis, -50_000, 0x40));
     axis.until(1_000, "at 150,000", |seen| seen.has(TARGET_REACHED));
     axis.run(100);
@@ -149,15 +149,18 @@ fn profile_position_buffers_one_set_point_or_takes_it_at_once() {
     assert!(give(&mut axis, 0, 0x20));
     let seen = axis.until(3_000, "back", |seen| seen.has(TARGET_REACHED));
     let (_, farthest) = bounds(&seen, |seen| seen.position);
-    assert!(farthest < 500_000, "it turned round: {farthest}");
+    assert!(farthest < 500_000, "the axis reversed: {farthest}");
 }
 
 // covers: sim-drive
 #[test]
-fn a_target_is_reached_when_it_was_in_its_window_for_the_window_time() {
+fn a_target_is_reached_after_the_window_time_in_its_window() {
     // Cycles in the window before the bit.
     let waited = |seen: &[Feedback], inside: &dyn Fn(&Feedback) -> bool| {
-        assert!(seen.iter().all(|seen| !seen.has(TARGET_REACHED) || inside(seen)), "reached outside of the window");
+        assert!(
+            seen.iter().all(|seen| !seen.has(TARGET_REACHED) || inside(seen)),
+            "target reached outside of the window"
+        );
         seen.iter().rev().skip(1).take_while(|seen| inside(seen)).count()
     };
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[(0x6067, 0, 100, 4), (0x6068, 0, 50, 2)]);
@@ -178,7 +181,7 @@ fn a_target_is_reached_when_it_was_in_its_window_for_the_window_time() {
 
 // covers: sim-drive
 #[test]
-fn profile_position_goes_on_after_a_halt() {
+fn profile_position_continues_after_a_halt() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
     axis.position = 800_000;
     axis.control = ENABLE | NEW_SET_POINT;
@@ -195,7 +198,7 @@ fn profile_position_goes_on_after_a_halt() {
 
 // covers: sim-drive
 #[test]
-fn a_target_from_before_is_not_taken_up_when_the_drive_is_enabled_again() {
+fn an_earlier_target_is_dropped_when_the_drive_is_enabled_again() {
     let mut axis = Axis::enabled(MODE_PROFILE_POSITION, &[]);
     axis.position = 800_000;
     axis.control = ENABLE | NEW_SET_POINT;
@@ -213,7 +216,7 @@ fn a_target_from_before_is_not_taken_up_when_the_drive_is_enabled_again() {
 
 // covers: sim-drive
 #[test]
-fn profile_velocity_ramps_and_says_when_it_is_there() {
+fn profile_velocity_ramps_and_reports_the_reached_target() {
     let objects = [(0x6083, 0, 4_000_000, 4), (0x6084, 0, 1_000_000, 4)];
     let mut axis = Axis::enabled(MODE_PROFILE_VELOCITY, &objects);
     assert!(axis.last.has(BIT_12), "speed 0");
@@ -245,7 +248,7 @@ fn profile_torque_rises_with_its_slope() {
 
 // covers: sim-drive
 #[test]
-fn modes_change_without_a_jump_and_unknown_ones_are_not_taken() {
+fn modes_change_without_a_jump_and_unknown_ones_are_ignored() {
     let mut axis = Axis::at_speed(500_000, &[]);
     axis.mode = MODE_PROFILE_VELOCITY;
     let seen = axis.run(50);
@@ -255,7 +258,7 @@ fn modes_change_without_a_jump_and_unknown_ones_are_not_taken() {
     axis.mode = MODE_PROFILE_POSITION;
     let seen = axis.until(200, "at rest", |seen| seen.velocity.abs() < 2);
     let (least, most) = bounds(&seen, |seen| seen.velocity);
-    assert!(seen.len() > 50 && most < 500_500 && least > -10_000, "by its ramp of 50 ms: {seen:?}");
+    assert!(seen.len() > 50 && most < 500_500 && least > -10_000, "with a ramp of 50 ms: {seen:?}");
     assert_eq!(axis.last.state(), OPERATION_ENABLED);
     axis.mode = 0;
     assert_eq!(axis.run(3)[2].mode, 0);

@@ -1,4 +1,4 @@
-//! Energy, friction, acceleration: laws that every motion must obey.
+//! Energy, friction, acceleration: laws that hold for every motion.
 
 use super::*;
 use crate::application::servo::{ACCELERATION, FRICTION, MODE_CSP, MODE_CST, MODE_CSV, PEAK_TORQUE};
@@ -7,9 +7,9 @@ use crate::application::servo::{ACCELERATION, FRICTION, MODE_CSP, MODE_CST, MODE
 fn energies(seen: &[Feedback]) -> (f64, f64, f64) {
     let (mut work, mut heat) = (0.0, 0.0);
     for pair in seen.windows(2) {
-        let way = f64::from(pair[1].position) - f64::from(pair[0].position);
-        work += f64::from(pair[1].torque) * way;
-        heat += FRICTION * f64::from(pair[0].velocity + pair[1].velocity) / 2.0 * way;
+        let distance = f64::from(pair[1].position) - f64::from(pair[0].position);
+        work += f64::from(pair[1].torque) * distance;
+        heat += FRICTION * f64::from(pair[0].velocity + pair[1].velocity) / 2.0 * distance;
     }
     let energy = |at: &Feedback| f64::from(at.velocity).powi(2) / (2.0 * ACCELERATION);
     (work, heat, energy(&seen[seen.len() - 1]) - energy(&seen[0]))
@@ -17,7 +17,7 @@ fn energies(seen: &[Feedback]) -> (f64, f64, f64) {
 
 // covers: sim-drive
 #[test]
-fn work_of_the_torque_is_energy_of_the_load_and_heat_of_friction() {
+fn work_of_the_torque_equals_energy_of_the_load_and_heat_of_friction() {
     for torque in [100, 500, -1_500, 3_000] {
         let mut axis = Axis::enabled(MODE_CST, &[]);
         axis.torque = torque;
@@ -33,13 +33,13 @@ fn work_of_the_torque_is_energy_of_the_load_and_heat_of_friction() {
 
 // covers: sim-drive
 #[test]
-fn a_load_without_torque_is_slowed_down_by_friction_alone() {
+fn a_load_without_torque_is_decelerated_by_friction_only() {
     let mut axis = Axis::at_speed(4_000_000, &[]);
     (axis.mode, axis.torque) = (MODE_CST, 0);
     axis.run(2);
     let start = f64::from(axis.last.velocity);
     axis.run(1_000);
-    // dv/dt = -FRICTION * ACCELERATION * v, half a second to the power of e.
+    // dv/dt = -FRICTION * ACCELERATION * v: exponential decay with exponent -0.5 per second.
     let expected = start * (-FRICTION * ACCELERATION).exp();
     assert!((f64::from(axis.last.velocity) / expected - 1.0).abs() < 0.002, "{} of {expected}", axis.last.velocity);
     assert_eq!(axis.last.torque, 0);
@@ -47,18 +47,18 @@ fn a_load_without_torque_is_slowed_down_by_friction_alone() {
 
 // covers: sim-drive
 #[test]
-fn acceleration_never_exceeds_what_the_torque_gives() {
+fn acceleration_never_exceeds_the_limit_of_the_torque() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, -1, 4)]);
     axis.position = 1_000_000;
     let seen = axis.run(400);
-    // Friction helps to brake.
+    // Friction adds to braking.
     let most = (PEAK_TORQUE + FRICTION * 1e7) * ACCELERATION / 1_000.0;
     for pair in seen.windows(2) {
         let gained = f64::from(pair[1].velocity - pair[0].velocity);
         assert!(gained.abs() <= 1.001 * most, "{pair:?}");
-        let way = f64::from(pair[1].position - pair[0].position);
+        let distance = f64::from(pair[1].position - pair[0].position);
         let mean = f64::from(pair[0].velocity + pair[1].velocity) / 2_000.0;
-        assert!((way - mean).abs() <= most / 1_000.0, "no jumps: {pair:?}");
+        assert!((distance - mean).abs() <= most / 1_000.0, "no jumps: {pair:?}");
     }
     assert_eq!((axis.last.position, axis.last.velocity, axis.last.torque), (1_000_000, 0, 0), "settled");
 }
@@ -79,7 +79,7 @@ fn the_motion_does_not_depend_on_reads_of_the_inputs() {
             axis.client.bench.output(&data);
             let seen: Vec<Feedback> = (0..looks).map(|_| axis.look()).collect();
             axis.client.bench.pass(Duration::from_micros(980 - 20 * looks as u64));
-            // The inputs that the outputs left behind.
+            // The inputs after the outputs.
             course.push(seen[0]);
         }
         course

@@ -3,13 +3,13 @@
 use super::*;
 use crate::application::servo::{ERROR_COMMUNICATION, ERROR_FOLLOWING, MODE_CSP, MODE_CSV};
 
-/// Speed at which stops begin.
+/// Speed before each stop.
 const SPEED: i32 = 2_000_000;
 
 // covers: sim-drive
 #[test]
-fn each_transition_of_cia_402_by_command_is_made() {
-    let way = [
+fn each_commanded_transition_of_cia_402_occurs() {
+    let steps = [
         (0x0000, SWITCH_ON_DISABLED, "1, by itself"),
         (ENABLE, SWITCH_ON_DISABLED, "none"),
         (SHUTDOWN, READY_TO_SWITCH_ON, "2"),
@@ -40,10 +40,10 @@ fn each_transition_of_cia_402_by_command_is_made() {
         (0x0000, SWITCH_ON_DISABLED, "12"),
     ];
     let mut axis = Axis::with(&[(0x605A, 0, 6, 2)]);
-    for (step, (control, state, transition)) in way.into_iter().enumerate() {
+    for (step, (control, state, transition)) in steps.into_iter().enumerate() {
         axis.control = control;
         axis.cycle();
-        // 5 and 8 need a step of the drive in which the motor stands still.
+        // Transitions 5 and 8 need a step of the drive at standstill.
         let seen = axis.look();
         assert_eq!(seen.state(), state, "step {step}, controlword {control:#06x}, transition {transition}");
         assert_eq!(seen.brake == 0, state == OPERATION_ENABLED || state == QUICK_STOP_ACTIVE, "brake in step {step}");
@@ -52,7 +52,7 @@ fn each_transition_of_cia_402_by_command_is_made() {
 
 // covers: sim-drive
 #[test]
-fn a_drive_is_not_ready_until_it_has_tested_itself() {
+fn a_drive_is_not_ready_before_the_end_of_its_self_test() {
     let mut bench = crate::device::tests::bench::Bench::new(described());
     let state = |bench: &crate::device::tests::bench::Bench| {
         bench.device.application.process_data().value(0x6041, 0).unwrap() as u16 & STATE
@@ -76,8 +76,8 @@ fn stop(axis: &mut Axis, control: u16) -> (usize, i32, u16) {
 
 // covers: sim-drive
 #[test]
-fn quick_stop_does_what_its_option_code_says() {
-    // Distances are v*v/2a for 1e7 and 5e7 per second squared, and with 3,000 thousandths of the torque (1.5e8).
+fn quick_stop_follows_its_option_code() {
+    // Distances are v*v/2a for 1e7 and 5e7 per second squared, and for 3,000 thousandths of the torque (1.5e8).
     let (slow, quick, hardest) = (200_000, 40_000, 13_333);
     // The brake alone has 1,000 thousandths.
     let table = [
@@ -155,7 +155,7 @@ fn a_fault_stops_the_motor_and_then_waits_for_a_rising_reset() {
 
 // covers: sim-drive
 #[test]
-fn a_reset_bit_that_was_set_before_the_fault_resets_nothing() {
+fn a_reset_bit_set_before_the_fault_resets_nothing() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x6065, 0, 1_000, 4)]);
     axis.control = ENABLE | 0x0080;
     axis.cycle();
@@ -170,7 +170,7 @@ fn a_reset_bit_that_was_set_before_the_fault_resets_nothing() {
 
 // covers: sim-drive
 #[test]
-fn lost_process_data_does_what_the_abort_connection_code_says() {
+fn lost_process_data_causes_the_reaction_of_the_abort_connection_code() {
     for (option, state, error) in [
         (1, FAULT, ERROR_COMMUNICATION),
         (2, SWITCH_ON_DISABLED, 0),
@@ -192,22 +192,22 @@ fn lost_process_data_does_what_the_abort_connection_code_says() {
 
 // covers: sim-drive
 #[test]
-fn the_brake_takes_the_energy_of_a_load_that_loses_its_torque() {
+fn the_brake_stops_a_load_that_loses_its_torque() {
     let mut axis = Axis::at_speed(SPEED, &[]);
     axis.control = 0;
     axis.cycle();
     let seen = axis.run(60);
     assert!(seen.iter().all(|seen| seen.state() == SWITCH_ON_DISABLED && seen.brake == 1 && seen.torque == 0));
     let speeds: Vec<i32> = seen.iter().map(|seen| seen.velocity).collect();
-    // 1,000 thousandths brake 50,000 increments per second each millisecond, friction adds at most a fiftieth.
+    // 1,000 thousandths brake 50,000 increments per second each millisecond; friction adds at most a fiftieth.
     let evenly = speeds.windows(2).take(38).all(|pair| (50_000..=51_100).contains(&(pair[0] - pair[1])));
     assert!(evenly && speeds[45] == 0, "{speeds:?}");
-    assert_eq!(seen[45].position, seen[59].position, "it holds");
+    assert_eq!(seen[45].position, seen[59].position, "the brake holds");
 }
 
 // covers: sim-drive
 #[test]
-fn power_keeps_the_load_where_it_is_and_forgets_the_origin() {
+fn a_power_cycle_keeps_the_position_of_the_load_and_clears_the_origin() {
     let mut axis = Axis::enabled(MODE_CSP, &[(0x607C, 0, 777, 4)]);
     axis.position = 5_000;
     axis.run(100);

@@ -1,4 +1,4 @@
-//! Frames that fly in one go do what frames do hop by hop: two segments, one of each kind, live through the same.
+//! The fast path gives the same results as hop by hop: two segments, one of each kind, with the same actions.
 
 use core::time::Duration;
 
@@ -27,15 +27,15 @@ const KINDS: [&str; 7] = [
     "coupler",
 ];
 const ADDRESS_SPACE: usize = 0x1_0000;
-/// Up to here lies what devices use.
+/// End of the addresses that devices use.
 const USED: usize = 0x2000;
 
-/// What happens to a segment.
+/// An action on a segment.
 #[derive(Clone, Debug)]
-enum Deed {
-    /// A frame of these datagrams on a link, or on both.
+enum Action {
+    /// Sends a frame of these datagrams on a link, or on both.
     Send(Option<HostLink>, Vec<(Kind, u16, u16)>),
-    /// A register of a device is written.
+    /// Writes a register of a device.
     Write(u16, u16, Vec<u8>),
     Advance(u64),
     UntilReceived(u64),
@@ -45,7 +45,7 @@ enum Deed {
     FaultIn(u64, Fault),
 }
 
-/// A datagram; the numbers beside it are address and length.
+/// A datagram; the numbers that follow it are address and length.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Lrd,
@@ -106,11 +106,11 @@ fn faults(devices: usize) -> impl Strategy<Value = Fault> {
     ]
 }
 
-fn deeds(devices: usize) -> impl Strategy<Value = Vec<Deed>> {
+fn actions(devices: usize) -> impl Strategy<Value = Vec<Action>> {
     use Kind::{Aprd, Brd, Bwr, Fprd, Frmw, Lrd, Lrw, Lwr};
     let link = prop_oneof![Just(None), Just(Some(HostLink::Main)), Just(Some(HostLink::Redundant))];
     let kind = prop::sample::select(&[Lrd, Lwr, Lrw, Lrw, Lrw, Brd, Aprd, Fprd, Frmw, Bwr][..]);
-    // Usual frames are alike, so that what was found for one is used for the next.
+    // Usual frames are equal, so that precomputed results are reused.
     let usual = Just(vec![(Lrw, 0, 48), (Brd, 0, 2)]);
     let datagrams = prop_oneof![3 => usual, 2 => prop::collection::vec((kind, any::<u16>(), any::<u16>()), 1..4)];
     let register = prop::sample::select(
@@ -118,21 +118,21 @@ fn deeds(devices: usize) -> impl Strategy<Value = Vec<Deed>> {
     );
     let value = prop_oneof![prop::collection::vec(any::<u8>(), 1..3), Just(vec![2]), Just(vec![8]), Just(vec![1, 4])];
     let time = prop_oneof![0u64..3_000, 0u64..60_000, Just(1_000_000), Just(120_000_000)];
-    let deed = prop_oneof![
-        10 => (link, datagrams).prop_map(|(link, datagrams)| Deed::Send(link, datagrams)),
+    let action = prop_oneof![
+        10 => (link, datagrams).prop_map(|(link, datagrams)| Action::Send(link, datagrams)),
         1 => (0..devices as u16, register, value)
-            .prop_map(|(device, register, data)| Deed::Write(device, register, data)),
-        4 => time.clone().prop_map(Deed::Advance),
-        4 => time.clone().prop_map(Deed::UntilReceived),
-        2 => time.clone().prop_map(Deed::Leap),
-        1 => Just(Deed::Settle),
-        1 => faults(devices).prop_map(Deed::Fault),
-        1 => (time, faults(devices)).prop_map(|(time, fault)| Deed::FaultIn(time, fault)),
+            .prop_map(|(device, register, data)| Action::Write(device, register, data)),
+        4 => time.clone().prop_map(Action::Advance),
+        4 => time.clone().prop_map(Action::UntilReceived),
+        2 => time.clone().prop_map(Action::Leap),
+        1 => Just(Action::Settle),
+        1 => faults(devices).prop_map(Action::Fault),
+        1 => (time, faults(devices)).prop_map(|(time, fault)| Action::FaultIn(time, fault)),
     ];
-    prop::collection::vec(deed, 10..60)
+    prop::collection::vec(action, 10..60)
 }
 
-/// A segment whose devices have process data in the logical bytes 0 to 47, as far as they take it.
+/// A segment of devices with process data in the logical bytes 0 to 47, if they accept it.
 fn segment(kinds: &[usize], ring: bool, compiled: bool) -> Network {
     let devices = kinds.iter().map(|kind| Device::new(catalogue::by_name(KINDS[*kind]).unwrap())).collect();
     let builder = if ring { SegmentBuilder::ring(devices) } else { SegmentBuilder::line(devices) };
@@ -150,7 +150,7 @@ fn segment(kinds: &[usize], ring: bool, compiled: bool) -> Network {
         for (number, entry) in (0..).zip(&entries) {
             let (start, length) = (entry.start.to_le_bytes(), entry.length.to_le_bytes());
             write(map::sync_manager(number), &[start[0], start[1], length[0], length[1], entry.control, 0, 1, 0]);
-            // One behind the other where there is process data: outputs 4 bytes apart, inputs likewise, in halves.
+            // Consecutive addresses for process data: outputs 4 bytes apart, inputs the same, in halves.
             let logical = position as u8 * 4 % 24 + if entry.control & 4 == 0 { 24 } else { 0 };
             let kind = if entry.control & 4 == 0 { 1 } else { 2 };
             if number == 0 || number > 1 {
@@ -170,29 +170,29 @@ fn segment(kinds: &[usize], ring: bool, compiled: bool) -> Network {
     network
 }
 
-fn act(network: &mut Network, deed: &Deed, number: u8) {
-    match deed {
-        Deed::Send(link, datagrams) => {
+fn act(network: &mut Network, action: &Action, number: u8) {
+    match action {
+        Action::Send(link, datagrams) => {
             let bytes = frame(datagrams, number);
             HostLink::ALL.into_iter().filter(|one| link.is_none_or(|link| link == *one)).for_each(|link| {
                 network.send(link, &bytes);
             });
         }
-        Deed::Write(device, register, data) => {
+        Action::Write(device, register, data) => {
             let target = Target::Position(Position(*device), RegisterAddress(*register));
             network.send(HostLink::Main, &command(Command::Apwr, target, data));
         }
-        Deed::Advance(ns) => network.advance_by(Duration::from_nanos(*ns)),
-        Deed::UntilReceived(ns) => network.advance_until_received(network.now() + Duration::from_nanos(*ns)),
-        Deed::Leap(ns) => network.advance_until_quiet(network.now() + Duration::from_nanos(*ns)),
-        Deed::Settle => network.settle_all(),
-        Deed::Fault(fault) => network.apply(fault.clone()),
-        Deed::FaultIn(ns, fault) => network.schedule(network.now() + Duration::from_nanos(*ns), fault.clone()),
+        Action::Advance(ns) => network.advance_by(Duration::from_nanos(*ns)),
+        Action::UntilReceived(ns) => network.advance_until_received(network.now() + Duration::from_nanos(*ns)),
+        Action::Leap(ns) => network.advance_until_quiet(network.now() + Duration::from_nanos(*ns)),
+        Action::Settle => network.settle_all(),
+        Action::Fault(fault) => network.apply(fault.clone()),
+        Action::FaultIn(ns, fault) => network.schedule(network.now() + Duration::from_nanos(*ns), fault.clone()),
     }
 }
 
-/// Everything that can be seen of a segment from outside.
-fn agree(one: &mut Network, other: &mut Network, memory: usize) -> Result<(), TestCaseError> {
+/// Compares all observable properties of two segments.
+fn compare(one: &mut Network, other: &mut Network, memory: usize) -> Result<(), TestCaseError> {
     prop_assert_eq!(one.now(), other.now());
     prop_assert_eq!(one.statistics(), other.statistics());
     for link in HostLink::ALL {
@@ -213,9 +213,9 @@ fn agree(one: &mut Network, other: &mut Network, memory: usize) -> Result<(), Te
     Ok(())
 }
 
-fn lives() -> impl Strategy<Value = (Vec<usize>, bool, Vec<Deed>)> {
+fn runs() -> impl Strategy<Value = (Vec<usize>, bool, Vec<Action>)> {
     (prop::collection::vec(0..KINDS.len(), 2..7), any::<bool>())
-        .prop_flat_map(|(kinds, ring)| (Just(kinds.clone()), Just(ring), deeds(kinds.len())))
+        .prop_flat_map(|(kinds, ring)| (Just(kinds.clone()), Just(ring), actions(kinds.len())))
 }
 
 proptest! {
@@ -223,18 +223,18 @@ proptest! {
 
     // covers: sim-interfaces
     #[test]
-    fn flights_and_hops_are_told_apart_by_nothing((kinds, ring, deeds) in lives()) {
-        let mut flights = segment(&kinds, ring, true);
+    fn fast_path_and_hops_give_the_same_results((kinds, ring, actions) in runs()) {
+        let mut fast = segment(&kinds, ring, true);
         let mut hops = segment(&kinds, ring, false);
-        agree(&mut flights, &mut hops, ADDRESS_SPACE)?;
-        for (number, deed) in deeds.iter().enumerate() {
-            act(&mut flights, deed, number as u8);
-            act(&mut hops, deed, number as u8);
-            agree(&mut flights, &mut hops, USED)?;
+        compare(&mut fast, &mut hops, ADDRESS_SPACE)?;
+        for (number, action) in actions.iter().enumerate() {
+            act(&mut fast, action, number as u8);
+            act(&mut hops, action, number as u8);
+            compare(&mut fast, &mut hops, USED)?;
         }
-        for network in [&mut flights, &mut hops] {
+        for network in [&mut fast, &mut hops] {
             network.advance_by(Duration::from_millis(1));
         }
-        agree(&mut flights, &mut hops, ADDRESS_SPACE)?;
+        compare(&mut fast, &mut hops, ADDRESS_SPACE)?;
     }
 }

@@ -1,24 +1,24 @@
-//! Moves frames along a [`Route`] in one step, up to the next other event.
+//! The fast path: moves frames along a [`Route`] in one step, up to the next other event.
 //!
 //! A frame that cannot change the paths of frames moves from one processing unit to the next, and on to the end, at the
-//! same times as hop by hop ([`super::traffic`]). Its effect on a device is computed by the same code.
+//! same times as hop by hop ([`super::traffic`]). The same code computes its effect on a device.
 //!
-//! Frames of the same kind that enter after it, or at the other end, may do so meanwhile: they do not overtake it, each
-//! processing unit belongs to the path of one interface, and a frame that only passes by leaves no trace. Any other due
-//! event, in the segment or in a device, ends the flight there, and the frame continues hop by hop. So does the time
-//! limit of the caller, which may then inspect the devices or change the segment.
+//! Frames of the same kind that enter after it, or at the other end, may move at the same time: they do not overtake
+//! it, each processing unit belongs to the path of one interface, and a frame that only passes by has no effect. Any
+//! other due event, in the segment or in a device, ends the fast path there, and the frame continues hop by hop. The
+//! same applies to the time limit of the caller, which may then inspect the devices or change the segment.
 
 use super::Network;
 use super::event::Event;
 use super::pool::Slot;
 use super::route::{Hop, Route, Stop};
 use crate::cable::{Endpoint, HostLink, LegId};
-use crate::controller::Way;
+use crate::controller::InternalPath;
 use crate::queue::Lane;
 use crate::time::SimTime;
 
 impl Network {
-    /// A frame has come to the end of the first cable.
+    /// Handles a frame that has arrived at the end of the first cable.
     pub(super) fn enter(&mut self, slot: Slot, link: HostLink, leg: LegId) -> Option<(SimTime, Event)> {
         if self.options.compiled {
             let frame = self.frames.frame(slot);
@@ -27,22 +27,22 @@ impl Network {
                 self.find_route(link);
             }
             let route = &self.routes[link as usize];
-            // Events that are due at this very time have their own order.
+            // Events due at the same time have their own order.
             let alone = self.horizon(link) >= self.now;
             if alone && route.wiring == Some(self.wiring) && first_bit >= route.since {
-                return self.fly(slot, link);
+                return self.take_fast_path(slot, link);
             }
         }
         self.arrive(slot, leg, false)
     }
 
-    /// Cables, links or power have changed.
+    /// Handles a change of cables, links or power.
     pub(super) fn wiring_changed(&mut self) {
         self.wiring = self.wiring.wrapping_add(1);
     }
 
-    /// Moves a frame along its route up to the next other event. Returns its next hop, if that is not the end.
-    fn fly(&mut self, slot: Slot, link: HostLink) -> Option<(SimTime, Event)> {
+    /// Moves a frame along its route up to the next other event. Returns its next hop, if it has not reached the end.
+    fn take_fast_path(&mut self, slot: Slot, link: HostLink) -> Option<(SimTime, Event)> {
         let mut route = core::mem::take(&mut self.routes[link as usize]);
         let entered = self.now;
         let place = self.follow(slot, link, &mut route);
@@ -52,10 +52,10 @@ impl Network {
         let time = |hop: Hop| SimTime(entered.0.saturating_add(hop.after_ns));
         let Hop { leg, .. } = route.hops[place];
         let at = time(route.hops[place]);
-        self.flown_to = self.flown_to.max(time(route.hops[place.saturating_sub(1)]));
+        self.fast_path_until = self.fast_path_until.max(time(route.hops[place.saturating_sub(1)]));
         self.statistics.hops += place as u64;
         self.routes[link as usize] = route;
-        let arrival = Event::Arrival { slot, leg, meddled: false };
+        let arrival = Event::Arrival { slot, leg, faults_applied: false };
         if place < last {
             return Some((at, arrival));
         }
@@ -63,7 +63,7 @@ impl Network {
         None
     }
 
-    /// Processes everything up to the hop whose index it returns.
+    /// Processes the frame up to the hop with the returned index.
     fn follow(&mut self, slot: Slot, link: HostLink, route: &mut Route) -> usize {
         let entered = self.now;
         let time = |hop: &Hop| SimTime(entered.0.saturating_add(hop.after_ns));
@@ -89,8 +89,8 @@ impl Network {
             if !stop.processed {
                 continue;
             }
-            controller.process_on_way(self.frames.frame_mut(slot), at.back_ns(wire_ns), at);
-            if self.leaping {
+            controller.process_on_path(self.frames.frame_mut(slot), at.back_ns(wire_ns), at);
+            if self.defers_settling {
                 self.settle_later(index, id);
             } else {
                 self.settle(index);
@@ -114,7 +114,7 @@ impl Network {
         if !self.until_received {
             return horizon;
         }
-        // The receiver of the first frame may change the segment then.
+        // The receiver of the first frame may change the segment at that time.
         let other = if link == HostLink::Main { HostLink::Redundant } else { HostLink::Main };
         let entry = self.queue.next_in(other.entry_lane());
         let route = &self.routes[other as usize];
@@ -122,7 +122,7 @@ impl Network {
         horizon.min(self.queue.next_in(Lane::Exit)).min(SimTime(entry.0.saturating_add(there)))
     }
 
-    /// Finds the path of frames of an interface, if it leads through cables without faults and back to an interface.
+    /// Finds the path of frames of an interface, if it consists of cables without faults and returns to an interface.
     fn find_route(&mut self, link: HostLink) {
         let mut route = core::mem::take(&mut self.routes[link as usize]);
         route.hops.clear();
@@ -135,7 +135,7 @@ impl Network {
     fn walk(&self, link: HostLink, route: &mut Route) -> Option<()> {
         let mut leg_id = self.hosts[link as usize].out?;
         let mut after_ns = 0u64;
-        // Every port of every device is entered once at most.
+        // A frame enters every port of every device at most once.
         for _ in 0..=4 * self.nodes.len() {
             let leg = &self.legs[leg_id.index()];
             route.since = route.since.max(leg.steady_since()?);
@@ -147,7 +147,7 @@ impl Network {
             };
             let node = &self.nodes[index];
             route.since = route.since.max(node.last_loop_change);
-            let Way { exit, processed, port_changes } = node.device.controller.way(port)?;
+            let InternalPath { exit, processed, port_changes } = node.device.controller.internal_path(port)?;
             let device = index as u32;
             if processed || !route.stops.iter().rev().any(|stop| stop.device == device) {
                 route.stops.push(Stop { hop, device, port_changes, processed });
