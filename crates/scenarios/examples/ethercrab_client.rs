@@ -1,11 +1,10 @@
-//! The MainDevice of another project (ethercrab, from the registry) on a network interface, as a check of our
-//! simulator.
+//! The MainDevice ethercrab (from the registry) on a network interface, as an independent check of the simulator.
 //!
-//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings everything to OP and exchanges process data. In cycle
-//! i byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but the exchange, to
-//! tell how many there are in a second. Prints one line of figures, with the propagation delays that it has measured,
-//! then keeps exchanging the last outputs until its standard input ends. Anything unexpected ends it with an error.
-//! TIMES is how often it hands out the reference time before OP, unless it is to be as it likes.
+//! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings all SubDevices to OP and exchanges process data. In
+//! cycle i byte j of the outputs of SubDevice k is i + k + j. The same number of cycles follows without other work, to
+//! measure the cycle rate. Prints one line of figures, with the measured propagation delays, then keeps exchanging the
+//! last outputs until its standard input ends. Unexpected results end it with an error. TIMES is the number of
+//! distributions of the reference time before OP; default is that of ethercrab.
 
 use std::io;
 use std::process::ExitCode;
@@ -17,17 +16,17 @@ use std::time::{Duration, Instant};
 use ethercrab::std::{ethercat_now, tx_rx_task};
 use ethercrab::{MainDevice, MainDeviceConfig, PduStorage, Timeouts};
 
-/// Most SubDevices.
+/// Maximum number of SubDevices.
 const SUBDEVICES: usize = 64;
 /// Bytes of process data in both directions.
 const PROCESS_DATA: usize = 1024;
 /// Frames in flight.
 const FRAMES: usize = 32;
-/// Bytes of a datagram's data at the most.
+/// Maximum length of a datagram's data, in bytes.
 const DATAGRAM: usize = PduStorage::element_size(1100);
-/// The machine that this runs on may be busy with something else.
+/// Time limit with a reserve for a busy machine.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// From the first frame to OP of the last SubDevice at the most.
+/// Time limit from the first frame to OP of the last SubDevice.
 const OP_LIMIT: Duration = Duration::from_secs(20);
 
 static STORAGE: PduStorage<FRAMES, DATAGRAM> = PduStorage::new();
@@ -59,7 +58,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A MainDevice on an interface, whose frames a thread of its own moves.
+/// A MainDevice on an interface; a separate thread sends and receives its frames.
 fn connect(interface: &str, config: MainDeviceConfig) -> Result<Arc<MainDevice<'static>>, String> {
     let (sender, receiver, pdu_loop) = STORAGE.try_split().map_err(|()| "the storage is in use".to_owned())?;
     let timeouts = Timeouts { pdu: PATIENCE, eeprom: PATIENCE, ..Timeouts::default() };
@@ -78,7 +77,7 @@ fn end_of_input() -> Arc<AtomicBool> {
     let ended = Arc::new(AtomicBool::new(false));
     let end = ended.clone();
     thread::spawn(move || {
-        // An end and an error of the input both say that nothing more is wanted.
+        // End and error of the input both end the program.
         let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
         end.store(true, Ordering::Relaxed);
     });

@@ -1,9 +1,9 @@
-//! The picture of the README: a cable of a simulated ring is cut and repaired, and process data goes on.
+//! The picture of the README: a cable of a simulated ring is cut and repaired during process data exchange.
 //!
 //! `cargo run -p scenarios --example ring_picture > docs/ring.svg`
 //!
-//! Everything drawn comes from the run: the working counter of every cycle, how many SubDevices answer on each link,
-//! the events and their times. Time is virtual, so each run draws the same.
+//! All data comes from the run: the working counter of every cycle, the number of SubDevices that respond on each link,
+//! the events and their times. Time is virtual, so each run gives the same picture.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -16,19 +16,19 @@ use ringcat_sim::fault::Fault;
 
 /// SubDevices in the ring.
 const DEVICES: usize = 8;
-/// The cable that is cut lies behind this position.
+/// The cable behind this position is cut.
 const CUT_BEHIND: usize = 4;
 /// Cycles before the cut, during the break, and after the repair.
 const CYCLES: [usize; 3] = [12, 20, 16];
-/// So long before a cycle begins the cable is cut: ports notice after 300 us, so the frames of that cycle are lost in
-/// it.
+/// Time from the cut to the begin of the next cycle: ports detect the cut after 300 us, so the frames of this cycle are
+/// lost.
 const BEFORE_THE_CYCLE: Duration = Duration::from_micros(100);
 const CYCLE: Duration = Duration::from_millis(1);
 
-/// Events in words, with the cycle that they came in.
+/// Events as text, with their cycle.
 type Told = Vec<(usize, String)>;
 
-/// What one cycle showed.
+/// Results of one cycle.
 struct Seen {
     wkc: u32,
     expected: u32,
@@ -81,7 +81,7 @@ fn watch() -> Result<(Vec<Seen>, Told), ringcat::Error> {
     Ok((cycles, events))
 }
 
-/// The second stretch begins with a cut, the third with the repair.
+/// The second part begins with a cut, the third with the repair.
 fn disturb(application: &mut Application<SimulatedSegment>, stretch: usize) {
     let network = application.links_mut().network_mut();
     let cable =
@@ -94,7 +94,7 @@ fn disturb(application: &mut Application<SimulatedSegment>, stretch: usize) {
     }
 }
 
-/// Left edge, width of a cycle, and where each part begins, in pixels.
+/// Left edge, width of a cycle, and begin of each part, in pixels.
 const LEFT: f64 = 150.0;
 const STEP: f64 = 16.0;
 const WIDTH: f64 = LEFT + STEP * (CYCLES[0] + CYCLES[1] + CYCLES[2]) as f64 + 30.0;
@@ -131,7 +131,7 @@ fn picture(cycles: &[Seen], events: &[(usize, String)]) -> String {
     svg + "</svg>\n"
 }
 
-/// The ring with the SubDevices that each link reaches.
+/// The ring, with the SubDevices that can be reached on each link.
 fn topology(svg: &mut String, y: f64, title: &str, cut_behind: Option<usize>, answering: [u16; 2]) {
     let pitch = (WIDTH - LEFT - 150.0) / DEVICES as f64;
     let at = |position: usize| LEFT + 70.0 + pitch * position as f64;
@@ -159,7 +159,7 @@ fn topology(svg: &mut String, y: f64, title: &str, cut_behind: Option<usize>, an
     }
 }
 
-/// One bar per cycle: its working counter, red where it is not the expected one.
+/// One bar per cycle: its working counter, red if it is not the expected one.
 fn counters(svg: &mut String, cycles: &[Seen]) {
     let highest = cycles.iter().map(|cycle| cycle.wkc.max(cycle.expected)).max().unwrap_or(1).max(1);
     let incomplete = cycles.iter().filter(|cycle| cycle.wkc != cycle.expected).count();
@@ -176,7 +176,7 @@ fn counters(svg: &mut String, cycles: &[Seen]) {
     }
 }
 
-/// How many SubDevices answer on each link, as steps over the cycles.
+/// Number of SubDevices that respond on each link, as steps over the cycles.
 fn answers(svg: &mut String, cycles: &[Seen]) {
     let bottom = ANSWERS + ANSWER_HEIGHT;
     let y = |count: u16| bottom - ANSWER_HEIGHT * f64::from(count) / DEVICES as f64;

@@ -1,9 +1,8 @@
-//! A segment that does nothing but answer cyclic frames: a stand-in where only the MainDevice's cost is of interest.
+//! A test double of a segment that only responds to cyclic frames, for measurements of the MainDevice's cost.
 //!
-//! In: the frames that a MainDevice put on its in-memory links. Out: the same frames, with the working counters that
+//! In: the frames that a MainDevice sent on its in-memory links. Out: the same frames, with the working counters that
 //! SubDevices would have written, their AL status in presence datagrams, and the bit that controllers set in the source
-//! address (protocol 2.6), on the link where the cabling brings them back (protocol 9.2.1). Inputs stay as they were
-//! sent.
+//! address (protocol 2.6), on the link on which the cabling returns them (protocol 9.2.1). Inputs are returned as sent.
 
 use ringcat::memory::FrameRing;
 use ringcat_engine::layout::{Layout, PlannedFrame};
@@ -15,7 +14,7 @@ use ringcat_wire::source_address::PROCESSED;
 
 /// Offset of the first datagram in a frame.
 const DATAGRAMS_AT: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
-/// Offset of the first datagram's address, by which frames are told apart.
+/// Offset of the first datagram's address, which identifies a frame.
 const KEY_AT: usize = DATAGRAMS_AT + 2;
 /// Offset of the source address.
 const SOURCE_AT: usize = 6;
@@ -24,16 +23,16 @@ const IN_OP: u8 = 0x08;
 /// Bytes of AL status, which the supervision datagram reads.
 const AL_STATUS_LEN: usize = 2;
 
-/// How the SubDevices hang on the links.
+/// How the SubDevices are connected to the links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cabling {
     /// On the main link alone.
     Line,
-    /// A closed ring: the main copy meets all SubDevices and arrives on the redundant link, the redundant copy meets
-    /// none and arrives on the main link.
+    /// A closed ring: all SubDevices process the main copy, which arrives on the redundant link; none processes the
+    /// redundant copy, which arrives on the main link.
     ClosedRing,
-    /// A ring that is cut: copies return where they were sent. The main copy meets those before the break, the
-    /// redundant copy the others.
+    /// A broken ring: copies return on the link they were sent on. SubDevices before the break process the main copy,
+    /// the others the redundant copy.
     CutRing {
         /// Number of SubDevices before the break.
         before: usize,
@@ -41,7 +40,7 @@ pub enum Cabling {
 }
 
 impl Cabling {
-    /// The copy that meets a SubDevice.
+    /// The copy that a SubDevice processes.
     fn met_on(self, subdevice: usize) -> Link {
         match self {
             Cabling::CutRing { before } if subdevice >= before => Link::Redundant,
@@ -89,14 +88,14 @@ pub struct AnsweringDouble {
 }
 
 impl AnsweringDouble {
-    /// A double that answers the frames of a layout for this many SubDevices.
+    /// A double that responds to the frames of a layout for this many SubDevices.
     pub fn new(layout: &Layout, subdevices: usize, cabling: Cabling) -> AnsweringDouble {
         let frames = layout.domains.iter().flat_map(|domain| &domain.frames);
         AnsweringDouble { answers: frames.map(|frame| Answer::new(frame, subdevices, cabling)).collect(), cabling }
     }
 
-    /// Answers all frames that were sent; frames that are not of the layout vanish.
-    // One copy of this in a program: what it costs is measured apart and subtracted.
+    /// Responds to all sent frames; frames that are not in the layout are dropped.
+    // Not inlined: its cost is measured separately and subtracted.
     #[inline(never)]
     pub fn answer(&self, sent: &mut FrameRing, arriving: &mut FrameRing) {
         while let Some((link, frame)) = sent.pop() {

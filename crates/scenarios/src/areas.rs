@@ -1,4 +1,4 @@
-//! Where process data of SubDevices is: in a domain's image, in the device, in the logical address space.
+//! Areas of process data: in a domain's image, in the device, in the logical address space.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub struct Area {
     pub device: DeviceIndex,
     /// The domain.
     pub domain: DomainId,
-    /// Whether they are outputs or inputs.
+    /// Outputs or inputs.
     pub direction: Direction,
     /// Bytes of the domain's image.
     pub in_image: Range<usize>,

@@ -11,7 +11,7 @@ use std::io::{self, Error, ErrorKind};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// What a run of a program cost.
+/// Cost of a run of a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
     /// Instructions in user mode.
@@ -89,7 +89,7 @@ pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
     profile(&[], arguments, Command::new("valgrind"))
 }
 
-/// As [`profile_self`], and counts within functions of this name alone; `*` stands for anything.
+/// As [`profile_self`], but counts only within functions of this name; `*` matches any text.
 ///
 /// # Errors
 /// As [`profile_self`].
@@ -123,7 +123,7 @@ fn profile(options: &[String], arguments: &[String], mut valgrind: Command) -> i
     Profile::parse(&text).ok_or_else(|| Error::new(ErrorKind::InvalidData, "callgrind's output has no totals"))
 }
 
-/// A directory that is removed in the end.
+/// A directory that is removed on drop.
 struct Directory(PathBuf);
 
 impl Directory {
@@ -136,7 +136,7 @@ impl Directory {
 
 impl Drop for Directory {
     fn drop(&mut self) {
-        // What cannot be removed stays in the directory for temporary files.
+        // On failure it stays in the directory for temporary files.
         let _ = fs::remove_dir_all(&self.0);
     }
 }

@@ -1,30 +1,29 @@
-//! A judge of captures: recomputes from a file alone whether a MainDevice kept its promises on the wire.
+//! Checks of captures: recomputes from a file alone whether a MainDevice followed the rules on the wire.
 //!
-//! In goes a pcapng file with both directions of one or two links (main link first), out comes a [`Verdict`]. It parses
-//! pcapng, Ethernet and EtherCAT by itself: nothing of the engine or of `ringcat-wire` is used, so that one misreading
-//! does not hide itself. Constants are those of protocol 1.1 to 1.4 and 9.7.
+//! In goes a pcapng file with both directions of one or two links (main link first), out comes a [`Verdict`]. It has
+//! its own parsers for pcapng, Ethernet and EtherCAT: no code of the engine or of `ringcat-wire` is used, so that a
+//! common misreading is detected. Constants are those of protocol 1.1 to 1.4 and 9.7.
 //!
-//! What is checked of every frame that was sent:
+//! Checks of every sent frame:
 //!
 //! 1. **Form** (protocol 1.1 to 1.3): EtherType 0x88A4, type 1, 60 to 1,514 bytes, the length in the EtherCAT header is
 //!    that of the datagrams, the M bit is set in all of them but the last, reserved bits and padding are zero.
 //! 2. **Circulation** (protocol 2.4, CR-25): the C bit of each datagram is 0.
 //! 3. **Fresh datagrams** (protocol 1.2): working counters and event requests are 0.
-//! 4. **Reads** (protocol 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (What is read by LRW, APRW, FPRW and BRW
-//!    cannot be told apart from what is written; of ARMW and FRMW the data is written to all others.)
+//! 4. **Reads** (protocol 9.3): the data of APRD, FPRD, BRD and LRD is zeros. (For LRW, APRW, FPRW and BRW read and
+//!    written data cannot be distinguished; ARMW and FRMW write their data to all other SubDevices.)
 //! 5. **Link mark** (SM-01): the RED bit of the source address is set on the redundant link and clear on the main link.
-//! 6. **Pairs** (CR-01, SM-02): with two links each frame leaves once on each; the copies differ in the RED bit, in the
-//!    ADP of auto-increment commands (CR-09) and in station addresses that are set (strangers on two links must not get
-//!    the same one), and in nothing else.
+//! 6. **Pairs** (CR-01, SM-02): with two links each frame is sent once on each; the copies differ only in the RED bit,
+//!    in the ADP of auto-increment commands (CR-09) and in station addresses that are written (unassigned SubDevices on
+//!    two links must not get the same address).
 //! 7. **Ids** (CR-04, SM-02): a frame's number, 15 bits from source address and Idx within its class (bit 7 of the
-//!    first datagram's Idx), is that of the frame before plus 1, or 1 where the MainDevice begins anew (scan,
+//!    first datagram's Idx), is that of the frame before plus 1, or 1 if the MainDevice restarts its count (scan,
 //!    activation, stop); all datagrams of a frame carry the same Idx.
 //! 8. **Flights** (CR-04, CR-07, SM-03): each copy comes back at most once, and not after the 8 bits of its id in the
-//!    source address were used by another frame of its class: no id is twice in flight. Frames that come back were
-//!    sent.
+//!    source address were used by another frame of its class: no id is in flight twice. Only sent frames come back.
 //! 9. **Windows**: see [`windows`].
 //!
-//! Copies that do not come back are counted and not judged: cables are cut in tests.
+//! Copies that do not come back are counted but are not findings: cables are cut in tests.
 
 pub mod ethercat;
 pub mod flights;
@@ -41,33 +40,33 @@ use pcapng::Capture;
 
 pub use verdict::Verdict;
 
-/// Judges a capture. `cycle` is the time between cycles; `None` takes the one that is seen.
+/// Checks a capture. `cycle` is the time between cycles; with `None` it is taken from the capture.
 ///
 /// # Errors
-/// A file that is no pcapng capture of one or two Ethernet interfaces with directions.
+/// The file is not a pcapng capture of one or two Ethernet interfaces with directions.
 pub fn judge(bytes: &[u8], cycle: Option<Duration>) -> Result<Verdict, String> {
     judge_frames(&Capture::parse(bytes)?, cycle)
 }
 
-/// As [`judge`], of a file that was read.
+/// As [`judge`], for the contents of a file.
 ///
 /// # Errors
-/// Interfaces that are not one or two.
+/// The number of interfaces is not one or two.
 pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdict, String> {
     let links = capture.interfaces.len();
     if !(1..=2).contains(&links) {
         return Err(format!("{links} interfaces, expected one or two"));
     }
     let mut packets: Vec<(usize, &pcapng::Packet)> = capture.packets.iter().enumerate().collect();
-    // Threads that write into one file may be a little out of order.
+    // Frames of threads that write into one file may be slightly out of order.
     packets.sort_by_key(|(_, packet)| packet.time_ns);
     let mut verdict = Verdict::default();
     let mut flights = Flights::new(links);
     let mut traffic = Vec::new();
-    // When the copy on the main link was handed over, by number.
+    // Send time of the copy on the main link, by number.
     let mut first_copies: HashMap<(bool, u16), u64> = HashMap::new();
     for (number, packet) in packets {
-        // As tshark counts.
+        // Frame numbers as in tshark.
         let number = number + 1;
         let link = packet.interface;
         if packet.sent {
@@ -100,7 +99,7 @@ pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdic
     Ok(verdict)
 }
 
-/// Checks 2 to 5 and a part of 7; [`Frame::parse`] made check 1.
+/// Checks 2 to 5 and a part of 7; [`Frame::parse`] does check 1.
 fn check_sent(verdict: &mut Verdict, number: usize, link: usize, frame: &Frame<'_>) {
     if frame.is_marked_redundant() != (link == 1) {
         verdict.find(number, "the RED bit is not that of its link");

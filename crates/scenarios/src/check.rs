@@ -1,5 +1,5 @@
-//! What is checked, apart from the scenarios: what each cycle delivered, whether images agree with what the simulated
-//! devices had and latched, and how many events a change may cause.
+//! Checks, separate from the scenarios: results of each cycle, comparison of images with the data of the simulated
+//! devices, and the number of events of a change.
 
 use ringcat::{Direction, DomainId, DomainState, DomainStatus, Event, Freshness, Instant, TimedEvent};
 use ringcat_engine::exchange::Exchange;
@@ -13,25 +13,25 @@ use ringcat_wire::register::map;
 
 use crate::areas::{Area, areas_of};
 
-/// What a domain delivered in one cycle.
+/// Result of a domain in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Delivery {
-    /// Nothing was judged: it was not due, or not out.
+    /// Not evaluated: the domain was not due, or no frame was under way.
     None,
-    /// Its frames were still out.
+    /// Its frames were still under way.
     Pending,
-    /// Everybody answered.
+    /// All SubDevices responded.
     Complete,
-    /// All inputs but those of SubDevices that are not there or not in OP are fresh.
+    /// All inputs are fresh except those of SubDevices that are absent or not in OP.
     WithoutAbsent,
-    /// Somebody's data is missing who could have answered, or somebody was met twice.
+    /// Data of a SubDevice that could have responded is missing, or a SubDevice processed a datagram twice.
     Incomplete,
-    /// Nobody answered.
+    /// No SubDevice responded.
     Zero,
 }
 
 impl Delivery {
-    /// Whether a SubDevice that could answer was missed.
+    /// Whether data of a SubDevice that could respond is missing.
     pub const fn is_incomplete(self) -> bool {
         matches!(self, Delivery::Incomplete | Delivery::Zero)
     }
@@ -42,41 +42,41 @@ impl Delivery {
 pub struct Judged {
     /// The domain.
     pub domain: DomainId,
-    /// When the cycle began that judged it.
+    /// Begin of the cycle that evaluated it.
     pub at: Instant,
-    /// What the engine says.
+    /// Status of the engine.
     pub status: DomainStatus,
-    /// What came of it.
+    /// Its result.
     pub delivery: Delivery,
-    /// SubDevices whose inputs are not fresh.
+    /// SubDevices with stale inputs.
     pub stale: Vec<usize>,
 }
 
-/// What was true when a domain's frames left.
+/// State when a domain's frames were sent.
 #[derive(Debug)]
 struct Flight {
     left_at: SimTime,
-    /// The domain's image, for its outputs.
+    /// The domain's image, with its outputs.
     image: Vec<u8>,
     /// Inputs of all devices.
     inputs: Vec<Vec<u8>>,
-    /// Who was in OP.
+    /// Devices in OP.
     operating: Vec<bool>,
 }
 
-/// Compares images with devices, cycle by cycle: fresh inputs are what the device had when the frame left, outputs of a
-/// complete cycle are what the device latched.
+/// Compares images with devices, cycle by cycle: fresh inputs equal the device's inputs when the frame was sent,
+/// outputs of a complete cycle equal those that the device latched.
 #[derive(Debug)]
 pub struct Mirror {
     areas: Vec<Area>,
     flights: Vec<Option<Flight>>,
     compared: u64,
-    /// What differs from what a device latched is a failure.
+    /// Whether a difference to latched outputs is a failure.
     pub judges_latched: bool,
 }
 
 impl Mirror {
-    /// A mirror for declared SubDevices, `devices` being theirs.
+    /// A mirror for declared SubDevices; `devices` are their devices.
     pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize) -> Mirror {
         let mut areas = Vec::new();
         for (subdevice, device) in devices.iter().enumerate() {
@@ -90,7 +90,7 @@ impl Mirror {
         self.compared
     }
 
-    /// What a domain delivered whose frames left before and were judged now. Compares where it can.
+    /// Result of a domain that was sent before and is evaluated now. Compares the data if possible.
     ///
     /// # Panics
     /// When image and device differ.
@@ -110,7 +110,7 @@ impl Mirror {
         for area in self.areas.iter().filter(|area| area.domain == domain) {
             let device = network.device(area.device);
             let (got, expected) = match area.direction {
-                // What a device put into the frame is judged from its log, where it has one ([`crate::truth`]).
+                // Inputs are checked with the device's log, if it has one ([`crate::truth`]).
                 Direction::Inputs
                     if !device.controller.logs_logical()
                         && exchange.freshness(domain, area.subdevice) == Freshness::Fresh =>
@@ -118,8 +118,8 @@ impl Mirror {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
                 }
-                // Where somebody is missing, which optional ones may be, only fresh inputs show that it is not this
-                // one.
+                // If a SubDevice is missing, which is allowed for optional ones, only fresh inputs show that it is not
+                // this one.
                 Direction::Outputs
                     if ((delivery == Delivery::Complete && status.wkc == status.expected)
                         || exchange.freshness(domain, area.subdevice) == Freshness::Fresh)
@@ -139,7 +139,7 @@ impl Mirror {
         delivery
     }
 
-    /// Whose inputs are not fresh.
+    /// SubDevices with stale inputs.
     pub fn stale(&self, domain: DomainId, exchange: &Exchange) -> Vec<usize> {
         let inputs = self.areas.iter().filter(|area| area.domain == domain && area.direction == Direction::Inputs);
         let stale = inputs.filter(|area| exchange.freshness(domain, area.subdevice) != Freshness::Fresh);
@@ -164,14 +164,14 @@ impl Mirror {
         if all_fresh { Delivery::WithoutAbsent } else { Delivery::Incomplete }
     }
 
-    /// Devices changed by something else than frames, while the frames have not left yet.
+    /// Devices were changed by other means than frames before the frames were sent.
     pub fn look_again(&mut self, network: &Network) {
         for flight in self.flights.iter_mut().flatten().filter(|flight| flight.left_at == network.now()) {
             flight.inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
         }
     }
 
-    /// A domain's frames leave now.
+    /// A domain's frames are sent now.
     pub fn depart(&mut self, domain: DomainId, exchange: &Exchange, network: &Network) {
         let image = exchange.image(domain).to_vec();
         let inputs = network.devices().map(|device| device.inputs().to_vec()).collect();
@@ -182,8 +182,8 @@ impl Mirror {
     }
 }
 
-/// It uses outputs: it is in OP and its application works. One without an application stays in OP when its watchdog
-/// expires.
+/// Whether a device uses outputs: it is in OP and its application runs. A device without an application stays in OP
+/// when its watchdog expires.
 pub fn uses_outputs(device: &Device) -> bool {
     let in_op = device.al_status() == AlStatus::new(AlState::Op);
     let alive = !device.description.emulation || device.controller.register(map::WATCHDOG_STATUS, 2)[0] & 1 != 0;
@@ -199,7 +199,7 @@ pub fn ring_events(events: &[TimedEvent]) -> Vec<&Event> {
     events.iter().map(|timed| &timed.event).filter(of_ring).collect()
 }
 
-/// Events that say that something is wrong with a SubDevice or its configuration.
+/// Events that report a fault of a SubDevice or its configuration.
 pub fn troubles(events: &[TimedEvent]) -> Vec<&Event> {
     let of_subdevice = |event: &&Event| {
         matches!(

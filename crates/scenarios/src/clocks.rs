@@ -1,4 +1,4 @@
-//! Segments with distributed clocks that are not ideal, and the truth about them, which no MainDevice can see.
+//! Segments with distributed clocks that have errors, and their true values, which a MainDevice cannot read.
 
 use std::time::Duration;
 
@@ -40,7 +40,7 @@ fn one(number: usize, ppm: i64) -> DeviceDescription {
     device
 }
 
-/// Device `n` hangs on device `(n - 1) / 3`, with cables of different lengths.
+/// Device `n` is connected to device `(n - 1) / 3`, with cables of different lengths.
 ///
 /// # Panics
 /// When the tree cannot be built.
@@ -64,17 +64,17 @@ pub fn clock_tree(mut descriptions: Vec<DeviceDescription>) -> Network {
         .expect("the tree can be built")
 }
 
-/// Everything that was scanned in one domain, with clocks.
+/// All scanned SubDevices in one domain, with clocks.
 pub fn with_clocks(scan: &Scan, config: ClockConfig) -> Declaration {
     Declaration { clocks: Some(config), ..automatic(&scan.subdevices, CYCLE) }
 }
 
-/// Usual settings, in scenarios.
+/// Usual settings of scenarios.
 pub fn config() -> ClockConfig {
     ClockConfig { epoch: EPOCH, ..ClockConfig::default() }
 }
 
-/// A world whose clocks are being brought together.
+/// A world in which the clocks begin to synchronise.
 ///
 /// # Panics
 /// When scan or activation fail.
@@ -86,13 +86,13 @@ pub fn world(seed: u64, network: Network, config: ClockConfig) -> World {
 /// Runs until all clocks are locked.
 ///
 /// # Panics
-/// When they are not within a time.
+/// When they are not locked within a time.
 pub fn lock(world: &mut World, limit: Duration) {
     world.until(limit, "all clocks locked", |world| world.application().engine().clocks_locked());
 }
 
-/// What the clocks of these devices show now, less what that of the first one shows, in nanoseconds. Clocks of 32 bits
-/// are compared in 32 bits.
+/// Differences of the clocks of these devices to the first one, in nanoseconds. Clocks of 32 bits are compared in 32
+/// bits.
 pub fn differences(network: &Network, devices: &[usize]) -> Vec<i64> {
     let time = |device: usize| network.device(DeviceIndex(device)).controller.system_time(network.now());
     let first = devices.first().map_or(0, |first| time(*first));
@@ -105,7 +105,7 @@ pub fn spread(network: &Network, devices: &[usize]) -> i64 {
     all.iter().max().unwrap_or(&0) - all.iter().min().unwrap_or(&0)
 }
 
-/// Largest spread while so many cycles go by.
+/// Largest spread in this many cycles.
 pub fn largest_spread(world: &mut World, devices: &[usize], cycles: u64) -> i64 {
     let mut largest = 0;
     for _ in 0..cycles {
@@ -135,7 +135,7 @@ pub fn wired(mut descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, Endp
     Network::new(devices(descriptions), cables, NetworkOptions::default()).expect("the cables fit")
 }
 
-/// Runs so many cycles; the largest spread of each of these groups meanwhile.
+/// Runs this many cycles; returns the largest spread of each of these groups.
 pub fn watch<const N: usize>(world: &mut World, groups: [&[usize]; N], cycles: u64) -> [i64; N] {
     let mut worst = [0; N];
     for _ in 0..cycles {

@@ -1,18 +1,18 @@
-//! An allocator that counts, per thread: how often it was called, bytes held, and the most that were held.
+//! An allocator that counts, per thread: number of calls, bytes held, and peak of bytes held.
 //!
-//! In: a program's allocations, where it names [`CountingAllocator`] as its global allocator. Out: [`Counts`] of the
-//! calling thread. Memory that one thread takes and another gives back is in nobody's favour; the programs that use
-//! this measure single-threaded work.
+//! In: the allocations of a program with [`CountingAllocator`] as its global allocator. Out: [`Counts`] of the calling
+//! thread. Memory that one thread allocates and another frees is not balanced; programs that use this measure
+//! single-threaded work.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// What a thread did so far.
+/// Counts of a thread so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Allocations, also those by growing.
+    /// Allocations, including reallocations.
     pub allocations: u64,
-    /// Deallocations, also those by growing.
+    /// Deallocations, including reallocations.
     pub deallocations: u64,
     /// Bytes held.
     pub bytes: i64,
@@ -31,7 +31,7 @@ pub fn counts() -> Counts {
     COUNTS.get()
 }
 
-/// From now on the peak is looked for anew.
+/// Restarts the measurement of the peak.
 pub fn restart_peak() {
     COUNTS.set(Counts { peak: COUNTS.get().bytes, ..COUNTS.get() });
 }

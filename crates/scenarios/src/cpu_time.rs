@@ -15,7 +15,8 @@ pub fn process_cpu_time() -> Duration {
     ticks(&stat).map_or_else(|| panic!("/proc/self/stat is odd: {stat}"), |ticks| TICK * ticks)
 }
 
-/// `utime` and `stime`, fields 14 and 15. The name before them, field 2, stands in parentheses and may hold anything.
+/// `utime` and `stime`, fields 14 and 15. The name before them, field 2, is in parentheses and may contain any
+/// characters.
 fn ticks(stat: &str) -> Option<u32> {
     let (_, fields) = stat.rsplit_once(')')?;
     let mut fields = fields.split_whitespace().skip(11);

@@ -1,7 +1,7 @@
-//! An exchange that runs against the answering double: what the benches and tests of the cyclic path measure.
+//! An exchange with the answering double as its segment, measured by the benches and tests of the cyclic path.
 //!
-//! In: number of SubDevices, their process data, the cabling. Out: whole cycles, one call each: receive, judge, work a
-//! little on the image, queue, send on the in-memory links.
+//! In: number of SubDevices, their process data, the cabling. Out: whole cycles, one call each: receive, evaluate,
+//! change the image, queue, send on the in-memory links.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -32,27 +32,27 @@ const EVENTS: usize = 64;
 const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
 const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
 
-/// What is exchanged, and how.
+/// Parameters of the exchange.
 #[derive(Clone, Copy, Debug)]
 pub struct LoadSpec {
     /// Number of SubDevices.
     pub subdevices: usize,
     /// Bytes of outputs, and of inputs, of each of them.
     pub bytes: u16,
-    /// Number of domains; each holds part of the SubDevices.
+    /// Number of domains; each contains a part of the SubDevices.
     pub domains: usize,
-    /// How many cycles of a domain may be under way.
+    /// Limit of cycles of a domain under way.
     pub under_way: u8,
-    /// Whether the SubDevices know LRW.
+    /// Whether the SubDevices support LRW.
     pub lrw: bool,
-    /// Whether the supervision datagram rides along.
+    /// Whether the supervision datagram is included.
     pub supervision: bool,
-    /// Links and where the copies go.
+    /// Links and paths of the copies.
     pub cabling: Cabling,
 }
 
 impl LoadSpec {
-    /// Frames of a cycle, bytes of their datagrams, and how many of these are presence datagrams.
+    /// Frames of a cycle, bytes of their datagrams, and bytes of presence datagrams among them.
     ///
     /// # Errors
     /// Process data that cannot be laid out.
@@ -66,16 +66,16 @@ impl LoadSpec {
     }
 }
 
-/// The exchange with everything around it.
+/// The exchange with its environment.
 #[derive(Debug)]
 pub struct CyclicLoad {
     /// The exchange.
     pub exchange: Exchange,
     /// The links between it and the double.
     pub links: MemoryLinks,
-    /// Words shared with the half that is not there.
+    /// Board shared with the absent acyclic half.
     pub board: Arc<Board>,
-    /// What the exchange reports.
+    /// Events of the exchange.
     pub events: Consumer,
     /// The double.
     pub double: AnsweringDouble,
@@ -84,7 +84,7 @@ pub struct CyclicLoad {
 }
 
 impl CyclicLoad {
-    /// An exchange whose SubDevices all take part.
+    /// An exchange in which all SubDevices take part.
     ///
     /// # Errors
     /// Process data that cannot be laid out.
@@ -110,8 +110,8 @@ impl CyclicLoad {
         })
     }
 
-    /// The MainDevice's part of a cycle: everything that came in is received and judged, the application copies two
-    /// bytes, everything is sent. Returns the last domain's status.
+    /// The MainDevice's part of a cycle: all frames are received and evaluated, the application copies two bytes, all
+    /// frames are sent. Returns the last domain's status.
     #[inline(never)]
     pub fn exchange_once(&mut self) -> DomainStatus {
         let CyclicLoad { exchange, links, now, .. } = self;
@@ -124,7 +124,7 @@ impl CyclicLoad {
         for domain in (0..exchange.domain_count()).map(DomainId) {
             status = exchange.process(domain, *now);
             let image = exchange.image_mut(domain);
-            // Outputs lie in front, inputs behind: the application answers to an input.
+            // Outputs are first, inputs follow: the application copies an input to an output.
             if let [first, second, .., last] = image {
                 *first = first.wrapping_add(1);
                 *second = *last;
@@ -140,7 +140,7 @@ impl CyclicLoad {
         self.double.answer(&mut self.links.sent, &mut self.links.arriving);
     }
 
-    /// The same work for the double in the other direction: with this, it can be run alone.
+    /// The same work for the double in the other direction, so that it can run alone.
     pub fn answer_back(&mut self) {
         self.double.answer(&mut self.links.arriving, &mut self.links.sent);
     }

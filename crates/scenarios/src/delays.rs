@@ -1,8 +1,8 @@
-//! Propagation delays that are written while process data goes on, against the truth.
+//! Propagation delays that are written during process data exchange, compared with the true delays.
 //!
-//! A run takes a segment of random shape to a state in which its delays are known, cuts and heals cables of it, and
-//! looks at every delay that is written then, in every cycle. The truth is when the processing units met one frame,
-//! which only the simulator knows. A delay is right or it is not written, and then there is a reason ([`Outcome`]).
+//! A run brings a random segment to a state with known delays, cuts and repairs its cables, and checks every written
+//! delay in every cycle. The true delays follow from the times at which the processing units received one frame, which
+//! only the simulator knows. A delay is right, or it is not written and a reason is reported ([`Outcome`]).
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -23,52 +23,52 @@ use crate::dice::Dice;
 use crate::segments::{MAIN, REDUNDANT, at};
 use crate::world::{Mark, World};
 
-/// A delay that is further than this from the truth, for each hop to the reference, is wrong.
+/// Maximum error of a delay for each hop to the reference.
 pub const HOP_NS: i64 = 20;
-/// Cycles in which delays are to be right again, or it is to be told why they are not written.
+/// Cycles until delays have to be right again, or the reason for missing ones reported.
 const LIMIT_CYCLES: u64 = 1_500;
-/// Cycles after which a look at them is worth the effort.
+/// Cycles before the first check of the delays.
 const LOOK_CYCLES: u64 = 60;
-/// Cycles in which it must stay so.
+/// Cycles in which the delays must stay right.
 const CALM_CYCLES: u64 = 20;
 
-/// Cycles in which it must stay the same which delays are hidden: the next measurement may find what one has not.
+/// Cycles in which the set of hidden delays must not change: the next measurement may find further delays.
 const STEADY_CYCLES: u64 = 200;
 
-/// What a segment looks like.
+/// Shape of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// A ring of two links with so many.
+    /// A ring of two links with this many SubDevices.
     Ring(usize),
-    /// A ring behind a junction, with so many members, and one SubDevice in front of and one behind it.
+    /// A ring behind a junction, with this many members, and one SubDevice before and one behind it.
     LocalRing(usize),
-    /// Anything with branches and rings behind junctions, with one link or two.
+    /// A tree with branches and rings behind junctions, with one link or two.
     Tree,
-    /// The same with forks and others that have no clock.
+    /// The same with forks and other SubDevices without a clock.
     Gaps,
 }
 
-/// What became of changes of a segment.
+/// Results of changes of a segment.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Cables that were cut or healed.
+    /// Cables that were cut or repaired.
     pub changes: u64,
     /// Delays that were written meanwhile.
     pub written: u64,
     /// Changes after which all delays were right.
     pub right: u64,
-    /// Changes after which some were not written, by the reason that was told.
+    /// Changes after which some delays were not written, by reported reason.
     pub not_written: BTreeMap<String, u64>,
-    /// Changes after which so many delays were hidden by forks without a clock, and told to be.
+    /// Changes after which delays were hidden by forks without a clock, and reported as hidden.
     pub hidden: BTreeMap<usize, u64>,
     /// Delays that were written and wrong, or not written without a reason.
     pub wrong: Vec<String>,
-    /// Largest error of what was written, in nanoseconds for each hop.
+    /// Largest error of a written delay, in nanoseconds for each hop.
     pub largest_ns: f64,
 }
 
 impl Outcome {
-    /// Takes in another one.
+    /// Adds another outcome.
     pub fn add(&mut self, other: Outcome) {
         (self.changes, self.written) = (self.changes + other.changes, self.written + other.written);
         self.right += other.right;
@@ -79,12 +79,12 @@ impl Outcome {
     }
 }
 
-/// Cables of a segment, those that may be cut, and how many devices it has.
+/// Cables of a segment, those that may be cut, and the number of devices.
 struct Plan {
     cables: Vec<(Endpoint, Endpoint)>,
     cut: Vec<usize>,
     devices: usize,
-    /// Where rings behind junctions close.
+    /// Closing cables of rings behind junctions.
     connections: Vec<JunctionConnection>,
 }
 
@@ -120,7 +120,7 @@ impl Plan {
         self.devices - 1
     }
 
-    /// So many in a row; returns where it goes on.
+    /// A row of this many devices; returns its last port.
     fn chain(&mut self, from: Endpoint, count: usize) -> Endpoint {
         (0..count).fold(from, |from, _| at(self.hang(from), B))
     }
@@ -172,8 +172,7 @@ impl Plan {
     }
 }
 
-/// Clocks of a run: ideal ones for a third of the seeds; a third of the others does not tell frames apart when it
-/// latches.
+/// Clocks of a run: ideal for a third of the seeds; a third of the others latch any frame.
 fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
     let is_ideal = dice.one_in(3);
     let any = dice.one_in(3);
@@ -188,7 +187,7 @@ fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
     all
 }
 
-/// Runs a seed: a segment of this shape, and so many changes of it.
+/// Runs a seed: a segment of this shape with this many changes.
 ///
 /// # Panics
 /// When the segment does not come up.
@@ -226,7 +225,7 @@ pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
     outcome
 }
 
-/// Looks at what is written after a change.
+/// Checks the delays written after a change.
 struct Watch {
     since: Mark,
     before: Vec<u32>,
@@ -237,7 +236,7 @@ struct Watch {
 struct Written {
     device: usize,
     value: u32,
-    /// Whose delays were hidden by then: others do not count from them.
+    /// SubDevices with hidden delays at this time: other delays are not relative to them.
     hidden: Vec<usize>,
 }
 
@@ -256,7 +255,7 @@ impl Watch {
         self.before = now;
     }
 
-    /// Until all delays are right and stay so, or it is told why they are not.
+    /// Runs until all delays are right and stay right, or the reason for missing ones is reported.
     fn settle(mut self, world: &mut World, outcome: &mut Outcome, what: &str) {
         (0..LOOK_CYCLES).for_each(|_| self.cycle(world));
         let mut cycles = LOOK_CYCLES;
@@ -265,7 +264,7 @@ impl Watch {
             let now = delays(world.network());
             let hidden = hidden(world);
             let truth = from_known(&all, &hidden);
-            // One that is hidden may keep what it had before: it is told that this counts for nothing.
+            // A hidden delay may keep its former register value: it is reported as invalid.
             if truth.iter().all(|place| hidden.contains(&place.device) || !place.is_wrong(now[place.device])) {
                 let calm = if hidden.is_empty() { CALM_CYCLES } else { STEADY_CYCLES };
                 (0..calm).for_each(|_| self.cycle(world));
@@ -297,7 +296,7 @@ impl Watch {
         }
     }
 
-    /// Delays that are not right at the end: they were not written, for a reason that was told.
+    /// Delays that are not right at the end: they were not written, for a reported reason.
     fn explain(&self, world: &World, outcome: &mut Outcome, what: &str, truth: &[Place]) {
         let reason = world.events(self.since).iter().rev().find_map(|timed| match &timed.event {
             Event::ClocksFailed { reason } => Some(reason.clone()),
@@ -317,15 +316,15 @@ impl Watch {
     }
 }
 
-/// A device that one frame met.
+/// A device that processed the frame.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     device: usize,
-    /// Which of the frames of both links it met.
+    /// Link of the processed frame.
     frame: u64,
-    /// From the first processing unit that the frame met.
+    /// Delay from the first processing unit.
     delay_ns: i64,
-    /// How many it met before.
+    /// Number of processing units before it.
     number: i64,
     hops: i64,
 }
@@ -340,7 +339,7 @@ impl Place {
     }
 }
 
-/// Devices whose delays are not known, as it is told.
+/// Devices that are reported with unknown delays.
 fn hidden(world: &World) -> Vec<usize> {
     let clocks = world.application().engine().clocks();
     let hidden = clocks.iter().filter(|clock| clock.hidden.is_some_and(|hidden| !hidden.is_estimated));
@@ -363,7 +362,7 @@ fn from_known(truth: &[Place], hidden: &[usize]) -> Vec<Place> {
     truth.iter().map(since).collect()
 }
 
-/// When the processing units of those with a clock meet a frame, from the first one on its link on.
+/// Receive times of a frame at the processing units with a clock, relative to the first one on its link.
 fn truth(world: &mut World) -> Vec<Place> {
     let latched =
         |world: &World| -> Vec<_> { world.network().devices().map(|device| device.controller.latched()).collect() };
@@ -379,7 +378,7 @@ fn truth(world: &mut World) -> Vec<Place> {
     let mut met: Vec<(u64, u64, usize)> = Vec::new();
     for (device, (now, before)) in latched(world).into_iter().zip(before).enumerate() {
         let of = world.network().device(DeviceIndex(device));
-        // What is not reached keeps what it had, what lost its power has nothing.
+        // Unreachable devices keep their delay, devices without power lose it.
         let counts = now != before && of.controller.is_powered() && of.description.dc.is_some();
         if let Some((frame, at)) = now.filter(|_| counts) {
             met.push((frame, at.0, device));

@@ -1,6 +1,6 @@
-//! Chance from a seed, so that whatever is drawn can be drawn again.
+//! Random numbers from a seed, so that every run can be repeated.
 
-/// A generator of numbers (SplitMix64).
+/// A random number generator (SplitMix64).
 #[derive(Clone, Copy, Debug)]
 pub struct Dice {
     state: u64,
@@ -20,17 +20,17 @@ impl Dice {
         mixed ^ mixed >> 31
     }
 
-    /// A number below `limit`, 0 where that is 0.
+    /// A number below `limit`, 0 if `limit` is 0.
     pub const fn below(&mut self, limit: u64) -> u64 {
         if limit == 0 { 0 } else { self.roll() % limit }
     }
 
-    /// A place in a list that is not empty.
+    /// A random element of a list that is not empty.
     pub fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
         &from[self.below(from.len() as u64) as usize]
     }
 
-    /// True once in `n` throws on average.
+    /// True in one of `n` calls on average.
     pub const fn one_in(&mut self, n: u64) -> bool {
         self.below(n) == 0
     }

@@ -1,6 +1,6 @@
 //! A host behind an EoE port in virtual time: an IP stack of its own (smoltcp) that downloads over TCP.
 //!
-//! It runs as a procedure of the acyclic half, as a network interface would beside it: nothing of it waits for a cycle.
+//! It runs as a procedure of the acyclic half, like a network interface beside it: it does not wait for cycles.
 
 use std::time::Duration;
 
@@ -12,16 +12,16 @@ use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
 use smoltcp::socket::tcp;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr, Ipv4Address};
 
-/// As much as Linux begins with.
+/// The initial value of Linux.
 const BUFFER: usize = 64 * 1024;
 const LOCAL_PORT: u16 = 49_152;
 const WEB_PORT: u16 = 80;
-/// The stack looks at its timers at least this often.
+/// The stack checks its timers at least this often.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
-/// Frames that the stack may have ready.
+/// Maximum number of frames queued in the stack.
 const READY: usize = 64;
 
-/// What a download came to.
+/// Result of a download.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Download {
     /// Bytes of the file.
@@ -37,7 +37,7 @@ impl Download {
     }
 }
 
-/// Who connects to whom.
+/// Addresses of a connection.
 #[derive(Clone, Copy, Debug)]
 pub struct Addresses {
     /// MAC address of the host.
@@ -55,10 +55,10 @@ struct Host {
     frames: Frames,
 }
 
-/// Downloads so many bytes from the web server of a simulated device; gives up after a time.
+/// Downloads this many bytes from the web server of a simulated device, with a time limit.
 ///
 /// # Errors
-/// Not everything came in time, or something else.
+/// The download was incomplete within the limit, or the data was wrong.
 pub async fn download(
     bus: Bus,
     port: &EthernetPort,
@@ -79,7 +79,7 @@ pub async fn download(
             asked = socket.send_slice(request.as_bytes()).is_ok();
         }
         got += take(socket, &mut head, got)?;
-        // What was taken makes room, which the other end is told.
+        // Taken data frees the receive window, which the stack announces to the other end.
         host.poll(bus.now());
         while port.room() > 0
             && let Some(frame) = host.frames.sent.pop_front()
@@ -99,13 +99,13 @@ pub async fn download(
                 let frame = port.frame().await;
                 host.frames.received.push_back(frame.bytes);
             };
-            // A time that runs out is a reason to look, too.
+            // An expired time is a reason to poll, too.
             let _ = bus.within(wait, any).await;
         }
     }
 }
 
-/// Takes what has come; how much of it is behind the head.
+/// Takes the received data; returns the number of bytes after the HTTP header.
 fn take(socket: &mut tcp::Socket<'_>, head: &mut Vec<u8>, before: usize) -> Result<usize, String> {
     const END: &[u8] = b"\r\n\r\n";
     let mut count = 0;
@@ -138,7 +138,7 @@ impl Host {
         let config = Config::new(HardwareAddress::Ethernet(EthernetAddress(addresses.mac)));
         let mut interface = Interface::new(config, &mut frames, instant(now));
         let [a, b, c, d] = addresses.host;
-        // There is room for one.
+        // The capacity is checked.
         interface.update_ip_addrs(|known| {
             let _ = known.push(IpCidr::new(Ipv4Address::new(a, b, c, d).into(), 24));
         });

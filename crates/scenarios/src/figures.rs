@@ -1,4 +1,4 @@
-//! Figures with their bars: a table that people read, and a verdict for CI.
+//! Figures with their bars: a readable table, and a verdict for CI.
 
 use std::fmt::Display;
 use std::process::ExitCode;
@@ -38,7 +38,7 @@ impl Figures {
         self.row(name, format!("{} {unit}", short(value)), format!(">= {} {unit}", short(bar)), verdict);
     }
 
-    /// A figure whose bar is known not to be reached yet: it is shown, and no failure.
+    /// A figure with a bar that is known not to be reached yet: it is shown and is not a failure.
     pub fn goal_at_least(&mut self, name: &str, value: f64, bar: f64, unit: &str) {
         let verdict = if value >= bar { "ok" } else { "not reached yet" };
         self.row(name, format!("{} {unit}", short(value)), format!(">= {} {unit}", short(bar)), verdict);
@@ -48,7 +48,7 @@ impl Figures {
         self.rows.push([name.to_owned(), value, bar, verdict.to_owned()]);
     }
 
-    /// Prints the table. True where every bar was met.
+    /// Prints the table. True if every bar was met.
     pub fn print(&self) -> bool {
         let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
         let [first, second, third] = [0, 1, 2].map(width);
@@ -60,12 +60,12 @@ impl Figures {
     }
 }
 
-/// Success, or failure where a bar was missed.
+/// Success, or failure if a bar was missed.
 pub fn verdict(met: bool) -> ExitCode {
     if met { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// As many digits as a reader needs.
+/// Rounds to the significant digits.
 fn short(value: f64) -> String {
     if value.fract() == 0.0 || value.abs() >= 1000.0 { format!("{value:.0}") } else { format!("{value:.2}") }
 }

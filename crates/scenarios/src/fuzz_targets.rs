@@ -1,9 +1,8 @@
-//! What a fuzzer may throw any bytes at: one target per mailbox decoder (protocol 6, 10.1), and one for ENI files
-//! (protocol 8).
+//! Fuzz targets for arbitrary bytes: one per mailbox decoder (protocol 6, 10.1), and one for ENI files (protocol 8).
 //!
-//! A target is a plain function. It panics where a decoder does, and where what was decoded does not survive being
-//! encoded and decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus`
-//! and mutants of them ([`mutate`]); the corpora come from our own encoders ([`seeds`]).
+//! A target is a plain function. It panics if a decoder panics, or if a decoded value changes when it is encoded and
+//! decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus` and mutants
+//! of them ([`mutate`]); the corpora are made by the encoders of `ringcat-wire` ([`seeds`]).
 
 pub mod eni;
 pub mod seeds;
@@ -22,7 +21,7 @@ use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
 
 use crate::dice::Dice;
 
-/// A decoder and what must hold of it for any bytes.
+/// A decoder and its properties for any bytes.
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
@@ -43,10 +42,10 @@ pub const TARGETS: [(&str, Target); 14] = [
     ("eni", eni::target),
 ];
 
-/// Bytes that any message fits into: more than a mailbox has, and what an encoder puts before shorter ones.
+/// Buffer size for any message: more than a mailbox, and the largest prefix of an encoder.
 const ROOM: usize = 1 << 16;
 
-/// What decodes, encodes to bytes that decode to the same.
+/// A decoded value encodes to bytes that decode to the same value.
 macro_rules! survives {
     ($what:ty, $bytes:expr) => {
         if let Ok(value) = <$what>::decode($bytes) {
@@ -118,7 +117,7 @@ pub fn sdo_response(bytes: &[u8]) {
     survives!(SdoResponse<'_>, bytes);
 }
 
-/// SDO information, and what its data says.
+/// SDO information, and its data.
 pub fn sdo_information(bytes: &[u8]) {
     survives!(SdoInformation<'_>, bytes);
     let Ok(message) = SdoInformation::decode(bytes) else { return };
@@ -156,7 +155,7 @@ pub fn foe(bytes: &[u8]) {
     survives!(FoeMessage<'_>, bytes);
 }
 
-/// The payload of EoE. What a fragment's head says, and cannot be true, is not encoded.
+/// The payload of EoE. Fragments with impossible headers are not encoded.
 pub fn eoe(bytes: &[u8]) {
     let Ok(message) = EoeMessage::decode(bytes) else { return };
     let mut out = vec![0; ROOM];
@@ -200,12 +199,12 @@ pub fn any_gateway(bytes: &[u8]) {
     mailbox(&out[2..length]);
 }
 
-/// Numbers at which decoders change their minds.
+/// Boundary values of decoders.
 const EDGES: [u32; 12] = [0, 1, 2, 4, 7, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0xFFFF_FFFF];
 /// Longest mutant.
 const LONGEST: usize = 2048;
 
-/// Changes bytes as a fuzzer does: bits, bytes and numbers, pieces left out, doubled, exchanged or added.
+/// Changes bytes like a fuzzer: bits, bytes and numbers, parts removed, duplicated, exchanged or added.
 pub fn mutate(bytes: &mut Vec<u8>, other: &[u8], dice: &mut Dice) {
     for _ in 0..=dice.below(4) {
         let at = dice.below(bytes.len() as u64) as usize;

@@ -1,9 +1,9 @@
-//! Engine and simulated segment put together in virtual time: [`world`] with its verbs, what it runs on ([`segments`],
-//! [`tap`], [`dice`]) and, apart from the scenarios, what is checked ([`check`]). The scenarios are in `tests/`, one
-//! file per theme.
+//! Engine and simulated segment put together in virtual time: [`world`] with its actions, its environment
+//! ([`segments`], [`tap`], [`dice`]) and, separate from the scenarios, the checks ([`check`]). The scenarios are in
+//! `tests/`, one file per subject.
 //!
 //! Benches (`src/bin/`) run on [`cyclic_load`] and [`answering_double`], count with [`callgrind`] and
-//! [`counting_allocator`] and print [`figures`]; what is measured on real interfaces runs in [`namespaces`].
+//! [`counting_allocator`] and print [`figures`]; measurements on real interfaces run in [`namespaces`].
 
 pub mod answering_double;
 pub mod areas;

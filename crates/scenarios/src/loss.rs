@@ -1,4 +1,4 @@
-//! Frames that get lost on purpose: chosen by a datagram in them, on their way out or back.
+//! Injected frame losses: selected by a datagram in the frame, on the way out or back.
 
 use ringcat_wire::command::Command;
 use ringcat_wire::frame::Frame;
@@ -6,7 +6,7 @@ use ringcat_wire::frame::Frame;
 /// Frames to be lost.
 #[derive(Clone, Copy, Debug)]
 pub struct Loss {
-    /// On the way out, so that nobody got them; otherwise on the way back, when all was done.
+    /// Lost on the way out, before any SubDevice processes them; otherwise on the way back, after processing.
     pub outward: bool,
     /// Command of a datagram in them.
     pub command: Command,
@@ -14,19 +14,19 @@ pub struct Loss {
     pub station: u16,
     /// Register or memory that it addresses.
     pub register: u16,
-    /// Frames that pass before.
+    /// Matching frames that are not lost first.
     pub skip: u32,
-    /// Frames that are lost.
+    /// Number of lost frames.
     pub count: u32,
 }
 
 impl Loss {
-    /// The next frame out that writes there.
+    /// The next sent frame that writes there.
     pub fn of_write(station: u16, register: u16) -> Loss {
         Loss { outward: true, command: Command::Fpwr, station, register, skip: 0, count: 1 }
     }
 
-    /// The next frame out that reads there.
+    /// The next sent frame that reads there.
     pub fn of_read(station: u16, register: u16) -> Loss {
         Loss { command: Command::Fprd, ..Loss::of_write(station, register) }
     }
@@ -37,7 +37,7 @@ impl Loss {
         Loss { outward: false, ..self }
     }
 
-    /// So many frames, after some others.
+    /// This many frames, after some that pass.
     #[must_use]
     pub fn times(self, count: u32, skip: u32) -> Loss {
         Loss { count, skip, ..self }

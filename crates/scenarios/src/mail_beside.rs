@@ -1,5 +1,5 @@
-//! Who uses the mailboxes of devices beside procedures: a request of the cyclic thread and a client of the gateway
-//! each. Both read elements of an array, whose values show which one was asked for; anything else panics.
+//! Users of the devices' mailboxes besides procedures: for each device a request of the cyclic thread and a client of
+//! the gateway. Both read elements of an array with values that identify the element; a wrong value panics.
 
 use std::collections::BTreeMap;
 
@@ -9,42 +9,42 @@ use ringcat_wire::mailbox::{Header, Message, Protocol, gateway};
 
 use crate::world::World;
 
-/// The array, and its elements that nobody writes: each has its subindex as value.
+/// The array, and its elements that are never written: each has its subindex as value.
 const ARRAY: u16 = 0x2001;
 const FIRST: u8 = 20;
 const LAST: u8 = 200;
-/// Cycles after which a client asks again when no answer came.
+/// Cycles after which a client repeats a request without a response.
 const PATIENCE: u32 = 40;
 
-/// A device and who asks it.
+/// A device and its users.
 #[derive(Debug)]
 struct Users {
     station: u16,
     request: SdoRequest,
-    /// What the request asks for.
+    /// Element of the request.
     asked: u8,
     client: u64,
     counter: u8,
-    /// What the client has asked for under a counter.
+    /// Element and counter of the client's request.
     sent: BTreeMap<u8, u8>,
-    /// For so many cycles it has waited.
+    /// Cycles for which it has waited.
     waited: Option<u32>,
 }
 
-/// The users of some devices, and what they have come to.
+/// The users of some devices, and their results.
 #[derive(Debug)]
 pub struct Beside {
     users: Vec<Users>,
     stopped: bool,
     next: u8,
-    /// Values that were right.
+    /// Number of right values.
     pub answered: u32,
-    /// Requests that were told to have failed.
+    /// Number of failed requests.
     pub failed: u32,
 }
 
 impl Beside {
-    /// Users of these devices, which are declared under the same numbers.
+    /// Users of these devices, which are declared with the same indices.
     pub fn new(world: &mut World, devices: &[usize]) -> Beside {
         let users = devices.iter().map(|device| Users {
             station: world.station_of(*device),
@@ -59,7 +59,7 @@ impl Beside {
         Beside { users, stopped: false, next: FIRST, answered: 0, failed: 0 }
     }
 
-    /// So many cycles, with a look at everybody after each.
+    /// Runs this many cycles and checks all users after each.
     pub fn run_cycles(&mut self, world: &mut World, cycles: u64) {
         for _ in 0..cycles {
             world.cycle();
@@ -67,7 +67,7 @@ impl Beside {
         }
     }
 
-    /// Nobody asks any more. True when all have what they asked for, or were told that there is nothing.
+    /// Starts no new requests. True when all requests have a value or have failed.
     pub fn stop(&mut self, world: &mut World) -> bool {
         self.stopped = true;
         for users in &mut self.users {
@@ -138,7 +138,7 @@ impl Beside {
             let users = self.users.iter_mut().find(|users| users.client == relayed.client).expect("a client of ours");
             let Message { header, payload } = gateway::decode(&relayed.bytes).expect("a message");
             let asked = users.sent.get(&header.counter).copied();
-            assert!(header.address == users.station && asked.is_some(), "to nobody's question: {header:?}");
+            assert!(header.address == users.station && asked.is_some(), "response without a request: {header:?}");
             users.waited = None;
             if header.protocol != Protocol::Coe {
                 self.failed += 1;

@@ -1,8 +1,7 @@
-//! Questions to a device that speaks all mailbox protocols, whose answers show whose they are.
+//! Requests to a device with all mailbox protocols; each response identifies its request.
 //!
-//! An [`Asker`] writes a value that nobody else writes, reads it back, and knows what it may find: what it wrote last,
-//! and where a write failed what that may have left. Anything else is the answer to somebody else's question, or to an
-//! old one, and panics.
+//! An [`Asker`] writes a unique value, reads it back, and knows the possible values: the last written one, and after
+//! failed writes their possible remains. Any other value is the response to another or an older request, and panics.
 
 use ringcat::Limits;
 use ringcat_engine::mail::aoe::{self, AoeRoute};
@@ -18,7 +17,7 @@ use ringcat_wire::mailbox::aoe::{AmsAddress, NetId};
 use ringcat_wire::mailbox::coe::ValueInfo;
 use ringcat_wire::mailbox::soe::Idn;
 
-/// Kinds of questions.
+/// Kinds of requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// CoE: an object, expedited.
@@ -41,7 +40,7 @@ pub enum Kind {
     Address,
 }
 
-/// All of them.
+/// All kinds.
 pub const KINDS: [Kind; 9] = [
     Kind::Object,
     Kind::LargeObject,
@@ -55,7 +54,7 @@ pub const KINDS: [Kind; 9] = [
 ];
 
 impl Kind {
-    /// The lane in which it is asked.
+    /// The lane of the request.
     pub const fn lane(self) -> Lane {
         match self {
             Kind::Object | Kind::LargeObject | Kind::Description => Lane::Coe,
@@ -81,17 +80,17 @@ impl Kind {
     }
 }
 
-/// Who asks one kind of question, with values of its own.
+/// Sends one kind of request, with unique values.
 #[derive(Debug)]
 pub struct Asker {
     kind: Kind,
     mailbox: Mailbox,
     limits: Limits,
-    /// What is there when nobody wrote anything, once it was read.
+    /// The initial value, after it was read.
     initial: Option<Vec<u8>>,
-    /// What may be there, the last last.
+    /// Possible values, the last written at the end.
     known: Vec<Vec<u8>>,
-    /// The device may lose its power, and with it what was written.
+    /// The device may lose its power, and with it the written value.
     forgets: bool,
 }
 
@@ -100,24 +99,24 @@ const fn length_without_sum(value: &[u8]) -> usize {
     value.len().saturating_sub(4)
 }
 
-/// FNV-1a of the bytes of a list: whether they belong together.
+/// FNV-1a of the bytes of a list, to detect mixed lists.
 fn check_sum(bytes: &[u8]) -> [u8; 4] {
     let hash = bytes.iter().fold(0x811C_9DC5u32, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193));
     hash.to_le_bytes()
 }
 
-/// Whether bytes lie within others, one after the other.
+/// Whether a sequence of bytes is contained in another.
 fn contains(all: &[u8], part: &[u8]) -> bool {
     all.windows(part.len().max(1)).any(|window| window == part)
 }
 
-/// Words about an error.
+/// Text of an error.
 fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
 impl Asker {
-    /// An asker; of each kind only one may ask a device at a time.
+    /// An asker; only one of each kind may use a device at a time.
     pub fn new(kind: Kind, mailbox: Mailbox, limits: Limits, forgets: bool) -> Asker {
         Asker { kind, mailbox, limits, initial: None, known: Vec::new(), forgets }
     }
@@ -125,10 +124,10 @@ impl Asker {
     /// Writes a value of this number and reads it back.
     ///
     /// # Errors
-    /// What the service said.
+    /// The error of the service.
     ///
     /// # Panics
-    /// When an answer belongs to another question.
+    /// When a response belongs to another request.
     pub async fn ask(&mut self, number: u32) -> Result<(), String> {
         match self.kind {
             Kind::Description => return self.describe(number).await,
@@ -150,7 +149,7 @@ impl Asker {
         Ok(())
     }
 
-    /// A value that no other number has.
+    /// A value that is unique for this number.
     fn value(&self, number: u32) -> Vec<u8> {
         let mut value: Vec<u8> = (0..self.kind.length()).map(|at| (at as u32 * 31 + number * 7 % 251) as u8).collect();
         let tag = (number << 8 | self.kind as u32).to_le_bytes();
@@ -196,7 +195,7 @@ impl Asker {
             }
             Kind::Idn => soe::write(mailbox, self.idn(), value, limits).await.map_err(said),
             Kind::IdnList => {
-                // A list begins with its length and its longest length.
+                // A list begins with its length and its maximum length.
                 let length = (value.len() as u16).to_le_bytes();
                 let list = [&length, &20_000u16.to_le_bytes(), value].concat();
                 soe::write(mailbox, self.idn(), &list, limits).await.map_err(said)
@@ -224,12 +223,12 @@ impl Asker {
             Kind::Idn => soe::read(mailbox, self.idn(), limits, room).await.map_err(said),
             Kind::IdnList => {
                 let list = soe::read(mailbox, self.idn(), limits, room).await.map_err(said)?;
-                // Of fragments that the device itself forgets, only what is in the list tells.
+                // Fragments that the device itself discards show only in the list.
                 let value = list.get(4..).unwrap_or_default();
                 let length = list.first_chunk().map(|length| usize::from(u16::from_le_bytes(*length)));
                 let end = length_without_sum(value);
                 let sum_fits = value.len() != self.kind.length() || check_sum(&value[..end]) == value[end..];
-                // Where the first ones were forgotten, the last one is a list by itself, whatever is in it.
+                // If the first fragments were discarded, the last one alone is accepted as a list, with any contents.
                 let is_rest = |known: &Vec<u8>| known.len() > value.len() && contains(known, value);
                 let whole = sum_fits && !self.known.iter().any(is_rest);
                 if length == Some(value.len()) && whole {
@@ -250,7 +249,7 @@ impl Asker {
         }
     }
 
-    /// An entry of the array: which one is in the answer.
+    /// An entry of the array; the response contains its subindex.
     async fn describe(&self, number: u32) -> Result<(), String> {
         let address = (0x2001, (number % 200) as u8 + 1);
         let entry = information::entry(&self.mailbox, address, ValueInfo::ALL, self.limits).await.map_err(said)?;
@@ -261,7 +260,7 @@ impl Asker {
     async fn echo(&self, number: u32) -> Result<(), String> {
         let message = Voe { vendor_id: 0x0C47, vendor_type: number as u16, data: self.value(number) };
         let answer = voe::exchange(&self.mailbox, &message, self.limits).await.map_err(said)?;
-        // A message of the vendor may be unasked, too; what was asked last may be answered late.
+        // A vendor message may be unsolicited, too; the last request may have a late response.
         assert!(self.known.is_empty() && answer.vendor_type == number as u16 && answer == message, "VoE {number}");
         Ok(())
     }

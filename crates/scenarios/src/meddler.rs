@@ -1,18 +1,18 @@
-//! Links into a simulated segment on which somebody meddles with what comes back: answers are changed, dropped or
-//! invented. Virtual time has a limit, so that an engine that hangs fails its test.
+//! Links into a simulated segment that tamper with returned frames: responses are changed, dropped or forged. Virtual
+//! time has a limit, so that an engine that hangs fails its test.
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Instant, Link, Links};
 use ringcat_sim::network::Network;
 use ringcat_wire::frame::MacAddress;
 
-/// Looks and waits in a row between which no time passes; far beyond what an engine needs between two events.
+/// Limit of consecutive receives and waits without progress of time; far more than an engine needs between two events.
 const IDLE_CALLS: u64 = 200_000;
 
-/// What becomes of a frame that came back.
+/// Handling of a returned frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It arrives, with whatever was done to it.
+    /// It arrives, possibly changed.
     Arrives,
     /// It arrives twice.
     ArrivesTwice,
@@ -20,7 +20,7 @@ pub enum Verdict {
     IsLost,
 }
 
-/// Links with a meddler, who sees every frame that comes back and may change it.
+/// Links with a function that receives every returned frame and may change it.
 pub struct Meddled<F> {
     segment: SimulatedSegment,
     meddle: F,

@@ -1,4 +1,4 @@
-//! Two network namespaces with a veth pair between them, and programs in them: what benches on real interfaces run in.
+//! Two network namespaces with a veth pair between them, and programs in them, for benches on real interfaces.
 //!
 //! The MainDevice's end is `near0`, the segment's `far0`. Both namespaces are gone when the value is dropped.
 
@@ -6,9 +6,9 @@ use std::ffi::OsStr;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Numbers of the interfaces: different at both ends, so that the loss of a carrier is told in time.
+/// Interface indices: different at both ends, so that the kernel reports the loss of a carrier in time.
 const INDEX: [u32; 2] = [50, 60];
-/// A program that serves gets this long to be ready.
+/// Start-up time of a server.
 const START: Duration = Duration::from_millis(400);
 
 /// The namespaces.
@@ -22,7 +22,7 @@ impl Namespaces {
     /// Makes them.
     ///
     /// # Errors
-    /// What `ip` says: mostly that only root may.
+    /// The error of `ip`, usually missing permission.
     pub fn new() -> Result<Namespaces, String> {
         let id = std::process::id();
         let made = Namespaces { near: format!("ringcat{id}near"), far: format!("ringcat{id}far") };
@@ -32,7 +32,7 @@ impl Namespaces {
         let ([near, far], Namespaces { near: here, far: there }) = (INDEX, &made);
         ip(&format!("-n {here} link add near0 index {near} type veth peer name far0 index {far} netns {there}"))?;
         for (namespace, interface) in [(here, "near0"), (there, "far0")] {
-            // Addresses of the host would only make it send frames of its own; old kernels do not know the mode.
+            // With IPv6 addresses the host would send frames of its own; old kernels do not support the mode.
             let _ = ip(&format!("-n {namespace} link set {interface} addrgenmode none"));
             ip(&format!("-n {namespace} link set {interface} up"))?;
         }
@@ -44,7 +44,7 @@ impl Namespaces {
         inside(&self.near, program.as_ref())
     }
 
-    /// Starts a program at the segment's end that serves until it is dropped.
+    /// Starts a server at the segment's end that runs until it is dropped.
     ///
     /// # Errors
     /// It does not start.
@@ -64,19 +64,19 @@ impl Namespaces {
 impl Drop for Namespaces {
     fn drop(&mut self) {
         for namespace in [&self.near, &self.far] {
-            // One that could not be made cannot be removed.
+            // A namespace that could not be created cannot be removed.
             let _ = ip(&format!("netns del {namespace}"));
         }
     }
 }
 
-/// A program that serves.
+/// A running server.
 #[derive(Debug)]
 pub struct Server(Child);
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

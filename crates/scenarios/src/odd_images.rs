@@ -1,7 +1,6 @@
-//! SII images as they are met beside sound ones: cut short, with flipped bits, odd SyncManagers, PDOs, sizes and
-//! checksums.
+//! Inconsistent and damaged SII images: truncated, with bit errors, unusual SyncManagers, PDOs, sizes and checksums.
 //!
-//! In go a sound image and [`Dice`]; out comes an image with what was done to it. The same seed makes the same one.
+//! A valid image and [`Dice`] go in; a changed image and its changes come out. The same seed gives the same image.
 
 use std::fmt;
 
@@ -9,14 +8,14 @@ use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader, SiiSyncManager}
 
 use crate::dice::Dice;
 
-/// What was done to an image.
+/// Change of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Change {
     /// Everything from this byte on reads as erased or zero; `is_inside` says that a category lost a part.
     Cut {
-        /// First byte that is lost.
+        /// First lost byte.
         at: usize,
-        /// What is read instead.
+        /// Value that is read instead.
         padding: u8,
         /// A category that a MainDevice needs lost a part, or the fixed area is all there is.
         is_inside: bool,
@@ -26,11 +25,11 @@ pub enum Change {
         /// Bytes left.
         at: usize,
     },
-    /// These bits are the other way round, the checksum is not mended.
+    /// These bits are inverted, the checksum is not corrected.
     Bits(Vec<usize>),
-    /// These bits of the fixed area are the other way round, with a checksum that fits.
+    /// These bits of the fixed area are inverted, with a correct checksum.
     SoundBits(Vec<usize>),
-    /// The checksum does not fit, and the mailbox words are garbage.
+    /// The checksum is wrong, and the mailbox words are random.
     Garbage,
     /// A SyncManager is described in another way.
     SyncManager {
@@ -50,7 +49,7 @@ pub enum Change {
         /// The SyncManager, 0xFF for none.
         to: u8,
     },
-    /// A word of the fixed area has another value; the checksum fits.
+    /// A word of the fixed area has another value; the checksum is correct.
     Word {
         /// Its address.
         word: usize,
@@ -66,7 +65,7 @@ pub enum Change {
     },
     /// A category comes a second time, with the data of the first one or erased.
     Repeated(CategoryKind),
-    /// The categories come in another order, one of a vendor among them.
+    /// The categories are in another order, with a vendor specific one among them.
     Reordered,
 }
 
@@ -76,16 +75,16 @@ impl fmt::Display for Change {
     }
 }
 
-/// An odd image.
+/// A changed image.
 #[derive(Clone, Debug)]
 pub struct Variant {
     /// Its bytes.
     pub image: Vec<u8>,
-    /// What was done.
+    /// The change.
     pub change: Change,
 }
 
-/// Kinds of changes, each of which comes in turn.
+/// Number of kinds of changes, which are used in turn.
 pub const KINDS: u64 = 12;
 
 /// The variant `number` of an image.
@@ -125,7 +124,7 @@ pub fn variant(image: &[u8], number: u64, dice: &mut Dice) -> Variant {
 
 type Found = Vec<(usize, CategoryHeader)>;
 
-/// The categories of a sound image: where their headers are.
+/// The categories of a valid image, with the offsets of their headers.
 fn categories(image: &[u8]) -> Found {
     let mut found = Vec::new();
     let mut at = SiiHeader::LEN;
@@ -145,13 +144,13 @@ fn is_needed(kind: CategoryKind) -> bool {
     matches!(kind, Strings | General | SyncManager | TxPdo | RxPdo | Dc)
 }
 
-/// A category that lost so many bytes lost something that counts.
+/// A category that lost this many bytes lost relevant data.
 const LOST: usize = 8;
 
 fn cut(image: &mut [u8], found: &Found, used: usize, dice: &mut Dice) -> Change {
     let at = if dice.one_in(4) { SiiHeader::LEN } else { dice.below(used as u64) as usize };
     let padding = *dice.pick(&[0xFF, 0xFF, 0x00]);
-    // Bytes at the end of an entry may be what they are padded with, or mean nothing.
+    // Bytes at the end of an entry may be padding or have no meaning.
     let hit = |(start, header): &(usize, CategoryHeader)| {
         let end = start + CategoryHeader::LEN + header.data_len();
         let is_here = (start + CategoryHeader::LEN..end).contains(&at);
@@ -171,7 +170,7 @@ fn flip(image: &mut [u8], bytes: usize, dice: &mut Dice) -> Vec<usize> {
     bits
 }
 
-/// Makes the checksum fit.
+/// Corrects the checksum.
 pub fn mend_checksum(image: &mut [u8]) {
     if let Some(area) = image.first_chunk_mut::<{ SiiHeader::LEN }>() {
         *area = SiiHeader::decode(area).with_checksum().encode();
@@ -184,7 +183,7 @@ fn of_kind(found: &Found, kind: CategoryKind) -> Option<std::ops::Range<usize>> 
     Some(start..start + header.data_len())
 }
 
-/// Values that are met: types, control and enable bytes of other devices, places and lengths just beside.
+/// Plausible values: types, control and enable bytes of other devices, slightly wrong addresses and lengths.
 fn sync_manager(image: &mut [u8], found: &Found, dice: &mut Dice) -> Change {
     let Some(range) = of_kind(found, CategoryKind::SyncManager).filter(|range| range.len() >= SiiSyncManager::LEN)
     else {
@@ -262,7 +261,7 @@ fn category_length(image: &mut [u8], found: &Found, dice: &mut Dice) -> Change {
     Change::CategoryLength { kind: header.kind, words }
 }
 
-/// The same categories in another way.
+/// The same categories in another arrangement.
 fn rearrange(image: &mut Vec<u8>, found: &Found, dice: &mut Dice) -> Change {
     let mut parts: Vec<Vec<u8>> =
         found.iter().map(|(at, header)| image[*at..at + CategoryHeader::LEN + header.data_len()].to_vec()).collect();

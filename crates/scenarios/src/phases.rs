@@ -1,8 +1,7 @@
-//! When each phase of a start-up ends, how much of it nothing was on the wire, and how often somebody waited for it.
+//! End of each phase of a start-up, its time with an idle wire, and its number of sequential exchanges.
 //!
-//! In: a segment. Out: [`Phase`]s from power-on to all in OP, taken from the devices' own registers. What counts in
-//! real time besides the time itself is the number of exchanges that follow one another: each costs a round trip
-//! through two hosts.
+//! In: a segment. Out: [`Phase`]s from power-on to all in OP, taken from the devices' own registers. In real time the
+//! number of sequential exchanges counts as well: each costs a round trip through two hosts.
 
 use std::time::Duration;
 
@@ -14,17 +13,17 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::register::map;
 
-/// Beyond this virtual time a start has failed.
+/// Limit of the virtual time of a start.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// What ends a phase.
+/// End of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Everybody has a station address.
+    /// All SubDevices have a station address.
     Addressed,
     /// The scan has ended: every SII has been read.
     Scanned,
-    /// Everybody is in this state or a higher one.
+    /// All SubDevices are in this state or a higher one.
     State(AlState),
 }
 
@@ -45,15 +44,15 @@ impl std::fmt::Display for End {
 /// A part of a start-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Phase {
-    /// What ended it.
+    /// Its end.
     pub end: End,
-    /// When, since power-on.
+    /// Time of the end since power-on.
     pub at: Duration,
-    /// How much of it nothing was on the wire.
+    /// Time with an idle wire.
     pub silent: Duration,
-    /// How often the wire was silent before a frame left: exchanges that followed one another.
+    /// Number of frames sent on an idle wire: sequential exchanges.
     pub exchanges: u64,
-    /// Frames that left.
+    /// Sent frames.
     pub frames: u64,
 }
 
@@ -76,7 +75,7 @@ pub fn start_up(network: Network, options: &Options, period: Duration) -> Result
     Ok(application.links().phases.clone())
 }
 
-/// Links into a segment that watch wire and devices.
+/// Links into a segment that observe wire and devices.
 struct Watched {
     segment: SimulatedSegment,
     /// Copies that have not come back.
@@ -101,7 +100,7 @@ impl Watched {
         self.silent_since = now;
     }
 
-    /// Ends the phases that this is the end of.
+    /// Ends the phases up to this one.
     fn reach(&mut self, end: End) {
         if ENDS.get(self.phases.len()) != Some(&end) {
             return;

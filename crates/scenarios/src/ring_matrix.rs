@@ -1,5 +1,5 @@
-//! The matrix of rings: any cable of a ring of any length cut and healed at any phase of its life, with everything that
-//! must hold checked ([`Bed::run`]). Scenarios run a part of it, the bench of the ring all of it.
+//! The matrix of rings: any cable of a ring of any length cut and repaired in any phase, with all checks
+//! ([`Bed::run`]). Scenarios run a part of it, the bench of the ring all of it.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -31,30 +31,30 @@ const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 
 /// Bytes of a download over TCP.
 const STREAM: usize = 60_000;
 const OBJECT: SdoAddress = SdoAddress::new(0x2002, 0);
-/// Some segments of an SDO, and some packets of a file.
+/// Enough bytes for several segments of an SDO and several packets of a file.
 const BYTES: usize = 12_000;
 /// Cycles after an edge.
 const AFTER_EDGE: u64 = 25;
-/// Cycles in OP before anything happens.
+/// Cycles in OP before the first fault.
 const BEFORE: u64 = 5;
-/// Cycles for which the SubDevice that falls hangs: a little longer than its watchdog.
+/// Cycles for which the application of the failing SubDevice hangs: a little longer than its watchdog.
 const FALL: u64 = 110;
-/// Inputs are functions of outputs, so that they are what they would have been this many cycles after the last one that
-/// was not complete.
+/// Inputs are functions of outputs: this many cycles after the last incomplete cycle they have their undisturbed
+/// values.
 const ECHO: usize = 2;
 
-/// What is going on when the cable is cut.
+/// Activity during the cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// The segment has just got its power.
+    /// Right after power-on.
     PowerOn,
     /// SII contents are being read.
     Scan,
-    /// On the way to PREOP.
+    /// Transition to PREOP.
     ToPreOp,
-    /// On the way to SAFEOP.
+    /// Transition to SAFEOP.
     ToSafeOp,
-    /// On the way to OP.
+    /// Transition to OP.
     ToOp,
     /// All are in OP, mailboxes are idle.
     Idle,
@@ -62,16 +62,16 @@ pub enum Phase {
     Sdo,
     /// A file is written by FoE and read back.
     Foe,
-    /// A stream of Ethernet frames by EoE: a download over TCP.
+    /// Ethernet frames by EoE: a download over TCP.
     Eoe,
-    /// One SubDevice fell to SAFEOP and is on its way back.
+    /// One SubDevice fell to SAFEOP and returns to OP.
     StateChange,
-    /// One SubDevice is asked to go to PREOP, and back to OP when the cable is healed.
+    /// PREOP is requested of one SubDevice, and OP when the cable is repaired.
     StateRequest,
 }
 
 impl Phase {
-    /// In the order of a life.
+    /// In order of time.
     pub const ALL: [Phase; 11] = [
         Phase::PowerOn,
         Phase::Scan,
@@ -99,7 +99,7 @@ pub struct Case {
     pub count: usize,
     /// The cable, from the main link on.
     pub cable: usize,
-    /// What is going on.
+    /// Activity.
     pub phase: Phase,
     /// Moment of the edges within the cycle, or within the phase of the start-up, in thousandths.
     pub moment: u32,
@@ -107,18 +107,18 @@ pub struct Case {
     pub detection: Duration,
 }
 
-/// What came of it.
+/// Result of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Incomplete cycles at the cut and at the repair; none are counted in a start-up.
     pub incomplete: [usize; 2],
-    /// How many were allowed each time, with the flight that was measured.
+    /// Allowed incomplete cycles each time, with the measured round trip.
     pub allowed: usize,
-    /// From the first frames that went the original way to the event.
+    /// From the first frames on the original path to the event.
     pub fixed_after: Duration,
     /// Bytes of inputs that were compared with the uncut twin.
     pub compared: u64,
-    /// Times that a SubDevice was found to have taken over its outputs just once in a cycle.
+    /// Number of cycles in which a SubDevice took over its outputs exactly once.
     pub taken: u64,
 }
 
@@ -128,12 +128,12 @@ pub const fn speaker(count: usize) -> usize {
 }
 
 thread_local! {
-    /// When the cycles of the world in this thread begin, in nanoseconds after a whole one: on its own stub a frame may
-    /// meet a SubDevice some hundred microseconds later than in the twin, and that must not be the next cycle.
+    /// Begin of the cycles of the world in this thread, in nanoseconds after a full period: in an open ring a SubDevice
+    /// may process a frame some hundred microseconds later than in the twin, and this must not be in the next cycle.
     static GRID: Cell<u64> = const { Cell::new(0) };
 }
 
-/// Inputs from the number of the cycle and the outputs that were latched last.
+/// Inputs from the number of the cycle and the last latched outputs.
 fn echo(now: SimTime, outputs: &[u8], inputs: &mut [u8]) {
     let cycle = (now.0.wrapping_sub(GRID.get()) / CYCLE.as_nanos() as u64) as u8;
     for (at, input) in inputs.iter_mut().enumerate() {
@@ -182,18 +182,18 @@ fn in_op(count: usize, detection: Duration) -> World {
     world
 }
 
-/// What the runs of one length have in common: when the phases of its start end, and the twin that nobody cuts.
+/// Common data of the runs of one length: end times of the start-up phases, and the undisturbed twin.
 #[derive(Debug)]
 pub struct Bed {
     count: usize,
     detection: Duration,
     phases: Vec<StartPhase>,
-    /// Inputs and outputs of each cycle from OP on; of one whose SubDevice falls, too.
+    /// Inputs and outputs of each cycle in OP; also of a run with a failing SubDevice.
     twins: [Vec<Vec<u8>>; 2],
 }
 
 impl Bed {
-    /// A bed for rings of so many SubDevices.
+    /// A test bed for rings of this many SubDevices.
     pub fn new(count: usize, detection: Duration) -> Bed {
         let phases = start_up(segment(count, detection), &Options::default(), CYCLE).expect("it starts");
         let cycles = 2 * wait(detection) + FALL + 40;
@@ -212,12 +212,12 @@ impl Bed {
         Bed { count, detection, phases, twins }
     }
 
-    /// SubDevices of its rings.
+    /// Number of SubDevices of its rings.
     pub const fn count(&self) -> usize {
         self.count
     }
 
-    /// Cuts and heals a cable in a phase, at a moment of the cycle (or of the phase of the start-up) in thousandths.
+    /// Cuts and repairs a cable in a phase, at a moment of the cycle (or of the phase of the start-up) in thousandths.
     ///
     /// # Panics
     /// When something does not hold.
@@ -231,7 +231,7 @@ fn falls(phase: Phase) -> usize {
     usize::from(phase == Phase::StateChange)
 }
 
-/// A break that comes and goes while the ring starts.
+/// A break and its repair during the start of the ring.
 fn start(case: &Case, phases: &[StartPhase]) -> Outcome {
     GRID.set(0);
     let mut network = segment(case.count, case.detection);
@@ -260,7 +260,7 @@ fn start(case: &Case, phases: &[StartPhase]) -> Outcome {
     Outcome::default()
 }
 
-/// The ring is closed, all are in OP, everything is complete.
+/// The ring is closed, all SubDevices are in OP, all domains are complete.
 fn is_whole(world: &World, case: &Case) {
     let status = world.application().ring_status();
     assert_eq!(
@@ -273,22 +273,22 @@ fn is_whole(world: &World, case: &Case) {
     assert_eq!(last, Some(Delivery::Complete), "{case:?}");
 }
 
-/// A ring in OP, beside what its twin that nobody cuts had in each cycle.
+/// A ring in OP, with the data of its undisturbed twin in each cycle.
 struct Pair<'a> {
     cut: World,
     twin: std::slice::Iter<'a, Vec<u8>>,
     /// Complete cycles in a row.
     calm: usize,
     compared: u64,
-    /// How often each device took over outputs so far.
+    /// Number of times each device took over outputs.
     latched: Vec<u64>,
-    /// Who is not watched for that: it leaves OP in this phase.
+    /// Device without this check: it leaves OP in this phase.
     apart: Option<usize>,
     taken: u64,
 }
 
 impl Pair<'_> {
-    /// One cycle. Outside the edges the inputs are the twin's, and outputs come once.
+    /// One cycle. Outside the edges the inputs equal those of the twin, and outputs are taken over once.
     fn cycle(&mut self, case: &Case) {
         self.cut.cycle();
         let world = &self.cut;
@@ -302,12 +302,12 @@ impl Pair<'_> {
         self.compared += image.len() as u64;
     }
 
-    /// Outputs reach each SubDevice once per cycle; at an edge not at all, once or twice. Returns how many they
-    /// reached.
+    /// Each SubDevice receives outputs once per cycle; at an edge never, once or twice. Returns the number of
+    /// SubDevices with outputs.
     fn count_latches(&mut self, case: &Case) -> u64 {
         let now: Vec<u64> = self.cut.network().devices().map(Device::outputs_latched).collect();
         let before = std::mem::replace(&mut self.latched, now);
-        // A copy that met somebody again came back and made its cycle incomplete.
+        // A copy that a SubDevice processed again made its cycle incomplete.
         let is_calm = self.calm > ECHO;
         let mut taken = 0;
         for (number, (before, now)) in before.iter().zip(&self.latched).enumerate() {
@@ -347,13 +347,13 @@ async fn write_and_read_file(mailbox: Mailbox) -> Vec<u8> {
 }
 
 async fn stream(mailbox: Mailbox) -> Vec<u8> {
-    let port = EthernetPort::open(&mailbox).expect("nobody else has it");
+    let port = EthernetPort::open(&mailbox).expect("the port is free");
     let bus = mailbox.bus().clone();
-    download(bus, &port, ADDRESSES, STREAM, Duration::from_secs(10)).await.expect("TCP heals what a break has lost");
+    download(bus, &port, ADDRESSES, STREAM, Duration::from_secs(10)).await.expect("TCP repeats lost data");
     pattern()
 }
 
-/// Something begins that goes on over both edges.
+/// Starts work that continues over both edges.
 fn begin(world: &mut World, case: &Case) -> Option<Pending<Vec<u8>>> {
     let mailbox = world.mailbox(speaker(case.count));
     match case.phase {
@@ -395,20 +395,21 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
         let mark = pair.cut.mark();
         let state = [AlState::PreOp, AlState::Op][at];
-        let who = speaker(case.count);
+        let speaker = speaker(case.count);
         let asked = (case.phase == Phase::StateRequest)
-            .then(|| pair.cut.application_mut().engine_mut().start_state_request(who, state));
+            .then(|| pair.cut.application_mut().engine_mut().start_state_request(speaker, state));
         pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
         pair.cycles(case, wait(case.detection));
         if let Some(asked) = asked {
             let reached = pair.cut.finish(Duration::from_secs(2), asked);
             reached.unwrap_or_else(|error| panic!("{case:?}: {state}: {error}"));
-            assert_eq!(pair.cut.network().device(DeviceIndex(who)).al_status(), AlStatus::new(state));
+            assert_eq!(pair.cut.network().device(DeviceIndex(speaker)).al_status(), AlStatus::new(state));
         }
         let world = &pair.cut;
         let expected: Vec<&Event> = if at == 0 { opened.iter().collect() } else { closed.iter().collect() };
         assert_eq!(ring_events(world.events(mark)), expected, "{case:?}");
-        let left: Vec<usize> = world.left_op(mark).iter().map(|who| who.0).filter(|who| Some(*who) != fallen).collect();
+        let left: Vec<usize> =
+            world.left_op(mark).iter().map(|device| device.0).filter(|device| Some(*device) != fallen).collect();
         assert_eq!(left, Vec::<usize>::new(), "{case:?}: they left OP");
         if fallen.is_none() {
             assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{case:?}");
@@ -430,7 +431,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     outcome
 }
 
-/// Brings about what the phase is. Returns the SubDevice that is not in OP meanwhile.
+/// Starts the activity of the phase. Returns the SubDevice that is not in OP meanwhile.
 fn disturb(pair: &mut Pair<'_>, case: &Case) -> Option<usize> {
     let fallen = match case.phase {
         Phase::StateChange => Some(fall(pair, case)),
@@ -438,25 +439,25 @@ fn disturb(pair: &mut Pair<'_>, case: &Case) -> Option<usize> {
         _ => None,
     };
     if case.phase == Phase::StateRequest {
-        // Its inputs are not the twin's while it is in another state.
+        // Its inputs differ from the twin's while it is in another state.
         pair.twin = [].iter();
     }
     fallen
 }
 
-/// Time from the first cycle behind a mark to an event.
+/// Time from the first cycle after a mark to an event.
 fn fixed_after(world: &World, mark: Mark, event: &Event) -> Duration {
     let told = world.events(mark).iter().find(|timed| timed.event == *event).map(|timed| timed.at);
     let since = world.judged(mark).first().map(|judged| judged.at);
     told.zip(since).map_or(Duration::ZERO, |(told, since)| told.since(since))
 }
 
-/// The SubDevice with mailboxes falls out of OP, as in the twin, and is on its way back.
+/// The SubDevice with mailboxes loses OP, as in the twin, and returns.
 fn fall(pair: &mut Pair<'_>, case: &Case) -> usize {
-    let who = speaker(case.count);
-    pair.cut.hang(DeviceIndex(who), true);
+    let speaker = speaker(case.count);
+    pair.cut.hang(DeviceIndex(speaker), true);
     pair.cycles(case, FALL);
-    pair.cut.hang(DeviceIndex(who), false);
+    pair.cut.hang(DeviceIndex(speaker), false);
     pair.cycles(case, 2);
-    who
+    speaker
 }

@@ -1,4 +1,4 @@
-//! Segments that scenarios run on, from the simulator's catalogue.
+//! Segments of the scenarios, from the simulator's catalogue.
 
 use std::time::Duration;
 
@@ -11,9 +11,9 @@ use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 
-/// Where the cable to the main interface is plugged in.
+/// End of the cable at the main interface.
 pub const MAIN: Endpoint = Endpoint::Host(HostLink::Main);
-/// Where that to the redundant one is.
+/// End of the cable at the redundant interface.
 pub const REDUNDANT: Endpoint = Endpoint::Host(HostLink::Redundant);
 
 /// Sixteen SubDevices of all kinds, as in the demonstration.
@@ -86,8 +86,8 @@ pub fn wired_with(descriptions: Vec<DeviceDescription>, cables: &[(Endpoint, End
     builder.options(NetworkOptions::default()).build().expect("the cables fit")
 }
 
-/// One, a junction with a ring of three on port 3 that comes back to port 1, and two more on its port 2. The ring's
-/// cables are [`RING_OF_THREE`], its last one closes it.
+/// One device, a junction with a ring of three from port 3 to port 1, and two more devices on its port 2. The ring's
+/// cables are [`RING_OF_THREE`], the last one is the closing cable.
 pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, Port::A)),
     (at(0, Port::B), at(1, Port::A)),
@@ -101,8 +101,8 @@ pub const RING_BEHIND_JUNCTION: [(Endpoint, Endpoint); 8] = [
 /// Cables of the ring in [`RING_BEHIND_JUNCTION`].
 pub const RING_OF_THREE: [usize; 4] = [2, 3, 4, 5];
 
-/// Two junctions in a row, 0 and 3, each with a ring of two behind it, and one more behind both. Cables 1 to 3 are
-/// those of the first ring, 5 to 7 those of the second one.
+/// Two junctions in a row, 0 and 3, each with a ring of two behind it, and one more device behind both. Cables 1 to 3
+/// belong to the first ring, 5 to 7 to the second one.
 pub const TWO_RINGS: [(Endpoint, Endpoint); 9] = [
     (MAIN, at(0, Port::A)),
     (at(0, Port::D), at(1, Port::A)),
@@ -115,8 +115,8 @@ pub const TWO_RINGS: [(Endpoint, Endpoint); 9] = [
     (at(3, Port::C), at(6, Port::A)),
 ];
 
-/// A ring of two links, with a local ring behind the junction in its middle, device 1. The local ring's two members are
-/// 2 and 3, its cables 2 to 4.
+/// A ring of two links, with a local ring behind the junction in its middle, device 1. Members of the local ring are 2
+/// and 3, its cables are 2 to 4.
 pub const RING_IN_RING: [(Endpoint, Endpoint); 7] = [
     (MAIN, at(0, Port::A)),
     (at(0, Port::B), at(1, Port::A)),
@@ -157,7 +157,7 @@ pub fn ring_of_16(detection: Duration) -> Network {
     ring(descriptions(&SIXTEEN), NetworkOptions::default().with_detection_delay(detection))
 }
 
-/// The line of 1, 10 or 50 SubDevices that start-ups are measured on: outputs, inputs and servos behind a coupler.
+/// The line of 1, 10 or 50 SubDevices for measurements of start-ups: outputs, inputs and servos behind a coupler.
 ///
 /// # Panics
 /// For other numbers.

@@ -1,5 +1,5 @@
-//! Short seeded runs of small rings: cuts, repairs, losses, delays and power cycles at random, and in the end
-//! everything is back ([`run`]). So short that ten thousand of them fit into a minute.
+//! Short seeded runs of small rings: cuts, repairs, losses, delays and power cycles at random, and at the end all
+//! SubDevices are in OP again ([`run`]). Ten thousand runs take about a minute.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -23,7 +23,7 @@ const KINDS: [&str; 7] = [
     "analog-output-4",
     "digital-input-16",
 ];
-/// Time until all is well again.
+/// Time limit of the recovery.
 const RECOVERY: Duration = Duration::from_secs(12);
 
 /// Runs a seed.
@@ -37,7 +37,7 @@ pub fn run(seed: u64) {
     let detection = Duration::from_micros(*dice.pick(&[10, 200, 1_500]));
     let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
     let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
-    // Late and doubled frames leave their own traces in the devices.
+    // Late and duplicated frames change the devices.
     world.judge_latched(false);
     let mut cut: Option<CableId> = None;
     let mut off: Option<DeviceIndex> = None;
@@ -61,7 +61,7 @@ pub fn run(seed: u64) {
         let settled = world.all_in_op() && world.application().all_settled();
         settled && complete && world.application().ring() == RingState::Closed && redundancy == Redundancy::Ready
     });
-    // What was delayed has come, and what changed twice has held.
+    // Wait for delayed frames and for the end of the ring's damping.
     world.run_cycles(40);
     world.judge_latched(true);
     let mark = world.mark();
@@ -72,7 +72,7 @@ pub fn run(seed: u64) {
     assert!(world.application().pace().skipped == 0 && world.now().0 > CYCLE.as_nanos() as u64);
 }
 
-/// A fault of the cables or devices, or the end of one that lasts.
+/// A fault of the cables or devices, or the end of a lasting fault.
 fn next_fault(dice: &mut Dice, count: usize, cut: &mut Option<CableId>, off: &mut Option<DeviceIndex>) -> Fault {
     let cable = CableId(dice.below(count as u64 + 1) as usize);
     let direction = *dice.pick(&[None, Some(Direction::AToB), Some(Direction::BToA)]);
@@ -93,9 +93,9 @@ fn next_fault(dice: &mut Dice, count: usize, cut: &mut Option<CableId>, off: &mu
     }
 }
 
-/// The ring opens and closes in turns, and is closed in the end.
+/// The ring opens and closes alternately, and is closed at the end.
 fn changes_alternate<'a>(told: impl IntoIterator<Item = &'a Event>) {
-    // Each change once: never the same twice in a row.
+    // Each change is reported once: never the same twice in a row.
     let (mut is_open, mut edges) = (false, 0);
     for event in told {
         match event {
@@ -108,7 +108,7 @@ fn changes_alternate<'a>(told: impl IntoIterator<Item = &'a Event>) {
     assert!(!is_open && edges % 2 == 0);
 }
 
-/// Runs seeds; returns those that fail, each printed with what happened.
+/// Runs seeds; returns those that fail, each printed with its log.
 pub fn runs(seeds: std::ops::Range<u64>) -> Vec<u64> {
     seeds.filter(|seed| catch_unwind(AssertUnwindSafe(|| run(*seed))).is_err()).collect()
 }

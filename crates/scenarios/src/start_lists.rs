@@ -1,12 +1,11 @@
-//! Start-up lists of many drives at once, measured in virtual time: how long, against what cannot be less (issue 4).
+//! Start-up lists of many drives at once, measured in virtual time and compared with the lower bound (issue 4).
 //!
-//! Servo drives hang on one link, each answers its mailbox 1 ms after a request. Time runs from activation, with the
-//! segment scanned and everybody in INIT, until all are in OP and process data is complete.
+//! Servo drives are connected to one link, each responds 1 ms after a mailbox request. The time is measured from
+//! activation, with the segment scanned and all SubDevices in INIT, until all are in OP and process data is complete.
 //!
-//! Two things bound it. One drive alone takes its time, however many there are beside it. And the mail of all has to
-//! pass the wire: for each object a request, written as header, data and last byte, and a read of the whole send
-//! mailbox, with nothing else in as few frames as hold them. Neither states nor looks whether there is mail are in it,
-//! nor the cyclic frames, which carry process data from the first SubDevice on that can exchange some.
+//! There are two lower bounds. One is the time of a single drive. The other is the wire time of all mail: for each
+//! object a request, written as header, data and last byte, and a read of the whole send mailbox, in the smallest
+//! number of frames. State changes, mailbox polls and cyclic frames are not included.
 
 use std::time::Duration;
 
@@ -20,9 +19,9 @@ use ringcat_wire::mailbox::{Header, sdo};
 use crate::segments::{descriptions, line};
 use crate::world::World;
 
-/// How long a drive takes for an answer.
+/// Response time of a drive.
 pub const ANSWER_TIME: Duration = Duration::from_millis(1);
-/// Where mailboxes begin, and the bytes between two areas of a drive.
+/// Start address of the mailboxes, and distance of two areas of a drive, in bytes.
 const MAILBOX_START: u16 = 0x1000;
 const AREA: u16 = 0x100;
 
@@ -39,7 +38,7 @@ pub struct Lists {
     pub period: Duration,
 }
 
-/// What a start cost.
+/// Cost of a start.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
     /// From activation to OP.
@@ -56,7 +55,7 @@ impl Lists {
     /// Starts the drives.
     ///
     /// # Panics
-    /// When they are not in OP in time, or an answer found nobody.
+    /// When they are not in OP in time, or a response has no waiting request.
     pub fn start(self) -> Cost {
         let mut devices = descriptions(&vec!["servo"; self.drives]);
         for device in &mut devices {
@@ -105,7 +104,7 @@ impl Lists {
         }
     }
 
-    /// Wire time of the mail that cannot be done without, where nothing else is sent.
+    /// Wire time of the necessary mail alone.
     pub fn mail_alone(self) -> Duration {
         const HEADERS: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
         let last_byte = OVERHEAD + 1;

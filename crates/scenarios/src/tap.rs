@@ -1,5 +1,5 @@
-//! The links between engine and segment, with a tap: everything that passes is hashed, frames can be slipped in, and
-//! virtual time has a limit, so that an engine that hangs fails its test instead of stopping it.
+//! The links between engine and segment, with a tap: all frames are hashed, frames can be injected, and virtual time
+//! has a limit, so that an engine that hangs fails its test instead of blocking it.
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Instant, Link, Links};
@@ -9,7 +9,7 @@ use ringcat_wire::frame::MacAddress;
 
 use crate::loss::Loss;
 
-/// Looks and waits in a row between which no time passes; far beyond what an engine needs between two events.
+/// Limit of consecutive receives and waits without progress of time; far more than an engine needs between two events.
 const IDLE_CALLS: u64 = 200_000;
 const FNV_OFFSET: u64 = 0xCBF2_9CE4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01B3;
@@ -25,7 +25,7 @@ impl Default for Fingerprint {
 }
 
 impl Fingerprint {
-    /// Takes bytes in.
+    /// Adds bytes.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(FNV_PRIME);
@@ -39,7 +39,7 @@ const INDEX_AT: usize = 17;
 /// Bit of the first byte of the source address that marks the redundant copy.
 const REDUNDANT_BIT: u8 = 0x08;
 
-/// Which frame of the exchange it is, and a bit for each link whose copy came back.
+/// Number of a cyclic frame, and a bit for each link with a returned copy.
 #[derive(Clone, Copy, Debug)]
 struct Out {
     frame: (u8, u8),
@@ -54,26 +54,26 @@ pub struct Tap {
     injected: Vec<(Link, Vec<u8>)>,
     limit: Instant,
     idle: u64,
-    /// When the exchange last began to send.
+    /// Last time at which the exchange began to send.
     cyclic_sent: Instant,
-    /// Frames of the exchange that it sent last.
+    /// Last sent cyclic frames.
     out: Vec<Out>,
-    /// Marks of the frames of the exchange that left, until they are taken.
+    /// Marks of sent cyclic frames, until they are taken.
     departed: Vec<(u8, u8)>,
-    /// Copies that came back when newer frames had been sent, or twice.
+    /// Copies that came back after newer frames had been sent, or twice.
     outdated: u64,
     /// Whether links can be taken down.
     can_disconnect: bool,
-    /// Frames that are to be lost.
+    /// Injected losses.
     losses: Vec<Loss>,
-    /// Of a thousand frames so many are lost, at random.
+    /// Random losses, per thousand frames.
     lost_per_mille: u64,
-    /// Waits end by up to so much too late, at random.
+    /// Maximum random delay of the end of a wait.
     oversleep_ns: u64,
-    /// Each frame leaves up to so much after it was handed over, at random.
+    /// Maximum random sending delay of a frame.
     late_sending_ns: u64,
     random: u64,
-    /// Longest time from there to a frame of the exchange that came back before it sent again, in nanoseconds.
+    /// Longest round trip of a cyclic frame that came back before the next send, in nanoseconds.
     flight_ns: u64,
 }
 
@@ -105,32 +105,32 @@ impl Tap {
         self.segment.network()
     }
 
-    /// The segment, to bring about faults.
+    /// The segment, for fault injection.
     pub fn network_mut(&mut self) -> &mut Network {
         self.segment.network_mut()
     }
 
-    /// A frame that the engine will find on a link next.
+    /// Injects a frame that the engine receives next on a link.
     pub fn inject(&mut self, link: Link, bytes: &[u8]) {
         self.injected.push((link, bytes.to_vec()));
     }
 
-    /// Frames with a datagram like this get lost from now on.
+    /// Adds a loss of frames with a matching datagram.
     pub fn lose(&mut self, loss: Loss) {
         self.losses.push(loss);
     }
 
-    /// Losses that have not come about yet.
+    /// Number of losses that have not occurred yet.
     pub fn losses_left(&self) -> u32 {
         self.losses.iter().map(|loss| loss.count).sum()
     }
 
-    /// From now on links are like those that cannot be taken down.
+    /// From now on links cannot be taken down.
     pub fn forbid_disconnecting(&mut self) {
         self.can_disconnect = false;
     }
 
-    /// From now on so many of a thousand frames get lost, on their way out or back, at random from a seed.
+    /// From now on this many of a thousand frames are lost, on their way out or back, at random from a seed.
     pub fn lose_per_mille(&mut self, lost: u64, seed: u64) {
         self.lost_per_mille = lost;
         self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
@@ -158,17 +158,17 @@ impl Tap {
         self.flight_ns
     }
 
-    /// Waits end by up to so much too late from now on, at random, as those of a host that is no real-time system.
+    /// From now on waits end up to this much too late, at random, as on a host without real time.
     pub fn oversleep(&mut self, most: std::time::Duration) {
         self.oversleep_ns = most.as_nanos() as u64;
     }
 
-    /// Each frame leaves up to so much after it was handed over from now on, at random, copies of one frame too.
+    /// From now on each frame is sent with a random delay up to this time, each copy by itself.
     pub fn send_late(&mut self, most: std::time::Duration) {
         self.late_sending_ns = most.as_nanos() as u64;
     }
 
-    /// A number up to `most`.
+    /// A random number up to `most`.
     fn random(&mut self, most: u64) -> u64 {
         // xorshift64.
         self.random ^= self.random << 13;
@@ -177,23 +177,23 @@ impl Tap {
         self.random % (most + 1)
     }
 
-    /// Copies of frames of the exchange that came back when newer ones had been sent, or twice: those that nobody may
-    /// take for new.
+    /// Copies of cyclic frames that came back after newer frames had been sent, or twice: they must not be treated as
+    /// new.
     pub fn outdated(&self) -> u64 {
         self.outdated
     }
 
-    /// Frames of the exchange that have left since the last call: byte 1 of the source address, and Idx.
+    /// Cyclic frames sent since the last call: byte 1 of the source address, and Idx.
     pub fn take_departed(&mut self) -> Vec<(u8, u8)> {
         std::mem::take(&mut self.departed)
     }
 
-    /// Measures flights anew.
+    /// Restarts the measurement of round trips.
     pub fn measure_flights(&mut self) {
         self.flight_ns = 0;
     }
 
-    /// The engine looked for frames or waited, and no time passed.
+    /// The engine polled for frames or waited, and no time passed.
     fn count_idle(&mut self) {
         self.idle += 1;
         assert!(self.idle < IDLE_CALLS, "the engine lets no time pass, at {} ns", self.segment.now().0);

@@ -1,5 +1,5 @@
-//! Segments of many plain terminals, as the figures of issue 2 ask for: SII of 512 bytes that are all in use, 500 us
-//! per EEPROM command, 5 ms per state change, a time of choice per hop.
+//! Segments of many plain terminals for the figures of issue 2: a full SII of 512 bytes, 500 us per EEPROM command, 5
+//! ms per state change, a selectable time per hop.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub const SII_BYTES: usize = 512;
 pub const SII_BUSY: Duration = Duration::from_micros(500);
 /// Time of a state change.
 pub const STATE_CHANGE: Duration = Duration::from_millis(5);
-/// From one device to the next, as the bars have it.
+/// Delay from one device to the next in the bars.
 pub const HOP: Duration = Duration::from_micros(1);
 
 /// How the terminals are connected.
@@ -29,7 +29,7 @@ pub enum Links {
     Two,
 }
 
-/// So many terminals, every second one with outputs.
+/// This many terminals, every second one with outputs.
 ///
 /// # Panics
 /// When the segment cannot be built.
@@ -44,7 +44,7 @@ pub fn segment(count: usize, eight_byte_sii: bool, links: Links, hop: Duration) 
     builder.cable_delay(Duration::ZERO).options(options).build().expect("terminals make a segment")
 }
 
-/// A terminal whose SII is full: the name of its group is as long as there is room.
+/// A terminal with a full SII: the name of its group fills the remaining space.
 fn terminal(kind: &str, eight_byte_sii: bool) -> DeviceDescription {
     let mut description = describe(kind, kind);
     description.sii_size_bytes = SII_BYTES;

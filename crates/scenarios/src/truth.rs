@@ -1,9 +1,8 @@
-//! What the devices themselves say of process data, held against what the engine says: at all times, whatever faults
-//! are active.
+//! Comparison of the engine's status of process data with the logs of the devices, at all times and with any faults.
 //!
-//! Inputs that count as fresh were put into a frame of the judged cycle by that SubDevice, byte for byte; outputs of a
-//! complete cycle were taken by every SubDevice from a frame of it. Both are read from the log that each simulated
-//! controller keeps of the logical datagrams that it answered.
+//! Fresh inputs were written into a frame of the evaluated cycle by their SubDevice, byte for byte; outputs of a
+//! complete cycle were taken by every SubDevice from a frame of this cycle. Both are read from the log of processed
+//! logical datagrams that each simulated controller keeps.
 
 use std::collections::VecDeque;
 
@@ -16,22 +15,22 @@ use ringcat_sim::network::Network;
 
 use crate::areas::{Area, areas_of};
 
-/// Marks of the frames that left in one cycle: byte 1 of the source address, and Idx.
+/// Marks of the frames sent in one cycle: byte 1 of the source address, and Idx.
 pub type Departure = Vec<(u8, u8)>;
 
-/// Holds what counts as fresh and complete against the logs of the devices.
+/// Compares fresh inputs and complete cycles with the logs of the devices.
 #[derive(Debug)]
 pub struct Truth {
     areas: Vec<Area>,
-    /// Cycles that may be under way.
+    /// Limit of cycles under way.
     under_way: usize,
-    /// Of the last cycles of each domain, oldest first.
+    /// Departures of the last cycles of each domain, oldest first.
     departures: Vec<VecDeque<Departure>>,
     proven: u64,
 }
 
 impl Truth {
-    /// For declared SubDevices, `devices` being theirs.
+    /// For declared SubDevices; `devices` are their devices.
     pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize, under_way: usize) -> Truth {
         let departures = vec![VecDeque::new(); domains];
         let mut truth = Truth { areas: Vec::new(), under_way, departures, proven: 0 };
@@ -39,7 +38,7 @@ impl Truth {
         truth
     }
 
-    /// SubDevices are these devices from now on; what is not there now stays what it was.
+    /// Updates the devices of the SubDevices; absent SubDevices keep their device.
     pub fn follow(&mut self, directory: &Directory, devices: &[Option<DeviceIndex>]) {
         for (subdevice, device) in devices.iter().enumerate() {
             let Some(device) = *device else { continue };
@@ -53,10 +52,10 @@ impl Truth {
         self.proven
     }
 
-    /// Judges a domain behind [`Exchange::process`].
+    /// Checks a domain after [`Exchange::process`].
     ///
     /// # Panics
-    /// When inputs count as fresh that the SubDevice did not put into a frame of the cycle.
+    /// When inputs are fresh that the SubDevice did not write into a frame of the cycle.
     pub fn judge(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) {
         let Some(departures) = self.departures.get(domain.0).filter(|_| !status.pending) else { return };
         let is_of_cycle = |access: &LogicalAccess| departures.iter().flatten().any(|frame| *frame == access.frame);
@@ -108,7 +107,7 @@ impl Truth {
         }
     }
 
-    /// A domain left with these frames, those of other domains among them.
+    /// A domain was sent with these frames, which include those of other domains.
     pub fn depart(&mut self, domain: DomainId, frames: &Departure) {
         let Some(departures) = self.departures.get_mut(domain.0).filter(|_| !frames.is_empty()) else { return };
         if departures.len() == self.under_way {
@@ -118,13 +117,13 @@ impl Truth {
     }
 }
 
-/// Whether the device moved all of an area between a datagram and its memory.
+/// Whether the device transferred a whole area between a datagram and its memory.
 fn is_moved(area: &Area, access: &LogicalAccess, write: bool) -> bool {
     let at = area.logical.checked_sub(access.address).and_then(|at| usize::try_from(at).ok());
     at.is_some_and(|at| access.has_moved(at..at + area.in_image.len(), write))
 }
 
-/// The part of a datagram's data that is an area's.
+/// The data of an area in a datagram.
 fn bytes_of<'a>(area: &Area, access: &'a LogicalAccess) -> Option<&'a [u8]> {
     let at = usize::try_from(area.logical.checked_sub(access.address)?).ok()?;
     access.data.get(at..at + area.in_image.len())

@@ -1,7 +1,7 @@
-//! A MainDevice and a simulated segment in virtual time, with verbs for what can happen to them.
+//! A MainDevice and a simulated segment in virtual time, with actions and faults.
 //!
-//! Every cycle writes new outputs, takes all events, compares images with devices ([`Mirror`]) and notes who left OP. A
-//! failing test prints the seed and everything that happened.
+//! Every cycle writes new outputs, takes all events, compares images with devices ([`Mirror`]) and records devices that
+//! left OP. A failing test prints the seed and the log.
 
 mod journal;
 
@@ -30,11 +30,11 @@ use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
 use crate::truth::Truth;
 
-/// Cycle time of scenarios that do not say otherwise.
+/// Default cycle time of scenarios.
 pub const CYCLE: Duration = Duration::from_millis(1);
-/// Segments of up to so many devices are judged from inside the devices.
+/// Largest segment that is checked inside the devices.
 const MOST_LOGGED: usize = 80;
-/// Virtual time that a scan may take.
+/// Limit of the virtual time of a scan.
 const SCAN_LIMIT: Duration = Duration::from_secs(20);
 
 /// A point in the history of a world.
@@ -50,7 +50,7 @@ pub struct Mark {
 pub struct World {
     seed: u64,
     application: Application<Tap>,
-    /// What the scan found.
+    /// Result of the scan.
     pub scan: Scan,
     devices: Vec<Option<DeviceIndex>>,
     mirror: Mirror,
@@ -63,7 +63,7 @@ pub struct World {
 }
 
 impl World {
-    /// Scans, declares everything that was found in one domain at [`CYCLE`], activates.
+    /// Scans, declares all found SubDevices in one domain at [`CYCLE`], activates.
     ///
     /// # Panics
     /// When scan or activation fail.
@@ -75,7 +75,7 @@ impl World {
     /// As [`World::new`], and runs until all devices are in OP and the process data is complete.
     ///
     /// # Panics
-    /// When that does not come about in 5 s.
+    /// When this takes more than 5 s.
     pub fn in_op(seed: u64, network: Network) -> World {
         let mut world = World::new(seed, network);
         world.settle();
@@ -134,7 +134,7 @@ impl World {
         Ok(world)
     }
 
-    /// Finds out which device each declared SubDevice is, by its station address, and looks at them from now on.
+    /// Determines the device of each declared SubDevice by its station address, and checks these devices from now on.
     pub fn recognise(&mut self) {
         self.devices = self.by_station(|_| true);
         let judged = self.mirror.judges_latched;
@@ -143,7 +143,7 @@ impl World {
         self.truth.follow(self.application.directory(), &self.devices);
     }
 
-    /// Which of these devices each declared SubDevice is, by its station address.
+    /// The device of each declared SubDevice, by its station address.
     fn by_station(&self, counts: impl Fn(&Device) -> bool) -> Vec<Option<DeviceIndex>> {
         let network = self.application.links().network();
         let by_station: Vec<Option<u16>> = network.devices().map(|it| counts(it).then(|| station(it))).collect();
@@ -157,7 +157,7 @@ impl World {
     /// Runs until all declared SubDevices are settled and all domains complete.
     ///
     /// # Panics
-    /// When that does not come about in 5 s.
+    /// When this takes more than 5 s.
     pub fn settle(&mut self) {
         self.until(Duration::from_secs(5), "everything settled and complete", |world| {
             let last = world.journal.judged.iter().rev().take(world.domains);
@@ -172,7 +172,7 @@ impl World {
         self.cycle_with(|_| ());
     }
 
-    /// One cycle, with `work` behind the pattern that is written to all outputs.
+    /// One cycle, with `work` after the pattern is written to all outputs.
     pub fn cycle_with<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
         let number = self.cycles;
         let mut due = Vec::new();
@@ -236,7 +236,7 @@ impl World {
     /// The mailbox of a declared SubDevice.
     ///
     /// # Panics
-    /// When nobody is declared there.
+    /// When no SubDevice is declared there.
     pub fn mailbox(&self, subdevice: usize) -> Mailbox {
         self.application.engine().mailbox(subdevice).expect("it is declared")
     }
@@ -249,7 +249,7 @@ impl World {
     /// Cycles until work has ended.
     ///
     /// # Panics
-    /// When it has not within a time.
+    /// When it has not ended within a time.
     pub fn finish<T: 'static>(&mut self, limit: Duration, mut work: Pending<T>) -> T {
         let end = self.application.now() + limit;
         loop {
@@ -273,14 +273,14 @@ impl World {
         self.application.links_mut().lose(loss);
     }
 
-    /// Lets time pass without a cycle, as an application does that is stopped. The acyclic half stands still too.
+    /// Lets time pass without a cycle, as if the application is stopped. The acyclic half stops too.
     pub fn stall(&mut self, time: Duration) {
-        self.say(format!("the application stands still for {} ms", time.as_millis()));
+        self.say(format!("the application stops for {} ms", time.as_millis()));
         let network = self.application.links_mut().network_mut();
         network.advance_by(time);
     }
 
-    /// Brings about a fault now.
+    /// Injects a fault now.
     pub fn fault(&mut self, fault: Fault) {
         self.say(format!("{fault:?}"));
         let network = self.network_mut();
@@ -289,7 +289,7 @@ impl World {
         self.mirror.look_again(self.application.links().network());
     }
 
-    /// Brings about a fault in a while.
+    /// Injects a fault after a time.
     pub fn fault_in(&mut self, delay: Duration, fault: Fault) {
         self.say(format!("in {} us: {fault:?}", delay.as_micros()));
         let at = self.network().now() + delay;
@@ -301,22 +301,22 @@ impl World {
         self.fault(Fault::Cut(cable));
     }
 
-    /// Makes a cable whole again.
+    /// Repairs a cable.
     pub fn heal(&mut self, cable: CableId) {
         self.fault(Fault::Heal(cable));
     }
 
-    /// Takes a device's power.
+    /// Switches a device off.
     pub fn power_off(&mut self, device: DeviceIndex) {
         self.fault(Fault::PowerOff(device));
     }
 
-    /// Gives a device its power back.
+    /// Switches a device on.
     pub fn power_on(&mut self, device: DeviceIndex) {
         self.fault(Fault::PowerOn(device));
     }
 
-    /// Lets a device's application hang or go on.
+    /// Lets a device's application hang or continue.
     pub fn hang(&mut self, device: DeviceIndex, hanging: bool) {
         self.fault(Fault::Hang(device, hanging));
     }
@@ -357,29 +357,28 @@ impl World {
         self.application.links_mut().network_mut()
     }
 
-    /// The device that a declared SubDevice is, if it was there at the last look.
+    /// The device of a declared SubDevice, if it was present at the last check.
     pub fn device_of(&self, subdevice: usize) -> Option<DeviceIndex> {
         self.devices.get(subdevice).copied().flatten()
     }
 
-    /// The station address that a device has.
+    /// The station address of a device.
     pub fn station_of(&self, device: usize) -> u16 {
         station(self.network().device(DeviceIndex(device)))
     }
 
-    /// Whether outputs that devices have latched are held against the image, too. Frames that come late or twice leave
-    /// their own traces there; the devices' logs are judged at all times.
+    /// Whether latched outputs of devices are compared with the image, too. Late and duplicated frames change them; the
+    /// devices' logs are checked at all times.
     pub fn judge_latched(&mut self, judged: bool) {
         self.mirror.judges_latched = judged;
     }
 
-    /// How much process data was held against the devices: bytes that they latched, areas that are in their logs.
+    /// Amount of compared process data: latched bytes, areas in the devices' logs.
     pub fn compared(&self) -> u64 {
         self.mirror.compared() + self.truth.proven()
     }
 
-    /// Areas of process data, inputs that counted as fresh and outputs of complete cycles, that were found in a
-    /// device's own log.
+    /// Areas of fresh inputs and of outputs of complete cycles that were found in a device's log.
     pub fn proven(&self) -> u64 {
         self.truth.proven()
     }
@@ -389,7 +388,7 @@ impl World {
         self.network().now()
     }
 
-    /// Here and now in the history.
+    /// The present point in the history.
     pub fn mark(&self) -> Mark {
         let Journal { events, judged, steps, .. } = &self.journal;
         Mark { events: events.len(), judged: judged.len(), steps: steps.len() }
@@ -405,17 +404,17 @@ impl World {
         &self.journal.events[since.events..]
     }
 
-    /// Whether an event came since a point.
+    /// Whether an event was reported since a point.
     pub fn saw(&self, since: Mark, wanted: impl Fn(&Event) -> bool) -> bool {
         self.events(since).iter().any(|timed| wanted(&timed.event))
     }
 
-    /// Judgements of domains since a point.
+    /// Evaluations of domains since a point.
     pub fn judged(&self, since: Mark) -> &[Judged] {
         &self.journal.judged[since.judged..]
     }
 
-    /// Judgements since a point in which somebody was missed who could have answered.
+    /// Evaluations since a point with missing data of a SubDevice that could have responded.
     pub fn incomplete(&self, since: Mark) -> usize {
         self.judged(since).iter().filter(|judged| judged.delivery.is_incomplete()).count()
     }
@@ -430,7 +429,7 @@ impl World {
         &self.journal.steps[since.steps..]
     }
 
-    /// Whether all devices are in OP, as they say themselves.
+    /// Whether all devices are in OP, by their own registers.
     pub fn all_in_op(&self) -> bool {
         self.network().devices().all(|device| device.al_status() == AlStatus::new(AlState::Op))
     }
@@ -444,7 +443,7 @@ impl World {
         fingerprint
     }
 
-    /// How things stand: what the devices say of themselves, what the engine thinks of them.
+    /// State of all devices, by their own registers and in the engine.
     pub fn condition(&self) -> String {
         let mut text = String::new();
         for (number, device) in self.network().devices().enumerate() {
@@ -480,7 +479,7 @@ fn station(device: &Device) -> u16 {
     u16::from_le_bytes([bytes[0], bytes[1]])
 }
 
-/// Where outputs lie in each domain's image.
+/// Ranges of the outputs in each domain's image.
 fn output_ranges(directory: &Directory, domains: usize, declared: usize) -> Vec<Vec<Range<usize>>> {
     let mut ranges = vec![Vec::new(); domains];
     for area in (0..declared).flat_map(|subdevice| directory.areas(subdevice)) {

@@ -1,4 +1,4 @@
-//! After activation the cyclic path takes and gives back no memory, whatever comes from the wire (issue 2).
+//! After activation the cyclic path neither allocates nor frees memory, for any received frames (issue 2).
 
 use std::time::Duration;
 
@@ -81,7 +81,7 @@ fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
         let used = counted(|| {
             for cycle in 0..CYCLES {
                 load.exchange_once();
-                // Answers come in bursts, one cycle's after the other.
+                // Responses arrive in bursts, cycle after cycle.
                 if (cycle + 1) % u64::from(under_way) == 0 {
                     load.answer();
                 }
@@ -109,7 +109,7 @@ fn disturbed_cycles_take_no_memory() {
             *load.exchange.counters();
         let everywhere = [lost, late, corrupt, foreign, other, skipped, incomplete];
         assert!(everywhere.iter().all(|count| *count > 0), "{cabling:?}: {:?}", load.exchange.counters());
-        // Of one link there is no half.
+        // A line has no second half.
         let halves = [half, copies_lost];
         assert!(cabling == Cabling::Line || halves.iter().any(|count| *count > 0), "{cabling:?}: {halves:?}");
     }
@@ -143,7 +143,7 @@ fn recorded_cycles_take_no_memory() {
     std::fs::remove_file(&path).expect("it was written");
     assert_eq!(used, (0, 0));
     for link in recorded {
-        // This is faster than anybody writes: what finds the queue full is counted.
+        // This is faster than the writer: frames that find the queue full are counted.
         assert_eq!(link.sent + link.received + link.lost, CYCLES * 6 + (CYCLES - 1) * 6, "{link:?}");
         assert!(link.sent > 0 && link.received > 0, "{link:?}");
     }
@@ -199,18 +199,18 @@ fn requests_take_no_memory_on_the_side_of_the_cyclic_thread() {
     assert_eq!(used, (0, 0));
 }
 
-/// Answers, but not quite, in a way of its own for each of ten cycles.
+/// Changes the responses, in a different way for each of ten cycles.
 fn disturb(load: &mut CyclicLoad, cycle: u64) {
     let CyclicLoad { exchange, links, board, double, now, .. } = load;
     match cycle % 10 {
-        // Everything is lost.
+        // All frames are lost.
         0 => while links.sent.pop().is_some() {},
         // One copy, or frame, is lost.
         1 => {
             links.sent.pop();
             double.answer(&mut links.sent, &mut links.arriving);
         }
-        // The first comes three times.
+        // The first frame arrives three times.
         2 => {
             double.answer(&mut links.sent, &mut links.arriving);
             let mut first = [0; 1514];
@@ -219,7 +219,7 @@ fn disturb(load: &mut CyclicLoad, cycle: u64) {
                 exchange.receive(link, &first[..length], *now);
             }
         }
-        // Somebody's working counter, Idx, sender, or protocol is wrong.
+        // A working counter, Idx, source address or protocol is wrong.
         3..=6 => {
             double.answer(&mut links.sent, &mut links.arriving);
             let mut first = [0; 1514];
@@ -231,7 +231,7 @@ fn disturb(load: &mut CyclicLoad, cycle: u64) {
                 exchange.pop_foreign();
             }
         }
-        // A datagram is not what was sent.
+        // A datagram differs from the sent one.
         7 => {
             double.answer(&mut links.sent, &mut links.arriving);
             let mut first = [0; 1514];
@@ -249,7 +249,7 @@ fn disturb(load: &mut CyclicLoad, cycle: u64) {
             exchange.send(early, &mut |_, _| panic!("nothing was queued"));
             double.answer(&mut links.sent, &mut links.arriving);
         }
-        // A SubDevice stops taking part, or takes part again; frames come after the next cycle has begun.
+        // A SubDevice stops taking part, or takes part again; frames arrive after the next cycle has begun.
         _ => {
             let subdevice = cycle as usize % SUBDEVICES;
             board.set_taking_part(subdevice, !board.takes_part(subdevice));

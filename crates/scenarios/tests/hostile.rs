@@ -1,6 +1,6 @@
-//! Segments that lie: EEPROMs with any content, answers with any data, working counters, lengths and bytes. Nothing
-//! panics, nothing hangs, virtual time and memory stay bounded, and when the lies end the next scan finds what is
-//! there.
+//! Hostile segments: EEPROMs with any content, responses with any data, working counters, lengths and bytes. Nothing
+//! panics, nothing hangs, virtual time and memory stay bounded, and after the end of the wrong responses the next scan
+//! finds all SubDevices.
 //!
 //! `SEED=17 cargo test -p scenarios --test hostile environment -- --nocapture` runs one seed of each.
 
@@ -24,9 +24,10 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const KINDS: [&str; 6] =
     ["coupler", "digital-input-8", "digital-output-16", "analog-input-4", "servo", "emulated-output-8"];
-/// Most virtual time of a seed: three tries of a scan, each within the limits of its EEPROMs, and what comes then.
+/// Limit of the virtual time of a seed: three attempts of a scan, each within the limits of its EEPROMs, and the run
+/// after it.
 const LIMIT: Instant = Instant(150_000_000_000);
-/// Most bytes that MainDevice and segment may hold.
+/// Maximum memory of MainDevice and segment, in bytes.
 const MEMORY: i64 = 64 << 20;
 
 /// A segment, and the product codes of its devices.
@@ -47,7 +48,7 @@ fn bytes(dice: &mut Dice, count: u64) -> Vec<u8> {
     (0..count).map(|_| any(dice)).collect()
 }
 
-/// Any content: noise, an image with bytes turned over, cut off, or with categories of any kind and length.
+/// Any content: random bytes, an image with inverted bytes, truncated, or with categories of any type and length.
 fn image(dice: &mut Dice, right: &[u8]) -> Vec<u8> {
     let mut image = right.to_vec();
     match dice.below(5) {
@@ -64,7 +65,7 @@ fn image(dice: &mut Dice, right: &[u8]) -> Vec<u8> {
         }
         3 => {
             image.truncate(128);
-            // Says that it is as large as none is.
+            // An impossible size.
             image[0x7C..0x7E].copy_from_slice(&(dice.roll() as u16).to_le_bytes());
             for _ in 0..dice.below(40) {
                 let kind: u16 = *dice.pick(&[10, 30, 40, 41, 50, 51, 60, 0, 0x8001, 0x1234]);
@@ -80,7 +81,8 @@ fn image(dice: &mut Dice, right: &[u8]) -> Vec<u8> {
     image
 }
 
-/// Starts what a scan found and lets it run for a while; a refusal is an answer too. `stop` is called before the end.
+/// Activates the result of a scan and runs it for a while; a refusal is a valid result too. `stop` is called before the
+/// end.
 fn work<L: Links>(mut main_device: MainDevice<L>, cycles: u32, stop: impl Fn()) -> MainDevice<L> {
     let Ok(scan) = main_device.scan() else { return main_device };
     let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
@@ -101,7 +103,7 @@ fn work<L: Links>(mut main_device: MainDevice<L>, cycles: u32, stop: impl Fn()) 
         .unwrap_or_else(|error| panic!("all go to INIT: {error}"))
 }
 
-/// Runs seeds, and looks at the memory that each takes.
+/// Runs seeds, and checks the memory of each.
 fn runs(seeds: Range<u64>, run: impl Fn(u64) + std::panic::RefUnwindSafe) {
     for seed in seeds {
         restart_peak();
@@ -128,7 +130,7 @@ fn eeproms(seed: u64) {
     work(MainDevice::request(links, &options), 200, || ());
 }
 
-/// Places of the datagrams of a frame: where each begins and how long its data is.
+/// Offset and data length of each datagram of a frame.
 fn datagrams(frame: &[u8]) -> Vec<(usize, usize)> {
     let Ok(parsed) = Frame::parse(frame) else { return Vec::new() };
     let mut at = parsed.payload_offset();
@@ -140,7 +142,7 @@ fn datagrams(frame: &[u8]) -> Vec<(usize, usize)> {
     parsed.datagrams().map(|datagram| datagram.data.len()).map(place).collect()
 }
 
-/// Says something else than the segment did.
+/// Changes a response of the segment.
 fn lie(dice: &mut Dice, frame: &mut Vec<u8>) -> Verdict {
     let places = datagrams(frame);
     let Some(&(begin, length)) = places.get(dice.below(places.len() as u64) as usize) else {
@@ -194,10 +196,10 @@ fn lies(seed: u64) {
         main_device = work(main_device, 200, || left.set(0));
     }
     left.set(0);
-    let scan = main_device.scan().unwrap_or_else(|error| panic!("nobody lies any more: {error}"));
+    let scan = main_device.scan().unwrap_or_else(|error| panic!("the responses are right again: {error}"));
     let found: Vec<u32> = scan.subdevices.iter().map(|info| info.identity.product_code).collect();
     assert_eq!(found, expected);
-    // The cache keeps what was said under a fixed area that was read rightly, which is a lie perhaps.
+    // The cache may keep wrong contents that were read with a right fixed area.
     if !options.sii_cache {
         let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
         let mut application = main_device.activate(declaration).map_err(|refused| refused.error).expect("fits");

@@ -1,4 +1,4 @@
-//! Judges a capture of a MainDevice of ours: `check_capture FILE.pcapng [CYCLE_US]`. What is checked is told by
+//! Checks a capture of RingCAT: `check_capture FILE.pcapng [CYCLE_US]`. The checks are listed in
 //! [`scenarios::capture`].
 
 use std::process::ExitCode;

@@ -1,11 +1,12 @@
 //! Instructions per process-data cycle (issue 2, "What it must reach"), counted by callgrind.
 //!
-//! A cycle is what the application's thread does: receive all frames, judge, copy between image and application, queue,
-//! send on the in-memory links. The other end is a double that only writes working counters and the source bit. Cost is
-//! the slope between two run lengths, so that start-up does not count; the double's own slope, measured by running it
-//! alone on the same frames, is subtracted. Between the two lengths no function that allocates or locks may be called.
+//! A cycle is the work of the application's thread: receive all frames, evaluate, copy between image and application,
+//! queue, send on the in-memory links. The other end is a double that only writes working counters and the source bit.
+//! Cost is the slope between two run lengths, so that start-up is excluded; the double's own slope, measured by running
+//! it alone on the same frames, is subtracted. Between the two lengths no function that allocates or locks may be
+//! called.
 //!
-//! Run without arguments it prints the table; `run CASE exchange|double CYCLES` is the work that callgrind watches.
+//! Run without arguments it prints the table; `run CASE exchange|double CYCLES` is the work that callgrind measures.
 
 use std::io;
 use std::process::ExitCode;
@@ -18,12 +19,12 @@ use scenarios::figures::{Figures, verdict};
 
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
-/// Most instructions of a cycle with one SubDevice on one link: 900 before each copy was judged by itself (decision
-/// 0023).
+/// Maximum instructions of a cycle with one SubDevice on one link: 900 before each copy was evaluated by itself
+/// (decision 0023).
 const BAR: f64 = 945.0;
-/// Most that two links may cost, as a multiple of one link.
+/// Maximum cost of two links, as a multiple of one link.
 const RING_BAR: f64 = 1.7;
-/// Most that 50 SubDevices may cost, as a multiple of one with as many bytes.
+/// Maximum cost of 50 SubDevices, as a multiple of one SubDevice with as many bytes.
 const FIFTY_BAR: f64 = 1.3;
 
 struct Case {
@@ -49,7 +50,7 @@ const SPLIT: Case = case("lwr+lrd", 1, 2, false, Cabling::Line);
 const CLOSED: Case = case("closed", 1, 2, false, Cabling::ClosedRing);
 const CUT_MAIN: Case = case("cut-main", 1, 2, false, ON_MAIN);
 const CUT_REDUNDANT: Case = case("cut-redundant", 1, 2, false, ON_REDUNDANT);
-/// Most that two links may cost with 16 SubDevices, as a multiple of one link (issue 5).
+/// Maximum cost of two links with 16 SubDevices, as a multiple of one link (issue 5).
 const SIXTEEN_BAR: f64 = 1.7;
 const CASES: [Case; 23] = [
     unsupervised(LRW, "lrw-unsupervised"),
@@ -97,7 +98,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The work that callgrind watches.
+/// The work that callgrind measures.
 fn run(name: &str, part: &str, cycles: &str) -> io::Result<()> {
     let case = CASES.iter().find(|case| case.name == name).ok_or(io::Error::other("no such case"))?;
     let cycles: u64 = cycles.parse().map_err(io::Error::other)?;
@@ -172,8 +173,8 @@ fn slope(short: &Profile, long: &Profile) -> f64 {
     (long.instructions as f64 - short.instructions as f64) / (LONG - SHORT) as f64
 }
 
-/// Functions that allocate, lock or enter the kernel. Rust's own paths begin with `alloc::` also where nothing is
-/// allocated, so names are taken for what they call in the end.
+/// Functions that allocate, lock or enter the kernel. Rust paths begin with `alloc::` also without an allocation, so
+/// the names of the functions called in the end are checked.
 fn allocates_or_locks(name: &str) -> bool {
     const PARTS: &str = "malloc calloc realloc memalign __rust_alloc __rust_dealloc _int_free mutex rwlock futex \
                          pthread lll_lock syscall";
@@ -181,8 +182,8 @@ fn allocates_or_locks(name: &str) -> bool {
     lower.starts_with("free") || lower.starts_with("cfree") || PARTS.split(' ').any(|part| lower.contains(part))
 }
 
-/// What it costs that freshness is exact: presence datagrams against the same bytes in datagrams with one SubDevice
-/// each, whose working counters are exact without.
+/// Cost of exact freshness: presence datagrams compared with the same bytes in datagrams with one SubDevice each, where
+/// the working counter alone is exact.
 fn print_exactness<'a>(find: &impl Fn(&str) -> &'a Measured) {
     println!(
         "  what exact freshness costs, one link, 2 + 2 bytes per SubDevice, against as many bytes of few SubDevices:"
@@ -209,9 +210,9 @@ fn print(measured: &[Measured]) -> bool {
          ring"
     );
     println!(
-        "  closed, or cut so that the main or the redundant copy meets it. n-of-b: n SubDevices with b + b bytes each."
+        "  closed, or cut so that it processes the main or the redundant copy. n-of-b: n SubDevices with b + b bytes each."
     );
-    // LRW is what one link uses where it can: the smaller figure of the two, so the stricter measure.
+    // One link uses LRW if possible: the smaller figure of the two, so the stricter reference.
     let one_link = find("lrw").net();
     for (case, measured) in CASES.iter().zip(measured) {
         let name =

@@ -1,10 +1,10 @@
 //! A thousand SubDevices: CPU per simulated second and memory of the MainDevice (issue 2, "What it must reach").
 //!
 //! Terminals as in [`scenarios::terminals`] form a closed ring on two links. With 1,000 of them and 1 us per hop the
-//! round trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is what the kernel charges
-//! this process, engine and simulator together, while all are in OP; the best of several stretches counts, for
-//! neighbours on the machine only add to it. Memory is what the allocator handed out since the segment was made: the
-//! MainDevice, and the few frames and queues that the simulator needed since.
+//! round trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is the CPU time of this
+//! process, engine and simulator together, while all are in OP; the best of several runs counts, because other programs
+//! on the machine only add to it. Memory is the allocated memory since the segment was built: the MainDevice, and a few
+//! frames and queues of the simulator.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -20,13 +20,13 @@ use scenarios::terminals::{Links, segment};
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-/// Most CPU seconds per simulated second with 1,000 SubDevices.
+/// Maximum CPU seconds per simulated second with 1,000 SubDevices.
 const CPU_BAR: f64 = 1.0;
-/// Most MiB of a MainDevice with 1,000 SubDevices.
+/// Maximum MiB of a MainDevice with 1,000 SubDevices.
 const MEMORY_BAR: f64 = 64.0;
 /// SubDevices, cycle in ms, delay of a hop in ns.
 const RINGS: [(usize, u64, u64); 3] = [(100, 1, 1_000), (1_000, 4, 1_000), (1_000, 1, 300)];
-/// Simulated time of a stretch.
+/// Simulated time of a measurement.
 const STRETCH: Duration = Duration::from_secs(2);
 const STRETCHES: usize = 3;
 const MIB: f64 = (1 << 20) as f64;
@@ -67,7 +67,7 @@ fn measure() -> Result<bool, Error> {
     Ok(met)
 }
 
-/// A MainDevice on the segment with everything in OP.
+/// A MainDevice on the segment with all SubDevices in OP.
 fn start(network: ringcat_sim::network::Network, period: Duration) -> Result<Application<SimulatedSegment>, Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let found = main_device.scan()?;

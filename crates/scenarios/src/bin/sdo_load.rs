@@ -1,10 +1,10 @@
-//! What 1,000 SDO requests per second cost a cyclic task of 1 kHz (issue 4): instructions of the cyclic half per cycle,
-//! counted by callgrind within that half alone, and when its frames leave, in virtual time.
+//! Cost of 1,000 SDO requests per second for a cyclic task of 1 kHz (issue 4): instructions of the cyclic half per
+//! cycle, counted by callgrind within this half alone, and the delay of its frames in virtual time.
 //!
-//! Four drives hang on one link. Both halves have links of their own, as in two threads; here they take turns in one,
-//! so that virtual time decides. Each millisecond one SDO is asked for, of one drive after the other. The bar is for
-//! requests of another thread; requests that the cyclic task makes itself cost what their calls cost, and are shown.
-//! Run without arguments it prints the table; `run KIND CYCLES` is the work that callgrind watches.
+//! Four drives are connected to one link. Both halves have links of their own, as in two threads; here they run
+//! alternately in one thread, in virtual time. Each millisecond one SDO is requested, from one drive after the other.
+//! The bar is for requests of another thread; the cost of requests by the cyclic task itself is printed without a bar.
+//! Run without arguments it prints the table; `run KIND CYCLES` is the work that callgrind measures.
 
 use std::collections::VecDeque;
 use std::hint::black_box;
@@ -33,34 +33,34 @@ const PERIOD: Duration = Duration::from_millis(1);
 const DRIVES: usize = 4;
 const SHORT: u64 = 200;
 const LONG: u64 = 600;
-/// Cycles in which leave times are looked at.
+/// Cycles in which departure times are checked.
 const LOOKED_AT: u64 = 3_000;
-/// Until all are in OP.
+/// Cycles until all are in OP.
 const START: u64 = 5_000;
-/// Most that requests may add to the instructions of the cyclic half, in percent.
+/// Maximum increase of the instructions of the cyclic half by requests, in percent.
 const BAR: f64 = 1.0;
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(500));
 const OBJECT: SdoAddress = SdoAddress::new(0x1018, 1);
 
-/// Who asks for SDOs.
+/// Source of the SDO requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asks {
-    Nobody,
+    None,
     AnotherThread,
     CyclicTask,
 }
 
 const KINDS: [(&str, Asks); 3] =
-    [("nobody", Asks::Nobody), ("another-thread", Asks::AnotherThread), ("cyclic-task", Asks::CyclicTask)];
+    [("none", Asks::None), ("another-thread", Asks::AnotherThread), ("cyclic-task", Asks::CyclicTask)];
 
-/// Both halves, the segment, and what happened.
+/// Both halves, the segment, and the results.
 struct Plant {
     segment: SimulatedSegment,
     engine: MainDevice,
     window: Window,
-    /// What the cyclic half receives and sends.
+    /// Frames of the cyclic half.
     links: MemoryLinks,
-    /// When what was sent will have left the interface.
+    /// Time at which the sent frames will have left the interface.
     free_at: u64,
     /// Longest wait of a cyclic frame behind an acyclic one.
     longest_wait: u64,
@@ -100,7 +100,7 @@ impl Plant {
         self.segment.send(link, frame);
     }
 
-    /// The acyclic half works until then; frames of the other half are kept for it.
+    /// Runs the acyclic half until this time; frames of the cyclic half are kept for it.
     fn acyclic_until(&mut self, until: Instant) {
         loop {
             let now = self.segment.now();
@@ -143,7 +143,7 @@ impl Plant {
         }
     }
 
-    /// One cycle: the acyclic half until it begins, then the cyclic half.
+    /// One cycle: first the acyclic half until the cycle begins, then the cyclic half.
     fn cycle(&mut self, exchange: &mut Exchange, begin: Instant, requests: &mut [SdoRequest]) {
         self.acyclic_until(begin);
         cyclic_half(exchange, &mut self.links, &self.window, begin, requests);
@@ -155,7 +155,7 @@ impl Plant {
     }
 }
 
-/// What the cyclic half does in a cycle: this is what callgrind counts.
+/// The cyclic half's work in a cycle, counted by callgrind.
 #[inline(never)]
 fn cyclic_half(
     exchange: &mut Exchange,
@@ -187,7 +187,7 @@ fn cyclic_half(
     black_box(status);
 }
 
-/// A run of so many cycles after the start.
+/// A run of this many cycles after the start.
 fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     let (mut plant, mut exchange) = Plant::new()?;
     let mut begin = plant.segment.now();
@@ -202,7 +202,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     }
     let mut requests: Vec<SdoRequest> = Vec::new();
     if asks == Asks::CyclicTask {
-        // One is done within a cycle or two: with two, one is asked for in each.
+        // A request takes one or two cycles: with two request objects, one is started in each cycle.
         requests = (0..2).map(|at| plant.engine.create_sdo_request(1 + at, 4)).collect();
         for request in &mut requests {
             request
@@ -244,7 +244,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The work that callgrind watches.
+/// The work that callgrind measures.
 fn watched(name: &str, cycles: &str) -> io::Result<()> {
     let (_, asks) = KINDS.iter().find(|(kind, _)| *kind == name).ok_or(io::Error::other("no such kind"))?;
     run(*asks, cycles.parse().map_err(io::Error::other)?).map(drop)
@@ -262,20 +262,20 @@ fn instructions(name: &str) -> io::Result<f64> {
 fn measure() -> io::Result<bool> {
     let mut figures = Figures::new("1,000 SDO requests per second beside process data at 1 kHz");
     if is_installed() {
-        let alone = instructions("nobody")?;
+        let alone = instructions("none")?;
         let beside = instructions("another-thread")?;
         figures.show("instructions of the cyclic half per cycle, no SDOs", format!("{alone:.1}"));
         let change = 100.0 * (beside - alone).abs() / alone;
         figures.show("      SDOs of another thread", format!("{beside:.1}"));
         figures.at_most("      change", change, BAR, "%");
         let own = instructions("cyclic-task")?;
-        figures.show("      two request objects of the cyclic task, looked at in each cycle", format!("{own:.1}"));
+        figures.show("      two request objects of the cyclic task, checked in each cycle", format!("{own:.1}"));
     } else {
         println!("  skipped: instructions, for valgrind is not installed");
     }
     let plant = run(Asks::AnotherThread, LOOKED_AT)?;
     figures.at_least("SDOs answered per second", plant.answered as f64 * 1000.0 / LOOKED_AT as f64, 990.0, "");
-    // A frame that finds the interface busy leaves beyond its window.
+    // A frame that finds the interface busy is sent outside its window.
     figures.at_most("longest wait of a frame of process data behind another one", plant.longest_wait as f64, 0.0, "ns");
     Ok(figures.print())
 }

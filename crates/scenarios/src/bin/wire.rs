@@ -1,9 +1,9 @@
 //! Figures on real interfaces (issue 3), each with its bar: round trips, system calls, cycles per second and start-up
-//! beside the MainDevices of others, the largest cycle rate.
+//! beside other MainDevices, the largest cycle rate.
 //!
-//! Everything runs in processes of its own on a veth pair, the MainDevice on one processor, the other end on another.
-//! What is compared alternates in blocks, because the machine may be busy with anything; a figure that misses its bar
-//! has three tries, and each is shown. `RINGCAT_PYTHON` names a Python with pysoem; without it pysoem is left out.
+//! All programs run in processes of their own on a veth pair, the MainDevice on one processor, the other end on
+//! another. Compared programs alternate in blocks, because the load of the machine varies; a figure that misses its bar
+//! has three attempts, and each is printed. `RINGCAT_PYTHON` names a Python with pysoem; without it pysoem is skipped.
 
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
@@ -12,32 +12,32 @@ use scenarios::figures::{Figures, verdict};
 use scenarios::namespaces::{Namespaces, Server};
 
 type Tried<T> = Result<T, String>;
-/// Fills a table with figures.
+/// Adds figures to a table.
 type Measure<'a> = &'a dyn Fn(&mut Figures) -> Tried<()>;
 
-/// Tries of each figure.
+/// Attempts for each figure.
 const TRIES: usize = 3;
-/// Blocks of those who are compared; the median counts.
+/// Blocks of compared programs; the median counts.
 const BLOCKS: usize = 3;
 /// A cycle on the wire against a bare client, by the bytes of the frame.
 const ROUND_TRIP_BARS: [(&str, f64); 2] = [("60", 1.3), ("1500", 1.2)];
-/// How many cycles of ours may be under way. The others have one; so has the first of these.
+/// Limits of cycles under way of RingCAT. The other MainDevices have one; so has the first of these.
 const UNDER_WAY: [&str; 3] = ["1", "2", "3"];
-/// Cycles of ours, of pysoem, and of ethercrab in a block.
+/// Cycles of RingCAT, pysoem and ethercrab in a block.
 const CYCLES: [&str; 3] = ["50000", "20000", "3000"];
 /// Cycles for start-up alone.
 const FEW: &str = "50";
 /// Cycles of the shorter and the longer run whose system calls are counted.
 const COUNTED: [u32; 2] = [2_000, 12_000];
-/// Cycles per second, as a multiple of the better of the others.
+/// Cycles per second, as a multiple of the better of the other MainDevices.
 const CYCLES_BAR: f64 = 2.0;
-/// Time to OP, as a multiple of the better of the others.
+/// Time to OP, as a multiple of the better of the other MainDevices.
 const START_UP_BAR: f64 = 0.5;
 
-/// Plain terminals: the segment's own processor takes little part.
+/// Plain terminals: the simulator needs little processor time.
 const TERMINALS: &str = "[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\ncount = 25\n\
                          [[device]]\ntype = \"digital-input-8\"\ncount = 25\n";
-/// A machine: drives with mailboxes among them.
+/// A machine with drives that have mailboxes.
 const MACHINE: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\ncount = 1\n\
                        [[device]]\ntype = \"digital-output-8\"\ncount = 20\n\
                        [[device]]\ntype = \"digital-input-8\"\ncount = 20\n[[device]]\ntype = \"servo\"\ncount = 9\n";
@@ -79,10 +79,10 @@ fn show(heading: &str, attempt: usize, measure: Measure<'_>) -> bool {
     met && result.is_ok()
 }
 
-/// What is measured with.
+/// The test set-up.
 struct Wire {
     namespaces: Namespaces,
-    /// Where the programs lie.
+    /// Directory of the programs.
     programs: PathBuf,
     python: Option<String>,
 }
@@ -103,7 +103,7 @@ impl Wire {
         self.namespaces.serve(self.ringcat(), &[arguments, &fixed].concat())
     }
 
-    /// A simulator that was just switched on.
+    /// A simulator right after power-on.
     fn simulate(&self, segment: &str, pace: &str) -> Tried<Server> {
         let file = std::env::temp_dir().join(format!("ringcat-wire-{}.toml", std::process::id()));
         std::fs::write(&file, segment).map_err(|error| error.to_string())?;
@@ -112,7 +112,7 @@ impl Wire {
         server.and_then(|server| removed.map(|()| server))
     }
 
-    /// `ringcat bench` at the near end; what it prints.
+    /// `ringcat bench` at the near end; returns its output.
     fn bench(&self, arguments: &[&str]) -> Tried<String> {
         let mut command = self.namespaces.near(self.ringcat());
         command.arg("bench").args(arguments).args(["--main", "near0", "--receive", "busy", "--cpu", "0"]);
@@ -123,10 +123,10 @@ impl Wire {
         let _echo = self.serve(&["bench", "echo"])?;
         for (size, bar) in ROUND_TRIP_BARS {
             let said = self.bench(&["round-trip", "--size", size, "--count", "100000"])?;
-            for who in ["bare echo client", "MainDevice"] {
+            for name in ["bare echo client", "MainDevice"] {
                 let (median, least) =
-                    (after(&said, &format!("{who} median"))?, after(&said, &format!("{who} minimum"))?);
-                figures.show(&format!("{size} bytes, {who}"), format!("{median:.2} us, at the least {least:.2}"));
+                    (after(&said, &format!("{name} median"))?, after(&said, &format!("{name} minimum"))?);
+                figures.show(&format!("{size} bytes, {name}"), format!("{median:.2} us, at the least {least:.2}"));
             }
             figures.at_most(&format!("{size} bytes, median of blocks"), after(&said, "median ratio")?, bar, "x");
         }
@@ -142,15 +142,15 @@ impl Wire {
         let (of_any_kind, sends) = self.calls_per_cycle(&[])?;
         figures.at_most("of any kind", of_any_kind, 1.0, "calls per cycle");
         figures.show("of these, sendto", format!("{sends:.2} calls per cycle"));
-        // How many these are is a matter of time, not of cycles, and strace makes a cycle take twenty times as long.
+        // Their number depends on time, not on cycles, and strace makes a cycle take twenty times as long.
         let (with_others, _) = self.calls_per_cycle(&["-f"])?;
-        let name = "with the thread that looks at the carrier every 5 ms";
+        let name = "with the thread that polls the carrier every 5 ms";
         figures.show(name, format!("{with_others:.2} calls per cycle under strace"));
         figures.show("calls that allocate or lock", "counted by ci/bench: none");
         Ok(())
     }
 
-    /// System calls of a cycle, of any kind and `sendto`, of the thread that cycles unless `flags` of strace say more.
+    /// System calls of a cycle, of any kind and `sendto`; of the cyclic thread unless `flags` of strace include others.
     fn calls_per_cycle(&self, flags: &[&str]) -> Tried<(f64, f64)> {
         let mut calls = Vec::new();
         for count in COUNTED.map(|count| count.to_string()) {
@@ -168,12 +168,12 @@ impl Wire {
             calls.push((total, number("sendto").unwrap_or_default()));
         }
         let cycles = f64::from(COUNTED[1] - COUNTED[0]);
-        // Some belong to the longer run as a whole, such as memory for its times: less than one in a hundred cycles.
+        // Some belong to the longer run as a whole, such as memory for its times: less than one per hundred cycles.
         let per_cycle = ((calls[1].0 - calls[0].0) / cycles * 100.0).round() / 100.0;
         Ok((per_cycle, (calls[1].1 - calls[0].1) / cycles))
     }
 
-    /// A figure of the MainDevices of others on this segment, each just switched on.
+    /// A figure of other MainDevices on this segment, each right after power-on.
     fn others(&self, segment: &str, pace: &str, figure: &str, cycles: [&str; 2]) -> Tried<Vec<(&'static str, f64)>> {
         let mut found = Vec::new();
         if let Some(python) = &self.python {
@@ -185,7 +185,7 @@ impl Wire {
         }
         if std::env::var_os("RINGCAT_ETHERCRAB").is_some() {
             let _simulator = self.simulate(segment, pace)?;
-            // It has two threads: one processor or both, as the system likes.
+            // It has two threads: on one processor or both, as scheduled by the system.
             let mut command = self.namespaces.near(self.programs.join("examples/ethercrab_client"));
             command.args(["near0", "50", cycles[1]]);
             found.push(("ethercrab 0.7", after(&output(command)?, figure)?));
@@ -212,7 +212,7 @@ impl Wire {
         let [serial, several @ ..] = &mut ours;
         let rows = beside(figures, "cycles per second", &title(UNDER_WAY[0]), serial, &others);
         let (serial, others) = (rows[0], rows[1..].iter().copied().fold(0.0, f64::max));
-        // What else runs on the machine only takes cycles away, from each alike in the long run: medians count.
+        // Other load on the machine reduces the rate of each program equally in the long run: medians count.
         figures.show("one under way against the better of them", format!("{:.2} x", serial / others));
         let mut best = (serial, UNDER_WAY[0]);
         for (under_way, ours) in UNDER_WAY[1..].iter().zip(several) {
@@ -254,7 +254,7 @@ impl Wire {
     }
 }
 
-/// Shows medians of blocks, ours first; returns them.
+/// Prints medians of blocks, RingCAT first; returns them.
 fn beside(
     figures: &mut Figures,
     unit: &str,
@@ -265,11 +265,11 @@ fn beside(
     let mut medians = vec![median(ours)];
     let all = |values: &[f64]| values.iter().map(|value| format!("{value:.0}")).collect::<Vec<_>>().join(", ");
     figures.show(name, format!("{:.0} {unit} (of {})", medians[0], all(ours)));
-    for (place, (who, _)) in others.first().into_iter().flatten().enumerate() {
+    for (place, (name, _)) in others.first().into_iter().flatten().enumerate() {
         let mut values: Vec<f64> =
             others.iter().filter_map(|block| block.get(place)).map(|(_, value)| *value).collect();
         medians.push(median(&mut values));
-        figures.show(who, format!("{:.0} {unit} (of {})", medians[place + 1], all(&values)));
+        figures.show(name, format!("{:.0} {unit} (of {})", medians[place + 1], all(&values)));
     }
     medians
 }
@@ -279,17 +279,17 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
-/// Runs a program that ends; what it prints.
+/// Runs a program to its end; returns its output.
 fn output(mut command: Command) -> Tried<String> {
     let output = command.stdin(Stdio::null()).output().map_err(|error| error.to_string())?;
-    // 1: measured, but something was lost, which a stall of the machine can do.
+    // 1: measured, but with losses, which a stall of the machine can cause.
     if matches!(output.status.code(), Some(0 | 1)) && !output.stdout.is_empty() {
         return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
     }
     Err(format!("{command:?} failed: {}", String::from_utf8_lossy(&output.stderr).trim()))
 }
 
-/// The figure behind a name.
+/// The figure after a name.
 fn after(text: &str, name: &str) -> Tried<f64> {
     let rest = text.split_once(name).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
     let end = |rest: &str| rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());

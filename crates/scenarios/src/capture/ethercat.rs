@@ -1,13 +1,13 @@
-//! Reading an EtherCAT frame for the judge (protocol 1.1 to 1.3, 9.7.1 A), strictly: a MainDevice has no business with
-//! what is refused here.
+//! Strict parser of EtherCAT frames for the capture checks (protocol 1.1 to 1.3, 9.7.1 A): a MainDevice must not send a
+//! frame that is refused here.
 
 /// Commands that only read: APRD, FPRD, BRD, LRD.
 pub const READS: [u8; 4] = [1, 4, 7, 10];
-/// Commands whose ADP counts SubDevices and may differ between copies: APRD, APWR, APRW, ARMW.
+/// Commands with an ADP that counts SubDevices and may differ between copies: APRD, APWR, APRW, ARMW.
 const AUTO_INCREMENT: [u8; 4] = [1, 2, 3, 13];
 /// Commands that write to physical addresses: APWR, APRW, FPWR, FPRW, BWR, BRW.
 const WRITES: [u8; 6] = [2, 3, 5, 6, 8, 9];
-/// Where a SubDevice has its station address.
+/// Register of the station address.
 const STATION_ADDRESS: u16 = 0x0010;
 
 /// A datagram.
@@ -27,7 +27,7 @@ pub struct Datagram<'a> {
     pub data: &'a [u8],
     /// Working counter.
     pub wkc: u16,
-    /// Where its header begins in the frame.
+    /// Offset of its header in the frame.
     pub at: usize,
 }
 
@@ -40,7 +40,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Reads a frame; what is wrong with it otherwise.
+    /// Parses a frame; the error is the fault.
     pub fn parse(bytes: &'a [u8]) -> Result<Frame<'a>, String> {
         if !(60..=1514).contains(&bytes.len()) {
             return Err(format!("{} bytes, expected 60 to 1514", bytes.len()));
@@ -112,8 +112,8 @@ impl<'a> Frame<'a> {
         u16::from(self.datagrams[0].index & 0x7F) << 8 | u16::from(self.id())
     }
 
-    /// Its bytes without what may differ between the copies on both links: RED bit, ADP of auto-increment commands,
-    /// station addresses that are being set.
+    /// Its bytes without those that may differ between the copies on both links: RED bit, ADP of auto-increment
+    /// commands, written station addresses.
     pub fn alike(&self) -> Vec<u8> {
         let mut bytes = self.bytes.to_vec();
         bytes[6] &= !0x08;

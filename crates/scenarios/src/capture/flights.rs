@@ -1,7 +1,7 @@
 //! Pairs, ids and flights: checks 6 to 8 of [`crate::capture`].
 //!
-//! In go frames in the order of time, findings go into the verdict. A frame is known by its class and its number; its
-//! copies by the link that their RED bit names.
+//! Frames go in, in the order of time; findings go into the verdict. A frame is identified by its class and number, its
+//! copies by the RED bit.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use super::ethercat::Frame;
 use super::pcapng::Packet;
 use super::verdict::Verdict;
 
-/// The number that a MainDevice begins with.
+/// First number that a MainDevice uses.
 const FIRST: u16 = 1;
 
 /// Class and number.
@@ -29,20 +29,20 @@ struct Flight {
     over: bool,
 }
 
-/// All that are under way or were.
+/// All sent frames.
 #[derive(Debug)]
 pub struct Flights {
     links: usize,
-    /// The last frame of each name.
+    /// The last frame with each class and number.
     flights: HashMap<Name, Flight>,
-    /// Who used a class and an 8-bit id last.
+    /// The last frame with each class and 8-bit id.
     users: HashMap<(bool, u8), Name>,
     /// The last number of each class.
     last: [Option<u16>; 2],
 }
 
 impl Flights {
-    /// None so far.
+    /// No frames.
     pub fn new(links: usize) -> Flights {
         Flights { links, flights: HashMap::new(), users: HashMap::new(), last: [None; 2] }
     }
@@ -106,7 +106,7 @@ impl Flights {
         flight.back[copy] = true;
     }
 
-    /// No frame will come any more.
+    /// End of the capture.
     pub fn finish(&mut self, verdict: &mut Verdict) {
         let mut flights: Vec<Flight> = self.flights.drain().map(|(_, flight)| flight).collect();
         flights.sort_by_key(|flight| flight.frame);

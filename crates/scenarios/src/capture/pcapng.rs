@@ -1,9 +1,9 @@
 //! Reading a pcapng file: little-endian, Ethernet, any resolution that is a power of ten.
 //!
-//! In go bytes, out come interfaces, packets and statistics. Blocks of other kinds are skipped; a file that ends within
-//! a block, or lies about lengths, is an error.
+//! Bytes go in; interfaces, packets and statistics come out. Blocks of other types are skipped; a file that ends within
+//! a block, or with wrong lengths, is an error.
 
-/// Times from here on, in the year 2116, are taken for a mistake.
+/// Later times, from the year 2116 on, are considered an error.
 const LATEST: u64 = 1 << 62;
 
 /// An interface of the capture.
@@ -13,14 +13,14 @@ pub struct Interface {
     pub name: String,
     /// Nanoseconds per unit of time.
     unit_ns: u64,
-    /// Frames that the recorder lost, once it has told.
+    /// Frames lost by the recorder, if its statistics are in the file.
     pub dropped: Option<u64>,
 }
 
 /// A captured frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packet {
-    /// Place of its interface.
+    /// Index of its interface.
     pub interface: usize,
     /// Whether this host sent it.
     pub sent: bool,
@@ -48,7 +48,7 @@ fn u32_at(bytes: &[u8], at: usize) -> Result<u32, String> {
     Ok(u32::from(u16_at(bytes, at)?) | u32::from(u16_at(bytes, at + 2)?) << 16)
 }
 
-/// Code and value of each option from a place of a block's body on.
+/// Code and value of each option from an offset in a block's body.
 fn options(body: &[u8], mut at: usize) -> Result<Vec<(u16, &[u8])>, String> {
     let mut found = Vec::new();
     while at < body.len() {
@@ -114,7 +114,7 @@ impl Capture {
             2 => true,
             _ => return Err("a frame without direction".to_owned()),
         };
-        let time_ns = time.checked_mul(unit_ns).filter(|time| *time < LATEST).ok_or("a time beyond all times")?;
+        let time_ns = time.checked_mul(unit_ns).filter(|time| *time < LATEST).ok_or("a time after the year 2116")?;
         self.packets.push(Packet { interface, sent, time_ns, bytes });
         Ok(())
     }
@@ -124,7 +124,7 @@ fn interface(body: &[u8]) -> Result<Interface, String> {
     if u16_at(body, 0)? != 1 {
         return Err("an interface that is not Ethernet".to_owned());
     }
-    // Microseconds where nothing is said.
+    // The default is microseconds.
     let mut interface = Interface { unit_ns: 1000, ..Interface::default() };
     for (code, value) in options(body, 8)? {
         match (code, value) {

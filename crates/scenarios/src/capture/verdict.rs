@@ -1,37 +1,37 @@
-//! What a capture shows: counts, and promises that were broken.
+//! Result of the checks of a capture: counts and findings.
 
 use std::fmt;
 use std::time::Duration;
 
 use super::windows::Windows;
 
-/// Findings that are kept in words; all are counted.
+/// Findings that are kept as text; all are counted.
 const TOLD: usize = 20;
 
-/// What a capture shows.
+/// Result of the checks.
 #[derive(Debug, Default)]
 pub struct Verdict {
     /// Frames sent, by link.
     pub sent: [u64; 2],
     /// Frames received, by link.
     pub received: [u64; 2],
-    /// Datagrams sent whose data was judged to be zeros.
+    /// Sent reads with checked zero data.
     pub reads: u64,
     /// Frames whose copies on both links were compared.
     pub pairs: u64,
     /// Copies that came back.
     pub returned: u64,
-    /// Copies that did not.
+    /// Copies that did not come back.
     pub missing: u64,
     /// Longest time between the copies of a frame on both links.
     pub longest_pair: Duration,
-    /// How often the numbers of a class began with 1 again.
+    /// Number of restarts of a class's numbers at 1.
     pub anew: u64,
-    /// How cyclic and acyclic frames shared the wire, by link; nothing where there were no cycles.
+    /// How cyclic and acyclic frames shared the wire, by link; empty without cycles.
     pub windows: Vec<Windows>,
-    /// Promises broken.
+    /// Number of findings.
     pub broken: u64,
-    /// The first of them in words.
+    /// The first findings as text.
     pub findings: Vec<String>,
 }
 

@@ -1,52 +1,51 @@
 //! Send windows: how cyclic and acyclic frames share a wire of 100 Mbit/s, check 9 of [`crate::capture`].
 //!
-//! In go the frames that were sent, with link, class, length and time, out comes a measure. A frame occupies its link
-//! for 80 ns per byte and 24 bytes more (preamble, FCS, gap; protocol 1.3), behind those that were handed over before
-//! it.
+//! The sent frames go in, with link, class, length and time; a measurement comes out. A frame occupies its link for 80
+//! ns per byte and 24 bytes more (preamble, FCS, gap; protocol 1.3), after the frames that were sent before it.
 //!
-//! The grid of the cycles is found in the capture: the period is given or the usual distance of the cycles' first
-//! frames, the phase is where the promptest of them lie. A cyclic frame **wants** to leave at its point of the grid and
-//! leaves a little later, when the thread has woken up. An acyclic frame is **in time** when it leaves behind the
-//! cyclic frames of a cycle and is through by the next point of the grid. One that was handed over before that point
-//! and is still on the wire **crosses** it; one that was handed over behind the point and before the cyclic frames
-//! **pushes in**. When a cyclic frame then finds the wire taken, it is **held up**.
+//! The grid of the cycles is derived from the capture: the period is given or the usual distance of the cycles' first
+//! frames, the phase is that of the earliest of them. A cyclic frame is **due** at its point of the grid and is sent a
+//! little later, when the thread has woken up. An acyclic frame is **in time** if it is sent after the cyclic frames of
+//! a cycle and has left the wire by the next point of the grid. A frame that was sent before this point and is still on
+//! the wire **crosses** it; a frame that was sent after the point and before the cyclic frames **pushes in**. If a
+//! cyclic frame then finds the wire occupied, it is **held up**.
 //!
-//! A sender that keeps windows decides in time and may be stopped by its machine between the decision and the wire.
-//! Where the cycle begins late as well, by more than a tenth of the period, the machine's **stall** is seen in the
-//! capture itself and such frames are counted apart. So is a second copy that was handed over more than a tenth of the
-//! period after the first one of the same frame: nothing is decided between the two. Between `Windows::acyclic` and the
-//! rest stands the share that a sender without windows would have: the wire time of acyclic frames, by chance.
+//! A sender with windows decides in time and may be stopped by its machine between the decision and sending. If the
+//! cycle begins late as well, by more than a tenth of the period, this **stall** of the machine is visible in the
+//! capture and such frames are counted separately. So is a second copy that was sent more than a tenth of the period
+//! after the first copy of the same frame: the sender makes no decision between the two. `Windows::by_chance` is the
+//! share of a sender without windows: the wire time of acyclic frames.
 
 use std::fmt;
 use std::time::Duration;
 
-/// Bytes that a frame takes on the wire besides its own.
+/// Additional bytes of a frame on the wire.
 const OVERHEAD: u64 = 24;
 /// Shortest frame without FCS.
 const SHORTEST: u64 = 60;
 const BYTE_NS: u64 = 80;
-/// A stall begins at this part of the period.
+/// A delay of more than this fraction of the period is a stall.
 const STALL_FRACTION: i64 = 10;
 
 /// A frame that was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sent {
-    /// When it was handed over.
+    /// Send time.
     pub time_ns: u64,
-    /// On which link.
+    /// Link.
     pub link: usize,
-    /// Whether it is an acyclic one.
+    /// Whether it is acyclic.
     pub acyclic: bool,
     /// Its bytes without FCS.
     pub length: usize,
-    /// How long after its first copy it was handed over, where it is the second one.
+    /// Delay after the first copy, if it is the second copy.
     pub behind_ns: u64,
 }
 
-/// What was measured on a link.
+/// Measurement of a link.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Windows {
-    /// The period of the grid; zero where there are too few cycles for one.
+    /// The period of the grid; zero if there are too few cycles.
     pub period: Duration,
     /// Cycles.
     pub cycles: u64,
@@ -54,15 +53,15 @@ pub struct Windows {
     pub late: u64,
     /// Acyclic frames between the first and the last cycle.
     pub acyclic: u64,
-    /// Of them, those that cross a point of the grid, or push in, where the cycle is not late.
+    /// Acyclic frames that cross a point of the grid, or push in, if the cycle is not late.
     pub crossed: u64,
-    /// The same where the cycle is late, or the frame was long after its first copy: a stall of the machine.
+    /// The same if the cycle is late, or the frame is long after its first copy: a stall of the machine.
     pub crossed_in_stalls: u64,
-    /// Cycles whose first frame found an acyclic one on the wire.
+    /// Cycles with a first frame that found an acyclic frame on the wire.
     pub held_up: u64,
-    /// For how long at most.
+    /// Longest such delay.
     pub longest_hold_up: Duration,
-    /// How far the worst of `crossed` reaches beyond its point.
+    /// Largest time by which a frame of `crossed` exceeds its point.
     pub furthest: Duration,
     /// Crossings that a sender without windows would have made by chance.
     pub by_chance: u64,
@@ -90,14 +89,14 @@ const fn wire_ns(length: usize) -> u64 {
     (if length < SHORTEST { SHORTEST } else { length } + OVERHEAD) * BYTE_NS
 }
 
-/// Measures frames that are in the order of time; nothing where they are too few for a grid.
+/// Measures frames in the order of time; empty if they are too few for a grid.
 pub fn measure(sent: &[Sent], links: usize, period: Option<Duration>) -> Vec<Windows> {
     let of_link = |link| sent.iter().copied().filter(|frame| frame.link == link).collect::<Vec<Sent>>();
     let grids = (0..links).map(of_link).filter_map(|sent| Some((Grid::find(&sent, period)?, sent)));
     grids.map(|(grid, sent)| measure_link(&sent, &grid)).collect()
 }
 
-/// Where the cycles of a link are.
+/// The grid of a link's cycles.
 #[derive(Debug)]
 struct Grid {
     period_ns: i64,
@@ -123,8 +122,8 @@ impl Grid {
         }
         let first = *starts.first()?;
         let phase = |time: u64| (time - first) as i64 % period_ns;
-        // Most cycles are prompt: the densest of some bins is around the grid, and what lies before it within half a
-        // period is late by more than half of one.
+        // Most cycles are in time: the bin with the most frames is around the grid, and frames up to half a period
+        // before it are late by more than half a period.
         let mut bins = [0u32; 50];
         for start in &starts {
             bins[(phase(*start) * bins.len() as i64 / period_ns) as usize] += 1;
@@ -137,14 +136,14 @@ impl Grid {
         Some(Grid { period_ns, point_ns: first as i64 + densest + promptest, starts })
     }
 
-    /// The point that a cycle belongs to: the last one before it, or one that it is hardly before.
+    /// The point of a cycle: the last one before it, or one shortly after it.
     fn point_of(&self, start: u64) -> i64 {
         let since = start as i64 - self.point_ns + self.period_ns / 4;
         start as i64 - (since.rem_euclid(self.period_ns) - self.period_ns / 4)
     }
 }
 
-/// The usual distance of frames that are not of one cycle, to a microsecond.
+/// The usual distance of frames of different cycles, to a microsecond.
 fn usual_distance(times: &[u64]) -> i64 {
     let mut distances: Vec<u64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     distances.sort_unstable();
@@ -157,7 +156,7 @@ fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
     let mut windows = Windows { period: Duration::from_nanos(grid.period_ns as u64), ..Windows::default() };
     let (Some(first), Some(last)) = (grid.starts.first(), grid.starts.last()) else { return windows };
     let (mut free_ns, mut chance_ns) = (0, 0);
-    // Acyclic frames since the last cycle: when they are through.
+    // Acyclic frames since the last cycle: times at which they have left the wire.
     let mut waiting: Vec<(u64, bool)> = Vec::new();
     let mut starts = grid.starts.iter().copied().peekable();
     for frame in sent {
@@ -177,7 +176,7 @@ fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
     windows
 }
 
-/// A cycle begins behind acyclic frames that are through at these times, some of them held up by a stall.
+/// A cycle begins after acyclic frames that have left the wire at these times, some of them delayed by a stall.
 fn cycle(windows: &mut Windows, grid: &Grid, start: u64, waiting: &[(u64, bool)]) {
     let point = grid.point_of(start);
     let late = start as i64 - point > grid.period_ns / STALL_FRACTION;

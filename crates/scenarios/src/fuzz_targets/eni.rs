@@ -1,7 +1,7 @@
-//! ENI files and any bytes (protocol 8): whatever a file says, it is a configuration that holds together, or an error.
+//! ENI files and any bytes (protocol 8): every file gives a consistent configuration or an error.
 //!
-//! [`mutate`] changes a file as people and tools do: other numbers, half a datagram, elements that are gone, doubled,
-//! or elsewhere. Changed bytes alone are seldom XML any more.
+//! [`mutate`] makes typical changes of a file: other numbers, half a datagram, elements that are removed, duplicated or
+//! moved. Random bytes would seldom be valid XML.
 
 use ringcat::eni::EniFile;
 use ringcat_config::eni;
@@ -10,17 +10,17 @@ use ringcat_engine::info::Direction;
 
 use crate::dice::Dice;
 
-/// An own file with everything in it.
+/// An own file with all elements.
 pub const WHOLE: &str = include_str!("../../../config/tests/files/small.xml");
 /// A hot connect group, commands without many of their parts, values at edges.
 pub const GROUP: &str = include_str!("../../../config/tests/files/group.xml");
 
-/// Reads and follows; what follows must hold together, and a segment can be made of it or not.
+/// Reads and follows a file; the result must be consistent, and building a segment from it must not panic.
 pub fn target(bytes: &[u8]) {
     let _ = is_followed(bytes);
 }
 
-/// The same; whether the file could be followed.
+/// The same; returns whether the file could be followed.
 pub fn is_followed(bytes: &[u8]) -> bool {
     let configuration = match eni::read(bytes).and_then(|model| follow(&model)) {
         Ok(configuration) => configuration,
@@ -35,7 +35,7 @@ pub fn is_followed(bytes: &[u8]) -> bool {
     true
 }
 
-/// Every number in a configuration leads to something that is there.
+/// Every index in a configuration refers to an existing element.
 fn holds_together(configuration: &Configuration) {
     let (declaration, image) = (&configuration.declaration, &configuration.image);
     let count = declaration.subdevices.len();
@@ -67,7 +67,7 @@ fn holds_together(configuration: &Configuration) {
     }
 }
 
-/// Values at which readers change their minds.
+/// Boundary values of readers.
 const VALUES: [&str; 20] = [
     "0",
     "1",

@@ -1,4 +1,4 @@
-//! Messages to begin with, one or more of each kind, from our own encoders.
+//! Initial messages, one or more of each kind, from the encoders of `ringcat-wire`.
 
 use std::net::Ipv4Addr;
 
@@ -27,7 +27,7 @@ fn written(encode: impl FnOnce(&mut [u8]) -> Option<usize>) -> Vec<u8> {
 /// The seeds of a target.
 ///
 /// # Panics
-/// For a name that no target has.
+/// For an unknown name.
 pub fn of(target: &str) -> Vec<Vec<u8>> {
     match target {
         "mailbox" => payloads().into_iter().map(|(protocol, payload)| in_mailbox(protocol, &payload)).collect(),

@@ -1,4 +1,4 @@
-//! What has happened in a world: events, judgements of domains, changes of AL status, and a log in words.
+//! History of a world: events, evaluations of domains, changes of AL status, and a text log.
 
 use ringcat::{Instant, TimedEvent};
 use ringcat_sim::cable::DeviceIndex;
@@ -7,29 +7,29 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use crate::check::Judged;
 
-/// A device changed its AL status, as seen at the beginning of a cycle.
+/// Change of a device's AL status, seen at the beginning of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// When it was seen.
+    /// Time.
     pub at: Instant,
-    /// Who.
+    /// Device.
     pub device: DeviceIndex,
     /// AL status before.
     pub from: AlStatus,
-    /// AL status since.
+    /// AL status after.
     pub to: AlStatus,
-    /// AL status code since.
+    /// AL status code after.
     pub code: AlStatusCode,
 }
 
 impl Step {
-    /// It was in OP and is no longer.
+    /// Whether the device left OP.
     pub fn leaves_op(&self) -> bool {
         self.from.al_state() == Some(AlState::Op) && self.to != AlStatus::new(AlState::Op)
     }
 }
 
-/// What happened, in order.
+/// Recorded events, in order.
 #[derive(Debug, Default)]
 pub(super) struct Journal {
     pub(super) lines: Vec<(Instant, String)>,
@@ -40,13 +40,13 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Notes an event.
+    /// Records an event.
     pub(super) fn event(&mut self, event: TimedEvent) {
         self.lines.push((event.at, format!("{:?}", event.event)));
         self.events.push(event);
     }
 
-    /// Notes a judgement; the log has only those that differ from the one before.
+    /// Records an evaluation; the log has only those that differ from the one before.
     pub(super) fn judge(&mut self, judged: Judged) {
         let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
         if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
@@ -57,7 +57,7 @@ impl Journal {
         self.judged.push(judged);
     }
 
-    /// Notes what the devices say about their state.
+    /// Records the states of the devices.
     pub(super) fn watch(&mut self, at: Instant, network: &Network) {
         for (number, device) in network.devices().enumerate() {
             let to = device.al_status();

@@ -1,5 +1,5 @@
 //! Two network namespaces with one or two veth pairs between them, a simulated segment in the one, and programs in the
-//! other. All of it is gone when the bench is dropped.
+//! other. All are removed when the bench is dropped.
 
 use std::fmt::{Display, Formatter};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,23 +13,23 @@ use std::time::{Duration, Instant};
 use crate::said::Said;
 use crate::states;
 
-/// One test at a time: the others would take processor time from it.
+/// One test at a time, because tests would take processor time from each other.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 /// Numbers of interfaces: different at both ends of a pair.
 const FIRST_INDEX: [usize; 2] = [50, 60];
-/// The simulator has to be there within.
+/// Time limit for the start of the simulator.
 const START_LIMIT: Duration = Duration::from_secs(10);
-/// All SubDevices have to be in OP within.
+/// Time limit until all SubDevices are in OP.
 const OP_LIMIT: Duration = Duration::from_secs(30);
-/// So many lines of the simulator about its lateness are shown.
+/// Maximum number of printed lines of the simulator about its lateness.
 const LATE_LINES: usize = 5;
-/// A program has to end within.
+/// Time limit for the end of a program.
 const END_LIMIT: Duration = Duration::from_secs(90);
-/// Both ends sleep until something comes, before all other programs: the machine may be busy.
+/// Both ends sleep until a frame arrives, with priority over other programs: the machine may be busy.
 const THREAD: [&str; 4] = ["--receive", "block", "--priority", "50"];
 
-/// Where the programs of this repository lie, made if they are not up to date: the whole workspace decides on the
-/// features of what they depend on, so that nothing is built twice.
+/// Directory of the programs of this repository; they are built if they are out of date. The whole workspace is built,
+/// so that its features are those of the tests and nothing is built twice.
 static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
     let profile = target_directory();
     let mut build = Command::new(env!("CARGO"));
@@ -48,7 +48,7 @@ pub fn program(name: &str) -> PathBuf {
     PROGRAMS.join(name)
 }
 
-/// Where this profile's programs lie.
+/// Directory of this profile's programs.
 pub fn target_directory() -> PathBuf {
     let here = std::env::current_exe().expect("a test knows its path");
     here.ancestors().nth(2).expect("tests lie in target/PROFILE/deps").to_owned()
@@ -60,7 +60,7 @@ pub struct Bench {
     main: String,
     /// Namespace of the simulator, with interfaces `sim0` and `sim1`.
     sim: String,
-    /// Namespace of another MainDevice or of a computer elsewhere, where a test wants one.
+    /// Namespace of another MainDevice or of a remote computer, if a test needs it.
     other: Option<String>,
     simulator: Option<Simulator>,
     _alone: MutexGuard<'static, ()>,
@@ -73,12 +73,12 @@ struct Simulator {
     said: Said,
 }
 
-/// How often and how long the simulator was late so far: the machine stalled, or had other work.
+/// Number and sum of the simulator's delays so far: the machine stalled or was busy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SimulatorLateness {
     /// Wake-ups.
     pub count: u64,
-    /// All of them together.
+    /// Sum of the delays.
     pub together_ms: f64,
 }
 
@@ -88,8 +88,8 @@ impl Display for SimulatorLateness {
     }
 }
 
-/// Whether a layer of tests is asked for by an environment variable; says so where it is not. Real time passes in
-/// these tests, so they are run when somebody looks, or by CI, and not with every `cargo test`.
+/// Whether an environment variable enables a layer of tests; prints a line if not. These tests need real time, so they
+/// run on request or in CI, not with every `cargo test`.
 pub fn is_asked_for(layer: &str) -> bool {
     let asked = std::env::var(layer).is_ok_and(|value| value == "1");
     if !asked {
@@ -99,7 +99,7 @@ pub fn is_asked_for(layer: &str) -> bool {
 }
 
 impl Bench {
-    /// A bench with so many veth pairs; `None`, with a printed line, where this user or machine cannot have one.
+    /// A bench with this many veth pairs; `None`, with a printed line, if the user or the machine does not allow it.
     pub fn new(pairs: usize) -> Option<Bench> {
         if !is_asked_for("RINGCAT_ON_THE_WIRE") {
             return None;
@@ -126,7 +126,7 @@ impl Bench {
                 self.main, self.sim
             ))?;
             for (namespace, end) in [(&self.main, "main"), (&self.sim, "sim")] {
-                // Addresses of the host would only make it send frames of its own.
+                // With IPv6 addresses the host would send frames of its own.
                 let _ = ip(&format!("-n {namespace} link set {end}{pair} addrgenmode none"));
                 ip(&format!("-n {namespace} link set {end}{pair} up"))?;
             }
@@ -142,7 +142,7 @@ impl Bench {
         ip(&format!("-n {other} link set main1 up")).expect("the interface is there");
     }
 
-    /// A computer in a network of its own, to which the MainDevice's host is the router: 10.1.0.2 behind 10.1.0.1.
+    /// A computer in a separate network, with the MainDevice's host as its router: 10.1.0.2 behind 10.1.0.1.
     pub fn add_routed_computer(&mut self) {
         let other = self.add_namespace();
         self.ip_main(&format!("link add far0 type veth peer name far1 netns {other}"));
@@ -183,7 +183,7 @@ impl Bench {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Starts a program beside the simulator's interfaces.
+    /// Starts a program in the simulator's namespace.
     pub fn start_at_sim(&self, path: &Path, arguments: &[&str]) -> Child {
         start(self.command(&self.sim, path).args(arguments))
     }
@@ -225,19 +225,19 @@ impl Bench {
         UnixStream::connect(&self.simulator.as_ref()?.socket).ok()
     }
 
-    /// What the simulator has said.
+    /// Output of the simulator.
     pub fn simulator_said(&self) -> &Said {
         &self.simulator.as_ref().expect("it runs").said
     }
 
-    /// Shows how late the simulator was, with its own lines about that, the first of them.
+    /// Prints the simulator's delays, with its first lines about them.
     pub fn show_simulator_lateness(&self) {
         println!("the simulator meanwhile: {}", self.simulator_lateness());
         let said = self.simulator_said().so_far();
         said.lines().filter(|line| line.contains("was late")).take(LATE_LINES).for_each(|line| println!("{line}"));
     }
 
-    /// How late the simulator was so far.
+    /// The simulator's delays so far.
     pub fn simulator_lateness(&self) -> SimulatorLateness {
         let status = self.order("status");
         let line = status.lines().find(|line| line.starts_with("late wake-ups")).expect("it tells");
@@ -248,7 +248,7 @@ impl Bench {
         SimulatorLateness { count: behind("): ") as u64, together_ms: behind("together ") }
     }
 
-    /// Gives the simulator an order that it obeys; its answer without the last line.
+    /// Sends a command to the simulator that must succeed; returns its answer without the last line.
     pub fn order(&self, line: &str) -> String {
         let mut stream = self.connect().expect("the simulator listens");
         writeln!(stream, "{line}").expect("the simulator reads");
@@ -274,7 +274,7 @@ impl Bench {
         self.start(&program("ringcat"), &[arguments, &THREAD].concat())
     }
 
-    /// Starts `ringcat` in the namespace of the MainDevice and reads along.
+    /// Starts `ringcat` in the namespace of the MainDevice and reads its output.
     pub fn run_ringcat(&self, arguments: &[&str]) -> Running {
         let mut child = self.start_ringcat(arguments);
         let said = Said::by(child.stdout.take().expect("it is piped"));
@@ -295,7 +295,7 @@ impl Bench {
 
     fn end_simulator(&mut self) {
         if let Some(Simulator { mut child, socket, .. }) = self.simulator.take() {
-            // It may have ended by itself.
+            // It may have ended already.
             let _ = child.kill();
             let _ = child.wait();
             let _ = std::fs::remove_file(socket);
@@ -308,13 +308,13 @@ impl Drop for Bench {
         self.end_simulator();
         for namespace in [&self.main, &self.sim].into_iter().chain(&self.other) {
             end_all_in(namespace);
-            // One that could not be made cannot be removed.
+            // A namespace that could not be created cannot be removed.
             let _ = ip(&format!("netns del {namespace}"));
         }
     }
 }
 
-/// Ends what a test that failed has left running in a namespace of ours, and what that has started.
+/// Ends the programs that a failed test has left in a namespace of this bench, and their children.
 fn end_all_in(namespace: &str) {
     let Ok(left) = Command::new("ip").args(["netns", "pids", namespace]).output() else { return };
     for process in String::from_utf8_lossy(&left.stdout).split_whitespace() {
@@ -332,7 +332,7 @@ fn ip(arguments: &str) -> Result<(), String> {
     if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
 
-/// Waits until so many SubDevices are in OP.
+/// Waits until this many SubDevices are in OP.
 pub fn await_op(bench: &Bench, count: usize) {
     let until = Instant::now() + OP_LIMIT;
     while states(bench, "OP") != count {
@@ -341,7 +341,7 @@ pub fn await_op(bench: &Bench, count: usize) {
     }
 }
 
-/// A program whose lines are read while it runs; killed when it is dropped.
+/// A program with output that is read while it runs; killed on drop.
 pub struct Running {
     child: Child,
     said: Said,
@@ -349,19 +349,19 @@ pub struct Running {
 }
 
 impl Running {
-    /// What it says.
+    /// Its output so far.
     pub fn said(&self) -> &Said {
         &self.said
     }
 
-    /// Asks it to end, as Ctrl-C does, and waits; what it said, and what of errors.
+    /// Sends SIGINT and waits for the end; returns standard output and standard error.
     pub fn interrupt(self) -> (String, String) {
         let process = self.child.id().to_string();
         assert!(Command::new("kill").args(["-INT", &process]).status().is_ok_and(|status| status.success()));
         self.finish(END_LIMIT)
     }
 
-    /// Waits for its end; what it said, and what of errors.
+    /// Waits for its end; returns standard output and standard error.
     pub fn finish(mut self, limit: Duration) -> (String, String) {
         wait(&mut self.child, limit);
         (self.said.whole(), self.errors.whole())
@@ -376,7 +376,7 @@ impl Drop for Running {
     }
 }
 
-/// Waits for a program, not for ever; reads what it says meanwhile.
+/// Waits for a program with a time limit; reads its output meanwhile.
 pub fn finish(child: Child) -> Output {
     let process = child.id().to_string();
     let (sender, ended) = channel();
@@ -401,7 +401,7 @@ fn wait(child: &mut Child, limit: Duration) {
     }
 }
 
-/// A program that prints one line, goes on until its input ends, and is killed when it is dropped.
+/// A program that prints one line, runs until its input ends, and is killed on drop.
 pub struct Client {
     child: Child,
     input: Option<ChildStdin>,
@@ -425,7 +425,7 @@ impl Client {
         words.nth(1).unwrap_or_default()
     }
 
-    /// Ends its input and waits; what it said of errors.
+    /// Ends its input and waits; returns its standard error.
     pub fn end(mut self) -> (bool, String) {
         drop(self.input.take());
         let mut errors = String::new();

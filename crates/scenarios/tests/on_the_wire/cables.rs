@@ -1,7 +1,7 @@
-//! A ring of 16 in OP, and each of its cables cut and healed: those of the host at either end of the cable, by
-//! switching the interface off, the inner ones by the simulator. Nobody leaves OP, and no more cycles are incomplete
-//! than the detection of the cut and stalls of this machine explain; both are measured at each edge and printed. Each
-//! edge is told once, with the counts of both sides and its place. All of it takes more than 20 s of cycles.
+//! A ring of 16 in OP, with each of its cables cut and repaired: the host cables at either end, by switching the
+//! interface off, the inner cables by the simulator. No SubDevice leaves OP, and no more cycles are incomplete than the
+//! detection time of the cut and stalls of this machine explain; both are measured at each edge and printed. Each edge
+//! is reported once, with the counts of both sides and its place. The test takes more than 20 s of cycles.
 
 use std::time::{Duration, Instant};
 
@@ -14,19 +14,19 @@ use crate::{RING_OF_16, states};
 const CYCLE_MS: f64 = 1.0;
 /// From one edge to the next.
 const PAUSE: Duration = Duration::from_millis(550);
-/// The simulator's cables are noticed as cut after 10 us: within one cycle.
+/// A cut of the simulator's cables is detected after 10 us: within one cycle.
 const INNER_ALLOWED: usize = 1;
 
-/// A cut or heal, and what came of it.
+/// A cut or repair, and its result.
 struct Edge {
     what: String,
     incomplete: usize,
-    /// From the order until the simulator noticed; for cables of the host only.
+    /// Time from the command until the simulator detected it; for host cables only.
     noticed_ms: Option<f64>,
     simulator: SimulatorLateness,
-    /// Cycles that our MainDevice left out because this machine stalled.
+    /// Cycles that RingCAT skipped because this machine stalled.
     left_out: usize,
-    /// What was told of the ring and the links.
+    /// Messages about the ring and the links.
     told: Vec<String>,
 }
 
@@ -37,7 +37,7 @@ impl Edge {
         self.noticed_ms.map_or(INNER_ALLOWED, |ms| (ms / CYCLE_MS).ceil() as usize + 1)
     }
 
-    /// Incomplete cycles that stalls explain: each is as long as it is, and reaches into one cycle more.
+    /// Incomplete cycles that stalls explain: the cycles of each stall and one more.
     fn stalled(&self) -> usize {
         let SimulatorLateness { count, together_ms } = self.simulator;
         (together_ms / CYCLE_MS).ceil() as usize + count as usize + self.left_out
@@ -57,7 +57,7 @@ impl Edge {
     }
 }
 
-/// Does something to a cable and waits until all is over.
+/// Changes a cable and waits until the effects have ended.
 fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl FnOnce()) -> Edge {
     let (late, begin) = (bench.simulator_lateness(), Instant::now());
     act();
@@ -81,7 +81,7 @@ fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl 
     Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, left_out: left_out(&lines), told: told.collect() }
 }
 
-/// An inner cable that is cut or healed is told in just these words.
+/// Checks the exact messages of a cut or repair of an inner cable.
 fn check_words(edge: &Edge, device: usize, is_cut: bool) {
     let (main, redundant) = (device + 1, 15 - device);
     let expected: &[String] = if is_cut {
@@ -107,13 +107,13 @@ fn check_words(edge: &Edge, device: usize, is_cut: bool) {
     assert!(is_right, "{}: {place}", edge.what);
 }
 
-/// How many cycles were not complete, by the times of the judgements; `None` where the last one was not.
+/// Number of incomplete cycles, from the times of the evaluations; `None` if the last one was incomplete.
 pub fn incomplete_cycles(lines: &[String]) -> Option<usize> {
     let (mut since, mut cycles) = (None, 0);
     for line in lines {
         let Some((ms, judgement)) = line.split_once(" ms  domain 0: ") else { continue };
         if judgement.starts_with("skipped") {
-            // No judgement: the frames of the cycle before were still out.
+            // No evaluation: the frames of the cycle before were still under way.
             continue;
         }
         let at: f64 = ms.trim().parse().ok()?;
@@ -129,7 +129,7 @@ pub fn incomplete_cycles(lines: &[String]) -> Option<usize> {
     since.is_none().then_some(cycles)
 }
 
-/// Cycles that our MainDevice tells to have left out.
+/// Cycles that RingCAT reports as skipped.
 pub fn left_out(lines: &[String]) -> usize {
     let counts = lines.iter().filter_map(|line| line.split_once(" ms  this machine: "));
     counts.map(|(_, rest)| rest.split(' ').next().and_then(|count| count.parse::<usize>().ok()).expect("a count")).sum()

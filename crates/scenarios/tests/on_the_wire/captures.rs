@@ -1,11 +1,10 @@
-//! Captures of our MainDevice on real interfaces, by itself (`--capture`) and by an onlooker (`ringcat capture`), read
-//! by others: tshark finds nothing malformed, and the judge of [`scenarios::capture`] recomputes that every promise was
-//! kept.
+//! Captures of RingCAT on real interfaces, by itself (`--capture`) and by a second process (`ringcat capture`), checked
+//! independently: tshark finds nothing malformed, and [`scenarios::capture`] finds no violation.
 //!
-//! Send windows are judged with a tolerance: a machine that stops the sender between its decision and the wire makes
-//! frames late that were decided in time. Where the cycle is late as well this is seen in the capture and told apart;
-//! of the rest a few are allowed. Without windows, forty SubDevices that return had five times as many frames in the
-//! way of cycles as are allowed here.
+//! Send windows are checked with a tolerance: if the machine stops the sender between its decision and sending, a frame
+//! is late although it was decided in time. If the cycle is late as well, the capture shows this and the frame is
+//! counted separately; a few others are allowed. Without windows, forty returning SubDevices had five times as many
+//! frames that delayed cycles as are allowed here.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
@@ -17,8 +16,8 @@ use scenarios::capture::{Verdict, judge};
 use crate::bench::{Bench, await_op, finish, program};
 use crate::{PLANTS, RING_OF_16, said};
 
-/// So many acyclic frames may be in the way of a cycle without a stall in sight, and this part of those that would be
-/// by chance.
+/// Acyclic frames that may delay a cycle without a visible stall: this number, and this fraction of those expected by
+/// chance.
 const TOLERATED: u64 = 2;
 const PART_OF_CHANCE: u64 = 5;
 /// Sends five frames that are no EtherCAT.
@@ -29,14 +28,14 @@ s.bind(('sim0', 0))
 for _ in range(5):
     s.send(b'\\xff' * 6 + b'\\x00\\x30\\x64\\x11\\x22\\x33' + b'\\x08\\x00' + bytes(46))
 ";
-/// An onlooker is there after so long.
+/// Start-up time of `ringcat capture`.
 pub const PAUSE: Duration = Duration::from_millis(300);
 
-/// A file that is removed when it is dropped, unless the test failed: then somebody wants to look at it.
+/// A file that is removed on drop, but kept for analysis if the test failed.
 pub struct CaptureFile(PathBuf);
 
 impl CaptureFile {
-    /// One of this name, that is not there yet.
+    /// A new file with this name.
     pub fn new(name: &str) -> CaptureFile {
         CaptureFile(std::env::temp_dir().join(format!("ringcat-wire-{}-{name}.pcapng", std::process::id())))
     }
@@ -50,8 +49,8 @@ impl CaptureFile {
         std::fs::read(&self.0).expect("the capture was written")
     }
 
-    /// What the judge and tshark say of the frames; not when they were sent. `unread` are protocols that tshark leaves
-    /// alone.
+    /// Checks the frames, but not their times, with [`scenarios::capture`] and tshark. `unread` are protocols that
+    /// tshark does not decode.
     pub fn check_frames(&self, title: &str, unread: &[&str]) -> Verdict {
         let verdict = judge(&self.bytes(), Some(Duration::from_millis(1))).expect("a capture");
         println!("{title}:\n{verdict}");
@@ -60,14 +59,14 @@ impl CaptureFile {
         verdict
     }
 
-    /// What tshark says of the frames, whoever sent them; how many there are.
+    /// Checks the frames of any sender with tshark; returns their number.
     pub fn check_with_tshark(&self) -> usize {
         let frames = Capture::parse(&self.bytes()).expect("a capture").packets.len();
         check_with_tshark(&self.0, frames as u64, &[]);
         frames
     }
 
-    /// Everything there is to check of a capture of ours; what the judge saw.
+    /// All checks of a RingCAT capture; returns the verdict.
     fn check(&self, title: &str) -> Verdict {
         let verdict = self.check_frames(title, &[]);
         for windows in &verdict.windows {
@@ -87,7 +86,7 @@ impl Drop for CaptureFile {
     }
 }
 
-/// Every frame is EtherCAT to tshark, none malformed, none with an expert's error.
+/// Every frame is EtherCAT for tshark, none malformed, none with an expert error.
 fn check_with_tshark(path: &Path, frames: u64, unread: &[&str]) {
     let found = |filter: &str| {
         let mut tshark = Command::new("tshark");
@@ -115,7 +114,7 @@ fn check_with_tshark(path: &Path, frames: u64, unread: &[&str]) {
     println!("tshark: {frames} EtherCAT frames, none malformed, no expert error\n");
 }
 
-/// Ends a program as Ctrl-C does.
+/// Sends SIGINT to a program.
 pub fn interrupt(child: Child) -> Output {
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(sent.expect("there is a kill").success());

@@ -1,6 +1,6 @@
 //! Distributed clocks on interfaces. The simulator's clocks run in the segment's own time, which follows this
-//! machine's, so what they latch is exact however late this machine is: delays are judged, and that clocks lock. How
-//! far cycles are from their phase depends on this machine, and is printed.
+//! machine's, so latched times are exact even if this machine is late: delays and the lock are checked. The phase of
+//! the cycles depends on this machine and is only printed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -40,7 +40,7 @@ type = "servo"
 drift_ppm = 50
 cable_ns = 80
 "#;
-/// Two forks of three cables, one behind the other; SubDevices in the order in which frames meet them.
+/// Two forks of three cables, one behind the other; SubDevices in processing order.
 const TREE: &str = r#"
 [[device]]
 type = "junction"
@@ -75,7 +75,7 @@ cable_ns = 400
 type = "servo"
 attach = "fork-2.1"
 "#;
-/// A fourth cable for the first fork, with a SubDevice without a clock on the way.
+/// A fourth cable for the first fork, with a SubDevice without a clock in between.
 const FOURTH: &str = r#"
 [[device]]
 type = "digital-output-8"
@@ -87,19 +87,19 @@ type = "servo"
 drift_ppm = 15
 cable_ns = 90
 "#;
-/// So far delays may be from the truth without jitter: rounding, and drift in one measurement.
+/// Maximum error of delays without jitter: rounding, and drift in one measurement.
 const WITHIN_NS: i64 = 2;
-/// Cycles of the other MainDevice, and how often it hands out the reference time before.
+/// Cycles of ethercrab, and its distributions of the reference time before them.
 const CYCLES: &str = "20";
 const HANDED_OUT: &str = "200";
-/// SubDevices have to be in OP, and programs to end, within.
+/// Time limit for OP, and for the end of programs.
 const LIMIT: Duration = Duration::from_secs(20);
-/// Times that are handed out are as exact as both ends are punctual.
+/// Allowed error of distributed times, which depends on the load of both ends.
 const TIMES_NS: &str = "100000000";
 /// BWR of the receive times.
 const LATCH: [u8; 16] = [0x10, 0x10, 8, 0, 0, 0, 0x00, 0x09, 4, 0, 0, 0, 0, 0, 0, 0];
 
-/// What every clock is away from the first, in nanoseconds: when one frame passes clocks that tell the truth.
+/// Delay of every clock from the first, in nanoseconds: times at which one frame passes ideal clocks.
 fn truth(segment: &str) -> Vec<Option<i64>> {
     let mut segment = Segment::from_toml(segment, Path::new(".")).expect("a good segment");
     for device in &mut segment.devices {
@@ -120,7 +120,7 @@ fn truth(segment: &str) -> Vec<Option<i64>> {
     clocks.map(|(device, has_clock)| has_clock.then(|| unit(device) - unit(0))).collect()
 }
 
-/// The delay of each device, as its register has it.
+/// The delay register of each device.
 fn written(bench: &Bench, count: usize) -> Vec<i64> {
     let delay = |device: usize| {
         let bytes = bench.order(&format!("register {device} 0x0928 4"));
@@ -134,12 +134,12 @@ fn file(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("ringcat-wire-clocks-{}-{name}", std::process::id()))
 }
 
-/// Those of SubDevices with a clock, all near the truth.
-fn judge(who: &str, delays: &[i64], truth: &[Option<i64>]) {
+/// Checks that the delays of SubDevices with a clock are near the true ones.
+fn judge(name: &str, delays: &[i64], truth: &[Option<i64>]) {
     let pairs: Vec<(i64, i64)> =
         delays.iter().zip(truth).filter_map(|(delay, truth)| Some((*delay, (*truth)?))).collect();
-    println!("{who}: {:?} ns", pairs.iter().map(|(delay, _)| delay).collect::<Vec<_>>());
-    assert!(pairs.iter().all(|(delay, truth)| (delay - truth).abs() <= WITHIN_NS), "{who}: expected {truth:?}");
+    println!("{name}: {:?} ns", pairs.iter().map(|(delay, _)| delay).collect::<Vec<_>>());
+    assert!(pairs.iter().all(|(delay, truth)| (delay - truth).abs() <= WITHIN_NS), "{name}: expected {truth:?}");
 }
 
 // covers: 7.1, dc-delays
@@ -150,7 +150,7 @@ fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true() {
     }
     let Some(mut bench) = Bench::new(1) else { return };
     let client = program("examples/ethercrab_client");
-    // Where the two differ, ours are true: ethercrab leaves out cables to SubDevices without a clock, and the last
+    // If both differ, those of RingCAT are right: ethercrab ignores cables to SubDevices without a clock, and the last
     // branch of a fork of four cables with another fork behind it.
     let (everywhere, larger) = (LINE.replace("clock_bits = 0", "clock_bits = 64"), format!("{TREE}{FOURTH}"));
     for (name, segment, with_foreign) in
@@ -179,7 +179,7 @@ fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true() {
     }
 }
 
-/// What ethercrab reports and writes.
+/// Delays that ethercrab reports and writes.
 fn foreign_delays(bench: &Bench, client: &Path, truth: &[Option<i64>]) {
     let count = truth.len();
     let arguments = ["main0".to_owned(), count.to_string(), CYCLES.to_owned(), HANDED_OUT.to_owned()];

@@ -1,5 +1,6 @@
-//! Distributed clocks on two interfaces in real time: host cables and one inside are cut and come back. The simulator
-//! knows how far clocks are apart in truth. Inside each part no host is in between; across both parts its sending is.
+//! Distributed clocks on two interfaces in real time: host cables and one inner cable are cut and repaired. The
+//! simulator knows the true differences of the clocks. Inside each part the host has no influence; across both parts
+//! its sending jitter has.
 
 use std::time::{Duration, Instant};
 
@@ -32,11 +33,11 @@ clock_bits = 64
 drift_ppm = 50
 "#;
 const COUNT: usize = 5;
-/// All clocks have to be locked within.
+/// Time limit until all clocks are locked.
 const LOCK_LIMIT: Duration = Duration::from_secs(10);
 /// From one edge to the next.
 const PAUSE: Duration = Duration::from_millis(300);
-/// So far clocks may be apart inside of a part, across both, and before the first cut: each is within 100 ns of its
+/// Maximum spread of clocks inside a part, across both, and before the first cut: each is within 100 ns of its
 /// reference.
 const INSIDE_NS: i64 = 1_000;
 const ACROSS_NS: i64 = 5_000;

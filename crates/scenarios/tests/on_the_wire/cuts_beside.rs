@@ -1,5 +1,5 @@
-//! The same schedule of cuts and repairs for another MainDevice (pysoem with two interfaces) and for ours, on the same
-//! simulated ring: incomplete cycles of both, side by side.
+//! The same schedule of cuts and repairs for pysoem with two interfaces and for RingCAT, on the same simulated ring:
+//! incomplete cycles of both.
 
 use std::io::{BufRead, BufReader};
 use std::time::{Duration, Instant};
@@ -13,10 +13,10 @@ use crate::{RING_OF_16, states};
 const CUT: [usize; 8] = [0, 14, 7, 3, 11, 5, 9, 1];
 /// From one edge to the next.
 const PAUSE: Duration = Duration::from_millis(250);
-/// Cycles go on for so long: the schedule and a little more.
+/// Duration of the cycles: the schedule and a little more.
 const SECONDS: u64 = 5;
 
-/// Cuts and heals one cable after the other.
+/// Cuts and repairs one cable after the other.
 fn schedule(bench: &Bench) {
     std::thread::sleep(PAUSE);
     for device in CUT {
@@ -62,7 +62,7 @@ fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
     let lines: Vec<String> = run.said().between(begin, end).into_iter().map(|(_, line)| line).collect();
     let (wrong, late) = (incomplete_cycles(&lines), left_out(&lines));
     if wrong.is_none() {
-        // The last judgement is not complete: what came before it tells why.
+        // The last evaluation is incomplete: print the output before it.
         lines.iter().rev().take(6).rev().for_each(|line| println!("  {line}"));
     }
     let wrong = wrong.map_or_else(|| "?".to_owned(), |cycles| cycles.to_string());

@@ -1,4 +1,4 @@
-//! An ENI on interfaces: `ringcat sim --eni` makes the segment, `ringcat run --eni` brings it to OP (protocol 8).
+//! An ENI on interfaces: `ringcat sim --eni` simulates the segment, `ringcat run --eni` brings it to OP (protocol 8).
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! EoE as network interfaces of the kernel: two SubDevices with IP stacks, bridged and by themselves.
+//! EoE as network interfaces of the kernel: two SubDevices with IP stacks, bridged and separate.
 
 use std::fs::OpenOptions;
 use std::path::Path;
@@ -27,8 +27,8 @@ gateway = \"10.0.0.1\"
 ";
 const INTERFACES: [&str; 2] = ["eoe0s1", "eoe0a7"];
 const LIMIT: Duration = Duration::from_secs(10);
-/// Pings an address, downloads bytes from its web server, or has bytes echoed; prints how long that took. Standard
-/// library only.
+/// Pings an address, downloads bytes from its web server, or has bytes echoed; prints the duration. Standard library
+/// only.
 const CLIENT: &str = "
 import socket, struct, sys, threading, time
 def checksum(data):
@@ -93,7 +93,7 @@ for word in sys.argv[1:]:
     download(address, int(what)) if int(what) > 1000 else ping(address, int(what))
 ";
 
-/// Whether this machine has TAP interfaces; says so where it has none.
+/// Whether this machine has TAP interfaces; prints a line if not.
 fn has_taps() -> bool {
     let there = OpenOptions::new().read(true).write(true).open("/dev/net/tun").is_ok();
     if !there {
@@ -102,7 +102,7 @@ fn has_taps() -> bool {
     there
 }
 
-/// Waits until the interfaces of the MainDevice's host fulfil something.
+/// Waits until the interfaces of the MainDevice's host meet a condition.
 fn wait(bench: &Bench, what: &str, condition: impl Fn(&str) -> bool) {
     let until = Instant::now() + LIMIT;
     loop {
@@ -150,7 +150,7 @@ fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
     wait(&bench, "both have a carrier", has_carrier);
     client(&bench, &["10.0.0.2/20", "10.0.0.3/20", "10.0.0.2/1000000", "10.0.0.3/1000000", "10.0.0.3/echo200000"]);
 
-    // A SubDevice that goes takes its carrier along and nothing else, and comes back into the bridge.
+    // An unreachable SubDevice only loses its carrier; its interface stays in the bridge.
     bench.order("power off 2");
     wait(&bench, "no carrier", |links| line(links, "eoe0a7").is_some_and(|is| is.contains("NO-CARRIER")));
     client(&bench, &["10.0.0.2/3"]);
@@ -165,11 +165,11 @@ fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
     bench.ip_main("addr add 10.0.0.1/24 dev eoe0a7");
     client(&bench, &["10.0.0.3/5", "10.0.0.3/50000"]);
 
-    // And from a network beyond that host.
+    // And from another network through this host.
     bench.add_routed_computer();
     ask(&["10.0.0.3/5", "10.0.0.3/50000"], |arguments| bench.start_elsewhere(Path::new("python3"), arguments));
 
-    // Somebody removes an interface: it is made anew.
+    // An interface that is removed is created again.
     let index = |links: &str| line(links, "eoe0s1").and_then(|line| line.split(':').next().map(str::to_owned));
     let before = index(&bench.links_main());
     bench.ip_main("link del eoe0s1");
@@ -189,7 +189,7 @@ fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
     assert!(output.contains("stopped: outputs zero"), "{output}{errors}");
     let links = bench.links_main();
     assert!(INTERFACES.iter().all(|name| line(&links, name).is_none()), "{links}");
-    // It takes fragments for whole frames, and what is in them for cut off.
+    // tshark treats fragments as whole frames, and their contents as truncated.
     capture.check_frames("two EoE devices", &["ip"]);
 }
 

@@ -1,5 +1,5 @@
-//! Situations on interfaces in which something does not hold, and what the program says last. None exits with 0. Those
-//! that need no interface are in `crates/cli/tests/program/exit_codes.rs`.
+//! Failures on interfaces, and the last line of the program. None exits with 0. Situations that need no interface are
+//! in `crates/cli/tests/program/exit_codes.rs`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
@@ -14,24 +14,24 @@ const PLANT: Plant = Plant { outputs: 2, inputs: 2, servos: 0, coupler: true };
 const SUBDEVICES: usize = 5;
 /// Two clocks.
 const WITH_DRIVES: Plant = Plant { outputs: 1, inputs: 0, servos: 2, coupler: true };
-/// What a test does to a run that is in OP, and for how long the run lasts.
+/// Duration of a run with a fault in OP.
 const LASTS: &str = "1500ms";
 const PAUSE: Duration = Duration::from_millis(300);
 
-/// What happens to a command, beside its command line.
+/// Event during a command.
 enum Happens {
     Nothing,
-    /// An order to the simulator, once all SubDevices are in OP.
+    /// A command to the simulator when all SubDevices are in OP.
     Order(&'static str),
-    /// A signal, once all SubDevices are in OP.
+    /// A signal when all SubDevices are in OP.
     Signal(&'static str),
-    /// Interfaces of the simulator are switched off then.
+    /// Interfaces of the simulator are switched off when all SubDevices are in OP.
     Down(&'static [&'static str]),
 }
 
 use Happens::{Down, Nothing, Order, Signal};
 
-/// What was found wrong.
+/// Failed checks.
 #[derive(Default)]
 struct Findings {
     looked: usize,
@@ -63,7 +63,7 @@ impl Findings {
     }
 }
 
-/// Whether a line has these parts in this order; `...` stands between them.
+/// Whether a line has these parts, separated by `...`, in this order.
 fn is_like(line: &str, parts: &str) -> bool {
     let mut rest = line;
     for (number, part) in parts.split("...").enumerate() {
@@ -79,7 +79,7 @@ fn words(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-/// Starts a command, waits for OP where something is to happen then, and has it happen.
+/// Starts a command, waits for OP if an event is given, and triggers the event.
 fn start(bench: &Bench, line: &str, happens: &Happens) -> Child {
     let child = bench.start_ringcat(&words(line));
     if !matches!(happens, Nothing) {
@@ -100,7 +100,7 @@ fn start(bench: &Bench, line: &str, happens: &Happens) -> Child {
     child
 }
 
-/// Makes good what has happened.
+/// Undoes the event.
 fn restore(bench: &Bench, happened: &Happens) {
     if let Down(interfaces) = happened {
         interfaces.iter().for_each(|interface| bench.set_link(interface, "up"));
@@ -113,7 +113,7 @@ fn restore(bench: &Bench, happened: &Happens) {
     std::thread::sleep(PAUSE);
 }
 
-/// A disk with room for little.
+/// A file system with little space.
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
@@ -128,18 +128,18 @@ impl SmallDisk {
 
 impl Drop for SmallDisk {
     fn drop(&mut self) {
-        // Nothing else is in it.
+        // It contains nothing else.
         let _ = Command::new("umount").arg(&self.0).status();
         let _ = std::fs::remove_dir(&self.0);
     }
 }
 
-/// Has each situation happen on the segment that is simulated, and restores it.
+/// Checks each situation on the simulated segment, and restores it.
 fn judge_all(bench: &Bench, situations: &[(String, Happens, &str)], findings: &mut Findings) {
     for (line, happens, expected) in situations {
         findings.judge(line, start(bench, line, happens), 1, expected);
         restore(bench, happens);
-        // Behind a cut cable nothing can be stopped, unless the other way of a ring leads there.
+        // SubDevices behind a cut cable cannot be stopped, except through the other side of a ring.
         let is_out_of_reach =
             matches!(happens, Order(order) if order.starts_with("cut")) && !line.contains("--redundant");
         let was_stopped = !matches!(happens, Nothing) && !expected.contains("stop:") && !is_out_of_reach;
@@ -174,7 +174,7 @@ fn what_does_not_hold_in_a_ring_is_said_last_and_does_not_exit_with_0() {
     ];
     let mut findings = Findings::default();
     judge_all(&bench, &situations, &mut findings);
-    // Without anything of that. A stall of this machine may still cost a frame: then that is said.
+    // Without an event. A stall of this machine may still cost a frame, which is then reported.
     let output = bench.ringcat(&words(&format!("run {ring} --for 300ms")));
     let (text, errors) = said(&output);
     let held = text.trim_end().lines().last().is_some_and(|line| line.starts_with("result: ok"));
@@ -247,7 +247,7 @@ fn no_command_but_capture_begins_beside_a_main_device_which_stays_in_op() {
     let program = crate::bench::program("ringcat");
     findings.judge(&line, bench.start(&program, &words(&line)), 0, "ok: ");
     std::fs::remove_file(&file).expect("it was written");
-    // A second simulator would answer each frame once more.
+    // A second simulator would return each frame a second time.
     let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/segments/demo.toml");
     let line = format!("sim --main sim0 --segment {segment}");
     findings.judge(&line, bench.start_at_sim(&program, &words(&line)), 2, "FAILED: process ... uses EtherCAT on sim0");

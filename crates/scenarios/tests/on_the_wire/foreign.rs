@@ -1,7 +1,7 @@
-//! The MainDevices of others on our simulator: they bring it to OP, and their process data is right at both ends.
+//! Other MainDevices on the simulator: they bring it to OP, and their process data is right at both ends.
 //!
-//! They have time limits of their own, which a stall of this machine breaks whatever the simulator does. So each has
-//! three tries, and each try that fails is shown with what it said and how late the simulator was.
+//! They have time limits of their own, which a stall of this machine can exceed. Each therefore has three attempts, and
+//! each failed attempt is printed with its output and the simulator's delays.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,24 +13,24 @@ use crate::bench::{Bench, Client, finish, is_asked_for, program, target_director
 use crate::captures::{CaptureFile, PAUSE, interrupt};
 use crate::{PLANTS, Plant, RING_OF_16, input, states};
 
-/// What asks for these tests.
+/// Environment variable that enables these tests.
 pub const FOREIGN: &str = "RINGCAT_FOREIGN";
-/// What Python compiles stays in memory.
+/// Python writes no byte code files.
 pub const NO_CACHE: &str = "-B";
 /// Cycles of process data.
 const CYCLES: usize = 500;
-/// A stall of this machine that is longer than the other's patience is no fault of the simulator: so many cycles may
-/// have another working counter.
+/// Allowed cycles with a wrong working counter: a stall of this machine that exceeds the other's time limit is not a
+/// fault of the simulator.
 const WRONG_ALLOWED: usize = CYCLES / 10;
-/// Tries for each MainDevice and segment.
+/// Attempts for each MainDevice and segment.
 const TRIES: usize = 3;
-/// What is installed: a MainDevice, and a client of mailbox gateways.
+/// Installed packages: a MainDevice, and a client of mailbox gateways.
 const PACKAGES: [&str; 2] = ["pysoem==1.1.13", "pyetg1510==0.1.3"];
 
-/// Compares what a foreign MainDevice saw and sent with the devices, and prints its figures.
-fn check(plant: &Plant, bench: &Bench, client: Client, who: &str) -> Result<(), String> {
+/// Compares the process data of another MainDevice with the devices, and prints its figures.
+fn check(plant: &Plant, bench: &Bench, client: Client, name: &str) -> Result<(), String> {
     let figures = client.line.split(" inputs").next().unwrap_or_default();
-    println!("{who}, {} SubDevices: {figures}", plant.count());
+    println!("{name}, {} SubDevices: {figures}", plant.count());
     if client.line.is_empty() {
         return Err(client.end().1);
     }
@@ -58,12 +58,12 @@ fn check(plant: &Plant, bench: &Bench, client: Client, who: &str) -> Result<(), 
     if ended { Ok(()) } else { Err(errors) }
 }
 
-/// Runs a foreign MainDevice on a fresh segment, up to [`TRIES`] times.
-fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, who: &str, start: impl Fn(&Bench) -> Child) {
+/// Runs another MainDevice on a new segment, up to [`TRIES`] times.
+fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, name: &str, start: impl Fn(&Bench) -> Child) {
     for attempt in 1..=TRIES {
         bench.simulate(&plant.segment(), ring);
         plant.set_inputs(bench);
-        let result = check(plant, bench, Client::new(start(bench)), who);
+        let result = check(plant, bench, Client::new(start(bench)), name);
         let late = bench.simulator_lateness();
         match result {
             Ok(()) => {
@@ -73,7 +73,7 @@ fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, who: &str, start: impl
             Err(error) => println!("  try {attempt} of {TRIES} failed: {}; the simulator was {late}", error.trim()),
         }
     }
-    panic!("{who} failed {TRIES} times with {} SubDevices", plant.count());
+    panic!("{name} failed {TRIES} times with {} SubDevices", plant.count());
 }
 
 // covers: sim-foreign
@@ -182,7 +182,7 @@ fn pysoem_lists_the_objects_of_every_device_that_offers_sdo_information() {
     panic!("{failures:?}");
 }
 
-/// Starts a client, before ordinary programs.
+/// Starts a client with priority over ordinary programs.
 pub fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
     let words = ["-n", "-15"].into_iter().map(str::to_owned).chain([client.display().to_string()]);
     let words: Vec<String> = words.chain(arguments.iter().cloned()).collect();
@@ -195,7 +195,7 @@ fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) ->
     start(bench, python, &arguments.map(str::to_owned))
 }
 
-/// A Python with these packages in an environment below the target directory. Only CI makes one by itself.
+/// A Python with these packages in an environment below the target directory. Only CI creates it automatically.
 pub fn python() -> Option<PathBuf> {
     let environment = target_directory().parent()?.join("pysoem");
     let python = environment.join("bin/python");
@@ -213,7 +213,7 @@ pub fn python() -> Option<PathBuf> {
     {
         return Some(python);
     }
-    // Past what the test harness keeps to itself: a test that passes must not look as if others had taken part.
+    // Printed past the output capture of the test harness, so that a skipped test does not look like a pass.
     let words =
         format!("skipped: clients of others are not installed; only CI does that by itself. By hand: {commands}\n");
     let _ = std::io::stderr().write_all(words.as_bytes());

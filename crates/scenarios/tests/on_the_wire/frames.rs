@@ -1,7 +1,7 @@
-//! Every frame is accounted for: a ring of 16 at 1 kHz for 30 s, or 10 minutes with RINGCAT_LONG=1. What our MainDevice
-//! sent went into the segment, what came out of it our MainDevice received, and what is missing is what the simulator
-//! was told to drop. Frames may come late when this machine stalls, or find a full ring; both are told apart from lost
-//! ones.
+//! Every frame is accounted for: a ring of 16 at 1 kHz for 30 s, or 10 minutes with RINGCAT_LONG=1. All frames that
+//! RingCAT sent arrived in the segment, all frames from the segment were received by RingCAT, and the missing ones are
+//! those that the simulator dropped on command. Frames may be late when this machine stalls, or find a full receive
+//! ring; both are counted separately from lost frames.
 
 use std::time::Duration;
 
@@ -11,27 +11,27 @@ use crate::{RING_OF_16, show_summary};
 /// Frames that the simulator drops, in each direction of the redundant cable.
 const DROPPED: u64 = 5;
 
-/// The number in front of some words.
+/// The number before a text.
 fn figure(text: &str, words: &str) -> u64 {
     let at = text.find(words).unwrap_or_else(|| panic!("{words} in: {text}"));
     let number = text[..at].trim_end().rsplit([' ', ',']).next().and_then(|number| number.parse().ok());
     number.unwrap_or_else(|| panic!("no number before {words} in: {text}"))
 }
 
-/// The line that begins with these words.
+/// The line that begins with this text.
 fn line<'t>(text: &'t str, begin: &str) -> &'t str {
     let found = text.lines().find(|line| line.trim_start().starts_with(begin));
     found.unwrap_or_else(|| panic!("no line begins with {begin}: {text}"))
 }
 
-/// What the interfaces of one link carried, at both ends.
+/// Counters of the interfaces of one link, at both ends.
 #[derive(Debug)]
 struct Link {
-    /// Process data that we sent and received.
+    /// Process data that RingCAT sent and received.
     sent: u64,
     received: u64,
     overrun: u64,
-    /// All frames that the simulator received, lost in a full ring and sent.
+    /// All frames that the simulator received, lost because of a full receive ring, and sent.
     arrived: u64,
     arrived_overrun: u64,
     answered: u64,
@@ -102,7 +102,7 @@ fn a_ring_of_16_at_1_khz_loses_no_frame_that_the_simulator_did_not_drop() {
     assert_eq!(lost_inside, 2 * DROPPED, "the simulator dropped what it was told to: {status}");
     assert_eq!(sum(|link| link.inside) - lost_inside, sum(|link| link.outside), "the segment lost nothing else");
     let dropped = lost_inside + sum(|link| link.arrived_overrun);
-    // A frame that was dropped may have been one of those that are not process data.
+    // A dropped frame may have been an acyclic one.
     let range = dropped.saturating_sub(acyclic_missing)..=dropped;
     assert!(
         range.contains(&(missing - overrun)),

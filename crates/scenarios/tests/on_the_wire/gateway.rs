@@ -1,5 +1,5 @@
-//! Clients of the mailbox gateway that share nothing with it: one in Python, written from the protocol, and the
-//! ETG.1510 client of others; tshark judges what the first one exchanged.
+//! Independent clients of the mailbox gateway: one in Python, written from the protocol, and the ETG.1510 client
+//! pyetg1510; tshark checks the messages of the first one.
 
 use std::path::Path;
 use std::process::Command;
@@ -31,7 +31,7 @@ fn run(bench: &Bench, python: &Path, arguments: &[&str]) -> String {
     told
 }
 
-/// What tshark prints of the packets that fulfil something.
+/// Output of tshark for the packets that match a filter.
 fn packets(path: &str, filter: &str) -> Vec<String> {
     let output = Command::new("tshark").args(["-r", path, "-Y", filter]).output().expect("tshark");
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
@@ -46,7 +46,7 @@ fn clients_of_others_read_dictionaries_objects_and_files_through_the_gateway() {
     let gateway = bench.run_ringcat(&["run", "--main", "main0", "--gateway"]);
     await_op(&bench, 2);
     let capture = CaptureFile::new("gateway");
-    // Segments of TCP as large as answers are: tshark takes each for a message.
+    // TCP segments as large as responses: tshark treats each as a message.
     let sniffer = bench.start(Path::new("tshark"), &["-q", "-i", "lo", "-w", capture.path()]);
     std::thread::sleep(PAUSE + Duration::from_millis(700));
     let python3 = Path::new("python3");

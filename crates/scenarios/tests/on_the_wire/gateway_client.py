@@ -201,7 +201,7 @@ def bad():
         pass
     for cut in (1, 2, 5, len(right) - 1):
         Client("tcp").socket.sendall(right[:cut])
-    # A length within that disagrees, and what nobody has, are answered with an error reply.
+    # A wrong inner length and an unknown address are answered with an error reply.
     asker = Client("udp")
     odd = bytearray(right)
     odd[2] += 1

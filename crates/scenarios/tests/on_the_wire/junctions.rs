@@ -7,8 +7,8 @@ use crate::bench::{Bench, await_op};
 
 /// A junction with a ring of three on port 3 that comes back to port 1, and one more on its port 2.
 const JUNCTION: &str = include_str!("../../../sim/segments/junction-ring.toml");
-/// A ring of two interfaces, whose third SubDevice has IN and OUT swapped, and a branch that only the redundant copy
-/// meets: a closed ring does not tell who of the two is crossed.
+/// A ring of two interfaces, whose third SubDevice has IN and OUT swapped, and a branch that processes only the
+/// redundant copy: a closed ring does not show which of the two is crossed.
 const CROSSED: &str = r#"
 [segment]
 name = "crossed"
@@ -42,14 +42,14 @@ attach = "first.2"
 from = "last.1"
 to = "redundant"
 "#;
-/// Cables that are cut, by the devices at their ends, and the words for both ends: an inner one, the closing one, the
-/// first.
+/// Cables that are cut, by the devices at their ends, and the text of both ends: an inner cable, the closing cable, the
+/// first cable.
 const BROKEN: [(&str, [&str; 2]); 3] = [
     ("2-3", [" SubDevice 2 ", " port 1 and SubDevice 3 "]),
     ("1-4", [" SubDevice 4 ", " port 1 and SubDevice 1 "]),
     ("1-2", [" SubDevice 1 ", " port 3 and SubDevice 2 "]),
 ];
-/// From an order until what comes of it has been told: a repair counts when it has held for 50 ms.
+/// Time from a command to the report of its effect: a repair is reported after 50 ms.
 const PAUSE: Duration = Duration::from_millis(250);
 
 // covers: JR-03, JR-07, junctions
@@ -97,7 +97,7 @@ fn enhanced_detection_takes_the_redundant_interface_down_and_brings_it_back() {
     let at_the_scan = run.said().so_far();
     assert_eq!(at_the_scan.matches("line crossed").count(), 1, "{at_the_scan}");
     assert_eq!(bench.simulator_said().so_far().matches("carrier is gone").count(), 1, "the scan took it down");
-    // Ports change: the branch is pulled and plugged in again.
+    // A change of ports: the branch is unplugged and plugged in again.
     for verb in ["cut", "heal"] {
         bench.order(&format!("{verb} 0-4"));
         std::thread::sleep(4 * PAUSE);

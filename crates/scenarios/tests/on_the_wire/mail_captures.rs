@@ -1,7 +1,7 @@
-//! Mail in captures, judged from the file alone by `ci/check-mail` on what tshark reads: counters, requests that a
-//! SubDevice could act on twice, and the same start-up list at each of a hundred power cycles. The captures come from
-//! virtual time; those that were tampered with, and one of a SubDevice that sends its mail twice, show that the script
-//! sees what it looks for.
+//! Mail in captures, checked from the file alone by `ci/check-mail` with the output of tshark: counters, requests that
+//! a SubDevice could execute twice, and the same start-up list at each of a hundred power cycles. The captures are
+//! recorded in virtual time; modified captures, and one of a SubDevice that sends its mail twice, show that the script
+//! detects faults.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -70,8 +70,8 @@ fn cycles(application: &mut Recorded, count: usize) {
     }
 }
 
-/// A ring with a drive that gets a start-up list, `power_cycles` times more; answers go wrong now and then, and a cable
-/// is cut and healed meanwhile.
+/// A ring with a drive that receives a start-up list, also after `power_cycles` power cycles; some responses are wrong,
+/// and a cable is cut and repaired meanwhile.
 fn recorded(path: &Path, power_cycles: usize, more: Option<MailFault>) {
     let names = [("sim-main", "main link"), ("sim-redundant", "redundant link")];
     let recorder = Recorder::start(path, &names).expect("a file");
@@ -115,7 +115,7 @@ fn recorded(path: &Path, power_cycles: usize, more: Option<MailFault>) {
     assert!(recorded.iter().all(|interface| interface.lost == 0), "{recorded:?}");
 }
 
-/// Places in a capture of the datagrams with a command to an address: packet, offset of the data.
+/// Datagrams in a capture with a command to an address: packet, offset of the data.
 fn places(capture: &Capture, sent: bool, command: u8, ado: u16) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for (number, packet) in capture.packets.iter().enumerate().filter(|(_, packet)| packet.sent == sent) {
@@ -146,7 +146,7 @@ fn write(capture: &Capture, path: &Path) {
     std::fs::write(path, writer.into_inner()).expect("a file");
 }
 
-/// Written mails, each with all of its copies, sent and returned: packet and offset of the mailbox.
+/// Written mails, each with all its copies, sent and returned: packet and offset of the mailbox.
 fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
     let mut mails: Vec<Vec<(usize, usize)>> = Vec::new();
     let id = |(packet, at): (usize, usize)| (capture.packets[packet].bytes[7], capture.packets[packet].bytes[at - 9]);
@@ -157,7 +157,7 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
         }
     }
     for place in places(capture, false, FPWR, RECEIVE) {
-        // Ids come again after 256 frames: of those with this one, the last that was sent before.
+        // Ids are reused after 256 frames: take the last frame sent before with this id.
         let of = mails.iter_mut().rfind(|mail| mail[0].0 < place.0 && id(mail[0]) == id(place));
         of.expect("it was sent").push(place);
     }
@@ -211,19 +211,19 @@ fn mail_that_was_tampered_with_is_found() {
         let (fine, said) = judged(capture);
         assert!(!fine && said.contains(finding), "expected \"{finding}\": {said}");
     };
-    assert!(judged(&original).0, "written anew, nothing is wrong with it");
+    assert!(judged(&original).0, "unchanged, it has no findings");
     // A counter of a written mail.
     let mut tampered = original.clone();
     for (packet, at) in &mails[3] {
         tampered.packets[*packet].bytes[at + COUNTER_AT] ^= COUNTER_ONE;
     }
     expect(&tampered, "of a written mail, expected");
-    // A counter of a mail that was read.
+    // A counter of a read mail.
     let mut tampered = original.clone();
     let (packet, at) = places(&original, false, FPRD, SEND)[4];
     tampered.packets[packet].bytes[at + COUNTER_AT] ^= COUNTER_ONE;
     expect(&tampered, "of a read mail, expected");
-    // The request before once more, with no answer in between.
+    // The previous request again, without a response in between.
     let mut tampered = original.clone();
     let (from, to) = (&mails[4], &mails[5]);
     let content = original.packets[from[0].0].bytes[from[0].1 + 6..from[0].1 + 16].to_vec();
@@ -232,7 +232,7 @@ fn mail_that_was_tampered_with_is_found() {
     }
     tampered.packets.drain(from.iter().map(|place| place.0).max().unwrap() + 1..to[0].0);
     expect(&tampered, "before it was answered");
-    // A mail that was taken, once more under its counter.
+    // An accepted mail again with the same counter.
     let mut tampered = original.clone();
     let again: Vec<_> = mails[4].iter().map(|(packet, _)| original.packets[*packet].clone()).collect();
     let behind = mails[4].iter().map(|place| place.0).max().unwrap() + 1;
@@ -241,7 +241,7 @@ fn mail_that_was_tampered_with_is_found() {
         tampered.packets.insert(behind + number, packet);
     }
     expect(&tampered, "though it was taken");
-    // Two objects of the last list have changed places.
+    // Two objects of the last list are exchanged.
     let mut tampered = original.clone();
     let (one, other) = (&mails[mails.len() - 4], &mails[mails.len() - 3]);
     for (mine, theirs) in [(one, other), (other, one)] {

@@ -1,9 +1,9 @@
-//! Real Ethernet frames: our MainDevice and those of others, each in a process of its own, on veth pairs in front of
-//! simulated segments. Needs RINGCAT_ON_THE_WIRE=1 (for MainDevices of others RINGCAT_FOREIGN=1 too), root and
-//! iproute2; prints a line and passes where they are missing.
+//! Real Ethernet frames: RingCAT and other MainDevices, each in a process of its own, on veth pairs with simulated
+//! segments. Needs RINGCAT_ON_THE_WIRE=1 (for other MainDevices also RINGCAT_FOREIGN=1), root and iproute2; otherwise
+//! prints a line and passes.
 //!
-//! Times are printed, not judged: the machine that tests run on may be busy with anything. Where a stall may be the
-//! reason for a lost cycle, both ends say how late they were.
+//! Times are printed, not checked, because the machine may be busy. If a stall may be the reason for a lost cycle, both
+//! ends print their delays.
 
 mod bench;
 mod cables;
@@ -26,7 +26,7 @@ use std::process::Output;
 
 use bench::{Bench, await_op};
 
-/// So many SubDevices of the catalogue: outputs first, then inputs, with a coupler and drives where there is room.
+/// Numbers of SubDevices of the catalogue: outputs first, then inputs, optionally with a coupler and drives.
 struct Plant {
     outputs: usize,
     inputs: usize,
@@ -63,7 +63,7 @@ impl Plant {
         usize::from(self.coupler) + self.outputs
     }
 
-    /// Gives each input terminal a value of its own.
+    /// Sets a different value for each input terminal.
     fn set_inputs(&self, bench: &Bench) {
         for device in self.first_input()..self.first_input() + self.inputs {
             bench.order(&format!("inputs {device} {:02x}", input(device)));
@@ -75,7 +75,7 @@ fn input(device: usize) -> u8 {
     (device * 3 + 1) as u8
 }
 
-/// How many devices are in a state without error.
+/// Number of devices in a state without error.
 fn states(bench: &Bench, state: &str) -> usize {
     bench.order("status").lines().filter(|line| line.ends_with(&format!("\": {state}"))).count()
 }
@@ -85,7 +85,7 @@ fn said(output: &Output) -> (String, String) {
     (text(&output.stdout), text(&output.stderr))
 }
 
-/// The summary of `ringcat run`, to be shown.
+/// Prints the summary of `ringcat run`.
 fn show_summary(title: &str, output: &str) {
     let summary = output.find("\nsummary").map_or("", |at| &output[at + 1..]);
     println!("ringcat run, {title}:\n{summary}");
@@ -99,7 +99,7 @@ fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() 
         bench.simulate(&plant.segment(), false);
         let (listed, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--json"]));
         assert_eq!(listed.matches("\"station\"").count(), plant.count(), "{listed}{errors}");
-        // The second MainDevice on the same simulator: it serves more than one.
+        // The second MainDevice on the same simulator.
         let (output, errors) = said(&bench.ringcat(&["run", "--main", "main0", "--for", "2s"]));
         assert!(output.contains("all SubDevices are in OP"), "{output}{errors}");
         assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");

@@ -1,4 +1,4 @@
-//! What users are told who cannot start, or whose segment somebody disturbs: each message says what to do.
+//! Messages when a command cannot start, or when the segment is disturbed: each message states the remedy.
 
 use std::path::Path;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use crate::bench::{Bench, Client, await_op, finish, program};
 use crate::{Plant, RING_OF_16, said};
 
 const TERMINAL: Plant = Plant { outputs: 1, inputs: 0, servos: 0, coupler: false };
-/// Sends frames back as they came, as a cable into a switch or a loop does.
+/// Returns frames unchanged, like a cable into a switch or a loop.
 pub const MIRROR: &str = "
 import socket
 s = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x88A4))
@@ -20,7 +20,7 @@ while True:
 ";
 const OTHER_MAIN_DEVICE: &str = "another MainDevice sends into this segment: frames from ";
 
-/// What `ringcat` says of errors when it cannot do what it is asked for.
+/// Standard error of a `ringcat` command that fails.
 fn error_of(bench: &Bench, arguments: &[&str]) -> String {
     let output = bench.ringcat(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -51,7 +51,7 @@ fn whoever_cannot_start_is_told_what_to_do() {
 #[test]
 fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
     let Some(bench) = Bench::new(1) else { return };
-    // It says that it is ready.
+    // It prints that it is ready.
     let mirror = Client::new(bench.start_at_sim(Path::new("python3"), &["-c", MIRROR]));
     assert_eq!(mirror.line, "ready");
     let unchanged = error_of(&bench, &["scan", "--main", "main0"]);
@@ -63,7 +63,7 @@ fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
 #[test]
 fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
     let Some(bench) = Bench::new(1) else { return };
-    let nobody = ["--reuid", "65534", "--regid", "65534", "--clear-groups", "--inh-caps", "-all"];
+    let unprivileged = ["--reuid", "65534", "--regid", "65534", "--clear-groups", "--inh-caps", "-all"];
     let program = program("ringcat").display().to_string();
     for command in ["scan", "run", "sim", "capture"] {
         let mut arguments = vec![program.as_str(), command, "--main", "main0"];
@@ -73,7 +73,7 @@ fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
         if command == "capture" {
             arguments.extend(["--out", "/dev/null"]);
         }
-        let output = finish(bench.start(Path::new("setpriv"), &[&nobody, &arguments[..]].concat()));
+        let output = finish(bench.start(Path::new("setpriv"), &[&unprivileged, &arguments[..]].concat()));
         let errors = said(&output).1;
         if errors.contains("failed to execute") {
             println!("skipped: other users may not run {program}");
@@ -100,11 +100,11 @@ fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
         assert!(told.contains(&format!("scan: no frame returns, {advice}")), "{told}");
         assert!(!told.contains("another MainDevice"), "{told}");
     }
-    // What the advice says helps, and so does the other way.
+    // Both remedies of the message help.
     let (_, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--redundant", "main1"]));
     assert!(!errors.contains("arrive on"), "{errors}");
     bench.set_link("main1", "down");
-    // An interface on top of the one in use shows what that one receives: no other cable is plugged in there.
+    // An interface on top of the used one shows the same frames: this is not another cable.
     bench.ip_main("link add above link main0 type macvlan mode bridge");
     bench.ip_main("link set above up");
     let (listed, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--json"]));
@@ -138,7 +138,7 @@ fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
     await_op(&bench, 1);
     bench.set_link("sim1", "up");
     let other = bench.start_other_ringcat(&["scan", "--main", "main1", "--force"]);
-    // It cannot get an answer: the segment leads its frames to us, and ours to it.
+    // It gets no response: each MainDevice receives the other's frames.
     let (_, errors) = said(&finish(other));
     assert_eq!(errors.matches(OTHER_MAIN_DEVICE).count(), 1, "{errors}");
     assert!(errors.contains("arrive on main1 (MAIN)"), "{errors}");

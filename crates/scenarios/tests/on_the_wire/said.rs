@@ -1,13 +1,13 @@
-//! What a program says while it runs, line by line, with the time at which each line came.
+//! Output of a running program, line by line, with the time of each line.
 
 use std::io::{BufRead, BufReader, Read};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A program that has ended has been read to its end within.
+/// Time limit to read the output of an ended program.
 const END_LIMIT: Duration = Duration::from_secs(5);
 
-/// Lines of an output that a thread reads, so that its pipe is never full.
+/// Lines of an output that a thread reads, so that the pipe is never full.
 pub struct Said(Arc<Mutex<Vec<(Instant, String)>>>);
 
 impl Said {
@@ -29,16 +29,16 @@ impl Said {
         lines.iter().filter(|(at, _)| (begin..end).contains(at)).cloned().collect()
     }
 
-    /// Everything so far.
+    /// The output so far.
     pub fn so_far(&self) -> String {
         let lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         lines.iter().map(|(_, line)| format!("{line}\n")).collect()
     }
 
-    /// Everything until the output's end, which has to be near.
+    /// The whole output, which has to end soon.
     pub fn whole(&self) -> String {
         let until = Instant::now() + END_LIMIT;
-        // The thread that reads keeps the lines too, until there are no more.
+        // The reading thread shares the lines until the output ends.
         while Arc::strong_count(&self.0) > 1 && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }

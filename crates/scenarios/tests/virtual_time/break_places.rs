@@ -1,5 +1,5 @@
-//! Places of breaks where more than one cable is out: branches that are not there, a second break, a SubDevice without
-//! power. CR-12, CR-18.
+//! Places of breaks with more than one missing cable: absent branches, a second break, a SubDevice without power.
+//! CR-12, CR-18.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use scenarios::world::{Mark, World};
 
 use crate::topologies::ring_with_branch;
 
-/// A cable of its ring, by positions: those of the branch are met behind the second one.
+/// A cable of its ring, by positions: the branch is processed after the second SubDevice.
 fn cable(number: usize) -> Cable {
     const POSITIONS: [usize; 5] = [0, 1, 4, 5, 6];
     let port = |device: usize, port: u8| PortOf { node: POSITIONS[device], port };
@@ -39,7 +39,7 @@ fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring() {
         world.run_cycles(200);
         assert_eq!(places(&world, mark), [cable(number)], "cable {number}");
         assert_eq!(world.application().ring_status().place, Some(cable(number)));
-        // Nor one that goes while the ring is open.
+        // The same with a branch that is unplugged while the ring is open.
         world.heal(CableId(6));
         world
             .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
@@ -57,7 +57,7 @@ fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring() {
     }
 }
 
-/// A ring of couplers that goes on from their port 2, as it does on real ones, with two terminals on port 1 of each.
+/// A ring of couplers that continues from their port 2, as on real ones, with two terminals on port 1 of each.
 fn ring_of_couplers(couplers: usize) -> (Vec<&'static str>, Vec<(Endpoint, Endpoint)>) {
     use Port::{A, B, C};
     let mut kinds = vec!["coupler"; couplers];
@@ -105,7 +105,7 @@ fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first() {
         assert_eq!(places(&world, mark), [one], "{first} and {second}");
         world.cut(CableId(second));
         world.run_cycles(200);
-        // Nobody is left who could see the cable of an interface behind which all are cut off.
+        // The cable of an interface cannot be located if no SubDevice behind it responds.
         let told: &[Cable] = if [0, 16].contains(&second) { &[one] } else { &[one, other] };
         assert_eq!(places(&world, mark), told, "{first} and {second}");
         world.heal(CableId(first));

@@ -1,4 +1,4 @@
-//! Rings that are broken from the start, break while something else is under way, or break twice.
+//! Rings that are broken from the start, break during other procedures, or break twice.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ fn a_subdevice_comes_back_into_a_broken_ring() {
     for (cable, device) in [(5, 12), (5, 2), (0, 7), (16, 7), (8, 8), (8, 7)] {
         let mut world = World::in_op(100 + cable as u64, broken(cable, FAST));
         world.run_cycles(60);
-        // Only what hangs at the end of a stub may go without taking others along.
+        // Only a SubDevice at the end of a part may leave without cutting others off.
         let mark = world.mark();
         let state = world.network().device(DeviceIndex(device)).al_status();
         assert_eq!(state, AlStatus::new(ringcat_wire::al::AlState::Op));
@@ -95,7 +95,7 @@ fn a_subdevice_comes_back_into_a_broken_ring() {
         world
             .until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
         world.run_cycles(20);
-        assert!(world.left_op(mark).iter().all(|who| who.0 == device));
+        assert!(world.left_op(mark).iter().all(|left| left.0 == device));
     }
 }
 
@@ -112,7 +112,7 @@ fn a_ring_that_breaks_during_scan_or_configuration_comes_to_op() {
             world.run_cycles(100);
             assert!(world.all_in_op());
             let lost = world.saw(world.beginning(), |event| matches!(event, Event::Lost { .. }));
-            assert!(!lost, "nobody is lost by a single break at {at_us} us, cable {cable}");
+            assert!(!lost, "no SubDevice is lost by a single break at {at_us} us, cable {cable}");
             let place = world.events(world.beginning()).iter().rfind(|t| matches!(t.event, Event::BreakLocated { .. }));
             assert_eq!(place.map(|timed| &timed.event), Some(&break_at(cable).1), "cut at {at_us} us, cable {cable}");
         }
@@ -161,7 +161,7 @@ fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
                 world.until(Duration::from_millis(60), "all of the piece are lost", |world| world.saw(mark, lost));
             }
             let stale = &world.judged(mark).last().expect("cycles went by").stale;
-            assert!(stale.iter().all(|who| isolated.contains(who)), "{stale:?}: the others go on");
+            assert!(stale.iter().all(|left| isolated.contains(left)), "{stale:?}: the others continue");
             let healing = world.mark();
             world.heal(CableId(first));
             world.until(Duration::from_secs(3), "all in OP again", |world| {
@@ -171,8 +171,8 @@ fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
             world.heal(CableId(second));
             world.run_cycles(50);
             assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
-            let left: Vec<usize> = world.left_op(mark).iter().map(|who| who.0).collect();
-            assert!(left.iter().all(|who| isolated.contains(who)), "{left:?} left OP, {isolated:?} were isolated");
+            let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+            assert!(left.iter().all(|left| isolated.contains(left)), "{left:?} left OP, {isolated:?} were isolated");
             for subdevice in 0..SIXTEEN.len() {
                 let lost = |event: &Event| *event == Event::Lost { subdevice };
                 assert_eq!(world.saw(mark, lost), isolated.contains(&subdevice), "{subdevice}");

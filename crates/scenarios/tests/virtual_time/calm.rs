@@ -1,5 +1,4 @@
-//! What the acyclic half asks of a segment on which nothing happens: little at a time, so that cyclic frames hardly
-//! ever wait behind it.
+//! Acyclic reads on an undisturbed segment: short frames, so that cyclic frames hardly ever wait behind them.
 
 use std::cell::Cell;
 use std::rc::Rc;

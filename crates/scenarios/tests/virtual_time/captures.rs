@@ -1,5 +1,5 @@
-//! Captures: what a MainDevice sent and received, recorded by a tee in virtual time and judged from the file alone; and
-//! captures that were tampered with, so that the judge is known to see what it looks for.
+//! Captures of a MainDevice, recorded by a tee in virtual time and checked from the file alone; modified captures show
+//! that the checks detect faults.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -26,7 +26,7 @@ const LWR: u8 = 11;
 
 type Recorded = Application<Tee<SimulatedSegment>>;
 
-/// Scan, OP, `work`, stop, all of it recorded; the file.
+/// Records scan, OP, `work` and stop; returns the file.
 fn recorded(network: Network, ring: bool, work: impl FnOnce(&mut Recorded)) -> Vec<u8> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let number = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -66,7 +66,7 @@ fn fault(application: &mut Recorded, fault: &Fault) {
     application.links_mut().links_mut().network_mut().apply(fault.clone());
 }
 
-/// One SubDevice, at rest.
+/// One SubDevice, undisturbed.
 fn short() -> Vec<u8> {
     recorded(line(descriptions(&["digital-output-8"]), NetworkOptions::default()), false, |run| cycles(run, 50))
 }
@@ -110,7 +110,7 @@ fn what_is_sent_keeps_every_promise_on_a_ring_that_breaks_and_closes() {
     assert!((1..100).contains(&verdict.missing), "{verdict}");
     for windows in &verdict.windows {
         assert_eq!((windows.period, windows.late), (CYCLE, 0), "{verdict}");
-        // In virtual time nobody stalls: not a single acyclic frame is in the way of a cycle.
+        // In virtual time there are no stalls: no acyclic frame delays a cycle.
         assert_eq!((windows.crossed, windows.crossed_in_stalls, windows.held_up), (0, 0, 0), "{verdict}");
         assert!(windows.by_chance > 0, "acyclic frames would have met cycles: {verdict}");
     }
@@ -154,15 +154,15 @@ fn a_tee_changes_nothing_and_records_each_link_and_direction() {
     assert!(capture.packets.is_sorted_by_key(|packet| packet.time_ns));
 }
 
-/// The verdict after something was done to the frames.
+/// The verdict after a change of the frames.
 fn tampered(capture: &Capture, tamper: impl FnOnce(&mut Vec<Packet>)) -> Verdict {
     let mut capture = capture.clone();
     tamper(&mut capture.packets);
     judge_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
 }
 
-/// The first frame of process data of the second half that was sent and has such a datagram, and where that begins. (On
-/// two links process data is an LWR and an LRD; mail is looked for with an LRD alone.)
+/// The first sent frame of process data in the second half with such a datagram, and the offset of the datagram. (On
+/// two links process data is an LWR and an LRD; mailbox polls have an LRD alone.)
 fn sent_with(packets: &[Packet], command: u8) -> (usize, usize) {
     let at = |packet: &Packet| {
         let frame = Frame::parse(&packet.bytes).expect("a good frame");
@@ -220,7 +220,7 @@ fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
     });
     assert_found(&pair, "left on 1 of 2 links");
     let unlike = tampered(&capture, |packets| {
-        // Of an output, which is data that may be anything.
+        // In output data, which may have any value.
         let (place, at) = sent_with(packets, LWR);
         packets[place].bytes[at + 10] ^= 0x01;
     });
@@ -274,7 +274,7 @@ fn the_judge_sees_acyclic_frames_that_delay_a_cycle_apart_from_stalls() {
     });
     let windows = &stall.windows[0];
     assert_eq!((windows.crossed, windows.late, windows.held_up), (0, 1, 1), "{stall}");
-    // Those that left behind the cycle as it was are now before it too.
+    // Frames that were sent after the original cycle are now before it too.
     assert!((1..5).contains(&windows.crossed_in_stalls), "{stall}");
 }
 
@@ -290,7 +290,7 @@ fn any_damage_to_a_file_is_survived() {
             bytes[at] = dice.below(256) as u8;
         }
         bytes.truncate(bytes.len() - if dice.below(2) == 0 { dice.below(100) as usize } else { 0 });
-        // Whatever it says, it comes to an end.
+        // With any result, it ends.
         let _ = judge(&bytes, None);
     }
     let frame = [0xFF; 70];

@@ -1,6 +1,6 @@
-//! The set-up of distributed clocks in captures, judged from the file alone by `ci/check-clocks`: delays and offsets
-//! computed anew from what SubDevices latched and from their DL status (protocol 7.1, 7.2, 7.5). Captures that were
-//! tampered with show that the script sees what it looks for.
+//! The set-up of distributed clocks in captures, checked from the file alone by `ci/check-clocks`: delays and offsets
+//! recomputed from latched receive times and DL status (protocol 7.1, 7.2, 7.5). Modified captures show that the script
+//! detects faults.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -26,7 +26,7 @@ use scenarios::segments::{MAIN, RING_BEHIND_JUNCTION, RING_OF_THREE, at, line, r
 const LIMIT: Duration = Duration::from_secs(5);
 const LINKS: [(&str, &str); 2] = [("sim-main", "main link"), ("sim-redundant", "redundant link")];
 
-/// What env says of a program that is not there.
+/// Exit status of env for a missing program.
 const NOT_FOUND: i32 = 127;
 
 type Recorded = Application<Tee<SimulatedSegment>>;
@@ -37,7 +37,7 @@ fn file() -> PathBuf {
     std::env::temp_dir().join(format!("ringcat-clocks-{}-{number}.pcapng", std::process::id()))
 }
 
-/// Scan, OP, `work`, all of it recorded. The static drift phase is short: nobody waits for a lock here.
+/// Records scan, OP and `work`. The static drift phase is short because no lock is needed here.
 fn recorded(options: &Options, network: Network, path: &Path, work: impl FnOnce(&mut Recorded)) {
     let recorder = Recorder::start(path, &LINKS).expect("a file");
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
@@ -67,22 +67,22 @@ fn cycles(application: &mut Recorded, count: usize) {
     }
 }
 
-/// Captures, and what the script must say of each. It is started once for all of them.
+/// Captures, and the expected output of the script for each. The script is started once for all of them.
 #[derive(Default)]
 struct Cases {
     all: Vec<(PathBuf, Case)>,
 }
 
-/// What is to be said.
+/// Expected output.
 enum Case {
-    /// Of this run nothing is wrong, and so much was judged.
+    /// No finding, and this amount of checks.
     Fine(&'static str, &'static str),
-    /// This is wrong.
+    /// This finding.
     Finding(&'static str),
 }
 
 impl Cases {
-    /// The script must find nothing wrong, and say that it has judged so much.
+    /// The script must have no finding, and report this amount of checks.
     fn fine(&mut self, name: &'static str, network: Network, judged: &'static str, work: impl FnOnce(&mut Recorded)) {
         let path = file();
         let options = Options::default().with_junctions(JunctionMode::Automatic);
@@ -90,7 +90,7 @@ impl Cases {
         self.all.push((path, Case::Fine(name, judged)));
     }
 
-    /// Judges them all.
+    /// Checks all captures.
     fn judge(self) {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ci/check-clocks");
         let paths = self.all.iter().map(|(path, _)| path);
@@ -148,8 +148,8 @@ fn the_static_drift_phase_is_as_long_as_declared_in_bursts_beside_the_start_up()
     assert_eq!(handed_out.len(), 100);
     let (first, last) = (handed_out[0], handed_out[99]);
     assert!(states.iter().any(|at| (first..last).contains(at)), "{first} to {last}: {states:?}");
-    // 80 us apart in the mean, since loops need their time; less within a burst, so that others have the bus in
-    // between.
+    // 80 us apart on average, since the control loops need time; less within a burst, so that other frames can be sent
+    // in between.
     assert!(last - first >= 12 * 640_000, "{handed_out:?}");
     for bursts in handed_out.chunks(8).collect::<Vec<_>>().windows(2) {
         let (within, between) = (bursts[0][7] - bursts[0][0], bursts[1][0] - bursts[0][7]);
@@ -209,7 +209,7 @@ fn apply(run: &mut Recorded, fault: Fault) {
     run.links_mut().links_mut().network_mut().apply(fault);
 }
 
-/// A line whose device 1 is plugged in the wrong way round, and device 4 behind a branch too.
+/// A line with device 1 crossed, and device 4 behind a branch crossed too.
 fn crossed() -> Network {
     let cables = [
         (MAIN, at(0, A)),
@@ -222,7 +222,7 @@ fn crossed() -> Network {
     wired(clocked(6, 100), &cables)
 }
 
-/// A fork without a clock, device 1, with two branches of two clocks and one more behind it.
+/// A fork without a clock, device 1, with two branches of two clocks and one more clock behind it.
 fn fork() -> Network {
     let cables = [
         (MAIN, at(0, A)),
@@ -272,7 +272,7 @@ fn rings_behind_junctions_are_judged_whole_and_broken() {
     cases.judge();
 }
 
-/// Is shown a datagram: whether it was sent, command, register, the bytes from its header to its counter.
+/// Called for a datagram: whether it was sent, command, register, the bytes from its header to its counter.
 type Tamper<'t> = dyn FnMut(bool, u8, u16, &mut [u8]) + 't;
 
 /// Visits each datagram of a capture.
@@ -304,10 +304,10 @@ fn write(capture: &Capture, path: &Path) {
 const FPRD: u8 = 4;
 const FPWR: u8 = 5;
 const FRMW: u8 = 14;
-/// Of the third SubDevice.
+/// Station address of the third SubDevice.
 const STATION: [u8; 2] = 0x1003_u16.to_le_bytes();
 
-/// A capture, judged with changes.
+/// A capture that is checked with changes.
 struct Tampering {
     original: Capture,
 }
@@ -330,8 +330,7 @@ impl Tampering {
         cases.all.push((path, case));
     }
 
-    /// The delays of these stations are told to be longer by so much: those written with their offsets, or those
-    /// written by themselves later.
+    /// Increases the written delays of these stations: those written with their offsets, or those written later.
     fn add_longer(&self, cases: &mut Cases, finding: &'static str, stations: &[u16], from: u16, by: i32) {
         self.add(cases, Case::Finding(finding), &mut |_, command, register, bytes| {
             let station = u16::from_le_bytes([bytes[2], bytes[3]]);
@@ -349,14 +348,14 @@ fn tampered_delays_are_found_crossed_behind_clockless_forks_and_in_rings() {
     let mut cases = Cases::default();
     // Stations are numbered in the order in which the frame is processed: device 1 is the last.
     let tampering = Tampering::with(crossed(), |_| ());
-    // Away from what was measured: towards it, rounding may hide as much.
+    // Away from the measured value: towards it, rounding may hide the change.
     tampering.add_longer(&mut cases, "ns is what was measured", &[0x1006], 0x0920, -4);
     let tampering = Tampering::with(fork(), |_| ());
-    // The second of a branch against its first; a branch as a whole between what is in front of it and behind it.
+    // The second clock of a branch against its first; a branch as a whole against the clocks before and behind it.
     tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 4);
     tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_100);
     tampering.add_longer(&mut cases, "after the frame was back", &[0x1007], 0x0920, 2_000);
-    // Of a ring that was broken from the start and is whole later.
+    // In a ring that was broken from the start and is closed later.
     let mut network = wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
     network.cut(CableId(3));
     network.advance_by(Duration::from_millis(1));
@@ -388,7 +387,7 @@ fn clocks_that_were_tampered_with_are_found() {
             bytes[10] ^= 4;
         }
     });
-    // It latched something else at port 1, by 64 ns each time.
+    // Its receive time at port 1 is changed by 64 ns each time.
     expect("ns is what was measured", &mut |_, command, register, bytes| {
         if (command, register) == (FPRD, 0x0900) && is_own(bytes) {
             let time = u32::from_le_bytes([bytes[14], bytes[15], bytes[16], bytes[17]]).wrapping_add(64);
@@ -405,7 +404,7 @@ fn clocks_that_were_tampered_with_are_found() {
             bytes[2..4].copy_from_slice(&STATION);
         }
     });
-    // Zero instead of a time, as the copies of others carry it.
+    // Zero instead of a time, as in the copies of other stacks.
     expect("a time is sent that is", &mut |sent, command, register, bytes| {
         if sent && (command, register) == (FRMW, 0x0910) {
             bytes[10..14].fill(0);

@@ -37,13 +37,13 @@ fn junction_ring() -> Network {
     wired(clocked(7, 50), &RING_BEHIND_JUNCTION)
 }
 
-/// A change of the segment: nobody strays on the way, and soon all are together as before.
+/// A change of the segment: no clock drifts away meanwhile, and soon all are synchronous as before.
 fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize {
-    let everybody = all(world.network());
+    let clocks = all(world.network());
     let mark = world.mark();
     act(world);
-    let [over] = watch(world, [&everybody], 400);
-    let [after] = watch(world, [&everybody], 100);
+    let [over] = watch(world, [&clocks], 400);
+    let [after] = watch(world, [&clocks], 100);
     let failed = |event: &Event| matches!(event, Event::ClocksFailed { .. } | Event::SyncWindow { inside: false, .. });
     assert!(!world.saw(mark, failed), "{what}");
     assert!(over <= 1_000 && after <= 100, "{what}: {over} ns, then {after} ns");
@@ -54,8 +54,8 @@ fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize 
 #[test]
 fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere() {
     let mut world = world(1, junction_ring());
-    let everybody = all(world.network());
-    assert!(largest_spread(&mut world, &everybody, 300) <= 100, "{:?}", differences(world.network(), &everybody));
+    let clocks = all(world.network());
+    assert!(largest_spread(&mut world, &clocks, 300) <= 100, "{:?}", differences(world.network(), &clocks));
     for cable in RING_OF_THREE {
         let cut = change(&mut world, &format!("cut of cable {cable}"), |world| world.cut(CableId(cable)));
         let heal = change(&mut world, &format!("repair of cable {cable}"), |world| world.heal(CableId(cable)));
@@ -90,8 +90,8 @@ fn a_local_ring_broken_from_the_start_has_right_delays_before_and_after_repair()
         network.cut(CableId(cable));
         network.advance_by(Duration::from_millis(1));
         let mut world = world(2, network);
-        let everybody = all(world.network());
-        assert!(largest_spread(&mut world, &everybody, 200) <= 100, "cable {cable}");
+        let clocks = all(world.network());
+        assert!(largest_spread(&mut world, &clocks, 200) <= 100, "cable {cable}");
         change(&mut world, &format!("first repair of cable {cable}"), |world| world.heal(CableId(cable)));
         change(&mut world, "another break", |world| world.cut(CableId(4)));
     }
@@ -101,43 +101,43 @@ fn a_local_ring_broken_from_the_start_has_right_delays_before_and_after_repair()
 #[test]
 fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either() {
     let mut world = world(3, wired(clocked(5, 50), &RING_IN_RING));
-    let everybody = all(world.network());
+    let clocks = all(world.network());
     for cable in [3, 5, 1, 4] {
         let what = format!("cable {cable}");
         let (front, behind): (Vec<usize>, Vec<usize>) = match cable {
             5 => (vec![0, 1, 2, 3], vec![4]),
             1 => (vec![0], vec![1, 2, 3, 4]),
-            _ => (everybody.clone(), Vec::new()),
+            _ => (clocks.clone(), Vec::new()),
         };
         world.cut(CableId(cable));
-        let [inside, other, across] = watch(&mut world, [&front, &behind, &everybody], 500);
+        let [inside, other, across] = watch(&mut world, [&front, &behind, &clocks], 500);
         assert!(inside <= 1_000 && other <= 1_000 && across <= 5_000, "{what}: {inside}, {other}, {across} ns");
         let [inside, other] = watch(&mut world, [&front, &behind], 50);
         assert!(inside <= 100 && other <= 100, "{what} cut: {inside}, {other} ns");
         world.heal(CableId(cable));
-        let [over] = watch(&mut world, [&everybody], 1_500);
-        let [after] = watch(&mut world, [&everybody], 100);
+        let [over] = watch(&mut world, [&clocks], 1_500);
+        let [after] = watch(&mut world, [&clocks], 100);
         assert!(over <= 5_000 && after <= 100, "{what} healed: {over}, then {after} ns");
     }
 }
 
-/// No frame comes back meanwhile, and rings are looked into one after the other.
+/// No frame comes back meanwhile, and rings are examined one after the other.
 // covers: JR-02, 7.5, dc-delays
 #[test]
 fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once() {
     let mut world = world(10, wired(clocked(7, 50), &TWO_RINGS));
-    let everybody = all(world.network());
+    let clocks = all(world.network());
     for (first, second, gap) in [(2, 6, 100), (5, 1, 800)] {
         let what = format!("cables {first} and {second}");
         let mark = world.mark();
         world.cut(CableId(first));
         world.cut(CableId(second));
-        let [blocked] = watch(&mut world, [&everybody], gap);
+        let [blocked] = watch(&mut world, [&clocks], gap);
         world.heal(CableId(first));
         world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         lock(&mut world, Duration::from_secs(5));
-        let [over] = watch(&mut world, [&everybody], 600);
-        let [after] = watch(&mut world, [&everybody], 100);
+        let [over] = watch(&mut world, [&clocks], 600);
+        let [after] = watch(&mut world, [&clocks], 100);
         println!("{what}: {blocked} ns while blocked, then {over} and {after} ns");
         assert_eq!(world.left_op(mark), [], "{what}");
         assert!(over <= 10_000 && after <= 100, "{what}: {over}, then {after} ns");
@@ -153,25 +153,25 @@ fn a_ring_broken_from_the_start_has_the_delay_of_its_cable_after_the_repair() {
     cables.insert(0, (MAIN, at(0, A)));
     cables.push((at(count - 1, B), REDUNDANT));
     let mut descriptions = clocked(count, 50);
-    // Entered from behind, and latching only what its processing unit has seen unless it is told.
+    // Entered from behind, and latching only frames in processing direction unless 0x0936 is set.
     descriptions[4].latches_processing_only = true;
     let mut network = wired(descriptions, &cables);
     network.cut(CableId(3));
     network.advance_by(Duration::from_millis(1));
     let mut world = world(4, network);
-    let everybody = all(world.network());
+    let clocks = all(world.network());
     let mark = world.mark();
     world.heal(CableId(3));
-    let [over] = watch(&mut world, [&everybody], 2_000);
-    let [after] = watch(&mut world, [&everybody], 200);
+    let [over] = watch(&mut world, [&clocks], 2_000);
+    let [after] = watch(&mut world, [&clocks], 200);
     assert!(over <= 5_000 && after <= 100, "{over}, then {after} ns");
-    // The ring is opened for a moment to measure the cable: nobody is told that, and nothing is lost.
+    // The ring is opened for a moment to measure the cable: this is not reported, and nothing is lost.
     assert!(!world.saw(mark, |event| matches!(event, Event::RingOpened { .. })));
     assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty());
 }
 
-/// Nobody looks for rings behind junctions, and there is one: delays cannot be measured. That is told once, and once
-/// more when the segment has changed; with the ring broken all is well.
+/// A ring behind a junction in mode disabled: delays cannot be measured. This is reported once, and again when the
+/// segment has changed; with the ring broken the delays are right.
 // covers: 7.1, 9.4, dc-lock
 #[test]
 fn a_ring_not_looked_for_is_reported_per_change_and_clocks_begin_when_open() {
@@ -185,7 +185,7 @@ fn a_ring_not_looked_for_is_reported_per_change_and_clocks_begin_when_open() {
     world.run_cycles(3_000);
     assert!(world.all_in_op());
     assert_eq!(failures(&world, mark), 1);
-    // A branch that has nothing to do with it.
+    // An unrelated branch.
     world.cut(CableId(7));
     world.run_cycles(2_000);
     assert_eq!(failures(&world, mark), 2);
@@ -195,8 +195,8 @@ fn a_ring_not_looked_for_is_reported_per_change_and_clocks_begin_when_open() {
     world.cut(CableId(5));
     lock(&mut world, Duration::from_secs(4));
     assert_eq!(failures(&world, mark), 0);
-    let everybody = all(world.network());
-    assert!(largest_spread(&mut world, &everybody, 200) <= 100, "{:?}", differences(world.network(), &everybody));
+    let clocks = all(world.network());
+    assert!(largest_spread(&mut world, &clocks, 200) <= 100, "{:?}", differences(world.network(), &clocks));
 }
 
 /// A trunk of three junctions with branches on ports 3 and 2, six clocks in branches, up to 100 ppm from the reference.
@@ -214,7 +214,7 @@ fn tree() -> Network {
     ];
     let mut descriptions = clocked(9, 100);
     descriptions[0].clock_drift_ppb = 0;
-    // One in between has no clock, one latches only what its processing unit has seen.
+    // One SubDevice in between has no clock, one latches only frames in processing direction.
     descriptions[6].dc = None;
     descriptions[4].latches_processing_only = true;
     wired(descriptions, &cables)
@@ -298,15 +298,15 @@ fn a_reference_that_loses_its_power_is_replaced_and_comes_back_without_a_jump() 
     world.power_on(DeviceIndex(0));
     let [back] = watch(&mut world, [&others], 400);
     world.until(Duration::from_secs(8), "all in OP again", World::all_in_op);
-    let everybody = all(world.network());
-    let [together] = watch(&mut world, [&everybody], 200);
+    let clocks = all(world.network());
+    let [together] = watch(&mut world, [&clocks], 200);
     assert!(without <= 1_000 && back <= 1_000 && together <= 200, "{without}, {back}, {together} ns");
     let elected =
         |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 1);
     assert!(world.saw(mark, elected));
     let took_over =
         |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 0);
-    assert!(!world.saw(mark, took_over), "the one that came back follows");
+    assert!(!world.saw(mark, took_over), "the returned clock follows");
     let drifted = i64::from(time(&world).wrapping_sub(before) as i32);
     // Seconds with clocks that differ by less than 100 ppm: no jump.
     let passed = 8_000_000_000_i64;
@@ -428,7 +428,7 @@ fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again() {
         (3..6).rev().for_each(|device| world.power_off(DeviceIndex(device)));
         world.until(Duration::from_secs(2), "the group has left", |world| world.application().groups()[0].present == 0);
     }
-    // That nobody had a clock was told once.
+    // The missing clocks were reported once.
     let failed = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::ClocksFailed { .. });
     assert_eq!(world.events(mark).iter().filter(failed).count(), 1);
     assert!(world.left_op(mark).iter().all(|device| device.0 > 2));

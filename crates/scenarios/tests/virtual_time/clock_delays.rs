@@ -1,4 +1,4 @@
-//! Propagation delays of lines, against those of their cables (protocol 7.1).
+//! Propagation delays of lines, compared with those of their cables (protocol 7.1).
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use scenarios::clocks::{clocked, config, delay, with_clocks, world};
 use scenarios::segments::line;
 use scenarios::world::World;
 
-/// Time of a passage and of a cable.
+/// Delay of a pass and of a cable.
 const HOP_NS: i64 = 300 + 50;
 
 // covers: 7.1, dc-delays
@@ -48,7 +48,7 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
         world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), COUNT - 1) != 0);
         world.run_cycles(10);
         for device in 0..COUNT {
-            // Frames turn round behind the processing unit of the last one: its cable is right in any case.
+            // Frames are looped back behind the processing unit of the last SubDevice: its cable is right in any case.
             let missed = systematic * device.min(COUNT - 2) as i64;
             let error = i64::from(delay(world.network(), device)) - hop * device as i64 + missed;
             assert!(error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64, "device {device}, {told}: {error} ns");
@@ -56,7 +56,7 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
     }
 }
 
-/// A coupler, terminals and drives, each with passages of its own: what each is told of is exact.
+/// A coupler, terminals and drives, each with its own passage times: delays are exact if each is configured.
 // covers: 7.1, dc-delays
 #[test]
 fn types_whose_passages_differ_have_exact_delays_where_each_is_told() {
@@ -97,7 +97,7 @@ fn types_whose_passages_differ_have_exact_delays_where_each_is_told() {
     assert!(told.iter().all(|error| error.abs() <= 2), "{told:?}");
 }
 
-/// The longest line. That 200 clocks lock and stay together is among the figures (bin `figures`, clocks).
+/// The longest line. The lock and spread of 200 clocks are among the figures (bin `figures`, clocks).
 // covers: 7.1, dc-delays
 #[test]
 fn two_hundred_clocks_in_a_line_have_their_delays() {

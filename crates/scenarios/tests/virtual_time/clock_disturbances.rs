@@ -11,12 +11,12 @@ use scenarios::dice::Dice;
 use scenarios::segments::ring;
 use scenarios::world::World;
 
-/// Time of a passage that is so long that frames are on the way for longer than a short cycle.
+/// A passage time with which the round trip exceeds a short cycle.
 const PASSAGE: Duration = Duration::from_micros(10);
-/// That and a cable.
+/// Delay of a pass and of a cable.
 const HOP_NS: i64 = 10_000 + 50;
 
-/// A share of what `figures delays` runs: nothing wrong is written, and nothing is left out.
+/// A share of the runs of `figures delays`: no wrong delay is written, and none is missing.
 fn all_right(shapes: impl Iterator<Item = Shape>, changes: u64) {
     let mut dice = Dice::new(1_400);
     let mut sum = Outcome::default();
@@ -54,8 +54,8 @@ fn not_measured(event: &Event) -> bool {
         if reason.contains("process data") || reason.contains("other frames"))
 }
 
-/// Frames leave as soon as the last ones are home, or several cycles are under way all the time: the cyclic half pauses
-/// when it is asked to, and where it may not, nothing is written and it is told why.
+/// Frames are sent as soon as the last ones are back, or several cycles are under way all the time: the cyclic half
+/// pauses on request, and if it may not, nothing is written and the reason is reported.
 // covers: 7.1, dc-remeasure
 #[test]
 fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
@@ -101,7 +101,7 @@ fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
     }
 }
 
-/// Cycles of 1 ms leave time enough: nothing pauses, and clocks lock as without process data.
+/// Cycles of 1 ms leave enough time: no cycle pauses, and clocks lock as without process data.
 // covers: 7.1, dc-remeasure
 #[test]
 fn cycles_of_a_millisecond_never_pause_for_a_measurement() {

@@ -1,5 +1,5 @@
-//! Forks without a clock: delays behind them are measured branch by branch at the set-up, and where they cannot be,
-//! none is written and that is told (protocol 7.1).
+//! Forks without a clock: delays behind them are measured branch by branch at the set-up; if this is not possible, none
+//! is written and this is reported (protocol 7.1).
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use scenarios::segments::{MAIN, at};
 use scenarios::tap::Tap;
 use scenarios::world::World;
 
-/// A world on these cables whose devices `without` have no clock.
+/// A world on these cables; the devices `without` have no clock.
 fn world(cables: &[(Endpoint, Endpoint)], without: &[usize], config: ClockConfig) -> World {
     let mut descriptions = clocked(cables.len(), 50);
     without.iter().for_each(|device| descriptions[*device].dc = None);
@@ -21,7 +21,7 @@ fn world(cables: &[(Endpoint, Endpoint)], without: &[usize], config: ClockConfig
     World::with(3, network, &Options::default(), |scan| with_clocks(scan, config)).expect("it comes up")
 }
 
-/// Times on cables of [`wired`], with the passage of 300 ns behind each.
+/// Delays of the cables of [`wired`], with a pass of 300 ns after each.
 fn hop(cable: i64) -> i64 {
     300 + 50 + 70 * (cable * 5 % 11)
 }
@@ -34,8 +34,8 @@ fn delays_told(world: &World) -> Vec<(Position, Option<Position>)> {
     world.events(world.beginning()).iter().filter_map(told).collect()
 }
 
-/// A clock, a splitter without one, two clocks on its port 3, one on its port 1, and on port 2 another splitter with
-/// two.
+/// A clock, a splitter without a clock, two clocks on its port 3, one on its port 1, and on port 2 another splitter
+/// with two.
 const SPLITTERS: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, A)),
     (at(0, B), at(1, A)),
@@ -66,7 +66,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     world.run_cycles(500);
     let apart = spread(world.network(), &[0, 2, 3, 4, 6, 7]);
     assert!(apart <= 100, "{apart} ns");
-    // A branch that is unplugged and back is known from before, and nothing is hidden by that.
+    // A branch that is unplugged and plugged in again is known from before, so no delay is hidden.
     world.cut(CableId(2));
     world.run_cycles(200);
     world.heal(CableId(2));
@@ -76,7 +76,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     assert!(error.abs() <= 20, "{error} ns from {second} ns");
 }
 
-/// Nothing measures what is between branches of a splitter that no clock is in front of.
+/// The time between branches of a splitter without a clock in front of it cannot be measured.
 // covers: dc-delays
 #[test]
 fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
@@ -94,14 +94,14 @@ fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
         let clocks = world.application().engine().clocks();
         let is_hidden: Vec<bool> = clocks.iter().map(|clock| clock.hidden.is_some()).collect();
         assert_eq!(is_hidden, [false, false, true, true]);
-        // A long time after, nothing is told again.
+        // After a long time it is not reported again.
         world.run_cycles(2_000);
         assert_eq!(delays_told(&world).len(), 2);
     }
 }
 
-/// Two branches of a splitter come at once in operation: what they take together is seen, what each of them takes is
-/// not. That is told with the least and the most that it may be; the middle is written only where that is asked for.
+/// Two branches of a splitter appear at once in operation: the sum of their times is measured, but not the time of
+/// each. This is reported with the minimum and maximum; the middle is written only on request.
 // covers: dc-delays
 #[test]
 fn a_delay_of_which_only_a_range_is_known_is_estimated_where_that_is_asked_for() {
@@ -172,7 +172,7 @@ fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
     assert_eq!([0, 1, 2].map(state), [8, 8, 4]);
 }
 
-/// Random trees, a third of whose SubDevices have no clock: what is written is right, what is hidden is told.
+/// Random trees, with a third of the SubDevices without a clock: written delays are right, hidden ones are reported.
 // covers: dc-delays
 #[test]
 fn delays_in_random_trees_with_gaps_are_right_or_not_written() {

@@ -1,5 +1,5 @@
 //! Distributed clocks with a host that sends tens of microseconds late at random: a reference that loses its power
-//! comes back to OP, and SYNC0 stays together while cables of a ring go and come (protocol 7.2, 7.3, 7.5).
+//! comes back to OP, and SYNC0 stays synchronous while cables of a ring are cut and repaired (protocol 7.2, 7.3, 7.5).
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use scenarios::clocks::{clocked, config, spread, watch, with_clocks};
 use scenarios::segments::{line, ring};
 use scenarios::world::{Mark, World};
 
-/// All in OP with SYNC0, on a host that sends so late; two seconds later.
+/// All SubDevices in OP with SYNC0, on a host with this sending delay; two seconds later.
 fn world(seed: u64, network: Network, late: Duration) -> World {
     let mut world = World::with(seed, network, &Options::default(), |scan| {
         let mut declaration = with_clocks(scan, config());
@@ -32,7 +32,7 @@ fn window_events(world: &World, since: Mark) -> usize {
 #[test]
 fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter() {
     const COUNT: usize = 6;
-    let (everybody, others): (Vec<usize>, Vec<usize>) = ((0..COUNT).collect(), (1..COUNT).collect());
+    let (clocks, others): (Vec<usize>, Vec<usize>) = ((0..COUNT).collect(), (1..COUNT).collect());
     for (late_us, closed) in [(0, false), (5, false), (20, false), (50, false), (5, true), (50, true)] {
         let descriptions = clocked(COUNT, 50);
         let options = NetworkOptions::default();
@@ -48,10 +48,10 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
         world
             .until(Duration::from_millis(4_800), &text, |world| world.all_in_op() && world.application().all_settled());
         let back = world.now() - begin;
-        let [apart, apart_others] = watch(&mut world, [&everybody, &others], 3_000);
+        let [apart, apart_others] = watch(&mut world, [&clocks, &others], 3_000);
         let told = window_events(&world, mark);
         println!("{text}: back after {} ms, {apart} ns apart, {told} times told", back.as_millis());
-        // What follows the reference is exact; the one in front of it is told what the host believes.
+        // Clocks behind the reference are exact; the clock in front of it receives the host's prediction.
         assert!(apart <= 1_000 && told <= 6, "{text}: {apart} ns apart, {told} times told");
         assert!(closed || apart_others <= 100, "{text}: {apart_others} ns");
     }
@@ -62,21 +62,21 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
 fn sync0_stays_together_while_cables_go_and_come_though_the_host_sends_50_us_late() {
     const COUNT: usize = 8;
     let network = || ring(clocked(COUNT, 50), NetworkOptions::default());
-    let everybody: Vec<usize> = (0..COUNT).collect();
+    let clocks: Vec<usize> = (0..COUNT).collect();
     for (seed, cables) in [(41, [0, 3, 6]), (42, [1, 5, 8])] {
         let mut world = world(seed, network(), Duration::from_micros(50));
         let mark = world.mark();
         for cable in cables {
             let (front, behind): (Vec<usize>, Vec<usize>) = ((0..cable).collect(), (cable..COUNT).collect());
             world.cut(CableId(cable));
-            let [first, second, across] = watch(&mut world, [&front, &behind, &everybody], 6_000);
+            let [first, second, across] = watch(&mut world, [&front, &behind, &clocks], 6_000);
             world.heal(CableId(cable));
-            let [first_after, second_after, after] = watch(&mut world, [&front, &behind, &everybody], 2_000);
+            let [first_after, second_after, after] = watch(&mut world, [&front, &behind, &clocks], 2_000);
             let inside = [first, second, first_after, second_after].into_iter().max().unwrap_or(0);
             let across = across.max(after);
             println!("cable {cable}: {inside} ns inside a part, {across} ns across");
             assert!(inside <= 1_000 && across <= 5_000, "cable {cable}: {inside} ns inside, {across} ns across");
-            assert!(spread(world.network(), &everybody) <= 200, "cable {cable}");
+            assert!(spread(world.network(), &clocks) <= 200, "cable {cable}");
         }
         assert!(window_events(&world, mark) <= 16, "{}", window_events(&world, mark));
         assert_eq!(world.left_op(mark), []);

@@ -1,4 +1,4 @@
-//! Who follows whom: the reference clock the host (bus shift), the host's cycles the reference clock (master shift)
+//! Bus shift (the reference clock follows the host) and master shift (the host's cycles follow the reference clock)
 //! (protocol 7.4).
 
 use std::time::Duration;
@@ -61,8 +61,8 @@ fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time(
     }
 }
 
-/// Where the host says what time it is, the reference follows it through a break; where the reference does, cycles
-/// follow it, also when all frames meet it from the other side.
+/// With bus shift the reference follows the host through a break; with master shift the cycles follow the reference,
+/// also if frames reach it from the other side.
 // covers: CR-26, 7.5, dc-reference
 #[test]
 fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair() {
@@ -135,8 +135,9 @@ fn cycles_follow_the_reference_clock_though_the_host_wakes_late() {
     assert!(world.application().follower().is_some_and(Follower::is_locked));
 }
 
-/// What the reference is told is up to 50 us late at random. It keeps near the host in the mean, so calmly that the
-/// others lock on it; nobody is told that they left their window, though the reference itself shows the host's jitter.
+/// Times written to the reference are up to 50 us late at random. On average the reference stays near the host, with so
+/// little jitter that the others lock on it; no clock is reported out of its window, although the reference's own
+/// register shows the host's jitter.
 // covers: 7.4, dc-reference
 #[test]
 fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
@@ -169,8 +170,8 @@ fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
     }
 }
 
-/// A clock that is moved by 6 us is told of when it has left the window, and when it is back; with bus shift each clock
-/// is looked at, without it the broadcast read of all.
+/// A clock that is moved by 6 us is reported when it leaves the window and when it is back; with bus shift each clock
+/// is read, without it the broadcast read is used.
 // covers: 7.2, dc-lock
 #[test]
 fn clocks_that_leave_their_window_and_come_back_are_told() {

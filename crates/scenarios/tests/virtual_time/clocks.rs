@@ -12,7 +12,7 @@ use scenarios::clocks::{
 use scenarios::segments::{line, ring};
 use scenarios::world::{CYCLE, World};
 
-/// Time of a passage and of a cable.
+/// Delay of a pass and of a cable.
 const HOP_NS: i64 = 300 + 50;
 
 fn all(count: usize) -> Vec<usize> {
@@ -30,7 +30,7 @@ fn clocks_of_a_line_lock_and_stay_together() {
     assert!(world.saw(mark, |event| matches!(event, Event::SyncWindow { inside: true, .. })));
     assert!(!world.saw(mark, |event| matches!(event, Event::SyncWindow { inside: false, .. })));
     assert!(largest <= 100, "{largest} ns");
-    // What the MainDevice believes is what is.
+    // The MainDevice's values are the true ones.
     let status = world.application().engine().clocks();
     assert_eq!(status.len(), 20);
     for (clock, truth) in status.iter().zip(differences(world.network(), &all(20))) {
@@ -43,13 +43,13 @@ fn clocks_of_a_line_lock_and_stay_together() {
     let network = world.network();
     let truth = network.device(DeviceIndex(0)).controller.system_time(network.now());
     let error = reference.at(now).wrapping_sub(truth) as i64;
-    // A minimal frame and the domain's take their time on the wire.
+    // Transmission time of a minimal frame and of the domain's frame.
     assert!(error.abs() <= 30_000, "{error} ns");
     let host = now.0.wrapping_add(EPOCH);
     assert!((truth.wrapping_sub(host) as i64).abs() < 2_000_000, "the reference began with the host's time");
 }
 
-/// The reference runs as fast as a clock may, others as slowly, and the other way round.
+/// The reference at the upper limit of the rate, others at the lower limit, and the reverse.
 // covers: 7.2.1, dc-lock
 #[test]
 fn clocks_anywhere_within_100_ppm_lock_and_stay_together() {
@@ -103,7 +103,7 @@ fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted() {
 #[test]
 fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_a_clear_error() {
     let mut descriptions = clocked(3, 0);
-    // Beyond what the control loop can take out (protocol 7.2.1).
+    // Beyond the range of the control loop (protocol 7.2.1).
     descriptions[2].clock_drift_ppb = 900_000;
     let mut world = World::with(4, line(descriptions, NetworkOptions::default()), &Options::default(), |scan| {
         let limit = Duration::from_secs(2);
@@ -135,7 +135,7 @@ fn a_reference_that_the_application_chooses_is_followed() {
     assert!(world.saw(mark, told));
     let behind: Vec<usize> = (2..6).collect();
     assert!(spread(world.network(), &behind) <= 100);
-    // Those before it follow the host's idea of its time.
+    // Clocks before it follow the time that the host predicts.
     assert!(spread(world.network(), &all(6)) <= 1_000, "{:?}", differences(world.network(), &all(6)));
 }
 
@@ -156,8 +156,7 @@ fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
     assert_eq!(references.iter().map(|clock| clock.is_reference).collect::<Vec<_>>(), [false, true, false, false]);
 }
 
-/// The first clock leads all others though nobody declares its SubDevice, which is left in the state in which it was
-/// found.
+/// The first clock is the reference although its SubDevice is undeclared; the SubDevice stays in its state.
 // covers: 7.2, dc-reference
 #[test]
 fn a_reference_that_nobody_declares_is_followed_and_left_alone() {
@@ -254,8 +253,8 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind() {
     }
 }
 
-/// Both copies of a frame leave at times of their own: between clocks of a part no host is in between, and across both
-/// parts only as far as the mean of what it does.
+/// Both copies of a frame are sent at different times: inside a part the host has no influence, across both parts only
+/// the mean of its jitter has.
 // covers: 7.5, dc-ring
 #[test]
 fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
@@ -283,7 +282,7 @@ fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
     }
 }
 
-/// Nobody has ever told the second part how fast the first one runs, and they are as far apart as clocks can be.
+/// The second part has never followed the first, and their rates differ by the maximum.
 // covers: 7.5, dc-ring
 #[test]
 fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart() {

@@ -1,4 +1,4 @@
-//! What an application declares about its SubDevices: who they are, their PDOs, their objects.
+//! Declarations of an application about its SubDevices: identity, PDOs, objects.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -84,7 +84,7 @@ fn subdevices_are_found_by_alias_wherever_they_are() {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices[2] = SubDeviceConfig::at_alias(77, 0).expect_product(0x0C47, 0x07D8_0010);
         declaration.subdevices[6] = SubDeviceConfig::at_position(2);
-        // The one behind it.
+        // The SubDevice behind it.
         declaration.subdevices[7] = SubDeviceConfig::at_alias(77, 1).expect_product(0x0C47, 0x0FA0_0004);
         declaration
     };
@@ -93,7 +93,7 @@ fn subdevices_are_found_by_alias_wherever_they_are() {
     assert_eq!((world.device_of(2), world.device_of(6)), (Some(DeviceIndex(6)), Some(DeviceIndex(2))));
     world.settle();
     world.run_cycles(50);
-    // It comes back as the one that it was.
+    // It comes back as the same SubDevice.
     world.power_off(DeviceIndex(6));
     world.run_cycles(30);
     world.power_on(DeviceIndex(6));
@@ -235,7 +235,7 @@ fn objects_are_uploaded_and_downloaded_in_op_while_process_data_goes_on() {
         results.borrow_mut().push(result.map(|()| Vec::new()));
         let result = read(&mailbox, object(0x8000, 1), LIMITS, 100).await;
         results.borrow_mut().push(result);
-        // Only in PREOP may this be written.
+        // This may be written only in PREOP.
         let result = write(&mailbox, object(0x8000, 2), &[1, 0, 0, 0], LIMITS).await;
         results.borrow_mut().push(result.map(|()| Vec::new()));
     });
@@ -259,7 +259,7 @@ fn controllers_of_all_kinds_are_read_alike() {
         .map(|(eight_byte_sii, wide, sii_cache)| {
             let mut devices = descriptions(&SIXTEEN);
             for device in &mut devices {
-                // Devices of one kind have the same strings in their SII; the cache counts on it.
+                // Devices of one type have the same strings in their SII; the cache relies on it.
                 device.name = device.order_code.clone();
                 device.eight_byte_sii = eight_byte_sii;
                 if let Some(dc) = &mut device.dc {

@@ -1,5 +1,5 @@
 //! Inputs of one SubDevice that are copied to outputs of another within the cycle: across domains, during cuts, while
-//! the source is away.
+//! the source is absent.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ const FAST_OUT: usize = 2;
 const SLOW_IN: usize = 3;
 const OUT_16: usize = 4;
 
-/// Everything in one domain but the 16 inputs, whose domain has four times the period.
+/// All SubDevices in one domain except the 16 inputs, which are in a domain with four times the period.
 fn world(seed: u64) -> World {
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
     let declare = |scan: &Scan| {
@@ -29,7 +29,7 @@ fn world(seed: u64) -> World {
     };
     let network = ring(descriptions(&KINDS), options);
     let mut world = World::with(seed, network, &Options::default(), declare).expect("activation");
-    // Inputs are changed behind its back.
+    // Inputs are changed directly in the device.
     world.judge_latched(false);
     world
 }
@@ -58,7 +58,7 @@ fn inputs_become_outputs_of_another_subdevice_in_the_same_cycle_across_cuts() {
     let (out, wide) = (whole(&world, FAST_OUT), whole(&world, OUT_16));
     let rules = [
         CopyRule::new(bits(fast, 1, 6), bits(out, 2, 6)),
-        // From the slow domain into the fast one, across the border of a byte.
+        // From the slow domain into the fast one, across a byte boundary.
         CopyRule::new(bits(slow, 3, 12), bits(wide, 2, 12)),
     ];
     world.application_mut().set_copies(&rules).expect("inputs to outputs");
@@ -78,7 +78,7 @@ fn inputs_become_outputs_of_another_subdevice_in_the_same_cycle_across_cuts() {
             let fresh = data.freshness(DomainId(0), FAST_IN) == Freshness::Fresh;
             ((data.read(&fast) as u16, data.read(&slow) as u16), fresh)
         });
-        // What was read in a cycle has arrived when the next one begins.
+        // Inputs read in a cycle have reached the outputs when the next one begins.
         world.network_mut().advance_by(Duration::from_micros(300));
         if seen && !(100..110).contains(&cycle) && !(200..210).contains(&cycle) {
             assert_eq!(outputs(&world, FAST_OUT) >> 2, read.0 >> 1 & 0x3F, "cycle {cycle}");
@@ -109,7 +109,7 @@ fn outputs_hold_or_are_zero_while_their_source_is_away_and_follow_it_again() {
     assert_eq!((outputs(&world, FAST_OUT), outputs(&world, OUT_16)), (0x5A, 0xA55A));
     world.power_off(DeviceIndex(FAST_IN));
     world.power_off(DeviceIndex(SLOW_IN));
-    // One cycle within which nobody knows, and the period of the slow domain.
+    // One cycle until the loss is detected, and the period of the slow domain.
     world.run_cycles(10);
     assert_eq!((outputs(&world, FAST_OUT), outputs(&world, OUT_16)), (0x5A, 0));
     let exchange = world.application().exchange();

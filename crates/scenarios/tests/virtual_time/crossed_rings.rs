@@ -1,5 +1,5 @@
-//! Rings in which SubDevices are plugged in the wrong way round, all of them where the two interfaces are swapped: what
-//! is told of them and of their breaks (protocol 9.5, CR-12).
+//! Rings with crossed SubDevices; all are crossed if the two interfaces are swapped: reports of them and of their
+//! breaks (protocol 9.5, CR-12).
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -16,7 +16,7 @@ const KINDS: [&str; 4] = ["coupler", "digital-output-8", "servo", "digital-input
 const COUNT: usize = KINDS.len();
 const ALL: usize = (1 << COUNT) - 1;
 
-/// A ring of four, of which those in `crossed` (a bit each) are plugged in the wrong way round.
+/// A ring of four; the SubDevices in `crossed` (a bit each) have IN and OUT swapped.
 fn cables(crossed: usize) -> Vec<(Endpoint, Endpoint)> {
     let ports = |device: usize| if crossed >> device & 1 == 1 { (Port::B, Port::A) } else { (Port::A, Port::B) };
     let begin = |device: usize| if device == COUNT { REDUNDANT } else { at(device, ports(device).0) };
@@ -33,7 +33,7 @@ fn ends(cable: Cable) -> Ends {
     ends
 }
 
-/// How a cable is plugged in, with positions of the scan.
+/// Ends of a cable, with positions of the scan.
 fn plugged(world: &World, cable: (Endpoint, Endpoint)) -> Ends {
     let end = |end: Endpoint| match end {
         Endpoint::Device(device, port) => {
@@ -55,7 +55,7 @@ fn places(events: &[&Event]) -> Vec<Ends> {
     events.iter().filter_map(place).collect()
 }
 
-/// How often each crossing was told, and that the interfaces are swapped.
+/// Number of reports of each crossing, and of swapped interfaces.
 fn crossings_told(world: &World) -> (BTreeMap<Option<usize>, usize>, usize) {
     let (mut crossed, mut swapped) = (BTreeMap::new(), 0);
     for timed in world.events(world.beginning()) {
@@ -97,7 +97,7 @@ fn breaks_with_any_crossed_subdevices_have_their_place_and_are_reported_once() {
         let (told, swapped) = crossings_told(&world);
         assert!(told.values().all(|times| *times == 1), "crossed {crossed:04b}: {told:?}");
         let named: usize = told.keys().flatten().map(|device| 1 << device).sum();
-        // Each of them is named once the ring has been open; that all are is one fact.
+        // Each is reported after the ring has been open; if all are crossed, there is one report.
         let expected = if crossed == ALL { (0, 1) } else { (crossed, 0) };
         assert_eq!((named, swapped), expected, "crossed {crossed:04b}: {told:?}");
     }
@@ -125,7 +125,7 @@ fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is
     }
 }
 
-/// A ring through a random tree: any ports of junctions, branches anywhere, SubDevices the wrong way round.
+/// A ring through a random tree: any ports of junctions, branches anywhere, crossed SubDevices.
 fn random_ring(dice: &mut Dice) -> (Vec<(Endpoint, Endpoint)>, usize, usize) {
     let trunk = 2 + dice.below(4) as usize;
     let total = trunk + dice.below(4) as usize;
@@ -185,7 +185,7 @@ fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unkn
             match &places(&told)[..] {
                 [] => unknown += 1,
                 [place] if *place == truth[number] => known += 1,
-                // What was never seen there goes on from the usual port.
+                // If the port was never connected, the usual port is assumed.
                 [place] if from_start == Some(number) && nodes(place) == nodes(&truth[number]) => known += 1,
                 other => {
                     wrong.push(format!("seed {seed} {what} cable {number} {:?}: {other:?}; {cables:?}", truth[number]))

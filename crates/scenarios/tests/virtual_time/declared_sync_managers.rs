@@ -1,4 +1,4 @@
-//! SubDevices whose SyncManagers a configuration file declares (protocol 8.1): it counts before their SII.
+//! SubDevices with SyncManagers from a configuration file (protocol 8.1), which has priority over the SII.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "servo", "digital-input-8"];
-/// The one with a file of its own.
+/// The SubDevice that the file configures.
 const DRIVE: usize = 2;
 
 fn declared(index: u8, role: SyncManagerRole, start: u16, length: u16, control: u8) -> DeclaredSyncManager {
@@ -53,7 +53,7 @@ fn of_file() -> Vec<DeclaredSyncManager> {
     ]
 }
 
-/// The downloads that a file has for such a mapping: in its own order, which nobody else would choose.
+/// The downloads of a file for this mapping, in an unusual order.
 fn downloads() -> Vec<(u16, u8, Vec<u8>)> {
     let mut all = Vec::new();
     for (assignment, pdos) in [(0x1C13, inputs()), (0x1C12, outputs())] {
@@ -150,7 +150,7 @@ fn a_mapping_that_differs_from_the_sii_is_taken_from_the_file_alone() {
 // covers: 8.1, sync-managers-declared
 #[test]
 fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty() {
-    // An SII with the mailboxes of another product, and one without mailbox, PDOs and SyncManagers.
+    // An SII with the mailboxes of another product, and an SII without mailbox, PDOs and SyncManagers.
     let moved = |described: &mut DeviceDescription| {
         let mailbox = described.mailbox.as_mut().expect("a servo has one");
         mailbox.standard.receive_offset += 0x400;
@@ -177,7 +177,7 @@ fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty() {
 // covers: sync-managers-declared
 #[test]
 fn an_absent_subdevice_has_its_place_from_the_file_and_takes_it_when_it_comes() {
-    // The file was written for all of them.
+    // The file describes all of them.
     let mut main_device = MainDevice::request(Tap::new(segment(|_| ())), &Options::default());
     let all: Vec<SubDeviceInfo> = main_device.scan().expect("a scan").subdevices;
     let mut network = segment(|_| ());

@@ -1,4 +1,4 @@
-//! Frames that are dropped, doubled, corrupted and delayed, of our own and of others.
+//! Own and foreign frames that are dropped, duplicated, corrupted and delayed.
 
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ fn in_a_closed_ring_the_unprocessed_copy_is_not_missed() {
         let mark = world.mark();
         world.fault(Fault::Drop { cable: CableId(cable), direction: Some(Direction::BToA), count: 3 });
         world.run_cycles(10);
-        // The cable to the redundant link is plugged in the other way round: there the main copy is dropped.
+        // The main copy is dropped on the cable to the redundant link.
         let last = cable == SIXTEEN.len();
         assert!(world.incomplete(mark) <= usize::from(last) * 3, "cable {cable}: {}", world.incomplete(mark));
     }
@@ -57,11 +57,11 @@ fn in_a_closed_ring_the_unprocessed_copy_is_not_missed() {
 // covers: CR-04, CR-07, lost-frames
 #[test]
 fn a_frame_that_comes_back_late_or_twice_is_counted_and_never_taken_for_a_new_one() {
-    // Up to 600 ms: more than 256 frames, after which frame ids come again.
+    // Up to 600 ms: more than 256 frames, after which frame ids are reused.
     let delays_us = [100, 500, 740, 760, 990, 1_000, 1_010, 1_500, 2_000, 5_000, 127_000, 255_950, 256_000, 512_000];
     for (seed, delay_us) in (0..).zip(delays_us) {
         let mut world = World::in_op(seed, ring_of_16(FAST));
-        // Outputs and inputs of the devices that a late frame passes are those of the late frame.
+        // Devices that process a late frame take its outputs.
         world.judge_latched(false);
         for cable in [0, 7, 16] {
             for direction in [Direction::AToB, Direction::BToA] {
@@ -154,7 +154,7 @@ fn frames_of_another_main_device_are_counted_and_handed_over() {
 fn a_frame_of_ours_with_other_datagrams_than_were_sent_is_counted_as_corrupt() {
     let mut world = World::in_op(5, line(descriptions(&SIXTEEN), NetworkOptions::default()));
     world.run_cycles(3);
-    // Built as the engine builds it, but with one datagram only: same id, same Idx.
+    // Like a frame of the engine, but with one datagram only: same id, same Idx.
     let before = world.application().cyclic_counters().corrupt;
     for id in 0..=255 {
         let mut bytes = foreign(0);
@@ -167,7 +167,7 @@ fn a_frame_of_ours_with_other_datagrams_than_were_sent_is_counted_as_corrupt() {
     assert_eq!(world.judged(world.beginning()).last().map(|judged| judged.delivery), Some(Delivery::Complete));
 }
 
-/// Everything as found, slower.
+/// All SubDevices as found, with a longer cycle.
 fn slowly(scan: &Scan) -> Declaration {
     automatic(&scan.subdevices, 4 * CYCLE)
 }

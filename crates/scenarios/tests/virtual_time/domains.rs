@@ -1,4 +1,4 @@
-//! Process data in several domains, in more than one frame, with SubDevices that are not there yet.
+//! Process data in several domains, in more than one frame, with absent SubDevices.
 
 use std::time::Duration;
 
@@ -103,7 +103,7 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
     {
         let mut world = World::with(4, network, &Options::default(), declare).expect("activation");
         world.settle();
-        // The block's inputs are its outputs, which are newer by now than those that the slow domain read.
+        // The block copies outputs to inputs; its outputs are now newer than those that the slow domain read.
         world.judge_latched(false);
         let mark = world.mark();
         world.run_cycles(200);
@@ -112,7 +112,7 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
     }
 }
 
-/// Declares an analogue input of four channels whose process data is known without it.
+/// Declares an absent analogue input of four channels with known process data.
 fn optional_analog_input(position: u16) -> SubDeviceConfig {
     let channel = |channel: u16| {
         let index = 0x6000 + 0x10 * channel;
@@ -171,7 +171,7 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     });
     assert_eq!(unexpected.count(), 1);
     assert_eq!(world.network().device(DeviceIndex(15)).al_status().al_state(), Some(AlState::Init));
-    // It does not keep others from coming back.
+    // It does not prevent the return of others.
     let mark = world.mark();
     world.power_off(DeviceIndex(3));
     world.run_cycles(30);
@@ -181,8 +181,8 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
     assert_eq!(SIXTEEN.len() - 1, world.application().states().len());
 }
 
-/// The PDI holds the SyncManager of the only inputs back from the beginning (protocol 3.5): there never was another
-/// state than Zero.
+/// The PDI has disabled the SyncManager of the only inputs from the beginning (protocol 3.5): the state of the domain
+/// is always Zero.
 // covers: lost-frames
 #[test]
 fn a_domain_that_is_silent_from_the_beginning_is_told_once() {

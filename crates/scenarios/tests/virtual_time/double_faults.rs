@@ -1,9 +1,10 @@
-//! Two faults at once, within one flight of a frame or half a second apart: cables that blink, heal in one direction
-//! first, hold frames back or double them; power that fails for microseconds; states that are asked for meanwhile.
+//! Two faults at once, within one round trip of a frame or half a second apart: cables that are interrupted briefly,
+//! repaired in one direction first, delay or duplicate frames; power failures of microseconds; state requests
+//! meanwhile.
 //!
-//! The values themselves are judged here: each SubDevice stamps its inputs with its number and a count that never
-//! comes twice, so a value of another SubDevice, an older one, or halves of two are seen in the process image. Some
-//! SubDevices are alike, exchange in OP only, are slow, or have few FMMUs; there are several domains.
+//! The values themselves are checked: each SubDevice stamps its inputs with its number and a unique count, so a value
+//! of another SubDevice, an older value, or parts of two values are detected in the process image. Some SubDevices are
+//! identical, exchange in OP only, are slow, or have few FMMUs; there are several domains.
 //!
 //! `SEED=17 cargo test -p scenarios --test virtual_time double_faults::seeds -- --nocapture` runs one seed,
 //! `SEED=0..2000` many.
@@ -53,7 +54,7 @@ type Cables = Vec<(Endpoint, Endpoint)>;
 
 thread_local! { static STAMPED: Cell<u32> = const { Cell::new(0) }; }
 
-/// Inputs of the device of that number: again and again the number after it and three bytes of a count.
+/// Inputs of the device with this number: repeatedly its number plus one and three bytes of a count.
 fn stamp<const DEVICE: u8>(_now: SimTime, _outputs: &[u8], inputs: &mut [u8]) {
     let count = STAMPED.get() + 1;
     STAMPED.set(count);
@@ -108,7 +109,7 @@ fn random_wiring(dice: &mut Dice) -> (Vec<&'static str>, Cables) {
     (kinds, cables)
 }
 
-/// Devices that stamp their inputs. In one segment of four those of one kind are alike.
+/// Devices that stamp their inputs. In one of four segments devices of one type are identical.
 fn random_devices(kinds: &[&str], dice: &mut Dice) -> Vec<DeviceDescription> {
     let mut described = descriptions(kinds);
     let alike = dice.one_in(4);
@@ -139,7 +140,7 @@ fn random_devices(kinds: &[&str], dice: &mut Dice) -> Vec<DeviceDescription> {
     described
 }
 
-/// One domain, or several of other periods; one LRW, or one for each SubDevice.
+/// One domain, or several with different periods; one LRW, or one for each SubDevice.
 fn declare(scan: &Scan, dice: &mut Dice) -> Declaration {
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     if dice.one_in(3) && scan.subdevices.len() > 1 {
@@ -157,7 +158,7 @@ fn declare(scan: &Scan, dice: &mut Dice) -> Declaration {
     declaration.with_under_way(1 + dice.below(4) as u8)
 }
 
-/// What one seed has judged.
+/// Amount of checks of a seed.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     /// Stamps that were read.
@@ -174,9 +175,9 @@ struct Run {
     off: Vec<DeviceIndex>,
     /// By SubDevice: the count of the last stamp.
     counts: Vec<u32>,
-    /// By domain: the image after the last cycle in which it was judged.
+    /// By domain: the image after the last cycle in which it was evaluated.
     images: Vec<Vec<u8>>,
-    /// All are to be in OP: no other state was asked for.
+    /// All SubDevices should be in OP: no other state is requested.
     all_to_op: bool,
     stamps: u64,
 }
@@ -195,7 +196,7 @@ impl Run {
             declaration
         };
         let mut world = World::with(seed, network, &options, declare).unwrap_or_else(|it| panic!("seed {seed}: {it}"));
-        // What was latched last is judged elsewhere; here from the logs and the stamps.
+        // Latched outputs are checked elsewhere; here the logs and the stamps are used.
         world.judge_latched(false);
         world.settle();
         Run {
@@ -227,7 +228,7 @@ impl Run {
         }
     }
 
-    /// Judges all inputs of a domain after a cycle in which it was due.
+    /// Checks all inputs of a domain after a cycle in which it was due.
     fn judge(&mut self, domain: DomainId, state: DomainState) {
         let application = self.world.application();
         let exchange = application.exchange();
@@ -307,7 +308,7 @@ impl Run {
         }
     }
 
-    /// Another state of a SubDevice is asked for.
+    /// Requests another state of a SubDevice.
     fn request(&mut self) {
         let subdevice = self.dice.below(self.counts.len() as u64) as usize;
         let state = *self.dice.pick(&STATES);
@@ -316,7 +317,7 @@ impl Run {
         drop(self.world.application_mut().request_state(subdevice, state));
     }
 
-    /// All is mended, and all are to be in OP again.
+    /// Ends all faults; all SubDevices have to return to OP.
     fn mend(&mut self) {
         self.world.application_mut().links_mut().lose_per_mille(0, 0);
         self.cycles(2);
@@ -342,7 +343,7 @@ impl Run {
     }
 }
 
-/// Whether it is out now, at most two at a time: another one comes back for a third.
+/// Toggles an element; at most two are out at a time: instead of a third, another one is restored.
 fn toggle<T: Copy + PartialEq>(out: &mut Vec<T>, it: T) -> (T, bool) {
     match out.iter().position(|other| *other == it) {
         Some(place) => (out.remove(place), false),
@@ -354,8 +355,8 @@ fn toggle<T: Copy + PartialEq>(out: &mut Vec<T>, it: T) -> (T, bool) {
     }
 }
 
-/// The count of a fresh value that was stamped, where there is room for one. The stamp is that of a device which has
-/// the station address of the SubDevice; inputs are zero before the first stamp.
+/// The count of a fresh stamped value, if the value is large enough. The stamp must be that of a device with the
+/// station address of the SubDevice; inputs are zero before the first stamp.
 fn stamp_of(world: &World, subdevice: usize, value: &[u8]) -> Option<u32> {
     let station = world.application().engine().stations()[subdevice].0;
     let powered = |device: &usize| world.network().device(DeviceIndex(*device)).controller.is_powered();

@@ -1,4 +1,5 @@
-//! The EEPROM is EtherCAT's again however the way to PREOP ends, for which the PDI gets it (protocol 3.8, 5.6).
+//! The EEPROM is assigned to the PDI for the transition to PREOP, and returned to EtherCAT after every result of it
+//! (protocol 3.8, 5.6).
 
 use std::time::Duration;
 
@@ -64,7 +65,7 @@ fn a_subdevice_lost_on_the_way_to_preop_gives_the_eeprom_back_on_return() {
 
 #[test]
 fn a_read_command_whose_answer_comes_too_late_does_not_end_the_scan() {
-    // Late by more than a frame is waited for, while the EEPROM is busy for longer than that.
+    // Delayed beyond the frame timeout, while the EEPROM is busy even longer.
     let moments = (15_000..45_000).step_by(1_000).flat_map(|at| [(at, Direction::AToB), (at, Direction::BToA)]);
     for (at_us, direction) in moments {
         let text = "[[device]]\ntype = \"digital-output-8\"\nsii_busy_us = 8000\n";

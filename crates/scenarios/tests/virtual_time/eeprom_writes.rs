@@ -73,7 +73,7 @@ fn what_is_no_image_is_refused_and_written_with_force() {
     assert_eq!(image(&world), before, "nothing was written");
     assert_eq!(write(&mut world, &wrong, true).map(|done| done.written), Ok(1));
     assert_eq!(image(&world), wrong);
-    // The controller refuses to load that, and says why.
+    // The controller refuses to load this, and reports the reason.
     let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
     let error = sii(world.finish(LIMIT, reload).expect_err("the checksum is wrong"));
     assert!(matches!(error, SiiProgramError::NotLoaded { .. }), "{error}");
@@ -124,7 +124,7 @@ fn an_alias_has_its_checksum_and_counts_from_the_next_start() {
         let work = world.application_mut().engine_mut().start_alias_write(DEVICE.0, 0x0ABC, force);
         world.finish(LIMIT, work)
     };
-    // The PDI has it, and gets it back.
+    // The PDI has the EEPROM, and gets it back.
     let to_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![1]);
     assert_eq!(world.finish(LIMIT, to_pdi), Ok(()));
     assert_eq!(alias(&mut world, false), Ok(SiiWritten { written: 2, unchanged: 6 }));
@@ -144,7 +144,7 @@ fn an_alias_has_its_checksum_and_counts_from_the_next_start() {
     world.run_cycles(50);
     assert_eq!(register(&world, map::STATION_ALIAS), [0xBC, 0x0A]);
     world.settle();
-    // One that is wrong is not made right by accident.
+    // A wrong checksum is not corrected as a side effect.
     world.fault(Fault::CorruptSii { device: DEVICE, offset: 0x0E, mask: 0x55 });
     let error = sii(alias(&mut world, false).expect_err("the checksum was wrong before"));
     assert!(matches!(error, SiiProgramError::Checksum { .. }), "{error}");

@@ -1,5 +1,5 @@
-//! Networks from ENIs, end to end: the file is read, a segment is made of it, it comes to OP as the file says, and
-//! exchanges data through the variables of the file (protocol 8).
+//! Networks from ENIs, end to end: the file is read, its segment is simulated, comes to OP as described in the file,
+//! and exchanges data through the variables of the file (protocol 8).
 
 mod cables;
 mod variants;
@@ -21,15 +21,15 @@ use ringcat_wire::al::{AlState, AlStatus};
 use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, line};
 
-/// A machine of our own: packed outputs, a copy, a drive with a mapping of its own and SYNC0, one LRW for all.
+/// A RingCAT example: packed outputs, a copy, a drive with its own mapping and SYNC0, one LRW for all.
 const MACHINE: &[u8] = include_bytes!("../../../ringcat/examples/machine.eni.xml");
 const LAMPS: usize = 1;
 const VALVES: usize = 2;
 const BUTTONS: usize = 3;
 const DRIVE: usize = 4;
-/// The output that another SubDevice's input is copied to.
+/// The output to which another SubDevice's input is copied.
 const COPIED: &str = "Valves.Channel 4";
-/// Files of tools, with the SubDevices that they have.
+/// Files of tools, with their numbers of SubDevices.
 const REAL: [(&str, usize); 5] = [
     ("twincat_mega_ek1100_el2008_el4002_el1809.xml", 4),
     ("rocos_eni.xml", 1),
@@ -51,7 +51,7 @@ fn machine() -> EniFile {
     EniFile::from_bytes(MACHINE).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A real file, where it is there.
+/// A real file, if present.
 fn real(name: &str) -> Option<EniFile> {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni").join(name);
     if !path.exists() {
@@ -73,7 +73,7 @@ fn activate_on(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant
     Ok(plant)
 }
 
-/// Activates a file on a network, whoever is there.
+/// Activates a file on a network with any SubDevices.
 fn start(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let found = main_device.scan()?.subdevices;
@@ -120,7 +120,7 @@ impl Plant {
         self.application.exchange_mut().status(DomainId(0)).state == DomainState::Complete
     }
 
-    /// Everything in OP, with all clocks locked where there are any.
+    /// All SubDevices in OP, with all clocks locked.
     fn settle(&mut self) {
         let until = self.application.now() + Duration::from_secs(30);
         let has_clocks = self.file.configuration.declaration.clocks.is_some();
@@ -139,7 +139,7 @@ impl Plant {
         assert_eq!(failed, None);
     }
 
-    /// Where a variable lies in its SubDevice's process data, from the file alone.
+    /// The place of a variable in its SubDevice's process data, from the file alone.
     fn place(&self, variable: usize) -> Option<(usize, Direction, u32, u32)> {
         let variable = &self.image.variables()[variable];
         let subdevice = variable.subdevice?;
@@ -155,7 +155,7 @@ impl Plant {
         None
     }
 
-    /// Sets all output variables at random, and compares all variables with what the devices have. Returns how many.
+    /// Sets all output variables at random, and compares all variables with the devices. Returns their number.
     fn compare(&mut self, dice: &mut Dice) -> [usize; 2] {
         for number in 0..self.image.variables().len() {
             let variable = self.image.variables()[number].clone();
@@ -200,7 +200,7 @@ fn files_of_tools_come_to_op_and_exchange_data_through_their_variables() {
     }
 }
 
-/// Whatever files there are, beside the ones above: `sim --eni` and `run --eni` of each, as one program.
+/// All present files, besides those above: `sim --eni` and `run --eni` of each, as one program.
 // covers: eni-run
 #[test]
 fn every_file_there_is_comes_to_op_with_complete_working_counters_or_says_why_not() {
@@ -224,7 +224,7 @@ fn every_file_there_is_comes_to_op_with_complete_working_counters_or_says_why_no
                 complete += 1;
                 assert!(wkc > 0, "{name}: something is exchanged");
             }
-            // A reason names the place in the file, or the SubDevice and what it lacks.
+            // A reason names the place in the file, or the SubDevice and its fault.
             Err(reason) => {
                 let is_named = ["line ", "this is ", "SubDevice "].iter().any(|mark| reason.contains(mark));
                 assert!(is_named, "{name}: {reason}");
@@ -268,7 +268,7 @@ fn packed_bits_copies_and_a_mapping_of_a_file_work_on_line_and_ring() {
         plant.settle();
         let mut dice = Dice::new(3);
         for _ in 0..10 {
-            // The copy has the last word about one bit.
+            // The copy overrides one bit.
             let copied = plant.image.variable("Buttons.Channel 4").cloned().expect("it is there");
             let target = plant.image.variable(COPIED).cloned().expect("it is there");
             let pressed = dice.roll() % 2;
@@ -298,7 +298,7 @@ fn packed_bits_copies_and_a_mapping_of_a_file_work_on_line_and_ring() {
     }
 }
 
-/// A drive that knows nothing of the file's mapping but what the file tells it (SOEM#958).
+/// A drive with another default mapping than the file's (SOEM#958).
 // covers: 8, eni-run
 #[test]
 fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone() {
@@ -332,12 +332,12 @@ fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone() {
 fn an_lrw_of_a_file_is_refused_on_two_links_by_name_unless_it_may_be_split() {
     let files = std::iter::once(("machine", Some(machine()), vec![1, 2, 3, 4]));
     let real = [("rocos_bcr_eni.xml", vec![0, 1, 2]), ("rocos_eni7.xml", (0..7).collect())];
-    let files = files.chain(real.into_iter().map(|(name, who)| (name, self::real(name), who)));
-    for (name, file, who) in files {
+    let files = files.chain(real.into_iter().map(|(name, subdevices)| (name, self::real(name), subdevices)));
+    for (name, file, subdevices) in files {
         let Some(file) = file else { continue };
         let Err(Error::Activate(error)) = activate(file.clone(), true, false) else { panic!("{name} was taken") };
         let ActivateError::NamedLrwOnTwoLinks(lrw) = &error else { panic!("{name}: {error}") };
-        assert_eq!(lrw.subdevices, who, "{name}");
+        assert_eq!(lrw.subdevices, subdevices, "{name}");
         assert!(!lrw.name.is_empty() && error.to_string().contains(&lrw.name), "{name}: {error}");
         let mut plant = activate(file, true, true).expect("split it is allowed");
         plant.settle();
@@ -395,7 +395,7 @@ fn variables_tell_how_old_they_are_by_the_subdevice_that_they_come_from() {
     plant.settle();
 }
 
-/// Written by hand, with two outputs' worth of process data for a SubDevice whose SII has eight bits.
+/// Written by hand, with more output bits than the eight bits of the SubDevice's SII.
 const BY_HAND: &str = r#"<EtherCATConfig><Config>
 <Slave><Info><Name>Outputs</Name><PhysAddr>1001</PhysAddr>
 <VendorId>3143</VendorId><ProductCode>131596296</ProductCode></Info>
@@ -423,7 +423,7 @@ fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
     assert_eq!(text, "SubDevice 0: its outputs end at bit 8 of the process image, which has 0");
 }
 
-/// Whatever numbers a file has, a segment is made and comes up or not, and an error says why.
+/// With any numbers in a file, the segment starts or an error states the reason.
 // covers: eni-run
 #[test]
 fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
@@ -471,7 +471,7 @@ fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
     assert!(refused > 0 && started > 0);
 }
 
-/// Where numbers stand in the text of elements.
+/// Ranges of numbers in the text of elements.
 fn numbers(text: &str) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for (at, _) in text.match_indices('>') {

@@ -1,5 +1,5 @@
-//! Ethernet through mailboxes: an IP stack at the host's end and one behind the SubDevice, frames beside every other
-//! protocol, losses, SubDevices that leave and return.
+//! Ethernet through mailboxes: IP stacks on the host and behind the SubDevice, frames beside every other protocol,
+//! losses, SubDevices that leave and return.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -59,7 +59,7 @@ fn start_download(
     let mailbox = world.mailbox(subdevice);
     let bus = mailbox.bus().clone();
     world.start(async move {
-        let port = EthernetPort::open(&mailbox).expect("nobody else has it");
+        let port = EthernetPort::open(&mailbox).expect("the port is free");
         let result = download(bus, &port, ADDRESSES, bytes, Duration::from_secs(30)).await;
         (result, port.status().counters)
     })
@@ -152,7 +152,7 @@ fn cuts_and_lost_mail_lose_no_frame() {
 fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
     let mut world = world(4, 256, EoeEnd::Loop);
     let mailbox = world.mailbox(TERMINAL);
-    let port = EthernetPort::open(&mailbox).expect("nobody else has it");
+    let port = EthernetPort::open(&mailbox).expect("the port is free");
     assert!(EthernetPort::open(&mailbox).is_none(), "there is one port");
     let frame: Vec<u8> = (0..1514u32).map(|at| (at % 251) as u8).collect();
     assert!(port.is_up());
@@ -174,7 +174,7 @@ fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
     world.run_cycles(50);
     let back = port.pop_frame().expect("it came back");
     assert_eq!((back.bytes == frame, back.time_ns, port.pop_frame()), (true, None, None));
-    // Without a port, fragments are mail that nobody asked for; with another one they are frames again.
+    // Without a port, fragments are unsolicited mail; with a new port they are frames again.
     drop(port);
     let port = EthernetPort::open(&mailbox).expect("it is free again");
     port.send(&frame).expect("it is up");
@@ -187,7 +187,7 @@ fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
 #[test]
 fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
     let mut world = world(5, 256, EoeEnd::Loop);
-    let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("nobody else has it");
+    let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("the port is free");
     world.hang(DeviceIndex(TERMINAL), true);
     let mut taken = 0;
     for _ in 0..400 {
@@ -195,7 +195,7 @@ fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
         world.cycle();
     }
     assert!(taken <= QUEUE + 2, "{taken} frames");
-    // After its limit a frame is dropped, and the next one has its turn.
+    // After its time limit a frame is dropped, and the next one is sent.
     world.run_cycles(800);
     let counters = port.status().counters;
     assert!((1..=4).contains(&counters.tx_dropped), "{counters:?}");
@@ -252,7 +252,7 @@ fn addresses_and_filter_are_set_and_told_beside_frames() {
 #[test]
 fn a_time_stamp_comes_with_the_number_of_its_frame() {
     let mut world = world(7, 128, EoeEnd::Nothing);
-    let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("nobody else has it");
+    let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("the port is free");
     let frame = vec![0x11; 300];
     let numbers: Vec<u8> = (0..3).map(|_| port.send_with_time(&frame).expect("there is room")).collect();
     port.send(&frame).expect("there is room");
@@ -281,7 +281,7 @@ fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told() {
         let own = world.mailbox(TERMINAL);
         let told = world.run(async move { eoe::read_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
         assert_eq!((told.address, &told.name), (settings.address, &settings.name));
-        // Without power it forgets them.
+        // It loses them without power.
         world.power_off(DeviceIndex(TERMINAL));
         world.run_cycles(20);
         world.power_on(DeviceIndex(TERMINAL));

@@ -1,5 +1,5 @@
-//! Short runs of random segments under random faults, each from its seed: nothing panics, nothing hangs, and when the
-//! faults end, everything is back in OP and complete.
+//! Short runs of random segments under random faults, each from its seed: nothing panics, nothing hangs, and after the
+//! end of the faults all SubDevices are in OP and all domains complete.
 //!
 //! `SEED=17 cargo test -p scenarios --test virtual_time explorer::environment -- --nocapture` runs one seed,
 //! `SEED=1000..2000` many.
@@ -29,11 +29,10 @@ const KINDS: [&str; 10] = [
     "junction",
     "block",
 ];
-/// Time from the end of the faults until all is well. A SubDevice that could not be configured is tried again after
-/// pauses of up to 5 s.
+/// Time limit of the recovery. The configuration of a SubDevice is retried after pauses of up to 5 s.
 const RECOVERY: Duration = Duration::from_secs(12);
 
-/// What is broken at the moment.
+/// Active faults.
 #[derive(Default)]
 struct Broken {
     cut: Vec<CableId>,
@@ -70,7 +69,7 @@ fn toggled<T: Copy + PartialEq>(list: &mut Vec<T>, what: T, most: usize) -> Opti
     room.then_some(true)
 }
 
-/// Something else goes wrong, or is put right again.
+/// Starts or ends another fault.
 fn any_fault(dice: &mut Dice, cables: usize, devices: usize, broken: &mut Broken) -> Fault {
     let cable = CableId(dice.below(cables as u64) as usize);
     let device = DeviceIndex(dice.below(devices as u64) as usize);
@@ -92,7 +91,7 @@ fn any_fault(dice: &mut Dice, cables: usize, devices: usize, broken: &mut Broken
     fault.unwrap_or_else(|| frame_fault(dice, cables))
 }
 
-/// Everything is put right.
+/// Ends all faults.
 fn mend(world: &mut World, broken: Broken) {
     let cables = world.network().cables().len();
     for cable in (0..cables).map(CableId) {
@@ -131,7 +130,7 @@ fn run(seed: u64) {
     let options = Options::default().with_sii_cache(!dice.one_in(2));
     let mut world = World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE))
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    // Late and doubled frames leave their own traces in the devices.
+    // Late and duplicated frames change the devices.
     world.judge_latched(false);
     let (cables, devices) = (world.network().cables().len(), world.network().devices().len());
     let mut broken = Broken::default();
@@ -148,8 +147,8 @@ fn run(seed: u64) {
     });
     let mistaken: Vec<usize> =
         (0..devices).filter(|device| world.station_of(*device) != 0x1001 + *device as u16).collect();
-    assert_eq!(mistaken, [], "each is who it was");
-    // Frames that were delayed for long are still to come.
+    assert_eq!(mistaken, [], "each SubDevice has its former identity");
+    // Long delayed frames are still outstanding.
     world.run_cycles(500);
     let mark = world.mark();
     world.judge_latched(true);

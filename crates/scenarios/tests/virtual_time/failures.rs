@@ -1,4 +1,4 @@
-//! What goes wrong with a SubDevice, its application or the whole segment, and how it is said and mended.
+//! Failures of a SubDevice, its application or the whole segment, their reports and the recovery.
 
 use std::time::Duration;
 
@@ -47,8 +47,8 @@ fn an_application_that_stalls_beyond_the_watchdog_finds_all_back_in_op() {
         world.run_cycles(20);
         for subdevice in watched {
             let fell = |event: &Event| {
-                matches!(event, Event::StateError { subdevice: who, requested: None, code, .. }
-                    if *who == subdevice && *code == AlStatusCode::SYNC_MANAGER_WATCHDOG)
+                matches!(event, Event::StateError { subdevice: fallen, requested: None, code, .. }
+                    if *fallen == subdevice && *code == AlStatusCode::SYNC_MANAGER_WATCHDOG)
             };
             assert!(world.saw(mark, fell), "{subdevice} is named with its code");
         }
@@ -98,7 +98,7 @@ fn an_application_of_a_subdevice_that_hangs_in_op_costs_nobody_else_anything() {
     assert_eq!(world.incomplete(mark), 0);
 }
 
-/// Everything as found, with short time limits.
+/// All SubDevices as found, with short time limits.
 fn impatient(scan: &Scan) -> Declaration {
     let short = Duration::from_millis(40);
     let timeouts = Timeouts { preop: short, safeop_op: short, back_to_init: short, sdo: short, ..Timeouts::default() };
@@ -159,7 +159,7 @@ fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
     world.run_cycles(3_000);
     let states = world.application().states();
     assert_eq!(states.iter().filter(|state| **state == SubDeviceState::Settled(AlState::Op)).count(), 15);
-    // The pause between attempts grows, so that nobody is flooded with events.
+    // The pause between attempts grows, which limits the number of events.
     let errors = troubles(world.events(world.beginning())).len();
     assert!((3..12).contains(&errors), "{errors} events");
     let last = world.judged(world.beginning()).last().expect("cycles went by");
@@ -169,7 +169,7 @@ fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
 // covers: refused-states
 #[test]
 fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
-    // Byte 8 is that of the vendor in word 8, byte 14 the checksum (protocol 4.1).
+    // Byte 16 is the first of the vendor id in word 8, byte 14 the checksum (protocol 4.1).
     let mut network = ring_of_16(FAST);
     network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
     network.apply(Fault::CorruptSii { device: DeviceIndex(5), offset: 16, mask: 0x80 });
@@ -178,7 +178,7 @@ fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
         declaration.subdevices[5] = declaration.subdevices[5].clone().expect_product(0x0C47, 0x03F0_0010);
         declaration
     };
-    let failed = World::with(5, network, &Options::default(), declare).expect_err("the vendor is another one");
+    let failed = World::with(5, network, &Options::default(), declare).expect_err("the vendor id differs");
     let text = failed.to_string();
     assert!(text.contains("expected vendor id 0x00000c47, got 0x00000cc7"), "{text}");
 }

@@ -18,7 +18,7 @@ use scenarios::world::{CYCLE, World};
 
 const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
 const BUDGET: usize = 4_000;
-/// SubDevices with objects; behind them one with files.
+/// SubDevices with objects, followed by one with files.
 const DRIVES: usize = 50;
 const FILES: usize = DRIVES + 1;
 const CYCLES: u64 = 250;
@@ -43,13 +43,13 @@ async fn read_on(mailbox: Mailbox, count: Rc<Cell<u32>>) {
     }
 }
 
-/// Answered SDOs per drive, each asking without end, and the most bytes of the acyclic half in a cycle.
+/// Completed SDOs per drive with continuous requests, and the maximum bytes of the acyclic half in a cycle.
 fn answered(world: &mut World) -> (Vec<u32>, u64) {
     let counts: Vec<Rc<Cell<u32>>> = (0..DRIVES).map(|_| Rc::default()).collect();
     let drives: Vec<_> = (1..=DRIVES).map(|drive| world.mailbox(drive)).collect();
     let work: Vec<_> =
         drives.into_iter().zip(&counts).map(|(mailbox, count)| world.start(read_on(mailbox, count.clone()))).collect();
-    // Everybody has begun.
+    // All have begun.
     world.run_cycles(30);
     counts.iter().for_each(|count| count.set(0));
     let mut most = 0;
@@ -69,8 +69,8 @@ fn a_long_file_and_a_flood_leave_fifty_others_their_share_of_the_budget() {
     let (alone, most) = answered(&mut world);
     assert!(most <= BUDGET as u64, "{most} bytes in a cycle");
     let least = *alone.iter().min().expect("fifty");
-    assert!(least as usize * DRIVES * 10 >= alone.iter().sum::<u32>() as usize * 9, "all ask for the same: {alone:?}");
-    // More is asked for than the budget has room for.
+    assert!(least as usize * DRIVES * 10 >= alone.iter().sum::<u32>() as usize * 9, "equal requests: {alone:?}");
+    // The requests exceed the budget.
     assert!(least >= 20 && most > BUDGET as u64 * 9 / 10, "{least} answers, {most} bytes in a cycle");
     let mailbox = world.mailbox(FILES);
     let file = world.start(async move {
@@ -93,8 +93,8 @@ fn a_long_file_and_a_flood_leave_fifty_others_their_share_of_the_budget() {
     let [fewest, all, all_alone] =
         [*beside.iter().min().expect("fifty"), beside.iter().sum(), alone.iter().sum::<u32>()];
     println!("{all_alone} SDOs alone, {all} beside a file and a flood; at least {least} and {fewest} per drive");
-    // Each drive would have 50/52 of what it had alone if it always had something waiting. While all drives wait for
-    // answers, what is left of the budget is not left unused.
+    // Each drive would keep 50/52 of its throughput if it always had a datagram waiting. While all drives wait for
+    // responses, the others use the rest of the budget.
     assert!(fewest * 10 >= least * 8 && all * 100 >= all_alone * 84, "{alone:?} {beside:?}");
     drop((file, flood));
     assert!(world.all_in_op());

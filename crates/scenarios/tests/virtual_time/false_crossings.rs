@@ -1,5 +1,5 @@
-//! Cables that are cut and healed within milliseconds while frames get lost: in a ring no line is said to be crossed
-//! that is not, and one that is is told (protocol 9.5).
+//! Cables that are cut and repaired within milliseconds during frame loss: no false crossed line is reported in a ring,
+//! and a real one is reported (protocol 9.5).
 //!
 //! `SEED=0..2000 cargo test -p scenarios --test virtual_time false_crossings::seeds -- --nocapture` runs many.
 
@@ -20,20 +20,20 @@ use super::explorer::from_environment;
 
 const KINDS: [&str; 6] = ["coupler", "digital-input-8", "digital-output-8", "servo", "junction", "emulated-output-8"];
 
-/// What is done to the ring.
+/// Faults of the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Course {
     /// Cuts and losses in OP.
     InOp,
-    /// The same, and the redundant link is taken down for looks at crossed lines.
+    /// The same, with enhanced detection that takes the redundant link down.
     Enhanced,
     /// Cuts and losses while the segment is scanned.
     Scan,
-    /// As in OP; one SubDevice is plugged in the wrong way round.
+    /// As in OP, with one crossed SubDevice.
     Crossed,
 }
 
-/// Single frames are lost somewhere within the next millisecond, in one of so many.
+/// Single frames are lost within the next millisecond, with a probability of one in `n`.
 fn lose_frames(dice: &mut Dice, cables: usize, one_in: u64) -> Option<(Duration, Fault)> {
     dice.one_in(one_in).then(|| {
         let cable = CableId(dice.below(cables as u64) as usize);
@@ -51,7 +51,7 @@ fn cut_and_heal(dice: &mut Dice, cables: usize) -> [(Duration, Fault); 2] {
     [(begin, Fault::Cut(cable)), (end, Fault::Heal(cable))]
 }
 
-/// A ring of these, of which one may be plugged in the wrong way round.
+/// A ring of these kinds, with at most one crossed SubDevice.
 fn segment(kinds: &[&str], crossed: Option<usize>, options: NetworkOptions) -> Network {
     let ports = |device: usize| if crossed == Some(device) { [Port::B, Port::A] } else { [Port::A, Port::B] };
     let builder = devices(descriptions(kinds)).into_iter().fold(SegmentBuilder::new(), SegmentBuilder::device);
@@ -61,7 +61,7 @@ fn segment(kinds: &[&str], crossed: Option<usize>, options: NetworkOptions) -> N
     cabled.options(options).build().expect("a ring")
 }
 
-/// What was said that is not true, and what is true and was not said.
+/// False and missing reports.
 fn run(seed: u64, course: Course) -> Vec<String> {
     let mut dice = Dice::new(seed);
     let kinds: Vec<&str> = (0..3 + dice.below(8)).map(|_| *dice.pick(&KINDS)).collect();
@@ -86,7 +86,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
     let options = Options::default().with_enhanced_line_crossed(course == Course::Enhanced);
     let mut world =
         World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("activation");
-    // Copies that are lost leave their own traces in the devices; what is fresh is the matter of others.
+    // Lost copies change the devices; freshness is checked in other scenarios.
     world.judge_latched(false);
     if course == Course::Scan {
         world.run_cycles(80);

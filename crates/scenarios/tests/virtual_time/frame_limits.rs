@@ -1,5 +1,5 @@
-//! Segments whose frames may hold fewer datagrams than fit, as behind some gateways and with other simulators: the
-//! MainDevice finds out and says what to set, and with that set nothing else is different.
+//! Segments with a limit of datagrams per frame, as behind some gateways and with other simulators: the MainDevice
+//! detects it and reports the option to set, and with this option all else is as without a limit.
 
 use std::time::Duration;
 
@@ -132,7 +132,7 @@ fn with_the_limit_set_no_frame_holds_more_and_all_else_is_as_without() {
     }
 }
 
-/// Everything that makes cyclic frames hold many datagrams.
+/// Settings that give cyclic frames many datagrams.
 fn busy(scan: &Scan) -> Declaration {
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     declaration.lrw = LrwPolicy::PerSubDevice;
@@ -172,7 +172,7 @@ fn subdevices_that_join_and_are_too_many_for_a_frame_are_explained_once() {
             declaration
         };
         let mut world = World::with(3, network, &Options::default(), declare).expect("three are there");
-        // Process data of those that are not there has its datagrams already.
+        // Process data of absent SubDevices has its datagrams already.
         world.run_cycles(2_500);
         let limits = |world: &World| {
             let events = world.events(world.beginning()).iter();
@@ -192,7 +192,7 @@ fn subdevices_that_join_and_are_too_many_for_a_frame_are_explained_once() {
     }
 }
 
-/// Scans a ring in which frames get lost and a cable comes and goes.
+/// Scans a ring with frame loss and a cable that is cut and repaired.
 fn disturbed(seed: u64) -> Option<String> {
     let mut dice = Dice::new(seed);
     let count = 3 + dice.below(30) as usize;

@@ -1,7 +1,7 @@
-//! What counts as fresh was put into this very frame by that SubDevice, whatever is cut, healed, lost or without power.
+//! Fresh inputs were written into this frame by their SubDevice, with any cuts, repairs, losses and power failures.
 //!
-//! Every world judges that from the logs of the devices (`scenarios::truth`); here are segments and faults that are
-//! made to confuse a sum of working counters.
+//! Every world checks this with the logs of the devices (`scenarios::truth`); these segments and faults are designed to
+//! confuse a sum of working counters.
 //!
 //! `SEED=17 cargo test -p scenarios --test virtual_time freshness::seeds -- --nocapture` runs one seed,
 //! `SEED=0..10000` many.
@@ -54,8 +54,8 @@ fn junctions() -> Options {
     Options::default().with_junctions(JunctionMode::Automatic)
 }
 
-/// A ring behind a junction that breaks at one cable while the break at another is healed: the sum of the working
-/// counters is the one that was expected before, from other SubDevices.
+/// A ring behind a junction that breaks at one cable while the break at another is repaired: the sum of the working
+/// counters is as expected before, but from other SubDevices.
 // covers: freshness
 #[test]
 fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
@@ -81,11 +81,11 @@ fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
         |device: usize| (0..4).find(|it| world.device_of(*it) == Some(DeviceIndex(device))).expect("it was scanned");
     assert_eq!(freshness[of(0)], Freshness::Fresh);
     assert_ne!(freshness[of(2)], Freshness::Fresh, "it is not there");
-    assert_eq!(exchange.image(DOMAIN), [0xAA; 3], "the absent one keeps its last value");
-    assert_eq!(freshness[of(3)], Freshness::Fresh, "it is there again and says so in this frame");
+    assert_eq!(exchange.image(DOMAIN), [0xAA; 3], "the absent SubDevice keeps its last value");
+    assert_eq!(freshness[of(3)], Freshness::Fresh, "it is back, with evidence in this frame");
 }
 
-/// Protocol 5.2: FMMUs are set before SAFEOP is asked for. Some controllers look at them on the way there only.
+/// Protocol 5.2: FMMUs are set before SAFEOP is requested. Some controllers read them only during this transition.
 // covers: freshness
 #[test]
 fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data() {
@@ -103,7 +103,7 @@ fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data(
     assert!(world.all_in_op());
 }
 
-/// One after the other joins again, each with its FMMUs set long before it is in SAFEOP: the others stay fresh in each
+/// SubDevices return one after the other, with FMMUs set long before SAFEOP: inputs of the others stay fresh in each
 /// cycle.
 // covers: freshness
 #[test]
@@ -128,8 +128,8 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
     }
 }
 
-/// A SubDevice is out of reach while the MainDevice starts anew, and keeps its station address, FMMUs and state. In the
-/// new session another one has this address; it loses its power as the old one comes into reach again.
+/// A SubDevice is unreachable while the MainDevice restarts, and keeps its station address, FMMUs and state. In the new
+/// session another SubDevice has this address; it loses its power when the old one becomes reachable again.
 // covers: freshness
 #[test]
 fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
@@ -146,7 +146,7 @@ fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
     (0..1_000).for_each(|_| application.cycle(|_| ()));
     assert!(application.all_settled());
     let named = |device: usize| scan.subdevices.iter().position(|it| it.name.ends_with(&device.to_string()));
-    // In the order of frames the branch at port D comes first: the one there has the second address.
+    // In processing order the branch at port D is first: the SubDevice there has the second address.
     assert_eq!((named(2), named(1)), (Some(1), Some(2)));
     application.links_mut().network_mut().cut(CableId(2));
     let mut main_device = application.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1)).expect("it stops");
@@ -161,14 +161,14 @@ fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
     for cycle in 0..5_000 {
         application.cycle(|_| ());
         let exchange = application.exchange();
-        // What left before may still come.
+        // Frames sent before may still arrive.
         assert!(cycle < 2 || exchange.freshness(DOMAIN, 1) != Freshness::Fresh, "cycle {cycle}");
         assert_eq!(exchange.image(DOMAIN), [0xA0, 0xA0, 0xA1, 0xA1], "cycle {cycle}");
     }
 }
 
-/// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte is read from then on, though nothing has written
-/// it yet.
+/// FMMUs and SyncManagers are set before SAFEOP: a buffer of one byte can be read from then on, although it has not
+/// been written yet.
 // covers: freshness
 #[test]
 fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
@@ -198,7 +198,7 @@ fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
     }
 }
 
-/// One link, LRW: inputs come, outputs are not taken.
+/// One link, LRW: inputs are delivered, outputs are not accepted.
 // covers: freshness
 #[test]
 fn a_domain_is_not_complete_while_outputs_are_not_taken() {
@@ -223,7 +223,7 @@ fn a_domain_is_not_complete_while_outputs_are_not_taken() {
     }
 }
 
-/// One with outputs is on its way from INIT, as was asked for, while another one loses its power: the sum is the same.
+/// A SubDevice with outputs leaves INIT on request while another one loses its power: the sum is unchanged.
 // covers: freshness
 #[test]
 fn outputs_that_one_takes_on_its_way_do_not_stand_for_those_of_one_without_power() {
@@ -258,7 +258,7 @@ fn random_tree(dice: &mut Dice) -> (usize, Vec<(Endpoint, Endpoint)>) {
         let parent = if device == 0 {
             MAIN
         } else if dice.one_in(2) {
-            // Lines are what is built.
+            // Only lines are built.
             let last = free.iter().position(|(parent, _)| *parent + 1 == device).unwrap_or(0);
             let (parent, port) = free.remove(last);
             at(parent, port)
@@ -303,9 +303,9 @@ fn random_segment(dice: &mut Dice) -> (Network, usize) {
     };
     let mut described = with_four_ports(&kinds);
     for (number, description) in described.iter_mut().enumerate() {
-        // Which of two alike came back is another matter.
+        // The identity of two identical SubDevices is checked elsewhere.
         description.identity.product_code += 0x1000 * number as u32;
-        // Few FMMUs leave none to spare.
+        // With few FMMUs none is free.
         description.controller_fmmus = *dice.pick(&[None, None, Some(3), Some(2)]);
     }
     (wired_with(described, &cables), cables.len())
@@ -320,7 +320,7 @@ struct Run {
 }
 
 impl Run {
-    /// A cable is cut or healed, a device loses its power or gets it back: two of each at most at a time.
+    /// Cuts or repairs a cable, or switches a device off or on: at most two of each at a time.
     fn fault(&mut self) {
         let dice = &mut self.dice;
         let delay = Duration::from_nanos(dice.below(1_000_000));
@@ -348,7 +348,7 @@ impl Run {
         self.world.fault_in(delay, fault);
     }
 
-    /// All that is broken is mended.
+    /// Ends all faults.
     fn mend(&mut self) {
         self.world.run_cycles(2);
         (0..self.cables).for_each(|cable| self.world.heal(CableId(cable)));
@@ -357,7 +357,7 @@ impl Run {
     }
 }
 
-/// Runs a seed; areas of process data that were proven.
+/// Runs a seed; returns the number of proven areas of process data.
 fn run(seed: u64) -> u64 {
     let mut dice = Dice::new(seed);
     let (network, cables) = random_segment(&mut dice);
@@ -365,7 +365,7 @@ fn run(seed: u64) -> u64 {
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
     let mut world =
         World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    // What was latched last is judged elsewhere; here from the logs alone.
+    // Latched outputs are checked elsewhere; here only the logs are used.
     world.judge_latched(false);
     world.settle();
     let lost = *dice.pick(&[0, 0, 0, 1, 10, 50, 200]);

@@ -1,6 +1,6 @@
-//! Hot connect groups: SubDevices in a row that come and go, at any place, while the others exchange process data.
+//! Hot connect groups: rows of SubDevices that join and leave at any place while the others exchange process data.
 //!
-//! `SEED=0..300 cargo test -p scenarios --test virtual_time hot_connect::seeds -- --nocapture` runs many random ones.
+//! `SEED=0..300 cargo test -p scenarios --test virtual_time hot_connect::seeds -- --nocapture` runs many random groups.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -26,17 +26,17 @@ use scenarios::world::{CYCLE, Mark, World};
 pub const LIMIT: Duration = Duration::from_secs(5);
 /// Alias of the group's head.
 pub const TOOL: u16 = 5;
-/// Those that are always there, and those of the group.
+/// Permanent SubDevices, and those of the group.
 const BASE: [&str; 4] = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16"];
 const GROUP: [&str; 2] = ["analog-input-4", "digital-output-16"];
 
-/// What a scan says about devices of these kinds.
+/// Scan results of devices of these kinds.
 pub fn infos(kinds: &[&str]) -> Vec<SubDeviceInfo> {
     let links = Tap::new(line(descriptions(kinds), NetworkOptions::default()));
     MainDevice::request(links, &Options::default()).scan().expect("a scan").subdevices
 }
 
-/// The two of the group, the head with an alias.
+/// The two SubDevices of the group, the head with an alias.
 pub fn tool() -> Vec<DeviceDescription> {
     let mut devices = descriptions(&GROUP);
     devices[0].alias = TOOL;
@@ -88,7 +88,7 @@ fn until_left(world: &mut World) {
     world.run_cycles(20);
 }
 
-/// Cycles in which a domain was not complete: the group is optional.
+/// Cycles in which a domain was incomplete: the group is optional.
 fn errors(world: &World, since: Mark) -> usize {
     world.judged(since).iter().filter(|judged| judged.status.state != DomainState::Complete).count()
 }
@@ -125,7 +125,7 @@ fn a_group_joins_and_leaves_a_line_without_working_counter_errors_elsewhere() {
         }
         until_joined(&mut world);
         assert_eq!(count(&world, mark, &Event::GroupJoined { group: 0 }), 1);
-        // Whoever is to be unplugged is sent away before.
+        // The group is set to INIT before it is unplugged.
         for subdevice in [5, 4] {
             let work = world.application_mut().request_state(subdevice, AlState::Init);
             assert_eq!(world.finish(LIMIT, work), Ok(()));
@@ -168,7 +168,7 @@ fn a_torn_off_group_with_a_domain_of_its_own_costs_the_others_nothing() {
 // covers: hot-connect
 #[test]
 fn a_group_joins_at_another_place_than_it_left() {
-    // One place behind a branch of the junction, another at the end of the line: of two alike one has power.
+    // One place behind a branch of the junction, another at the end of the line: one of two identical groups has power.
     let line = descriptions(&["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"]);
     let ends = [tool(), tool()].map(devices);
     let [branch, end] = ends;
@@ -189,7 +189,7 @@ fn a_group_joins_at_another_place_than_it_left() {
     for round in 0..4 {
         let place = places[round % 2];
         let mark = world.mark();
-        // Between two frames: one that passes a port while it opens is lost.
+        // Between two frames, because a frame that passes a port while it opens is lost.
         place.iter().for_each(|device| world.fault_in(CYCLE / 2, Fault::PowerOn(*device)));
         world.until(LIMIT, "the group has joined", has_joined);
         world.run_cycles(20);
@@ -217,7 +217,7 @@ fn a_group_in_the_middle_of_a_ring_joins_while_the_others_stay_in_op() {
         world.power_on(device);
         world.run_cycles(3);
     }
-    // The ring closes: that is the matter of its edges.
+    // The ring closes: incomplete cycles belong to this edge.
     let edges = errors(&world, mark);
     let mark = world.mark();
     until_joined(&mut world);
@@ -232,7 +232,7 @@ fn a_group_is_there_from_the_beginning_and_found_by_its_identification() {
     let mut head = tool();
     head[0].alias = 0;
     head[0].identification = Some(4711);
-    // In front of those with positions.
+    // Before those with positions.
     let mut all = descriptions(&BASE);
     let tail = all.split_off(1);
     let all = all.into_iter().chain(head).chain(tail).collect();
@@ -248,7 +248,7 @@ fn a_group_is_there_from_the_beginning_and_found_by_its_identification() {
     assert!(has_joined(&world));
     let found: Vec<Option<usize>> = (0..6).map(|index| world.device_of(index).map(|device| device.0)).collect();
     assert_eq!(found, [0, 3, 4, 5, 1, 2].map(Some));
-    // Its power goes and comes: the ones behind it come back too, by their places.
+    // It is power-cycled: the SubDevices behind it come back too, by their places.
     world.power_off(DeviceIndex(1));
     world.run_cycles(50);
     world.power_on(DeviceIndex(1));
@@ -272,8 +272,8 @@ fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
     assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
 }
 
-/// Two groups beside each other, the break between them: each goes on in its half, and one that comes anew joins from
-/// the side that is left to it.
+/// Two adjacent groups with a break between them: each continues in its half, and a new group joins from its remaining
+/// side.
 // covers: CR-21, hot-connect
 #[test]
 fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side() {
@@ -297,7 +297,7 @@ fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side
     world.until(LIMIT, "both groups have joined", both);
     world.settle();
     let mark = world.mark();
-    // Between the second one of the first group and the head of the second.
+    // Between the last SubDevice of the first group and the head of the second.
     world.fault_in(BETWEEN, Fault::Cut(CableId(4)));
     world.run_cycles(100);
     assert!(both(&world) && world.left_op(mark).is_empty() && world.incomplete(mark) <= 1);
@@ -317,8 +317,8 @@ fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side
     assert!(both(&world) && world.left_op(mark).is_empty() && world.incomplete(mark) <= 1);
 }
 
-/// Devices of a line or a ring with the group at its end: some look at their FMMUs on the way to SAFEOP only, some have
-/// inputs or outputs in OP only, some are slow or have no FMMU to spare.
+/// Devices of a line or a ring with the group at its end: some read their FMMUs only during the transition to SAFEOP,
+/// some have inputs or outputs in OP only, some are slow or have no free FMMU.
 fn random_network(dice: &mut Dice) -> (Network, usize) {
     let mut all: Vec<DeviceDescription> = descriptions(&BASE).into_iter().chain(tool()).collect();
     let limited = [SyncManagerKind::Inputs, SyncManagerKind::Outputs];
@@ -342,8 +342,8 @@ fn random_network(dice: &mut Dice) -> (Network, usize) {
     (network, count + usize::from(is_ring))
 }
 
-/// Cables, the group's and others, and devices come and go; each cycle is judged by the logs of the devices. Areas of
-/// process data that were found there.
+/// Cuts and repairs cables of the group and others, switches devices off and on; each cycle is checked with the logs of
+/// the devices. Returns the areas of process data found there.
 fn run(seed: u64) -> u64 {
     let mut dice = Dice::new(seed ^ 0x4C07);
     let (network, cables) = random_network(&mut dice);
@@ -359,7 +359,7 @@ fn run(seed: u64) -> u64 {
             (0, _, Some(device)) => Fault::PowerOn(device),
             (0 | 1, None, was) => {
                 off = was;
-                // The cable of the group in every second case.
+                // In every second case the cable of the group.
                 let cable = if dice.one_in(2) { BASE.len() } else { dice.below(cables as u64) as usize };
                 Fault::Cut(*cut.insert(CableId(cable)))
             }

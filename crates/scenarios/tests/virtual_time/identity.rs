@@ -1,5 +1,5 @@
-//! Two SubDevices at one station address: which of them is ours is told by what this MainDevice wrote to it, by
-//! identity and by place, never by which answers first.
+//! Two SubDevices at one station address: the declared one is identified by written registers, identity and place,
+//! never by the order of responses.
 
 use std::time::Duration;
 
@@ -19,8 +19,7 @@ use scenarios::world::{CYCLE, World};
 
 const DOMAIN: DomainId = DomainId(0);
 
-/// Devices with four MII ports each; the inputs of each are its number, from 0xA0 on. Those that are alike have one
-/// identity.
+/// Devices with four MII ports each; the inputs of each are its number plus 0xA0. Identical devices have one identity.
 fn described(kinds: &[&str], alike: bool) -> Vec<DeviceDescription> {
     let mut described = descriptions(kinds);
     for (number, it) in described.iter_mut().enumerate() {
@@ -50,7 +49,7 @@ fn activated(mut main_device: MainDevice<Tap>, count: usize) -> Application<Tap>
     application
 }
 
-/// A session in which the branch behind `cable` is out of reach, which was in OP in the session before.
+/// A session in which the branch behind `cable` is unreachable, after a session in which it was in OP.
 fn second_session(
     described: Vec<DeviceDescription>,
     cables: &[(Endpoint, Endpoint)],
@@ -64,8 +63,8 @@ fn second_session(
     activated(main_device, count - 1)
 }
 
-/// The device that has a station address of this session keeps it, in OP and with all its inputs fresh, whether the one
-/// of the earlier session comes before or behind it in the order of frames, and whether or not they are alike.
+/// The device with a station address of this session keeps it, in OP and with fresh inputs, whether the device of the
+/// earlier session comes before or behind it in processing order, and whether or not they are identical.
 // covers: identity
 #[test]
 fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_it() {
@@ -84,7 +83,7 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
         let mut application = second_session(described(&[kind; 3], alike), cables, CableId(2));
         let network = application.links_mut().network_mut();
         let ours = station(network, 1);
-        assert_eq!(ours, station(network, 2), "{what}: the one out of reach has this address from before");
+        assert_eq!(ours, station(network, 2), "{what}: the unreachable SubDevice has this address from before");
         while application.pop_event().is_some() {}
         let image = application.exchange().image(DOMAIN).to_vec();
         application.links_mut().network_mut().heal(CableId(2));
@@ -93,7 +92,7 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
             let network = application.links().network();
             let status = network.device(DeviceIndex(1)).al_status().al_state();
             assert_eq!(status, Some(AlState::Op), "{what}, cycle {cycle}");
-            // What was under way when the other one came, and frames that it bent to itself.
+            // Frames under way when the other SubDevice appeared, and frames that it processed instead.
             if cycle > 2 {
                 let exchange = application.exchange();
                 assert_eq!(exchange.freshness(DOMAIN, 1) == Freshness::Fresh, kind != "digital-output-8", "{what}");
@@ -105,7 +104,7 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
         assert_eq!(station(network, 1), ours, "{what}");
         assert_ne!(station(network, 2), ours, "{what}");
         let other = network.device(DeviceIndex(2));
-        assert_eq!(other.al_status().al_state(), Some(AlState::Init), "{what}: it is nobody's");
+        assert_eq!(other.al_status().al_state(), Some(AlState::Init), "{what}: it is unassigned");
         let identity = other.description.identity;
         let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
         let unexpected = |event: &&Event| match event {
@@ -119,9 +118,9 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
     }
 }
 
-/// One with the address of another one from an earlier session, whose registers are write-protected, answers while the
-/// one of this session has no power: it cannot be made to give up the address. It is not taken for the other one, is
-/// asked less and less often, and that is told once. The one of this session comes back when it is gone.
+/// A write-protected SubDevice with a station address of an earlier session responds while the SubDevice with this
+/// address has no power: the address cannot be removed. It is not mistaken for the other one, is checked at growing
+/// intervals, and this is reported once. The right SubDevice comes back when the other one is gone.
 // covers: identity
 #[test]
 fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_often() {
@@ -129,7 +128,7 @@ fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_ofte
     let described = described(&["digital-input-16"; 3], false);
     let mut application =
         activated(MainDevice::request(Tap::new(wired_with(described, &tree)), &Options::default()), 3);
-    // In the order of frames the branch at port D comes first: the one there has the second address.
+    // In processing order the branch at port D is first: the SubDevice there has the second address.
     let mut protect = application.engine_mut().start_register_write(1, map::REGISTER_WRITE_PROTECTION, vec![1]);
     (0..10).for_each(|_| application.cycle(|_| ()));
     protect.take().expect("it is done").expect("it is there");
@@ -137,7 +136,11 @@ fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_ofte
     let main_device = application.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1)).expect("it stops");
     let mut application = activated(main_device, 2);
     let ours = station(application.links().network(), 1);
-    assert_eq!(ours, station(application.links().network(), 2), "the one out of reach has this address from before");
+    assert_eq!(
+        ours,
+        station(application.links().network(), 2),
+        "the unreachable SubDevice has this address from before"
+    );
     application.links_mut().network_mut().power_off(DeviceIndex(1));
     (0..1_000).for_each(|_| application.cycle(|_| ()));
     while application.pop_event().is_some() {}
@@ -167,9 +170,9 @@ fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_ofte
     assert_eq!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
 }
 
-/// Branches of a junction with devices that are alike, without serial numbers: the one on the later branch has its
-/// power back first. A ring behind a junction whose first two are alike, the second one reached from the far end while
-/// the first has no power.
+/// Branches of a junction with identical devices without serial numbers: the device on the later branch has its power
+/// back first. And a ring behind a junction with two identical first members, the second one reached from the far end
+/// while the first has no power.
 // covers: identity
 #[test]
 fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() {

@@ -1,8 +1,8 @@
-//! Odd SII images, many of them: made by a seeded generator from those of the catalogue, and from those of real devices
-//! where `../shared/data` lies beside the repository.
+//! Many inconsistent or damaged SII images: made by a seeded generator from those of the catalogue, and from those of
+//! real devices if `../shared/data` is present beside the repository.
 //!
-//! One SubDevice of four has such an image. It comes to OP with complete working counters, or the reason is told of it;
-//! all others are in OP and exchange process data whatever it has. `SEED` and `VARIANTS` choose others, and how many
+//! One of four SubDevices has such an image. It reaches OP with complete working counters, or a reason is reported for
+//! it; all others are in OP and exchange process data in any case. `SEED` and `VARIANTS` choose others, and how many
 //! per image.
 
 use std::path::Path;
@@ -22,7 +22,7 @@ use scenarios::odd_images::{Change, Variant, variant};
 use scenarios::segments::{describe, line};
 use scenarios::world::{CYCLE, World};
 
-/// The one with the odd image.
+/// The SubDevice with the changed image.
 const ODD: usize = 2;
 /// Variants of an image of the catalogue, and of one of a real device.
 const SOME: u64 = 24;
@@ -30,21 +30,21 @@ const MANY: u64 = 50;
 /// Longer than any time limit of a state change.
 const LIMIT: Duration = Duration::from_secs(15);
 
-/// Whose image it is.
+/// Behaviour of the SubDevice with the changed image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Truth {
-    /// The SubDevice is what it was before its EEPROM was damaged.
+    /// The SubDevice behaves as before its EEPROM was damaged.
     Damaged,
-    /// The SubDevice is what its image says.
+    /// The SubDevice behaves as its image describes.
     AsItSays,
 }
 
-/// What became of the odd one.
+/// Result for this SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
-    /// In OP, everything complete.
+    /// In OP, all domains complete.
     Complete,
-    /// Told by the MainDevice before anything was written.
+    /// Reported by the MainDevice before any write.
     Refused,
     /// The SubDevice refused a state.
     RefusedByDevice,
@@ -57,7 +57,7 @@ struct Tally {
     by_device: usize,
     no_device: usize,
     warned: usize,
-    /// SubDevices that are what their image says and refuse what the MainDevice reads in it.
+    /// SubDevices that behave as their image describes and refuse the configuration of the MainDevice.
     disagree: Vec<String>,
     failures: Vec<String>,
 }
@@ -66,7 +66,7 @@ fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
 }
 
-/// A segment around the odd one.
+/// A segment around this SubDevice.
 fn around(odd: DeviceDescription) -> Vec<DeviceDescription> {
     let mut devices = vec![
         describe("digital-output-8", "before"),
@@ -87,7 +87,7 @@ fn with_image(mut description: DeviceDescription, image: &[u8]) -> DeviceDescrip
     description
 }
 
-/// What is true at all times, and what became of the odd one.
+/// Checks that hold in every case, and the result for this SubDevice.
 fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), String> {
     let network = line(around(odd), NetworkOptions::default());
     let started = World::with(1, network, &Options::default(), |scan| automatic(&scan.subdevices, CYCLE));
@@ -149,7 +149,7 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
     Ok((outcome, warned))
 }
 
-/// The SubDevices around the odd one are in OP, their inputs fresh, and they took outputs since.
+/// The other SubDevices are in OP, their inputs are fresh, and they have accepted outputs since.
 fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
     for other in [0, 1, 3] {
         let device = world.network().device(ringcat_sim::cable::DeviceIndex(other));
@@ -167,7 +167,7 @@ fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
     Ok(())
 }
 
-/// Judges all variants of an image.
+/// Checks all variants of an image.
 fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
     let image = sii_image::build(sound);
     let mut dice = Dice::new(seed);
@@ -178,7 +178,7 @@ fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally
                 Truth::Damaged => with_image(sound.clone(), &made.image),
                 Truth::AsItSays => match DeviceDescription::from_sii(made.image.clone(), &sound.name) {
                     Ok(mut odd) => {
-                        // It is plugged in where it was.
+                        // It has the same place as before.
                         (odd.behaviour, odd.ports) = (sound.behaviour.clone(), sound.ports);
                         odd
                     }

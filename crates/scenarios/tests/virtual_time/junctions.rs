@@ -1,4 +1,4 @@
-//! Rings behind junctions on one link (protocol 9.4): every cable cut and healed, in every mode.
+//! Rings behind junctions on one link (protocol 9.4): every cable cut and repaired, in every mode.
 
 mod closed_ports;
 mod declared;
@@ -22,10 +22,10 @@ use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_OF_THREE as RING, at, wired};
 use scenarios::world::{CYCLE, Mark, World};
 
-/// What a mode and its connections make of a segment.
+/// A mode and its connections.
 type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
 
-/// Those of [`RING_BEHIND_JUNCTION`]: an output, the junction. Only some of them have clocks.
+/// Devices of [`RING_BEHIND_JUNCTION`]: an output, the junction. Only some of them have clocks.
 const ONE: [&str; 7] =
     ["digital-output-8", "junction", "servo", "digital-input-8", "block", "coupler", "analog-input-4"];
 const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
@@ -65,7 +65,7 @@ fn told(world: &World, mark: Mark) -> Vec<Event> {
     events.filter(of_junctions).map(without_names).collect()
 }
 
-/// A change of a cable between these ends, without who is there.
+/// A change of a cable between these ends, without the SubDevices there.
 fn change(near: Option<PortOf>, far: PortOf, broken: bool, breaks: usize) -> Event {
     Event::JunctionChanged { near, far, station: None, declared: [None; 2], broken, breaks }
 }
@@ -86,7 +86,7 @@ fn changed(cable: usize, broken: bool) -> Event {
     change(Some(near), far, broken, usize::from(broken))
 }
 
-/// One edge in OP: nobody leaves it, at most one cycle is incomplete, process data is complete again.
+/// One edge in OP: no SubDevice leaves OP, at most one cycle is incomplete, process data is complete again.
 fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
     let mark = world.mark();
     act(world);
@@ -142,12 +142,12 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told() {
                 continue;
             }
             let (near, far) = ends(cable);
-            // What is before the break is not known yet, but where the closing cable is was declared.
+            // The SubDevice before the break is not known yet, but the closing cable was declared.
             let near = (cable == 5).then_some(near);
             assert_eq!(told_then, [change(near, far, true, 1)], "{what}");
             let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
             assert_eq!(told(&world, mark), [change(near, far, false, 0)], "{what}");
-            // Afterwards it is known as a whole.
+            // Afterwards the whole ring is known.
             for cable in RING {
                 let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
                 assert_eq!(told(&world, mark), [changed(cable, true)], "{what}");
@@ -157,7 +157,7 @@ fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told() {
     }
 }
 
-/// Events about rings that are not known, since a point.
+/// Events about unknown rings since a point.
 fn unknown(world: &World, mark: Mark) -> Vec<usize> {
     let rings = |timed: &ringcat::TimedEvent| match timed.event {
         Event::JunctionUnknown { rings } => Some(rings),
@@ -181,7 +181,7 @@ fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared()
         let what = format!("{setting:?}");
         let mark = edge(&mut world, &what, |world| world.heal(CableId(5)));
         assert_eq!(unknown(&world, mark), expected, "{what}");
-        // Its breaks cost what those of a known ring cost, and are told as JR-04 says, or by their place.
+        // Its breaks cost as much as those of a known ring, and are reported as in JR-04, or by their place.
         let mark = edge(&mut world, &what, |world| world.cut(CableId(3)));
         let is_known = setting.0 == JunctionMode::Strict;
         assert_eq!((told(&world, mark).len(), crossed(&world, mark)), if is_known { (1, 0) } else { (0, 1) }, "{what}");
@@ -248,17 +248,17 @@ fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line() {
             matches!(event, Event::LineCrossed { position: Some(at), entry_port: Some(1) }
             if usize::from(at.0) == cable)
         };
-        assert!(world.saw(mark, reversed), "cable {cable}: the one behind the break is entered at port 1");
+        assert!(world.saw(mark, reversed), "cable {cable}: the SubDevice behind the break is entered at port 1");
         let mark = edge(&mut world, "heal", |world| world.heal(CableId(cable)));
         assert_eq!(crossed(&world, mark), 0);
-        // It is told again when it comes again.
+        // It is reported again when it occurs again.
         let mark = edge(&mut world, "cut again", |world| world.cut(CableId(cable)));
         assert!(world.saw(mark, reversed));
     }
 }
 
-/// A random segment with a local ring: a line of terminals and junctions, one of which has the ring, with branches and
-/// members. Returns it with the numbers of the ring's cables, and whether it ends at the redundant link.
+/// A random segment with a local ring: a line of terminals and junctions, one of them with the ring, with branches and
+/// members. Returns the segment, the numbers of the ring's cables, and whether it ends at the redundant link.
 fn random_segment(dice: &mut Dice) -> (Network, Vec<usize>, bool) {
     let pick =
         |dice: &mut Dice| *dice.pick(&["digital-output-8", "digital-input-8", "servo", "analog-input-4", "block"]);
@@ -334,7 +334,7 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
     let mut world = in_op(9, one_ring(), (JunctionMode::Strict, &[STRICT]));
     let limits: Limits = (Duration::from_millis(100), Duration::from_secs(1));
     let object = SdoAddress::new(0x8000, 3);
-    // One in the ring, one behind it.
+    // One SubDevice in the ring, one behind it.
     for (subdevice, round) in [(6, 0), (6, 1), (6, 2), (6, 3)] {
         let cable = CableId(RING[round]);
         let mark = world.mark();
@@ -355,8 +355,8 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
     }
 }
 
-/// Ports change while others than whoever watches them read them: the look for crossed lines, and the clocks. What they
-/// read is no longer told to anybody else.
+/// Ports change while other procedures than their supervision read them: the scan for crossed lines, and the clocks.
+/// Their reads clear the event of the change.
 // covers: JR-07, junctions
 #[test]
 fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports() {

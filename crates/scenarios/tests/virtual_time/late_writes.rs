@@ -1,4 +1,4 @@
-//! Copies of configuration writes that were given up and come late, after later writes: what they undo is found and
+//! Copies of given-up configuration writes that arrive after later writes: overwritten registers are detected and
 //! written again.
 
 use std::time::Duration;
@@ -14,10 +14,10 @@ use ringcat_wire::sii::SiiSyncManager;
 use scenarios::segments::{descriptions, line};
 use scenarios::world::World;
 
-/// What was undone is found by then, and written again.
+/// Time limit until overwritten registers are detected and written again.
 const HEALED: Duration = Duration::from_millis(2_500);
 
-/// A terminal whose outputs flow in OP only, and one with a mailbox.
+/// A terminal with outputs in OP only, and one with a mailbox.
 fn world() -> World {
     let mut described = descriptions(&["emulated-output-8", "servo"]);
     described[0].sync_managers[0].enable = SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
@@ -31,7 +31,7 @@ fn is_well(world: &World) -> bool {
     world.all_in_op() && world.application().all_settled() && status.state == DomainState::Complete
 }
 
-/// Each group of registers of a configuration, cleared behind the back of the engine in OP, SAFEOP and PREOP.
+/// Each group of configuration registers is cleared without the engine's knowledge in OP, SAFEOP and PREOP.
 // covers: recovery
 #[test]
 fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
@@ -56,7 +56,7 @@ fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
         let held = |world: &World| {
             let controller = &world.network().device(DeviceIndex(subdevice)).controller;
             let mut held = controller.register(register, length).to_vec();
-            // The status byte of a SyncManager, and what its PDI says.
+            // The status byte of a SyncManager, and its PDI control.
             if length == SyncManager::LEN {
                 (held[5], held[7]) = (0, 0);
             }
@@ -67,7 +67,7 @@ fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
         let write = world.application_mut().engine_mut().start_register_write(subdevice, register, vec![0; length]);
         world.finish(Duration::from_secs(1), write).expect("it is there");
         world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
-        // Some see it themselves.
+        // Some SubDevices detect it themselves.
         let told = |event: &Event| match event {
             Event::ConfigurationFailed { subdevice: of, reason } => *of == subdevice && reason.contains("0x0"),
             Event::StateError { subdevice: of, .. } => *of == subdevice,
@@ -76,11 +76,11 @@ fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
         assert!(world.saw(mark, told), "{what}: {:?}", world.events(mark));
         world.run_cycles(3_000);
         let count = world.events(mark).iter().filter(|timed| told(&timed.event)).count();
-        assert_eq!(count, 1, "{what}: it is not configured again and again");
+        assert_eq!(count, 1, "{what}: it is configured once");
     }
 }
 
-/// Nothing is wrong with one that was led to SAFEOP and whose outputs flow in OP only.
+/// A SubDevice with outputs in OP only is right in a requested SAFEOP.
 // covers: recovery
 #[test]
 fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
@@ -93,7 +93,8 @@ fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
     assert_eq!(world.steps(mark), []);
 }
 
-/// Frames are late by milliseconds while a SubDevice comes back from a blink of its power, from each moment of that on.
+/// Frames are late by milliseconds while a SubDevice returns after a short power failure, beginning at different
+/// moments.
 // covers: recovery
 #[test]
 fn frames_that_are_late_while_a_subdevice_comes_back_undo_nothing_for_good() {

@@ -1,5 +1,5 @@
-//! Segments of more SubDevices than a byte counts: 300 and 1,000 of all kinds, on one link and in a ring, from power-on
-//! to OP and through breaks.
+//! Segments of more than 255 SubDevices: 300 and 1,000 of all kinds, on one link and in a ring, from power-on to OP and
+//! through breaks.
 
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ fn declared(network: Network, clocks: bool) -> World {
         Declaration { clocks, ..automatic(&scan.subdevices, CYCLE) }
     };
     let mut world = World::with(7, network, &Options::default(), declare).expect("it fits");
-    // A drive that gets to OP while frames are on their way has other inputs than when they left.
+    // Inputs of a drive that reaches OP change while frames are under way.
     world.judge_latched(false);
     world.settle();
     world.judge_latched(true);

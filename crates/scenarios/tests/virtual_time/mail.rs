@@ -1,4 +1,4 @@
-//! Mailboxes: CoE through the router of each SubDevice, undisturbed and with everything lost that can be lost.
+//! Mailboxes: CoE through the router of each SubDevice, undisturbed and with all kinds of losses.
 
 use std::time::Duration;
 
@@ -54,7 +54,7 @@ fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once() {
             assert_eq!(world.application().links().losses_left(), 0);
             let counters = mailbox.counters();
             assert_eq!((counters.written, counters.rewritten), (12, 1), "skip {skip}");
-            assert_eq!((counters.read, counters.duplicates, counters.unclaimed), (12, 0, 0), "one answer each");
+            assert_eq!((counters.read, counters.duplicates, counters.unclaimed), (12, 0, 0), "one response each");
         }
     }
 }
@@ -123,7 +123,7 @@ fn a_late_answer_to_a_request_that_was_given_up_is_not_taken_for_that_to_the_nex
     let own = mailbox.clone();
     let error = world.run(async move { read(&own, NUMBER, limits, 2).await }).expect_err("it hangs");
     assert_eq!(error.cause, SdoFailure::Mailbox(MailboxError::NoAnswer { limit: limits.1 }));
-    // Another one is dropped while it is under way.
+    // Another request is dropped while it is under way.
     let own = mailbox.clone();
     let dropped = world.start(async move { read(&own, NUMBER, LIMITS, 2).await });
     world.run_cycles(5);
@@ -189,7 +189,7 @@ fn an_idle_mailbox_costs_one_byte_per_poll_and_answers_are_read_when_there() {
     let mailbox = world.mailbox(TERMINAL);
     let before = mailbox.counters();
     world.run_cycles(100);
-    assert_eq!(mailbox.counters(), before, "nothing is read or looked at by the router itself");
+    assert_eq!(mailbox.counters(), before, "the router itself does not access the mailbox");
     assert_eq!(world.run(write_and_read(mailbox.clone(), 50)), Ok(()));
     let counters = mailbox.counters();
     println!("{} answers, {} empty reads, {} looks", counters.read, counters.empty_reads, counters.polls);

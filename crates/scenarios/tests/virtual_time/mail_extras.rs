@@ -1,4 +1,4 @@
-//! What is seldom asked of a mailbox: PDOs, messages of the application's own making, procedure commands of drives.
+//! Rare mailbox services: PDOs, raw messages of the application, procedure commands of drives.
 
 use std::time::Duration;
 
@@ -34,7 +34,7 @@ fn pdos_are_sent_and_asked_for_by_mailbox() {
     let sent = world.run(async move {
         let tx = pdo_mail::receive(&own, 0x1A00, LIMITS).await;
         let rx = pdo_mail::receive(&own, 0x1600, LIMITS).await?;
-        // Behind an SDO whose answer must not be taken for it, and the other way round.
+        // After an SDO whose response must not be mistaken for it, and the reverse.
         let sdo = coe::read(&own, SdoAddress::new(0x1018, 1), LIMITS, 4).await;
         pdo_mail::send(&own, 0x1600, &rx, LIMITS.0).await?;
         let again = pdo_mail::receive(&own, 0x1600, LIMITS).await?;
@@ -93,7 +93,7 @@ fn a_procedure_command_is_started_and_aborted() {
         command::abort(&own, 0, idn, LIMITS).await.unwrap();
         let state = command::state(&own, 0, idn, LIMITS).await.unwrap();
         assert!(!state.is_set() && !state.is_running() && !state.has_failed());
-        // One that is not aborted comes to its end, is notified and acknowledged.
+        // A command that is not aborted finishes, is notified and acknowledged.
         command::start(&own, 0, idn, LIMITS).await.unwrap();
         own.unsolicited(Unsolicited::Soe).await;
         assert!(command::state(&own, 0, idn, LIMITS).await.unwrap().is_done());
@@ -101,5 +101,5 @@ fn a_procedure_command_is_started_and_aborted() {
         assert!(!command::state(&own, 0, idn, LIMITS).await.unwrap().is_set());
     });
     world.run_cycles(20);
-    assert_eq!(mailbox.pop_unsolicited(Unsolicited::Soe), None, "the aborted one was never notified");
+    assert_eq!(mailbox.pop_unsolicited(Unsolicited::Soe), None, "the aborted command was never notified");
 }

@@ -1,5 +1,5 @@
-//! Every fault of a device's mail and of the frames that carry it, with every protocol: what heals, heals unseen; what
-//! does not is told as what it is, and the next question is answered (protocol 6.1, 6.2).
+//! Every fault of a device's mail and of its frames, with every protocol: recoverable faults have no visible effect;
+//! other faults are reported with their cause, and the next request succeeds (protocol 6.1, 6.2).
 
 use std::time::Duration;
 
@@ -18,12 +18,12 @@ use scenarios::world::World;
 
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(60));
 const PLANT: [&str; 2] = ["digital-input-8", "all-protocols"];
-/// The device with all protocols, and where its mailboxes lie.
+/// The device with all protocols, and the addresses of its mailboxes.
 const ALL: usize = 1;
 const RECEIVE: u16 = 0x1000;
 const SEND: u16 = 0x1400;
 
-/// What goes wrong.
+/// The fault.
 #[derive(Clone, Copy, Debug)]
 enum Trouble {
     Mail(MailFault),
@@ -34,11 +34,11 @@ enum Trouble {
     },
 }
 
-/// What a question is answered with meanwhile.
+/// Result of a request meanwhile.
 #[derive(Clone, Copy, Debug)]
 enum Outcome {
     Answer,
-    /// Words of the error.
+    /// Text of the error.
     Error(&'static str),
 }
 
@@ -60,7 +60,7 @@ fn troubles() -> Vec<(Trouble, Outcome)> {
         mail(MailFault::Refuse { count: 1, detail: ErrorReply::NO_MORE_MEMORY }, Error("mailbox error 0x0007")),
         mail(MailFault::LoseAnswers { count: 1 }, Error("no answer within 60 ms")),
         mail(MailFault::LoseRequests { count: 1 }, Error("no answer within 60 ms")),
-        // Later than anybody waits for it: the answer to the question before.
+        // Later than the time limit: the response to the previous request.
         mail(MailFault::DelayAnswers { count: 1, by: Duration::from_millis(90) }, Error("no answer within 60 ms")),
         mail(MailFault::LoseAnswers { count: u32::MAX }, Error("no answer within 60 ms")),
         mail(MailFault::AbortSdo { count: 1, code: AbortCode::GENERAL }, Error("aborted by the SubDevice")),
@@ -69,7 +69,7 @@ fn troubles() -> Vec<(Trouble, Outcome)> {
     ]
 }
 
-/// Whether a fault is one that this kind of question meets.
+/// Whether a fault affects this kind of request.
 fn concerns(trouble: Trouble, kind: Kind) -> bool {
     match trouble {
         Trouble::Mail(MailFault::AbortSdo { .. }) => matches!(kind, Kind::Object | Kind::LargeObject),
@@ -78,7 +78,7 @@ fn concerns(trouble: Trouble, kind: Kind) -> bool {
     }
 }
 
-/// A question, and the asker again.
+/// A request; returns the asker again.
 fn question(world: &mut World, mut asker: Asker, number: u32) -> (Result<(), String>, Asker) {
     world.run(async move { (asker.ask(number).await, asker) })
 }
@@ -111,13 +111,13 @@ fn every_protocol_bears_every_fault_of_mail_and_frames() {
             let told = result.err().unwrap_or_default();
             match (outcome, trouble) {
                 (Outcome::Answer, _) => assert_eq!(told, "", "{kind:?}, {trouble:?}"),
-                // The first fragment is forgotten, the second one is a request that makes no sense.
+                // The first fragment is discarded, the second one is an invalid request.
                 (Outcome::Error(_), Trouble::Mail(MailFault::LoseRequests { .. })) if kind == Kind::IdnList => {
                     assert!(told.contains("refused by the drive"), "{told}");
                 }
                 (Outcome::Error(words), _) => assert!(told.contains(words), "{kind:?}, {trouble:?}: {told}"),
             }
-            // A second copy of the last answer is found by looking for unasked mail.
+            // A second copy of the last response is found by the poll for unsolicited mail.
             world.run_cycles(10);
             let after = mailbox.counters();
             match trouble {

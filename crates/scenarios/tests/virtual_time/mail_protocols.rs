@@ -1,4 +1,4 @@
-//! Every mailbox protocol with a device that speaks all of them, alone and all at once, with faults.
+//! Every mailbox protocol with a device that supports all of them, alone and all at once, with faults.
 
 use std::time::Duration;
 
@@ -55,7 +55,7 @@ async fn objects(mailbox: Mailbox) {
 
 async fn files(mailbox: Mailbox) {
     let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
-    // A multiple of what a packet carries, and one more byte.
+    // A multiple of the packet size, and one more byte.
     for length in [20 * 1012, 20 * 1012 + 1] {
         let data = pattern(length);
         foe::write(&mailbox, "recipe", options, &mut Bytes::new(&data), |_| ()).await.unwrap();
@@ -68,7 +68,7 @@ async fn files(mailbox: Mailbox) {
 async fn idns(mailbox: Mailbox) {
     for drive in [0, 1, 0, 1] {
         let address = SoeAddress::value(drive, Idn::product(0, 1));
-        // A list begins with its length and its longest length.
+        // A list begins with its length and its maximum length.
         let list = soe::read(&mailbox, address, LIMITS, 30_000).await.unwrap();
         assert!(list.len() >= 5000, "{} bytes", list.len());
         soe::write(&mailbox, address, &list, LIMITS).await.unwrap();
@@ -203,7 +203,7 @@ fn an_error_reply_ends_the_request_that_it_belongs_to() {
     world.run(objects(mailbox));
 }
 
-/// Of two requests the first is refused, late enough that both wait; the second one's asker then asks again at once.
+/// The first of two waiting requests is refused late; a third request follows the second at once.
 fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<(), String>; 2] {
     let by = Duration::from_millis(8);
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::DelayAnswers { count: 3, by }));
@@ -218,18 +218,18 @@ fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<
         world.finish(Duration::from_secs(5), second)
     } else {
         let both = world.finish(Duration::from_secs(5), second);
-        assert!(world.finish(Duration::from_secs(5), first).is_err(), "nobody answered it");
+        assert!(world.finish(Duration::from_secs(5), first).is_err(), "it has no response");
         both
     }
 }
 
-// The error reply goes to the one that waits, and the answer to that one is still on its way.
+// The error reply is assigned to the waiting request, whose response is still under way.
 // covers: 6.1, mailbox
 #[test]
 fn an_error_reply_that_may_be_anothers_confuses_no_later_answer() {
     for first_is_dropped in [false, true] {
         let mut world = world(5);
-        // The drive has answered before, the vendor's protocol has not.
+        // The drive has responded before in SoE, but not yet in VoE.
         let mut idn = Asker::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
         assert_eq!(world.run(async move { idn.ask(7).await }), Ok(()));
         let [second, third] = refused_beside_another(&mut world, first_is_dropped);
@@ -402,7 +402,7 @@ fn the_diagnosis_history_is_read_and_acknowledged() {
 #[test]
 fn mail_of_all_who_can_show_it_is_found_with_one_read() {
     let mut world = world(12);
-    // The two that have mailboxes show a bit each: 0x080D.3 through their third FMMU.
+    // The two devices with mailboxes map a bit each: 0x080D.3 through their third FMMU.
     for device in [ALL, 3] {
         let registers = world.network().device(DeviceIndex(device)).controller.register(map::fmmu(2), Fmmu::LEN);
         let fmmu = Fmmu::decode(registers[..].try_into().unwrap());
@@ -412,7 +412,7 @@ fn mail_of_all_who_can_show_it_is_found_with_one_read() {
     let before = world.application().acyclic_counters();
     world.run_cycles(900);
     let datagrams = world.application().acyclic_counters().datagrams - before.datagrams;
-    // 180 reads of the bits, and what supervision asks once a second.
+    // 180 reads of the bits, and the reads of the supervision once a second.
     assert!((170..200).contains(&datagrams), "{datagrams} datagrams in 900 ms");
     let emergency = Emergency { error_code: 1, error_register: 1, data: [0; 5] };
     let mark = world.mark();

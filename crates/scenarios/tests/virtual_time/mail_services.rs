@@ -1,4 +1,4 @@
-//! Mailbox services of the MainDevice: before activation, from the cyclic thread, and firmware through BOOT.
+//! Mailbox services of the MainDevice: before activation, from the cyclic thread, and firmware in BOOT.
 
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
-//! Any interleaving of protocols, losses, faults of mail, cut cables and power cycles, by seed: no answer reaches
-//! another question, everything ends in bounded time, and nothing stays behind, neither in mailboxes nor among
-//! procedures and datagrams. Beside the procedures a request of the cyclic thread, a client of the gateway and a host
-//! that downloads through the Ethernet port use each device. A list of a drive has a check sum in it: of fragments that
-//! a device takes and forgets, nothing else tells.
+//! Random interleaving of protocols, losses, mail faults, cut cables and power cycles, by seed: no response reaches
+//! another request, all requests end in bounded time, and nothing remains in mailboxes, procedures and datagrams.
+//! Besides the procedures, a request of the cyclic thread, a client of the gateway and a host with a download through
+//! the Ethernet port use each device. The list of a drive contains a checksum, since discarded fragments cannot be
+//! detected otherwise.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -29,37 +29,37 @@ use scenarios::mail_questions::{Asker, KINDS, Kind};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-/// Answers that are later than twice this are not told from those to the next question, where a protocol has nothing to
-/// tell them by (SoE, FoE, EoE; decision 0007): what happens here delays none for so long.
+/// Responses later than twice this time cannot be distinguished from those to the next request in SoE, FoE and EoE
+/// (decision 0007): no fault here delays a response that long.
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(250));
 const PLANT: [&str; 3] = ["all-protocols", "digital-input-8", "all-protocols"];
-/// IP address of the first one; that of the other one is written by those who ask.
+/// IP address of the first device; requests write that of the other one.
 const DEVICE: [u8; 4] = [10, 0, 0, 2];
-/// The devices with all protocols, and where their mailboxes lie.
+/// The devices with all protocols, and the addresses of their mailboxes.
 const ALL: [usize; 2] = [0, 2];
 const RECEIVE: u16 = 0x1000;
 const SEND: u16 = 0x1400;
-/// Things that happen in a run.
+/// Number of faults in a run.
 const HAPPENINGS: u32 = 12;
-/// A download through the Ethernet port of a device, and how long it may take.
+/// Bytes of a download through the Ethernet port of a device, and its time limit.
 const DOWNLOAD: (usize, Duration) = (5_000, Duration::from_millis(120));
-/// Cycles within which there is a quiet moment.
+/// Cycles within which all transfers are idle once.
 const QUIET: usize = 60;
-/// Longest time that all questions under way may take when nothing happens any more: three limits each, some times.
+/// Time limit of the requests under way after the last fault: several times three limits each.
 const END: Duration = Duration::from_secs(5);
 
-/// What all runs together came to.
+/// Sum of the results of all runs.
 #[derive(Default)]
 struct Tally {
     answered: Cell<u32>,
     failed: Cell<u32>,
     downloads: Cell<u32>,
     emergencies: Cell<u32>,
-    /// Of the answered and failed ones, those of the cyclic thread and of the gateway.
+    /// Those of the cyclic thread and of the gateway among them.
     beside: Cell<u32>,
 }
 
-/// Something that goes wrong with the mail of a device.
+/// A random fault of a device's mail.
 fn mail_fault(dice: &mut Dice) -> MailFault {
     let count = 1 + dice.below(3) as u32;
     match dice.below(10) {
@@ -79,7 +79,7 @@ fn mail_fault(dice: &mut Dice) -> MailFault {
     }
 }
 
-/// Something that happens; cables and power are back after a while.
+/// A random fault; cables and power are restored after a while.
 fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: &mut BTreeMap<u16, u32>) {
     let device = *dice.pick(&ALL);
     let station = world.station_of(device);
@@ -110,15 +110,14 @@ fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: 
     }
 }
 
-/// Questions of one kind, one after the other, until it is time to stop; those that were given up in the middle are
-/// gone.
+/// Sends requests of one kind, one after the other, until the stop; dropped ones are not counted.
 fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let mailbox = world.mailbox(device);
     let bus = mailbox.bus().clone();
     let mut asker = Asker::new(KINDS[at], mailbox, LIMITS, true);
     let (stop, tally) = (stop.clone(), tally.clone());
     world.start(async move {
-        // Numbers differ between devices, kinds and questions.
+        // Numbers differ between devices, kinds and requests.
         let mut number = (device * 16 + at) as u32;
         while !stop.get() {
             number += 64;
@@ -129,13 +128,13 @@ fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tal
     })
 }
 
-/// Downloads through the Ethernet port of a device, one after the other. What breaks off is no failure, other bytes
-/// are.
+/// Downloads through the Ethernet port of a device, one after the other. An interrupted download is not a failure,
+/// wrong bytes are.
 fn start_downloads(world: &mut World, device: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let (mailbox, stop, tally) = (world.mailbox(device), stop.clone(), tally.clone());
     let addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: DEVICE };
     world.start(async move {
-        let port = EthernetPort::open(&mailbox).expect("nobody has it");
+        let port = EthernetPort::open(&mailbox).expect("the port is free");
         while !stop.get() {
             match download(mailbox.bus().clone(), &port, addresses, DOWNLOAD.0, DOWNLOAD.1).await {
                 Ok(_) => tally.downloads.set(tally.downloads.get() + 1),
@@ -146,7 +145,7 @@ fn start_downloads(world: &mut World, device: usize, stop: &Rc<Cell<bool>>, tall
     })
 }
 
-/// The least that is under way within some cycles.
+/// The minimum of transfers under way within some cycles.
 fn quiet_moment(world: &mut World) -> UnderWay {
     let loads = (0..QUIET).map(|_| {
         world.cycle();
@@ -155,7 +154,7 @@ fn quiet_moment(world: &mut World) -> UnderWay {
     loads.min_by_key(|load| (load.procedures, load.datagrams)).expect("some cycles")
 }
 
-/// 30 of them, or as RINGCAT_SEEDS says: how many, or from which to before which (`3217..3218`).
+/// 30 seeds, or RINGCAT_SEEDS: a number or a range (`3217..3218`).
 fn seeds() -> Range<u64> {
     let asked = std::env::var("RINGCAT_SEEDS").unwrap_or_default();
     let (from, to) = asked.split_once("..").unwrap_or(("0", &asked));
@@ -176,9 +175,9 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     let mut beside = Beside::new(&mut world, &ALL);
     let mut emergencies = BTreeMap::new();
     for device in ALL {
-        // Five or so of the nine kinds, none twice.
+        // About five of the nine kinds, none twice.
         for at in (0..KINDS.len()).filter(|_| !dice.one_in(3)) {
-            // Who downloads from it needs its address.
+            // The download needs its address.
             if device != ALL[0] || KINDS[at] != Kind::Address {
                 works.push(start(&mut world, device, at, &stop, tally));
             }
@@ -188,7 +187,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     for _ in 0..HAPPENINGS {
         beside.run_cycles(&mut world, 2 + dice.below(12));
         happen(&mut world, &mut beside, &mut dice, &mut emergencies);
-        // Somebody loses patience: whatever it was in the middle of.
+        // Drops a procedure at a random moment.
         if dice.one_in(4) && works.len() > 2 {
             drop(works.swap_remove(dice.below(works.len() as u64) as usize));
         }
@@ -205,10 +204,9 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     tally.answered.set(tally.answered.get() + beside.answered);
     tally.failed.set(tally.failed.get() + beside.failed);
     tally.beside.set(tally.beside.get() + beside.answered + beside.failed);
-    // An error reply does not say to what it belongs (decision 0007): one that is late on purpose would refuse the
-    // first question of whoever asks now.
+    // An error reply does not identify its request (decision 0007): a delayed one would end the first new request.
     world.run_cycles(100);
-    // What was lost on purpose and never met its frame would meet the next one.
+    // A remaining injected loss would affect the next frame.
     all_answer(&mut world, seed);
     world.run_cycles(90);
     let after = quiet_moment(&mut world);
@@ -220,7 +218,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     mailboxes_are_idle(&mut world, seed);
 }
 
-/// What goes on beside the storm ends.
+/// Ends the other users.
 fn end(beside: &mut Beside, world: &mut World, seed: u64) {
     let until = world.application().now() + END;
     while !beside.stop(world) {
@@ -229,7 +227,7 @@ fn end(beside: &mut Beside, world: &mut World, seed: u64) {
     }
 }
 
-/// Every kind of question is answered by every device that serves it.
+/// Every device responds to every kind of request that it supports.
 fn all_answer(world: &mut World, seed: u64) {
     for (device, kind) in ALL.into_iter().flat_map(|device| KINDS.map(|kind| (device, kind))) {
         if (device, kind) == (ALL[0], Kind::Address) {
@@ -241,7 +239,7 @@ fn all_answer(world: &mut World, seed: u64) {
     }
 }
 
-/// Emergencies came as often as they were sent on purpose.
+/// Each injected emergency arrived once.
 fn each_emergency_came_once(world: &World, seed: u64, mut left_of: BTreeMap<u16, u32>, tally: &Tally) {
     for event in world.events(world.beginning()) {
         if let Event::Emergency { emergency, .. } = event.event {
@@ -257,7 +255,7 @@ fn mailboxes_are_idle(world: &mut World, seed: u64) {
     for device in ALL {
         let mailbox = world.mailbox(device);
         let counters = mailbox.counters();
-        // One that is being looked into right now is at work.
+        // A mailbox that is being polled is not idle.
         let is_idle = (0..QUIET).any(|_| {
             world.cycle();
             mailbox.is_idle()
@@ -280,7 +278,7 @@ fn each_answer_finds_its_request_and_no_mail_stays_whatever_happens() {
     println!("{runs} runs: {answered} questions answered, {failed} failed, {beside} of them beside procedures");
     println!("{downloads} downloads, {emergencies} emergencies");
     if runs < 30 {
-        // A few that somebody asked for say nothing about how often something happens.
+        // A few selected seeds are not representative.
         return;
     }
     assert!(answered > 20 * runs && failed > runs && beside > 20 * runs, "{answered} answered, {failed} failed");

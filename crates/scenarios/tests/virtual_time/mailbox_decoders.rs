@@ -13,7 +13,7 @@ fn corpus(target: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target)
 }
 
-/// What is in a corpus, by name.
+/// The files of a corpus, by name.
 fn read(target: &str) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(corpus(target)).unwrap_or_else(|error| panic!("corpus of {target}: {error}"));
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -21,7 +21,7 @@ fn read(target: &str) -> Vec<(String, Vec<u8>)> {
     files.iter().map(|path| (path.file_name().unwrap().display().to_string(), fs::read(path).unwrap())).collect()
 }
 
-/// Says which bytes it was, if the target panics.
+/// Prints the bytes if the target panics.
 struct Running<'a>(&'a str, &'a [u8]);
 
 impl Drop for Running<'_> {

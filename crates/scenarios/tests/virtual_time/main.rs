@@ -1,7 +1,6 @@
 //! Whole systems in virtual time: an engine and a simulated segment, one module per subject.
 //!
-//! One program and not twenty, because each would be linked with everything; only those that count allocations are
-//! apart.
+//! One test program, which saves link time; only tests that count allocations are separate.
 
 mod break_places;
 mod broken_ring;

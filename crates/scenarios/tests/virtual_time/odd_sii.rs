@@ -1,5 +1,5 @@
-//! SubDevices whose SII is odd: no PDOs in it, others than the dictionary has, no end marker, SyncManagers in another
-//! order or without a type, nothing at all, nothing that can be followed.
+//! SubDevices with an unusual SII: without PDOs, with other PDOs than the dictionary, without end marker, with
+//! SyncManagers in another order or without a type, blank, or invalid.
 
 use std::time::Duration;
 
@@ -19,10 +19,10 @@ use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
-/// The odd one.
+/// The SubDevice with the unusual SII.
 const ODD: usize = 2;
 
-/// A segment in which one device has the SII of another one.
+/// A segment in which one device has this SII.
 fn with_sii(kind: &str, other: impl FnOnce(&mut DeviceDescription)) -> Vec<DeviceDescription> {
     let mut kinds = KINDS;
     kinds[ODD] = kind;
@@ -60,7 +60,7 @@ fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary() {
     assert_eq!(pdos, [(0x1600, Some(2)), (0x1A00, Some(3))]);
     assert!(read.application().entry(ODD, 0x6041, 0).is_some(), "entries have names by index");
     assert_eq!(troubles(read.events(read.beginning())), Vec::<&Event>::new());
-    assert!(!told(&read, "dictionary"), "what is only missing is no contradiction");
+    assert!(!told(&read, "dictionary"), "missing data is not a contradiction");
     read.power_off(DeviceIndex(ODD));
     read.run_cycles(20);
     read.power_on(DeviceIndex(ODD));
@@ -153,7 +153,7 @@ fn mailboxes_on_other_sync_managers_work_as_the_sii_says() {
     for shows_mail in [true, false] {
         let mut devices = descriptions(&KINDS);
         let device = &mut devices[ODD];
-        // Process data on 0 and 1, the mailboxes behind it, the one that is read first.
+        // Process data on 0 and 1, then the mailboxes, the send mailbox first.
         device.sync_managers.rotate_left(2);
         device.sync_managers.swap(2, 3);
         for pdo in &mut device.pdos {
@@ -171,7 +171,7 @@ fn mailboxes_on_other_sync_managers_work_as_the_sii_says() {
         let mark = world.mark();
         let mailbox = world.mailbox(ODD);
         assert_eq!(world.scan.subdevices[ODD].mailbox_sync_managers(), (3, 2));
-        // A lost answer is asked for again, mail that nobody asked for is found.
+        // A lost response is repeated, unsolicited mail is found.
         world.lose(Loss::of_read(world.station_of(ODD), send).on_the_way_back());
         let limits = (Duration::from_millis(100), Duration::from_secs(1));
         let own = mailbox.clone();
@@ -196,7 +196,7 @@ fn an_sii_without_an_end_marker_is_told_and_used() {
     let mut devices = descriptions(&KINDS);
     let used = sii_image::used_bytes(&devices[ODD]);
     let mut image = sii_image::build(&devices[ODD]);
-    // Where the end marker was, the rest of an older image.
+    // The rest of an older image instead of the end marker.
     for (at, byte) in image[used - 2..].iter_mut().enumerate() {
         *byte = [0x01, 0x80, 0x02, 0x00, 0xAA, 0xAA, 0x55, 0x55][at % 8];
     }
@@ -223,7 +223,7 @@ fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
     }
 }
 
-/// What is told of the odd one, whose reason begins so, while the others exchange process data.
+/// Checks the reported reason of the SubDevice, while the others exchange process data.
 fn others_run_and_it_says(mut world: World, reason: &str) {
     world.run_cycles(400);
     let failed = |event: &Event| {
@@ -244,7 +244,7 @@ fn others_run_and_it_says(mut world: World, reason: &str) {
 // covers: odd-sii
 #[test]
 fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
-    // Garbage in the mailbox words, with a checksum that does not fit.
+    // Random mailbox words with a wrong checksum.
     let mut devices = descriptions(&KINDS);
     let mut image = sii_image::build(&devices[ODD]);
     image[0x30..0x38].copy_from_slice(&[0x78, 0x78, 0x78, 0x29, 0x21, 0x45, 0x4C, 0x32]);
@@ -261,14 +261,14 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
     let reason =
         "its SII cannot be used: SM 3: 12 bytes (all buffers) at 0x2ffe exceed the memory, which ends at 0x3000";
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
-    // Nothing at all.
+    // A blank EEPROM.
     let mut devices = descriptions(&KINDS);
     devices[ODD].sii_image = Some(Vec::new());
     let reason = "its SII cannot be used: the EEPROM is blank or cannot be read, and nothing is declared";
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
 }
 
-/// It says that it has no place before the next activation and that it stays in SAFEOP, once; the others go on.
+/// An event reports once that it has no place before the next activation and stays in SAFEOP; the others continue.
 // covers: odd-sii
 #[test]
 fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_yet() {
@@ -302,7 +302,7 @@ fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_yet() {
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new());
 }
 
-/// Places in the process image that are declared stay, as for one that is not there.
+/// Declared places in the process image stay, as for an absent SubDevice.
 // covers: odd-sii
 #[test]
 fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
@@ -319,7 +319,7 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
         declaration.subdevices[ODD] = config.assign(2, ringcat::Direction::Outputs, pdos);
         declaration
     });
-    let mut world = started.expect("one bad EEPROM stops nobody");
+    let mut world = started.expect("one bad EEPROM stops no other SubDevice");
     assert!(told(&world, "no category follows the fixed area: the image is truncated"));
     assert!(world.application().entry(ODD, 0x7000, 1).is_some());
     world.run_cycles(300);
@@ -332,8 +332,7 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
     assert!(world.saw(world.beginning(), failed));
 }
 
-/// SubDevices that are what their SII says: outputs and inputs with default lengths, and PDOs for one direction or
-/// none. Three alike, which share what was read of their SIIs: one with damage inside of a category, whichever it is.
+/// Three identical SubDevices that share the contents of their SIIs; any one of them has damage inside a category.
 #[test]
 fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
     for damaged in 1..4 {
@@ -385,7 +384,7 @@ fn sync_managers_without_a_type_mean_one_thing_to_scan_run_and_simulator() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
         for without_pdos in [false, true] {
             let mut described = descriptions(&[kind]).remove(0);
-            // One that is not switched on is for nothing without a type.
+            // A disabled SyncManager without a type has no use.
             let kinds =
                 described.sync_managers.iter().map(|it| if it.enable == 0 { SyncManagerKind::Unused } else { it.kind });
             let kinds: Vec<SyncManagerKind> = kinds.collect();
@@ -408,12 +407,12 @@ fn is_mailbox(kind: SyncManagerKind) -> bool {
     matches!(kind, SyncManagerKind::MailboxOut | SyncManagerKind::MailboxIn)
 }
 
-/// A segment with a SubDevice that is what an SII says, in OP with complete working counters whatever dictionaries are
-/// read.
+/// A segment with a SubDevice that behaves as its SII describes, in OP with complete working counters for any use of
+/// dictionaries.
 fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
     let mut devices = descriptions(&KINDS);
     let mut described = DeviceDescription { emulation: false, ..described.clone() };
-    // With the fixed area of another one it would be taken for its twin, and not be read.
+    // With the fixed area of another SubDevice it would count as identical and not be read.
     described.identity.serial = 1;
     let image = sii_image::build(&described);
     devices[ODD] = DeviceDescription::from_sii(image, "odd").expect("it makes a device");

@@ -1,5 +1,5 @@
-//! Datagrams of the application's own on two links: positions are those of the scan whatever becomes of the ring, and
-//! LRW over several SubDevices is refused, declared or sent by hand.
+//! Datagrams of the application's own on two links: positions are those of the scan in any state of the ring, and LRW
+//! over several SubDevices is refused, declared or sent by the application.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use scenarios::world::{CYCLE, World};
 
 const LIMIT: Duration = Duration::from_secs(1);
 const KINDS: [&str; 5] = ["coupler", "digital-input-8", "servo", "digital-output-8", "digital-input-16"];
-/// RAM of the controller that nobody uses.
+/// Unused RAM of the controller.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
 fn segment() -> Network {
@@ -30,11 +30,11 @@ fn segment() -> Network {
 fn send(world: &mut World, command: Command, target: Target, data: Vec<u8>) -> Result<Reply, BusError> {
     let datagram = RawDatagram { command, target, data, resend: true };
     let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
-    world.finish(LIMIT, work).expect("it is taken").pop().expect("one answer")
+    world.finish(LIMIT, work).expect("it is taken").pop().expect("one reply")
 }
 
-/// Who answers at a position, by the station address that it reads there.
-fn who(world: &mut World, position: u16) -> Option<u16> {
+/// Station address of the SubDevice that responds at a position.
+fn station_at(world: &mut World, position: u16) -> Option<u16> {
     let target = Target::Position(Position(position), map::STATION_ADDRESS);
     let reply = send(world, Command::Aprd, target, vec![0; 2]).expect("it comes back");
     assert!(reply.wkc().0 <= 1);
@@ -49,11 +49,12 @@ fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing() {
     let all = |world: &mut World, missing: Option<usize>, what: &str| {
         for (position, station) in stations.iter().enumerate() {
             let expected = Some(*station).filter(|_| missing != Some(position));
-            assert_eq!(who(world, position as u16), expected, "{what}, position {position}");
+            assert_eq!(station_at(world, position as u16), expected, "{what}, position {position}");
         }
     };
     all(&mut world, None, "closed");
-    // No cycle goes by between a cut and the datagram: it must hit nobody else, and travels again until it arrives.
+    // No cycle passes between a cut and the datagram: it must not reach another SubDevice, and is repeated until it
+    // arrives.
     for (cut, heal) in [(2, 2), (4, 1), (1, 4), (5, 0), (0, 5)] {
         world.cut(CableId(cut));
         all(&mut world, None, "cut");
@@ -69,11 +70,11 @@ fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing() {
     world.power_on(DeviceIndex(2));
     world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     all(&mut world, None, "back again");
-    assert_eq!(who(&mut world, 5), None, "nobody was found there");
+    assert_eq!(station_at(&mut world, 5), None, "no SubDevice was found there");
 }
 
-/// A ring of three junctions and an output. A SubDevice hangs on the first junction, or with its other end on the third
-/// one; another one, without power, on the second one.
+/// A ring of three junctions and an output. A SubDevice is connected to the first junction, or with its other port to
+/// the third one; another one, without power, to the second one.
 fn movable() -> Network {
     use ringcat_sim::frame::Port::{A, B, D};
     let kinds = ["junction", "junction", "junction", "digital-output-8", "digital-input-16", "digital-output-16"];
@@ -93,8 +94,8 @@ fn movable() -> Network {
     network
 }
 
-/// Whoever was unplugged, plugged in elsewhere or is new has the position that a rescan has shown, and nobody another
-/// one.
+/// A SubDevice that was unplugged, moved or is new has the position of the rescan, and no other SubDevice changes its
+/// position.
 // covers: CR-09, CR-10, CR-17, ring-equals-line, sim-frames
 #[test]
 fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling() {
@@ -107,14 +108,14 @@ fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling(
     world.settle();
     world.judge_latched(false);
     let are = |world: &mut World, devices: &[usize], what: &str| {
-        // Not before the second junction: whoever is plugged in the wrong way round uses the one turn that a frame has.
+        // Not before the second junction: a crossed SubDevice is the one unconnected port 0 that a frame may pass.
         for broken in [None, Some(CableId(3)), Some(CableId(4))] {
             broken.iter().for_each(|cable| world.cut(*cable));
             for (position, device) in devices.iter().enumerate() {
                 let expected = Some(world.station_of(*device));
-                assert_eq!(who(world, position as u16), expected, "{what}, {broken:?}, position {position}");
+                assert_eq!(station_at(world, position as u16), expected, "{what}, {broken:?}, position {position}");
             }
-            assert_eq!(who(world, devices.len() as u16), None, "{what}, {broken:?}");
+            assert_eq!(station_at(world, devices.len() as u16), None, "{what}, {broken:?}");
             broken.iter().for_each(|cable| world.heal(*cable));
             world.run_cycles(60);
         }
@@ -138,7 +139,7 @@ fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling(
     world.power_on(DeviceIndex(5));
     world.run_cycles(200);
     rescan(&mut world);
-    are(&mut world, &[0, 1, 5, 2, 4, 3], "somebody new");
+    are(&mut world, &[0, 1, 5, 2, 4, 3], "a new SubDevice");
 }
 
 fn with_lrw(scan: &Scan) -> Declaration {
@@ -153,7 +154,7 @@ fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
     (subdevices, text)
 }
 
-/// Whatever a declaration was read from, it has to be applied: there it is refused.
+/// Any declaration has to be applied, and is refused there.
 // covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too() {
@@ -165,7 +166,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
         let result = World::with_junctions(2, network, &options, with_lrw, connections);
         assert_eq!(refused(result).0, [0, 2, 3, 4], "{junctions:?}");
     }
-    // A group that is not there yet, and has a place in the process image all the same.
+    // An absent group with a place in the process image.
     let scan = World::new(3, line(descriptions(&["digital-output-8"]), NetworkOptions::default()));
     let info = scan.application().engine().subdevices().remove(0);
     let with_group = |scan: &Scan| {
@@ -196,7 +197,7 @@ fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links() {
         panic!("{error}")
     };
     assert!(subdevices[0] != subdevices[1], "{error}");
-    // FMMUs that the application wrote by itself: one on either side of the break.
+    // FMMUs written by the application: one on either side of the break.
     let bus = world.application().engine().bus();
     let stations = [1, 4].map(|device| world.station_of(device));
     world.run(async move {

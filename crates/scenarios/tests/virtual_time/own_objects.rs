@@ -1,4 +1,4 @@
-//! What a client of the mailbox gateway finds at address 0: objects of the MainDevice itself (protocol 10.1, 10.2).
+//! Objects of the MainDevice itself at address 0 of the mailbox gateway (protocol 10.1, 10.2).
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ use scenarios::world::World;
 const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8", "ethernet-terminal"];
 const CLIENT: u64 = 7;
 const LIMIT: Duration = Duration::from_secs(5);
-/// A long segment, and its end.
+/// A long segment, and its last SubDevice.
 const COUNT: usize = 260;
 const LAST: usize = COUNT - 1;
 /// Bytes of a message at address 0.
@@ -28,7 +28,7 @@ fn world() -> World {
     World::in_op(1, ring(descriptions(&KINDS), options))
 }
 
-/// Sends a CoE message and takes so many answers; none of them is longer than a mailbox.
+/// Sends a CoE message and takes this many responses; none of them is longer than a mailbox.
 fn ask(world: &mut World, client: u64, payload: &[u8], answers: impl Fn(&[Vec<u8>]) -> bool) -> Vec<Vec<u8>> {
     let header = Header { address: 0, ..Header::new(Protocol::Coe, 5, payload.len() as u16) };
     let mut bytes = vec![0; gateway::HEADER_LEN + Header::LEN + payload.len()];
@@ -58,7 +58,7 @@ fn sdo<T>(world: &mut World, client: u64, request: SdoRequest<'_>, read: impl Fn
     read(SdoResponse::decode(&answers[0]).expect("an SDO"))
 }
 
-/// Reads an entry or, completely, an object, in as many segments as it takes.
+/// Reads an entry, or an object with complete access, in segments if necessary.
 fn read(world: &mut World, index: u16, sub_index: u8, complete_access: bool) -> Result<Vec<u8>, AbortCode> {
     let request = SdoRequest::Upload { index, sub_index, complete_access };
     let (total, mut data) = sdo(world, CLIENT, request, |response| match response {
@@ -119,7 +119,7 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is() {
         // No mailbox.
         (0x8001, 4, 0),
         (0x8001, 40, 0),
-        // A mailbox and no history: that is asked of it, and no error.
+        // A mailbox without history: this is read from it, without an error.
         (0x8004, 40, 0),
         (0xA004, 19, 0),
         (0xA004, 18, 0),
@@ -152,7 +152,7 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is() {
     assert_eq!((name.starts_with(b"all-protocols"), &name[20..]), (true, &[0; 44][..]));
     let complete = read(&mut world, 0x9002, 0, true).expect("its entries have one length each");
     assert_eq!((complete[..4].to_vec(), complete.len()), ([vec![32, 0], station.to_le_bytes().to_vec()].concat(), 22));
-    assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, vec![]), "process data goes on");
+    assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, vec![]), "process data continues");
 }
 
 // covers: 10.2, own-objects
@@ -165,7 +165,7 @@ fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_re
     assert!(number(&mut world, 0xA002, 10) > 0, "at the port that sees them first");
     world.cut(CableId(3));
     world.run_cycles(50);
-    assert_eq!(number(&mut world, 0xA002, 7), 0, "nobody there");
+    assert_eq!(number(&mut world, 0xA002, 7), 0, "no SubDevice there");
     assert_eq!(number(&mut world, 0x8002, 35), 0x24, "a link is missing at port 1");
     world.heal(CableId(3));
     world.run_cycles(50);
@@ -201,7 +201,7 @@ fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history() {
     assert!(refused.is_err());
     assert!(world.network_mut().device_mut(DeviceIndex(2)).application.diagnose(&message(), &[]));
     assert_eq!(seen(&mut world), [0, 0, 0x0602_0000, 1], "an abort of its, and news in its own history");
-    // Two frames that nobody sees again: of all who take part.
+    // Two lost frames with data of all SubDevices.
     world.drop(CableId(0), 2);
     world.drop(CableId(5), 2);
     world.run_cycles(10);
@@ -236,7 +236,7 @@ fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history() {
     assert_eq!(write(&mut world, 0x10F3, 3, &[0]), Ok(()));
     assert_eq!((number(&mut world, 0x10F3, 2), read(&mut world, 0x10F3, first, false)), (0, Ok(vec![])));
     assert_eq!(write(&mut world, 0xF200, 16, &[1]), Ok(()));
-    assert_eq!(seen(&mut world), [0, 0, 0, 1], "its own history is its own matter");
+    assert_eq!(seen(&mut world), [0, 0, 0, 1], "its own history is not affected");
     let complete = read(&mut world, 0xA002, 0, true).expect("its entries have one length each");
     assert_eq!((complete[0], complete.len(), complete.last()), (19, 2 + 16 + 8 * 4 + 2 + 1, Some(&1)));
 }
@@ -313,7 +313,7 @@ fn message() -> DiagnosisMessage<'static> {
     DiagnosisMessage { code, kind, local_time: true, reserved: 0, text: 1, time_ns: 1, parameter_count: 0, parameters }
 }
 
-/// A CoE message that may be anything, mostly one that is nearly right.
+/// A random CoE message, mostly almost valid.
 fn anything(dice: &mut Dice) -> Vec<u8> {
     let index =
         *dice.pick(&[0x1000, 0x1008, 0x10F3, 0x8001, 0x9004, 0xA002, 0xF002, 0xF020, 0xF040, 0xF120, 0xF200, 0xFFFF]);

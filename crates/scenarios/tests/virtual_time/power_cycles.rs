@@ -12,10 +12,10 @@ use scenarios::check::{Delivery, ring_events, troubles};
 use scenarios::segments::{SIXTEEN, descriptions, line, ring_of_16};
 use scenarios::world::{CYCLE, Mark, World};
 
-/// Edges of a power cycle in a ring: two cables go, two come back.
+/// Edges of a power cycle in a ring: two breaks and two repairs.
 const EDGES: usize = 4;
 
-/// Everything as found, with application SDOs and a watchdog time where there is a CoE mailbox.
+/// All SubDevices as found, with application SDOs and a watchdog time for those with a CoE mailbox.
 fn with_own_settings(scan: &Scan) -> Declaration {
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     for (config, info) in declaration.subdevices.iter_mut().zip(&scan.subdevices) {
@@ -36,7 +36,7 @@ fn world(seed: u64, network: Network) -> World {
     world
 }
 
-/// What a device has of its configuration.
+/// Configuration registers of a device.
 fn configuration(world: &World, device: DeviceIndex) -> (Vec<u8>, Vec<u8>, Vec<Vec<u8>>) {
     let device = world.network().device(device);
     let controller = &device.controller;
@@ -50,7 +50,7 @@ fn configuration(world: &World, device: DeviceIndex) -> (Vec<u8>, Vec<u8>, Vec<V
     (registers, sync_managers, values)
 }
 
-/// One device off for a while and on again, until it is back. Returns the cycles that missed anybody else.
+/// Switches a device off and on and waits until it is back. Returns the cycles with missing data of other devices.
 fn power_cycle(world: &mut World, device: DeviceIndex, off: u64, phase: u32) -> usize {
     let mark = world.mark();
     let before = configuration(world, device);
@@ -62,7 +62,7 @@ fn power_cycle(world: &mut World, device: DeviceIndex, off: u64, phase: u32) -> 
         world.all_in_op() && world.application().all_settled() && last(world, mark) == Some(Delivery::Complete)
     });
     world.run_cycles(20);
-    assert_eq!(world.left_op(mark).into_iter().filter(|who| *who != device).count(), 0, "the others stay in OP");
+    assert_eq!(world.left_op(mark).into_iter().filter(|left| *left != device).count(), 0, "the others stay in OP");
     assert_eq!(configuration(world, device), before, "the whole configuration is back");
     assert_eq!(world.network().device(device).al_status(), AlStatus::new(AlState::Op));
     assert_trouble(world, mark, device.0);
@@ -123,7 +123,7 @@ fn the_last_subdevice_of_a_line_comes_back_while_the_others_stay_in_op() {
     let mut world = world(4, line(descriptions(&kinds), NetworkOptions::default()));
     let incomplete = power_cycle(&mut world, DeviceIndex(3), 60, 100);
     println!("last of a line off and on: {incomplete} incomplete cycles");
-    assert_eq!(ring_events(world.events(world.beginning())), Vec::<&Event>::new(), "a line is no broken ring");
+    assert_eq!(ring_events(world.events(world.beginning())), Vec::<&Event>::new(), "a line is not a broken ring");
     assert!(incomplete <= EDGES, "{incomplete}");
 }
 
@@ -145,7 +145,7 @@ fn a_subdevice_that_loses_power_while_it_is_being_configured_comes_back_too() {
         });
         world.run_cycles(20);
         assert_eq!(last(&world, mark), Some(Delivery::Complete));
-        assert!(world.left_op(mark).iter().all(|who| *who == device));
+        assert!(world.left_op(mark).iter().all(|left| *left == device));
         assert!(!world.saw(mark, |event| matches!(event, Event::Unexpected { .. })), "it is known");
     }
 }
@@ -167,6 +167,6 @@ fn two_neighbours_of_a_ring_come_back_from_a_power_cycle_together() {
         });
         world.run_cycles(20);
         assert_eq!(last(&world, mark), Some(Delivery::Complete));
-        assert!(world.left_op(mark).iter().all(|who| [one, other].contains(&who.0)), "{:?}", world.left_op(mark));
+        assert!(world.left_op(mark).iter().all(|left| [one, other].contains(&left.0)), "{:?}", world.left_op(mark));
     }
 }

@@ -1,5 +1,5 @@
-//! Segments made of the SII images of real devices, where `../shared/data` lies beside the repository: every image that
-//! the simulator takes comes to OP and exchanges process data; every refused one has its reason.
+//! Segments of SII images of real devices, if `../shared/data` is present beside the repository: every image that the
+//! simulator accepts reaches OP and exchanges process data; every refused one has a reason.
 
 use std::path::Path;
 use std::time::Duration;
@@ -28,7 +28,7 @@ fn images() -> Option<(Vec<DeviceDescription>, Vec<String>)> {
         let image = std::fs::read(directory.join(name)).expect("an image can be read");
         match DeviceDescription::from_sii(image, name.trim_end_matches(".bin")) {
             Ok(mut description) => {
-                // Something to compare in the inputs.
+                // Values to compare in the inputs.
                 let pattern = (0..64).map(|at: u8| at.wrapping_mul(13) ^ number as u8 | 1).collect();
                 description.behaviour = Behaviour::Terminal(InputSource::Constant(pattern));
                 description.clock_start_ns = 1_000_003 * (number as u64 + 1);
@@ -40,7 +40,7 @@ fn images() -> Option<(Vec<DeviceDescription>, Vec<String>)> {
     Some((taken, refused))
 }
 
-/// Those of the images that come to OP alone; the others with the reason.
+/// Images that reach OP in a segment of their own; the others with the reason.
 fn usable(descriptions: Vec<DeviceDescription>, refused: &mut Vec<String>) -> Vec<DeviceDescription> {
     let mut usable = Vec::new();
     for description in descriptions {
@@ -114,7 +114,7 @@ fn real_images_are_read_alike_with_and_without_the_cache_and_with_4_and_8_bytes(
     let scans: Vec<_> = [(true, true), (true, false), (false, true), (false, false)]
         .into_iter()
         .map(|(sii_cache, eight_byte_sii)| {
-            // Twice, so that the cache has something to do.
+            // Twice, so that the cache is used.
             let mut descriptions = taken.clone();
             descriptions.extend(taken.clone());
             for (number, description) in descriptions.iter_mut().enumerate() {

@@ -1,5 +1,5 @@
-//! Start-up commands that a configuration file brings: registers that are written and checked, objects that are read,
-//! time limits and comments (protocol 8.2).
+//! Start-up commands of a configuration file: registers that are written and checked, objects that are read, time
+//! limits and comments (protocol 8.2).
 
 use std::time::Duration;
 
@@ -18,10 +18,10 @@ use scenarios::segments::{descriptions, line};
 use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
-/// The one with commands.
+/// The SubDevice with commands.
 const DRIVE: usize = 2;
 /// Registers of no function.
-const NOBODY: RegisterAddress = RegisterAddress(0x0E80);
+const UNUSED: RegisterAddress = RegisterAddress(0x0E80);
 
 fn world_of(change: impl FnOnce(&mut DeviceDescription), commands: &[StartupCommand]) -> World {
     let mut devices = descriptions(&KINDS);
@@ -54,7 +54,7 @@ fn check(transition: Transition, address: RegisterAddress, data: &[u8], mask: &[
     command(transition, address, RegisterAccess::Check { data, mask, limit })
 }
 
-/// The reason why the configuration fails, once it has; the others are in OP then.
+/// The reason of the failed configuration; the others are in OP then.
 fn failure(mut world: World) -> String {
     world.run_cycles(600);
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != DRIVE);
@@ -76,7 +76,7 @@ fn registers_are_written_and_checked_at_their_transitions() {
         write(Transition::Ip, map::WATCHDOG_DIVIDER, &[0x34, 0x12]),
         state(Transition::Ps, 2),
         write(Transition::Ps, map::WATCHDOG_TIME_PDI, &[0x78, 0x56]),
-        // The SyncManagers of the mailbox come behind those of IP.
+        // The SyncManagers of the mailbox follow the commands of IP.
         check(Transition::Ip, map::sync_manager(0), &[0; 8], &[0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0xFF, 0xFF], 0),
         state(Transition::Os, 8),
     ]);
@@ -88,7 +88,7 @@ fn registers_are_written_and_checked_at_their_transitions() {
     assert_eq!(register(&world, map::WATCHDOG_DIVIDER), [0x34, 0x12]);
     assert_eq!(register(&world, map::WATCHDOG_TIME_PDI), [0x78, 0x56]);
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
-    // Again when it comes back.
+    // Again after its return.
     world.power_off(DeviceIndex(DRIVE));
     world.run_cycles(20);
     world.power_on(DeviceIndex(DRIVE));
@@ -110,7 +110,7 @@ fn a_register_with_another_value_is_told_with_comment_expected_and_got() {
 // covers: 8.2, startup-commands
 #[test]
 fn a_register_may_take_until_its_limit_to_hold_the_value() {
-    // Outputs come some cycles after SAFEOP: bit 0 of the watchdog status is set when they do.
+    // Outputs arrive some cycles after SAFEOP: bit 0 of the watchdog status is set then.
     let watched = |limit| check(Transition::So, map::WATCHDOG_STATUS, &[1, 0], &[1, 0], limit);
     let mut patient = world(&[watched(200)]);
     patient.settle();
@@ -122,9 +122,9 @@ fn a_register_may_take_until_its_limit_to_hold_the_value() {
 // covers: 8.2, startup-commands
 #[test]
 fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken() {
-    let text = failure(world(&[write(Transition::Ps, NOBODY, &[0; 4])]));
+    let text = failure(world(&[write(Transition::Ps, UNUSED, &[0; 4])]));
     assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): register 0x0e80:"), "{text}");
-    let mut may = write(Transition::Ps, NOBODY, &[0; 4]);
+    let mut may = write(Transition::Ps, UNUSED, &[0; 4]);
     if let StartupAction::Register(command) = &mut may.action {
         command.required = false;
     }
@@ -200,11 +200,11 @@ fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice() {
     let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);
     world.run_cycles(400);
     let state = |world: &World| world.network().device(DeviceIndex(DRIVE)).al_status().al_state();
-    assert_eq!(state(&world), Some(AlState::PreOp), "it is looked at");
+    assert_eq!(state(&world), Some(AlState::PreOp), "its register is polled");
     world.power_off(DeviceIndex(DRIVE));
     world.run_cycles(100);
     world.power_on(DeviceIndex(DRIVE));
     assert_eq!(state(&world), Some(AlState::Init), "its power is back");
     world.run_cycles(400);
-    assert_eq!(state(&world), Some(AlState::PreOp), "and is brought up anew, to the same look");
+    assert_eq!(state(&world), Some(AlState::PreOp), "it is brought up again, to the same check");
 }

@@ -101,7 +101,7 @@ def cycles(path):
             out[key].copies[redundant] = {
                 address: (data, counter) for command, _, address, data, counter in found if is_input(command, address)
             }
-    # What was sent last is judged by nobody.
+    # The last sent frames are not evaluated.
     return collected
 
 
@@ -136,7 +136,7 @@ def main():
 
 
 def compare(printed, merged, first):
-    """Ends with status 1 at the first difference. Inputs of an incomplete cycle are those of whoever answered."""
+    """Ends with status 1 at the first difference. In an incomplete cycle only inputs of responding SubDevices count."""
     if len(merged) < len(printed):
         sys.exit(f"{len(merged)} cycles in the capture, {len(printed)} printed")
     incomplete = 0

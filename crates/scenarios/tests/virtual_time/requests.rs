@@ -1,5 +1,5 @@
-//! Requests that a cyclic thread makes and re-uses: registers, IDNs, vendor messages; cancelled, timed out, out of
-//! reach.
+//! Requests that a cyclic thread makes and reuses: registers, IDNs, vendor messages; cancelled, timed out, to
+//! unreachable SubDevices.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ const KINDS: [&str; 4] = ["coupler", "digital-input-8", "all-protocols", "digita
 /// The device with all protocols.
 const ALL: usize = 2;
 const VENDOR: u32 = 0x0C47;
-/// Memory that nothing uses: user RAM.
+/// Unused memory: user RAM.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
 fn world(seed: u64) -> World {
@@ -24,7 +24,7 @@ fn world(seed: u64) -> World {
     World::in_op(seed, ring(descriptions(&KINDS), options))
 }
 
-/// Cycles until a request is not busy; how many that took.
+/// Cycles until a request is not busy; returns their number.
 fn wait(world: &mut World, state: impl Fn() -> RequestState) -> u32 {
     let mut cycles = 0;
     while state() == RequestState::Busy {
@@ -56,15 +56,15 @@ fn registers_are_read_and_written_from_the_cyclic_thread_within_two_cycles() {
     assert_eq!(request.read(USER_RAM, 65), Err(RequestRefused::TooLong { bytes: 65, limit: 64 }));
     assert_eq!(request.write(USER_RAM, &[0; 65]), Err(RequestRefused::TooLong { bytes: 65, limit: 64 }));
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
-    // One that is not there.
+    // A missing SubDevice.
     world.power_off(DeviceIndex(3));
     request.read(map::TYPE, 2).unwrap();
     wait(&mut world, || request.state());
     assert_eq!(request.failure(), Some(RequestFailure::Failed));
-    let mut nobody = world.application_mut().engine_mut().create_register_request(99, 4);
-    nobody.read(map::TYPE, 1).unwrap();
-    wait(&mut world, || nobody.state());
-    assert_eq!(nobody.failure(), Some(RequestFailure::Failed));
+    let mut absent = world.application_mut().engine_mut().create_register_request(99, 4);
+    absent.read(map::TYPE, 1).unwrap();
+    wait(&mut world, || absent.state());
+    assert_eq!(absent.failure(), Some(RequestFailure::Failed));
 }
 
 // covers: registers
@@ -73,7 +73,7 @@ fn registers_of_any_length_are_read_and_written_by_a_service() {
     let mut world = world(2);
     let data: Vec<u8> = (0..4000).map(|at| (at * 7 % 251) as u8).collect();
     let engine = world.application_mut().engine_mut();
-    // Three datagrams, behind what SyncManagers use.
+    // Three datagrams, in memory behind the SyncManagers.
     let write = engine.start_register_write(3, RegisterAddress(0x2000), data.clone());
     assert_eq!(world.finish(Duration::from_secs(1), write), Ok(()));
     let read = world.application_mut().engine_mut().start_register_read(3, RegisterAddress(0x2000), 4000);
@@ -82,7 +82,7 @@ fn registers_of_any_length_are_read_and_written_by_a_service() {
     let error = world.finish(Duration::from_secs(1), read).expect_err("beyond the end");
     assert!(error.to_string().contains("the memory ends at 0xffff"), "{error}");
     let read = world.application_mut().engine_mut().start_register_read(99, map::TYPE, 1);
-    let error = world.finish(Duration::from_secs(1), read).expect_err("nobody");
+    let error = world.finish(Duration::from_secs(1), read).expect_err("absent");
     assert!(error.to_string().contains("there is no SubDevice 99"), "{error}");
 }
 

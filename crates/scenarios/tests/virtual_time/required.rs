@@ -1,4 +1,4 @@
-//! Who must be there for an activation, who may be missing or somebody else, and what is told about it.
+//! SubDevices that are mandatory for an activation, that may be missing or differ, and the reports about them.
 
 use std::time::Duration;
 
@@ -83,7 +83,7 @@ fn an_identification_that_is_right_is_no_mismatch() {
 // covers: 4.3, mandatory
 #[test]
 fn an_identification_in_memory_is_read_there() {
-    // Where the alias is loaded to, which some devices set by switches.
+    // The register of the alias, which some devices set by switches.
     let change = |devices: &mut Vec<DeviceDescription>| {
         devices[1].id_switch_address = Some(map::STATION_ALIAS.0);
         devices[1].alias = 77;

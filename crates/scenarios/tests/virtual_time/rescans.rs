@@ -1,4 +1,4 @@
-//! The whole segment is looked at again while process data goes on: who is where, who is new, has moved, is gone.
+//! Rescan of the whole segment during process data exchange: places, new, moved and missing SubDevices.
 
 use std::time::Duration;
 
@@ -14,15 +14,15 @@ use scenarios::world::{CYCLE, World};
 
 const LIMIT: Duration = Duration::from_secs(2);
 const OP: SubDeviceState = SubDeviceState::Settled(AlState::Op);
-/// Devices of [`workshop`] by the order in which they were built, and cables by that of plugging.
+/// Devices of [`workshop`] in the order of construction, and cables in the order of connection.
 const MOVABLE: DeviceIndex = DeviceIndex(6);
 const NEW: DeviceIndex = DeviceIndex(5);
 const LEAVING: DeviceIndex = DeviceIndex(7);
 const AT_THE_JUNCTION: CableId = CableId(6);
 const AT_THE_END: CableId = CableId(8);
 
-/// A junction with a line of three behind it, the last of which has no power at first, and two branches of one device:
-/// the first of them can be plugged in at the end of the line instead. All that is plugged in works.
+/// A junction with a line of three behind it, the last without power at first, and two branches of one device: the
+/// first of them can be connected to the end of the line instead. All connected devices work.
 fn workshop() -> Network {
     let kinds = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16", "analog-input-4"];
     let branch = |kind: &str| devices(descriptions(&[kind]));
@@ -42,12 +42,12 @@ fn rescan(world: &mut World) -> Rescan {
     let mark = world.mark();
     let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
     let rescan = world.finish(LIMIT, pending).expect("the segment holds still");
-    assert_eq!(world.incomplete(mark), 0, "nobody's working counter changes");
+    assert_eq!(world.incomplete(mark), 0, "no working counter changes");
     assert_eq!(world.left_op(mark), []);
     rescan
 }
 
-/// Who is where, by the index in the declaration.
+/// Index in the declaration for each position.
 fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
     let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
     rescan.subdevices.iter().map(|found| index(found.who)).collect()
@@ -58,7 +58,7 @@ fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
 fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter() {
     let declare = |scan: &ringcat::Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
-        // In the order of frames: coupler, input, junction, movable, output, input, leaving.
+        // Processing order: coupler, input, junction, movable, output, input, leaving.
         declaration.subdevices[3].optional = true;
         declaration.subdevices[6].optional = true;
         declaration
@@ -77,11 +77,15 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
     assert_eq!(declared(&with_new)[4..], [Some(4), Some(5), None, Some(6)]);
     let Who::Undeclared(identity) = with_new.subdevices[6].who else { panic!("{with_new:?}") };
     assert_eq!(identity.product_code, world.network().device(NEW).description.identity.product_code);
-    assert_eq!((with_new.moved().count(), with_new.missing.len()), (0, 0), "who comes in between moves nobody");
+    assert_eq!(
+        (with_new.moved().count(), with_new.missing.len()),
+        (0, 0),
+        "a SubDevice in between does not move others"
+    );
     assert_eq!(world.network().device(NEW).al_status().al_state(), Some(AlState::Init), "it is left alone");
     assert_eq!(world.incomplete(before), 0);
 
-    // The cable is plugged in elsewhere. It keeps its power and its address.
+    // The cable is moved. The SubDevice keeps its power and its address.
     world.cut(AT_THE_JUNCTION);
     world.until(LIMIT, "gone", |world| world.application().states()[3] == SubDeviceState::Absent);
     world.heal(AT_THE_END);
@@ -91,7 +95,7 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
     let moved = rescan(&mut world);
     assert_eq!(moved.moved().collect::<Vec<_>>(), [(3, Position(3), Position(6))]);
     let last = moved.topology.nodes[6];
-    assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, the wrong way round");
+    assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, crossed");
     let told = Event::Moved { subdevice: 3, from: Position(3), to: Position(6) };
     assert!(world.saw(mark, |event| *event == told));
 
@@ -117,7 +121,7 @@ fn a_rescan_of_a_ring_gives_the_places_and_ends_in_time_while_it_changes() {
         assert_eq!(declared(rescan), (0..5).map(Some).collect::<Vec<_>>());
         assert_eq!((rescan.moved().count(), rescan.missing.len()), (0, 0));
     }
-    // A plug with bad contact, faster than two looks.
+    // A plug with bad contact, faster than two scans.
     let limit = Duration::from_millis(200);
     let mut pending = world.application_mut().engine_mut().start_rescan(limit);
     let begin = world.application().now();
@@ -131,13 +135,13 @@ fn a_rescan_of_a_ring_gives_the_places_and_ends_in_time_while_it_changes() {
         }
         assert!(world.application().now().since(begin) < 2 * limit, "it ends in time");
     };
-    // Between two edges it may have been looked at as a whole.
+    // Between two edges a complete scan is possible.
     assert!(matches!(&result, Ok(rescan) if rescan.is_complete()) || result.is_err(), "{result:?}");
     world.heal(CableId(2));
     world.settle();
 }
 
-/// Damaged frames by cable, where there were some: the positions of its ends.
+/// Cables with damaged frames: positions of the ends and counts.
 fn damaged(world: &World) -> Vec<(Option<usize>, Option<usize>, u64)> {
     let counted = world.application().engine().cable_errors();
     let damaged = counted.iter().filter(|(_, errors)| errors.invalid_frames > 0);
@@ -163,7 +167,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
         .expect("a segment can be built");
     let declare = |scan: &ringcat::Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
-        // In the order of frames: coupler, junction, what is behind it, and the rest of the ring.
+        // Processing order: coupler, junction, its branch, and the rest of the ring.
         declaration.subdevices[2].optional = true;
         declaration
     };
@@ -181,7 +185,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
     damage(&mut world);
     let first = damaged(&world);
     let [(Some(3), Some(4), before)] = first[..] else { panic!("{first:?}") };
-    // The branch is unplugged: who is behind it comes one place sooner.
+    // The branch is unplugged: positions behind it are lower by one.
     world.power_off(BRANCH);
     world.until(LIMIT, "gone", |world| world.application().states()[2] == SubDeviceState::Absent);
     world.run_cycles(50);
@@ -195,7 +199,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
         world.cut(BETWEEN);
         world.run_cycles(100);
         assert_eq!(place(world), Some(at));
-        // While it is broken, the cabling of before is the better one.
+        // While the ring is broken, the former cabling is kept.
         rescan(world);
         world.run_cycles(100);
         assert_eq!(place(world), Some(at));
@@ -205,7 +209,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
         assert_eq!(place(world), None);
     };
     located(&mut world, (Some(2), Some(3)));
-    // It is back, and so are the places.
+    // The ring is closed again, and the places are as before.
     world.power_on(BRANCH);
     world.until(LIMIT, "back", |world| world.application().states()[2] == OP);
     world.run_cycles(100);
@@ -213,7 +217,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
     located(&mut world, (Some(3), Some(4)));
 }
 
-/// Frames meet the branch behind the port on which the ring goes on in another order while the ring is open (CR-09).
+/// In an open ring the processing order of a branch behind the port from which the ring continues is different (CR-09).
 // covers: CR-09, CR-17, rescan
 #[test]
 fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
@@ -237,7 +241,7 @@ fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
     }
 }
 
-/// The redundant copy meets the branch on port 2 of a closed ring: that is no break (CR-09).
+/// The branch on port 2 of a closed ring processes the redundant copy: this is not a break (CR-09).
 // covers: CR-09, CR-17, rescan
 #[test]
 fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
@@ -253,7 +257,7 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
         (at(1, D), at(4, A)),
     ];
     let kinds = ["junction", "junction", "digital-output-8", "digital-input-16", "digital-output-16"];
-    // Known from the scan on, or scanned while the ring was open, so that frames met them in another order.
+    // Scanned in the closed ring, or in the open ring with another processing order.
     for open_at_scan in [None, Some(CableId(2)), Some(CableId(0))] {
         let mut network = wired(&kinds, &cables);
         open_at_scan.into_iter().for_each(|cable| network.cut(cable));
@@ -271,7 +275,7 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
         let all = rescan(&mut world);
         assert_eq!((all.counts.0.0, all.counts.1.0), (4, 1), "{open_at_scan:?}");
         assert!(all.moved().count() == 0 && !world.saw(mark, |event| matches!(event, Event::Moved { .. })));
-        // In the order of the closed ring: 0, 1, the one that leaves, 2, and the branch that the redundant copy meets.
+        // Order of the closed ring: 0, 1, the leaving SubDevice, 2, and the branch that processes the redundant copy.
         let located = |world: &mut World, between: CableId, at| {
             let mark = world.mark();
             world.cut(between);
@@ -298,8 +302,8 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
     }
 }
 
-/// Somebody like a declared one is at a place of the cabling as nobody's; when that one goes he takes over, where he
-/// is.
+/// An unassigned SubDevice identical to a declared one is part of the cabling; when the declared one leaves, it becomes
+/// the member at its own place.
 // covers: CR-09, CR-17, rescan
 #[test]
 fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
@@ -333,7 +337,7 @@ fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
     }
     world.run_cycles(1_600);
     assert!(matches!(damaged(&world)[..], [(Some(0), Some(2), _)]), "{:?}", damaged(&world));
-    // Who looks for position 2 finds him, and at position 1 nobody is.
+    // Position 2 has this SubDevice, and position 1 none.
     let stations = world.application().engine().stations();
     assert_eq!(world.station_of(SPARE.0), stations[1].0);
     let mark = world.mark();

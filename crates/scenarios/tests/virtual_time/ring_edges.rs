@@ -1,6 +1,5 @@
-//! A copy that is turned round at a cut behind the other one: outputs come twice, with the same bytes. Whether that
-//! shows depends on whether the copy comes back (issue 5: a working counter above the expected one is an incomplete
-//! cycle).
+//! A copy that is looped back at a cut behind the other copy: outputs arrive twice, with the same bytes. This is
+//! visible only if the copy comes back (issue 5: a working counter above the expected one is an incomplete cycle).
 
 use std::time::Duration;
 
@@ -12,14 +11,14 @@ use scenarios::check::Delivery;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-/// SubDevices: so many that the redundant copy is still on its way when the main one has passed [`CUT`].
+/// Number of SubDevices: the redundant copy is still under way when the main copy has passed [`CUT`].
 const COUNT: usize = 64;
 /// The cable that is cut.
 const CUT: usize = 5;
 /// Outputs: next to the cut, and far behind it.
 const OUTPUTS: [usize; 2] = [CUT, 50];
 
-/// Few process data, so that frames are short: couplers, two outputs and an input before the cut and one behind it.
+/// Little process data, so that frames are short: couplers, two outputs and an input before the cut and one behind it.
 fn segment() -> Network {
     let mut kinds = ["coupler"; COUNT];
     OUTPUTS.into_iter().for_each(|at| kinds[at] = "digital-output-8");
@@ -32,7 +31,7 @@ fn latched(world: &World) -> [u64; 2] {
     OUTPUTS.map(|at| counts[at])
 }
 
-/// How often outputs behind the cut came in the cycle of a cut at this moment, and how that cycle was judged.
+/// Number of outputs behind the cut in the cycle of a cut at this moment, and the status of this cycle.
 fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<usize>) {
     let (before, mark) = (latched(world), world.mark());
     world.fault_in(moment, Fault::Cut(CableId(CUT)));
@@ -55,7 +54,7 @@ fn outputs_doubled_at_a_cut_are_incomplete_when_the_second_copy_is_back() {
         let (times, delivery, stale) = cut_after(&mut world, moment);
         match times {
             [1, 1] => {}
-            // The copy that turned round passes all that are behind the cut.
+            // All SubDevices behind the cut process the copy that was looped back.
             [2, 2] => {
                 assert_eq!(delivery, Delivery::Incomplete, "cut after {moment:?}");
                 assert_eq!(stale, [], "cut after {moment:?}: its inputs came with each copy");
@@ -67,7 +66,7 @@ fn outputs_doubled_at_a_cut_are_incomplete_when_the_second_copy_is_back() {
     assert!(twice.len() >= 5, "{twice:?}");
 }
 
-/// The other one has met everybody and brought all inputs. Nothing shows what the one did that was lost.
+/// All SubDevices have processed the other copy, with all inputs. The effects of the lost copy cannot be detected.
 // covers: ring-merge
 #[test]
 fn outputs_doubled_at_a_cut_are_complete_when_the_second_copy_is_lost() {

@@ -1,5 +1,5 @@
-//! What is told of a ring and what can be asked about it: each edge once with counts and place (CR-12), links and
-//! counts at any time (CR-13), redundancy apart from faults of the bus, cables that flap.
+//! Events and status of a ring: each edge once with counts and place (CR-12), links and counts at any time (CR-13),
+//! redundancy separate from bus faults, flapping cables.
 
 use std::time::Duration;
 
@@ -114,7 +114,7 @@ fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time() {
         let status = check(&world, COUNT, 0);
         assert_eq!((status.redundancy, status.place), (Redundancy::Ready, None));
     }
-    // One that falls is seen on its own side, among those that stay.
+    // A SubDevice that loses OP is reported on its side.
     world.cut(CableId(5));
     world.run_cycles(20);
     world.network_mut().device_mut(DeviceIndex(12)).refuse_transition(
@@ -141,7 +141,7 @@ fn redundancy_bus_faults_and_carriers_are_reported_each_by_itself() {
     world.run_cycles(50);
     let lost = Event::RedundancyLost { cause: RedundancyLoss::Open };
     assert_eq!(others(world.events(mark)), std::slice::from_ref(&lost));
-    assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "the bus is well");
+    assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "there is no bus fault");
     let since = world.application().ring_status().redundancy;
     world.run_cycles(500);
     assert_eq!(world.application().ring_status().redundancy, since, "it keeps the time at which it was lost");
@@ -167,7 +167,7 @@ fn redundancy_bus_faults_and_carriers_are_reported_each_by_itself() {
 fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_else() {
     let mut world = small(4);
     let mark = world.mark();
-    // Frames of RED die on their way to MAIN; the copies of MAIN do all the work.
+    // Frames of RED are lost on their way to MAIN; the copies of MAIN are complete.
     let fault = |blocked| Fault::OneWay { cable: CableId(2), direction: Direction::BToA, blocked };
     world.fault(fault(true));
     world.run_cycles(200);
@@ -246,7 +246,7 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
         assert!(told <= most, "{micros} us: {told} of {most}");
         assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);
         let closed = ring_events(world.events(mark)).last().is_none_or(|last| matches!(last, Event::RingClosed { .. }));
-        assert!(closed, "what was told last is how it is");
+        assert!(closed, "the last report is the present state");
     }
 }
 
@@ -255,7 +255,7 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
 fn a_cable_that_flaps_in_one_direction_changes_no_state_and_floods_no_log() {
     println!("direction, half period us | cycles incomplete of all | events about ring and redundancy");
     for (number, direction) in [Direction::AToB, Direction::BToA].into_iter().enumerate() {
-        // Away from MAIN nobody behind the cable gets outputs meanwhile: for less than the watchdog of 100 ms.
+        // Away from MAIN no SubDevice behind the cable receives outputs: for less than the watchdog of 100 ms.
         for micros in [3u64, 40, 700, 2_300, 30_000, 80_000, 1_000_000] {
             if direction == Direction::AToB && micros > 80_000 {
                 continue;
@@ -300,7 +300,7 @@ fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
     world.run_cycles(1_100);
     assert!(!world.application().ring_status().unsteady);
     assert!(matches!(ring_events(world.events(mark)).last(), Some(Event::RingClosed { main: 4, redundant: 0, .. })));
-    // It is told at once again.
+    // The next change is reported at once again.
     let mark = world.mark();
     world.cut(CableId(1));
     world.run_cycles(10);

@@ -1,5 +1,5 @@
-//! Cutting and healing any one cable of a closed ring of 16 in OP at 1 ms: every cable, several detection delays,
-//! several moments of the cycle (issue 2, "What it must reach").
+//! Cut and repair of any one cable of a closed ring of 16 in OP at 1 ms: every cable, several detection delays, several
+//! moments of the cycle (issue 2, "What it must reach").
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ const PHASES: [u32; 7] = [0, 5, 20, 60, 250, 500, 900];
 /// Cycles after which an edge must be over.
 const AFTER_EDGE: u64 = 100;
 
-/// What was measured for one detection delay.
+/// Measurement for one detection delay.
 #[derive(Debug, Default)]
 struct Row {
     detection: Duration,
@@ -37,12 +37,12 @@ fn bound(detection: Duration, flight: Duration) -> usize {
     if time < CYCLE / 2 { 1 } else { time.as_nanos().div_ceil(CYCLE.as_nanos()) as usize + 1 }
 }
 
-/// One edge: the fault at its moment, until everything is over. Returns the incomplete cycles.
+/// One edge: the fault at its moment, until its effects have ended. Returns the incomplete cycles.
 fn edge(world: &mut World, fault: Fault, phase: u32, detection: Duration) -> usize {
     let mark = world.mark();
     world.fault_in(CYCLE * phase / 1000, fault);
     world.run_cycles(detection.as_nanos().div_ceil(CYCLE.as_nanos()) as u64 + AFTER_EDGE);
-    assert_eq!(world.left_op(mark), [], "nobody leaves OP");
+    assert_eq!(world.left_op(mark), [], "no SubDevice leaves OP");
     assert!(world.all_in_op());
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "no SubDevice is in trouble");
     let last = world.judged(mark).last().map(|judged| judged.delivery);
@@ -79,7 +79,7 @@ fn cut_and_heal(world: &mut World, cable: usize, phase: u32, row: &mut Row) {
 
 fn matrix(detection: Duration) -> Row {
     let mut row = Row { detection, ..Row::default() };
-    // A world per cable: a ring that changes ten times a second for long is unsteady, and no longer told of each time.
+    // A world per cable: a ring with ten changes a second is unsteady, and changes are no longer reported each time.
     for cable in 0..=usize::from(COUNT) {
         let mut world = World::in_op(0, ring_of_16(detection));
         world.application_mut().links_mut().measure_flights();
@@ -119,8 +119,8 @@ fn cutting_any_cable_of_a_ring_of_16_costs_no_more_cycles_than_detection() {
     }
 }
 
-/// The ends of a cable that is healed open their ports one after the other: until the later one does, frames that are
-/// sent into the cable are lost. It costs the difference, not more, and is told as one repair.
+/// The ends of a repaired cable open their ports one after the other: until the second one opens, frames sent into the
+/// cable are lost. This costs the difference, not more, and is reported as one repair.
 // covers: CR-14, CR-15, ring-cut
 #[test]
 fn ends_that_open_one_after_the_other_cost_no_more_cycles_than_the_difference() {

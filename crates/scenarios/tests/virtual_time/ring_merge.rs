@@ -1,5 +1,5 @@
-//! The merged result of a split ring is that of the unsplit one (protocol 9.3): random trees with a ring through them,
-//! junctions and branches on any port, crossed SubDevices, random breaks of the ring, all commands. CR-05, CR-09.
+//! The merged result of a broken ring equals that of a closed ring (protocol 9.3): random trees with a ring through
+//! them, junctions and branches on any port, crossed SubDevices, random breaks of the ring, all commands. CR-05, CR-09.
 
 use std::time::Duration;
 
@@ -17,22 +17,22 @@ use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
-/// RAM of the controller that nobody uses.
+/// Unused RAM of the controller.
 const USER_RAM: u16 = 0x0F80;
-/// Bytes of it.
+/// Bytes of this RAM.
 const RAM: usize = 80;
-/// Where random logical commands go: far from process data.
+/// Logical address of random commands, away from process data.
 const LOGICAL: u32 = 0x7000_0000;
 /// Bytes that each SubDevice maps there.
 const MAPPED: u16 = 4;
 
-/// A tree with a way through it from MAIN to RED.
+/// A tree with a path through it from MAIN to RED.
 struct Segment {
     network: Network,
-    /// The cables of the way.
+    /// The cables of the path.
     trunk: Vec<CableId>,
-    /// A branch hangs behind the port through which the way goes on, or a SubDevice is crossed: a break changes the
-    /// order in which frames meet them (CR-09).
+    /// A branch is behind the port from which the path continues, or a SubDevice is crossed: a break changes the
+    /// processing order (CR-09).
     reordered: bool,
 }
 
@@ -40,7 +40,7 @@ struct Segment {
 fn segment(dice: &mut Dice) -> Segment {
     let trunk = 2 + dice.below(6) as usize;
     let total = trunk + dice.below(6) as usize;
-    // In the order in which frames pass them.
+    // In processing order.
     let mut free: Vec<Vec<Port>> = vec![vec![Port::D, Port::B, Port::C]; total];
     let mut behind: Vec<Vec<Port>> = vec![Vec::new(); total];
     let mut cables = Vec::new();
@@ -48,7 +48,7 @@ fn segment(dice: &mut Dice) -> Segment {
     let in_order = dice.one_in(3);
     let mut reordered = false;
     for (device, ports) in free.iter_mut().enumerate().take(trunk) {
-        // The ring goes on through any port of a junction.
+        // The ring continues from any port of a junction.
         let way_on = if in_order { ports.len() - 1 } else { dice.below(ports.len() as u64) as usize };
         behind[device] = ports[way_on + 1..].to_vec();
         let mut ends = [at(device, Port::A), at(device, ports.remove(way_on))];
@@ -81,7 +81,7 @@ struct Random {
 }
 
 impl Random {
-    /// Everybody writes what the datagram holds when it comes: that depends on who was met before.
+    /// SubDevices write the present data of the datagram, which depends on the SubDevices before them.
     fn depends_on_the_way(&self) -> bool {
         matches!(self.command, Command::Brw | Command::Armw | Command::Frmw)
     }
@@ -91,7 +91,7 @@ fn random(dice: &mut Dice, stations: &[u16]) -> Random {
     let station = StationAddress(*dice.pick(stations));
     let position = Position(dice.below(stations.len() as u64) as u16);
     let ram = RegisterAddress(USER_RAM + dice.below(64) as u16);
-    // Registers that say the same wherever a break is.
+    // Registers that do not depend on the place of a break.
     let constant = RegisterAddress(*dice.pick(&[0x0000, 0x0010, 0x0130, 0x0600, 0x0800, USER_RAM]));
     let logical = Target::Logical(LogicalAddress(LOGICAL + dice.below(40) as u32));
     // Of one SubDevice (protocol 9.2.2).
@@ -116,7 +116,7 @@ fn random(dice: &mut Dice, stations: &[u16]) -> Random {
     let (command, target) = *dice.pick(&commands);
     let longest = if command == Command::Lrw { MAPPED.into() } else { 16 };
     let length = 1 + dice.below(longest) as u16;
-    // Reads leave as zeros (protocol 9.3).
+    // Reads are sent as zeros (protocol 9.3).
     let reads = matches!(command, Command::Aprd | Command::Brd | Command::Fprd | Command::Lrd | Command::Nop);
     let data = (0..length).map(|_| if reads { 0 } else { dice.below(256) as u8 }).collect();
     Random { command, target, data }
@@ -126,14 +126,14 @@ fn send(world: &mut World, datagram: Random) -> Reply {
     let bus = world.application().engine().bus();
     let Random { command, target, data } = datagram;
     if matches!(target, Target::Position(..)) {
-        // Only the application's own are addressed as the scan found everybody.
+        // Only datagrams of the application use the positions of the scan.
         let resend = command == Command::Armw;
         let datagram = RawDatagram { command, target, data, resend };
         let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
         let replies = world.finish(Duration::from_secs(1), work).expect("one is not too many");
         return replies.into_iter().next().expect("one answer").expect("it comes back");
     }
-    // One copy is enough for what must not travel twice: read 1, write 2. Of ARMW and FRMW everybody counts 1.
+    // One copy is enough for datagrams that must not be repeated: read 1, write 2. ARMW and FRMW count 1 per SubDevice.
     let all = world.network().devices().len() as u16;
     let expected = match command {
         Command::Fprw | Command::Lrw => Some(Wkc(3)),
@@ -144,7 +144,7 @@ fn send(world: &mut World, datagram: Random) -> Reply {
     world.run(async move { bus.transfer(command, target, data, expected).await.expect("it comes back") })
 }
 
-/// Maps four bytes of user RAM of each SubDevice to the logical addresses, one behind the other.
+/// Maps four bytes of user RAM of each SubDevice to consecutive logical addresses.
 fn map_ram(world: &mut World, stations: &[u16]) {
     let bus = world.application().engine().bus();
     let stations = stations.to_vec();
@@ -167,13 +167,13 @@ fn map_ram(world: &mut World, stations: &[u16]) {
     });
 }
 
-/// What the RAM of all devices holds.
+/// The RAM of all devices.
 fn memories(world: &World) -> Vec<Vec<u8>> {
     let ram = |device: &Device| device.controller.register(RegisterAddress(USER_RAM), RAM).to_vec();
     world.network().devices().map(ram).collect()
 }
 
-/// Sends a datagram in both worlds; both answers and both segments must be the same afterwards.
+/// Sends a datagram in both worlds; both replies and both segments must be equal afterwards.
 fn compare(worlds: &mut [World; 2], datagram: Random, what: &str) {
     let [got, expected] = worlds.each_mut().map(|world| send(world, datagram.clone()));
     assert_eq!((&got.data, got.wkc()), (&expected.data, expected.wkc()), "{what}: {datagram:?}");
@@ -187,7 +187,7 @@ fn compare(worlds: &mut [World; 2], datagram: Random, what: &str) {
     assert_eq!(split, whole, "{what}: what they hold after {datagram:?}");
 }
 
-/// What the addressed SubDevice has is sent to it with FRMW or ARMW: everybody gets it then, also on the other side of
+/// The data of the addressed SubDevice is sent with FRMW or ARMW: all SubDevices receive it, also on the other side of
 /// a break.
 fn distribute(worlds: &mut [World; 2], dice: &mut Dice, stations: &[u16], what: &str) {
     let (station, ram) = (StationAddress(*dice.pick(stations)), RegisterAddress(USER_RAM + dice.below(64) as u16));
@@ -201,8 +201,8 @@ fn distribute(worlds: &mut [World; 2], dice: &mut Dice, stations: &[u16], what: 
     assert_eq!(split, whole, "{what}: FRMW of what {station} has");
 }
 
-/// Returns how many datagrams were compared, and how many of them were addressed by position, of these how many where a
-/// break changes the order of the SubDevices.
+/// Returns the number of compared datagrams, of those addressed by position, and of those with a changed order of
+/// SubDevices among them.
 fn run(seed: u64) -> [usize; 3] {
     let mut dice = Dice::new(seed);
     let Segment { network, trunk, reordered } = segment(&mut dice);

@@ -1,11 +1,11 @@
-//! Rings of 2, 5, 16 and 64 SubDevices, cut and healed in every phase of their life ([`scenarios::ring_matrix`]): all
-//! cables of the small ones, some of the large ones. `ci/bench` does all of them.
+//! Rings of 2, 5, 16 and 64 SubDevices, cut and repaired in every phase ([`scenarios::ring_matrix`]): all cables of the
+//! small ones, some of the large ones. `ci/bench` does all of them.
 
 use std::time::Duration;
 
 use scenarios::ring_matrix::{Bed, Phase};
 
-/// Runs some cables of a ring in all phases, each at another moment; returns how many runs there were.
+/// Runs some cables of a ring in all phases, each at another moment; returns the number of runs.
 fn cables(count: usize, cables: impl Iterator<Item = usize> + Clone) -> usize {
     let bed = Bed::new(count, Duration::from_micros(10));
     let mut runs = 0;
@@ -38,7 +38,7 @@ fn some_cables_of_rings_of_16_and_64_are_cut_and_healed_in_every_phase() {
     assert_eq!(cables(16, [0, 8, 9, 16].into_iter()) + cables(64, [33].into_iter()), 55);
 }
 
-/// Ports that notice late: the cut costs what their delay takes, and nothing else.
+/// Slow link detection: the cut costs the detection time and no more.
 // covers: CR-14, CR-15, ring-cut
 #[test]
 fn ports_that_notice_late_cost_rings_of_2_5_and_64_no_more_than_their_delay() {
@@ -55,6 +55,6 @@ fn ports_that_notice_late_cost_rings_of_2_5_and_64_no_more_than_their_delay() {
             }
         }
         println!("ring of {count}, {detection_us} us: at cut and repair {worst:?} incomplete cycles at the most");
-        assert!(worst[0] > 1, "a cut that is noticed late costs more than one cycle");
+        assert!(worst[0] > 1, "a cut that is detected late costs more than one cycle");
     }
 }

@@ -1,6 +1,5 @@
-//! A merge that was written apart from the engine (`remerge.py`, from the capture of both links alone) comes to the
-//! same inputs and to the same incomplete cycles as the engine printed as JSON, in runs with random breaks. CR-05,
-//! CR-06, CR-07, protocol 9.3.
+//! An independent merge (`remerge.py`, from the capture of both links alone) gives the same inputs and the same
+//! incomplete cycles as the engine, in runs with random breaks. CR-05, CR-06, CR-07, protocol 9.3.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,15 +23,15 @@ const KINDS: [&str; 6] =
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/virtual_time/remerge.py");
 const CYCLES: usize = 400;
 
-/// What a cycle came to.
+/// Result of a cycle.
 #[derive(Debug)]
 struct Cycle {
     complete: bool,
     inputs: String,
 }
 
-/// A straight ring, or one with branches on ports 3 and 2, of which the latter is met by the redundant copy even while
-/// the ring is closed, and with crossed SubDevices; with the number of cables that are the ring's.
+/// A straight ring, or a ring with crossed SubDevices and branches on ports 3 and 2, of which the latter processes the
+/// redundant copy even in the closed ring; with the number of cables of the ring.
 fn segment(shape: u64, options: NetworkOptions) -> (Network, usize) {
     if shape == 0 {
         return (ring(descriptions(&KINDS), options), KINDS.len() + 1);
@@ -59,7 +58,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Runs with random breaks; returns what the engine made of each cycle, from OP on with the number of the first one.
+/// Runs with random breaks; returns the engine's result of each cycle in OP, with the number of the first one.
 fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
     let mut dice = Dice::new(seed);
     let detection = Duration::from_micros(*dice.pick(&[10, 600, 3_000]));
@@ -106,14 +105,14 @@ fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
     (first.unwrap_or_default(), cycles)
 }
 
-/// What the engine made of all cycles, as the script reads it.
+/// The engine's results of all cycles, in the format of the script.
 fn json(first: usize, cycles: &[Cycle]) -> String {
     let one = |Cycle { complete, inputs }: &Cycle| format!("{{\"complete\": {complete}, \"inputs\": \"{inputs}\"}}");
     let cycles: Vec<String> = cycles.iter().map(one).collect();
     format!("{{\"first\": {first}, \"cycles\": [\n{}\n]}}\n", cycles.join(",\n"))
 }
 
-/// How many cycles the script compared, and how many of them were incomplete; `None` where there is no Python.
+/// Number of cycles that the script compared, and of incomplete ones; `None` without Python.
 fn remerged(capture: &Path, images: &Path, seed: u64) -> Option<(usize, usize)> {
     let output = Command::new("python3").arg(SCRIPT).args([capture, images]).output().ok()?;
     assert!(output.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&output.stderr));

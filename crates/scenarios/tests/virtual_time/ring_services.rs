@@ -1,5 +1,5 @@
-//! Everything goes on while a ring is broken: mailboxes, registers, EEPROMs, state changes, those that lose their power
-//! or appear for the first time, start and stop; LRW where it is allowed.
+//! Services in a broken ring: mailboxes, registers, EEPROMs, state changes, SubDevices that lose their power or appear
+//! for the first time, start and stop; LRW if it is allowed.
 
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
 /// The device with all protocols.
 const ALL: usize = 2;
 const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "servo", "digital-output-8"];
-/// RAM of the controller that nobody uses.
+/// Unused RAM of the controller.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
 fn segment() -> Network {
@@ -94,7 +94,7 @@ fn registers_are_reached_by_station_and_by_position_behind_any_break() {
         let marks: Vec<u8> = (0..count as u8).map(|position| position ^ 0xA5).collect();
         let (own, values) = (stations.clone(), marks.clone());
         let seen = world.run(async move {
-            // The broadcast shows how many the main copy meets.
+            // The broadcast shows the number of SubDevices on the main side.
             let counted = bus.brd(map::TYPE, 1).await.unwrap();
             assert_eq!(counted.wkc().0, count);
             let mut seen = Vec::new();
@@ -119,7 +119,7 @@ fn registers_are_reached_by_station_and_by_position_behind_any_break() {
 // covers: CR-17, ring-goes-on
 #[test]
 fn a_subdevice_power_cycled_on_either_stub_is_read_and_configured_again() {
-    // 7 and 8 are next to the break; behind 3 and 12 there are others, which return with them.
+    // 7 and 8 are next to the break; the SubDevices behind 3 and 12 return with them.
     for (device, gone) in [(7, 7..8), (8, 8..9), (3, 3..8), (12, 8..13)] {
         let mut world = World::in_op(device as u64, ring_of_16(FAST));
         world.cut(CableId(8));
@@ -135,13 +135,13 @@ fn a_subdevice_power_cycled_on_either_stub_is_read_and_configured_again() {
             .until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
         world.run_cycles(60);
         assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
-        let left: Vec<usize> = world.left_op(mark).iter().map(|who| who.0).collect();
-        assert!(left.iter().all(|who| gone.contains(who)), "{left:?} left OP with {device}");
+        let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
+        assert!(left.iter().all(|device| gone.contains(device)), "{left:?} left OP with {device}");
         assert_eq!(world.application().ring_status().place, Some(cable_of_ring(8, 16)));
     }
 }
 
-/// An analogue input of four channels whose process data is known without it.
+/// An absent analogue input of four channels with known process data.
 fn optional_analog_input(position: u16) -> SubDeviceConfig {
     let channel = |channel: u16| {
         let index = 0x6000 + 0x10 * channel;
@@ -154,7 +154,8 @@ fn optional_analog_input(position: u16) -> SubDeviceConfig {
 // covers: CR-17, CR-21, ring-goes-on
 #[test]
 fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_on() {
-    // It heads the redundant stub, or ends the main one: its neighbour across the break is configured beside it.
+    // It is the first SubDevice of the redundant side, or the last of the main side: its neighbour across the break is
+    // configured at the same time.
     for cable in [2, 3] {
         let kinds = ["coupler", "digital-output-8", "analog-input-4", "servo", "digital-output-16"];
         let mut network = ring(descriptions(&kinds), NetworkOptions::default().with_detection_delay(FAST));
@@ -231,7 +232,7 @@ fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices() {
         text.starts_with("domain 0: an LRW at logical address 0x00000000 of") && text.contains("[1, 2, 3, 4]"),
         "{text}"
     );
-    // On one link it is what is used.
+    // On one link LRW is used.
     let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());
     let mut world =
         World::with(0, line, &Options::default(), |scan| with_lrw(scan, LrwPolicy::Explicit)).expect("one link");
@@ -260,7 +261,7 @@ fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each() {
     assert!(world.compared() > 0);
 }
 
-/// As a configuration file names them.
+/// With names from a configuration file.
 // covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
@@ -281,7 +282,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
     let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for \
                     declarations [2, 3] cannot be used with two links";
     assert!(error.contains(expected), "{error}");
-    // On one link nothing speaks against it.
+    // On one link it is allowed.
     let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());
     World::with(0, line, &Options::default(), several()).expect("one link").settle();
     let mut world =
@@ -300,7 +301,7 @@ fn rings_work_with_both_encodings_of_the_source_address() {
         let mut world = World::with(2, ring_of_16(FAST), &options, |scan| automatic(&scan.subdevices, CYCLE)).unwrap();
         world.settle();
         let mark = world.mark();
-        // More frames than an id has numbers, with a break among them.
+        // More frames than the range of frame ids, with a break among them.
         world.run_cycles(300);
         world.cut(CableId(5));
         world.run_cycles(300);

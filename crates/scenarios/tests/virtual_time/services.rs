@@ -40,15 +40,15 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     world.run_cycles(50);
     let before = world.application().engine().statistics(2).expect("it is declared");
     assert!(before.is_clean() && before.readings >= 2, "{before:?}");
-    // Frames on the cable before the third one, in both directions: it sees those that come, its neighbour those that
-    // go back.
+    // Frames on the cable before the third SubDevice, in both directions: it counts those towards it, its neighbour
+    // those on the way back.
     for _ in 0..40 {
         world.corrupt(CableId(2), 10);
         world.run_cycles(25);
     }
     let engine = world.application().engine();
     let [here, behind, neighbour] = [2, 3, 1].map(|subdevice| engine.statistics(subdevice).expect("declared"));
-    // What comes back damaged is lost, so not all of the ten are in both directions.
+    // Frames damaged on the way back are lost, so not all ten are counted in both directions.
     assert!(here.ports[0].invalid_frames >= 300, "{:?}", here.ports);
     assert_eq!(here.ports[0].forwarded, 0);
     assert!(behind.ports[0].forwarded >= 200 && behind.ports[0].invalid_frames == 0, "{:?}", behind.ports);
@@ -121,7 +121,7 @@ fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back()
     set(&mut world, LoopControl::Auto);
     assert!(world.application_mut().engine_mut().force_topology_change());
     world.until(LIMIT, "back", |world| world.application().all_settled());
-    // The same by name.
+    // The same with the other method.
     let block = world.application_mut().engine_mut().start_block(3);
     assert_eq!(world.finish(LIMIT, block).map(|ports| ports.len()), Ok(1));
     world.until(LIMIT, "gone", gone);
@@ -140,7 +140,7 @@ fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lo
         let starts = world.network().device(DeviceIndex(3)).controller.starts();
         let mark = world.mark();
         if lost > 0 {
-            // Frames of the cycle among them.
+            // Cyclic frames are among them.
             world.drop(CableId(3), lost);
             world.drop(CableId(4), lost);
         }

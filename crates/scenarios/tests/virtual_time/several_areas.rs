@@ -1,5 +1,5 @@
-//! SubDevices with several areas of inputs: one that is dead is not hidden by another one that is not, though a
-//! SubDevice adds to a working counter once (protocol 1.4).
+//! SubDevices with several areas of inputs: a disabled SyncManager is not hidden by an enabled one, although a
+//! SubDevice adds to a working counter only once (protocol 1.4).
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use scenarios::world::World;
 
 const DOMAIN: DomainId = DomainId(0);
 
-/// Sixteen inputs, eight in each of two SyncManagers, between two others.
+/// Sixteen inputs, eight in each of two SyncManagers, between two other SubDevices.
 fn described(fmmus: Option<u8>) -> Vec<DeviceDescription> {
     let mut described = descriptions(&["digital-input-8", "digital-input-16", "digital-output-8"]);
     let two = &mut described[1];
@@ -57,8 +57,8 @@ fn inputs_of_a_dead_sync_manager_are_not_fresh_beside_those_of_another_one() {
                         assert_eq!(exchange.image(DOMAIN)[area.placed.image_offset as usize], 0xAA, "{what}");
                     }
                     assert!(matches!(exchange.freshness(DOMAIN, 1), Freshness::Stale { .. }), "{what}");
-                    // The first area shares its datagram with others where it is witnessed: then none of that can be
-                    // told apart.
+                    // With a presence datagram the first area shares its datagram with others, whose inputs are then
+                    // stale too.
                     if dead == 1 || fmmus.is_some() {
                         assert_eq!(exchange.freshness(DOMAIN, 0), Freshness::Fresh, "{what}");
                     }

@@ -1,5 +1,5 @@
-//! EEPROMs that are slow, now and then or always, and frames that come late or not at all while they are read: a scan
-//! takes the time that is needed, never more than a bound, and finds what is there (protocol 3.8, 5.4).
+//! EEPROMs that are slow sometimes or always, and frames that are late or lost while they are read: a scan takes the
+//! necessary time within a limit, and finds all SubDevices (protocol 3.8, 5.4).
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use scenarios::meddler::{Meddled, Verdict};
 use scenarios::segments::{describe, line};
 use scenarios::tap::Tap;
 
-/// Longest virtual time of a scan here.
+/// Limit of the virtual time of a scan.
 const LIMIT: Instant = Instant(200_000_000_000);
 
 fn network(terminals: Vec<DeviceDescription>) -> Network {
@@ -29,7 +29,7 @@ fn terminal(busy: Duration) -> DeviceDescription {
     DeviceDescription { sii_busy: busy, ..describe("digital-output-8", "terminal") }
 }
 
-/// The result of a scan, when it came, and how often somebody counted.
+/// The result of a scan, its time, and the number of counting broadcasts.
 fn scan(network: Network) -> (Result<Scan, Error>, Duration, usize) {
     let mut tap = Tap::new(network);
     tap.set_limit(LIMIT);
@@ -58,7 +58,7 @@ fn an_eeprom_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word()
         }
     });
     let took = Duration::from_nanos(main_device.links_mut().now().0);
-    // The other one is read all the same.
+    // The other EEPROM is read nevertheless.
     let found = result.expect("a scan").subdevices;
     assert!(found[0].warnings.is_empty() && found[0].name == "terminal" && !found[0].is_blank());
     assert!(found[1].is_blank() && found[1].identity.vendor_id == u32::MAX);
@@ -135,8 +135,8 @@ fn an_sii_command_sent_twice_after_a_lost_answer_does_no_harm() {
         let mut dice = Dice::new(seed);
         let busy = Duration::from_micros(*dice.pick(&[500, 3_000, 8_000]));
         let mut lost = 0;
-        // One in four answers to frames with a command to the EEPROM is lost: the same command comes once more while
-        // the EEPROM is busy with it or has done it.
+        // One in four responses to frames with an EEPROM command is lost: the command is repeated while the EEPROM is
+        // busy with it or has finished it.
         let links = Meddled::new(network(vec![terminal(busy); 2]), LIMIT, |bytes| {
             let is_command = |it: &Header| it.command == Command::Fpwr && it.address >> 16 == map::SII_CONTROL.0.into();
             let frame = Frame::parse(bytes);

@@ -1,4 +1,4 @@
-//! Power-on to OP: SubDevices that appear one after the other, and how long it takes (protocol 5.6).
+//! Power-on to OP: SubDevices that appear one after the other, and the duration (protocol 5.6).
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use scenarios::tap::Tap;
 
 const KINDS: [&str; 5] = ["coupler", "digital-output-8", "servo", "digital-input-8", "digital-output-8"];
 
-/// Devices from a number on get their power so late, one after the other.
+/// Devices from this number on are switched on late, one after the other.
 fn slow_to_appear(from: usize, pause: Duration) -> Network {
     let mut network = line(descriptions(&KINDS), NetworkOptions::default());
     for (late, device) in (from..KINDS.len()).enumerate() {

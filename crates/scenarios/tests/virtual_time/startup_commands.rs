@@ -1,5 +1,5 @@
-//! Start-up commands: objects and IDNs at each transition, in the declared order, the same at each re-entry; pauses and
-//! the EEPROM of those that need it.
+//! Start-up commands: objects and IDNs at each transition, in the declared order, the same at each re-entry; pauses,
+//! and EEPROMs for the PDI.
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use scenarios::segments::{descriptions, line};
 use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
-/// The one with a mailbox.
+/// The SubDevice with a mailbox.
 const DRIVE: usize = 2;
 
 fn segment(change: impl FnOnce(&mut DeviceDescription)) -> Network {
@@ -38,7 +38,7 @@ fn world(network: Network, change: impl Fn(SubDeviceConfig) -> SubDeviceConfig) 
     world
 }
 
-/// What the device was told, without what it was asked: object or IDN, value, state.
+/// Writes that the device received, without reads: object or IDN, value, state.
 fn written(world: &World) -> Vec<(AlState, String, Vec<u8>)> {
     let told = |mail: &ServedMail| match mail.protocol {
         Protocol::Coe => match SdoRequest::decode(&mail.payload).ok()? {

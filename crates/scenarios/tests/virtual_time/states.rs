@@ -1,4 +1,5 @@
-//! One SubDevice in another state while the others go on: nobody misses it, and it comes back with everything.
+//! One SubDevice in another state while the others continue: no cycle is incomplete, and it returns with its whole
+//! configuration.
 
 use std::time::Duration;
 
@@ -26,7 +27,7 @@ use scenarios::world::{CYCLE, Mark, World};
 const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
 const LIMIT: Duration = Duration::from_secs(5);
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
-/// The one with a mailbox and a boot loader.
+/// The SubDevice with a mailbox and a boot loader.
 const DRIVE: usize = 2;
 
 fn request(world: &mut World, subdevice: usize, state: AlState) -> Result<(), ConfigureError> {
@@ -38,9 +39,9 @@ fn state(world: &World, device: usize) -> AlStatus {
     world.network().device(DeviceIndex(device)).al_status()
 }
 
-/// Nobody but one has left OP, and no cycle missed anybody.
+/// Only one SubDevice has left OP, and no cycle was incomplete.
 fn assert_undisturbed(world: &World, since: Mark, but: usize) {
-    assert_eq!(world.incomplete(since), 0, "cycles that missed somebody");
+    assert_eq!(world.incomplete(since), 0, "incomplete cycles");
     assert!(world.judged(since).iter().all(|judged| judged.status.state == ringcat::DomainState::Complete));
     assert!(world.judged(since).iter().all(|judged| judged.stale.iter().all(|stale| *stale == but)));
     assert!(world.left_op(since).iter().all(|device| device.0 == but), "{:?}", world.left_op(since));
@@ -84,7 +85,7 @@ fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
     let exchange = world.application().exchange();
     assert!(matches!(exchange.freshness(DomainId(0), DRIVE), Freshness::Stale { .. }));
     assert_eq!(exchange.freshness(DomainId(0), 3), Freshness::Fresh);
-    // Only in PREOP may this be written.
+    // This may be written only in PREOP.
     let mailbox = world.mailbox(DRIVE);
     let ramp = SdoAddress::new(0x2003, 2);
     let written = world.run(async move { coe::write(&mailbox, ramp, &7u32.to_le_bytes(), LIMITS).await });
@@ -134,7 +135,7 @@ fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
         let device = &mut devices[DRIVE];
         let mailbox = device.mailbox.as_mut().expect("it has one");
         let (receive, send) = if own {
-            // Behind all others, at places of their own, the one that is read first.
+            // Behind all others, at separate addresses, the send mailbox first.
             mailbox.bootstrap.receive_offset = 0x2000;
             mailbox.bootstrap.send_offset = 0x2400;
             let of = |start, kind| {
@@ -145,7 +146,7 @@ fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
             device.sync_managers.extend(more);
             (5, 4)
         } else {
-            // Process data on 0 and 1, the mailboxes of all states behind it.
+            // Process data on 0 and 1, then the mailboxes of all states.
             device.sync_managers.rotate_left(2);
             for pdo in &mut device.pdos {
                 pdo.sync_manager = pdo.sync_manager.map(|number| number - 2);
@@ -160,7 +161,7 @@ fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
         assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
         assert_eq!(manager(&world, receive), (boot.receive_offset, boot.receive_size, true), "own: {own}");
         assert_eq!(manager(&world, send), (boot.send_offset, boot.send_size, true), "own: {own}");
-        // A lost answer is asked for again at the right one.
+        // A lost response is repeated at the right SyncManager.
         world.lose(Loss::of_read(world.station_of(DRIVE), boot.send_offset).on_the_way_back());
         let image = firmware::image("3.1", &[0x5A; 20_000]);
         let mailbox = world.mailbox(DRIVE);
@@ -178,7 +179,7 @@ fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
         assert!(world.all_in_op());
         assert_eq!(registers(&world, DRIVE), before, "own: {own}: all is as before");
         assert_undisturbed(&world, mark, DRIVE);
-        // Unasked mail is found again at the SyncManager of the other states.
+        // Unsolicited mail is found again at the SyncManager of the other states.
         let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
         assert!(world.network_mut().device_mut(DeviceIndex(DRIVE)).application.emergency(&emergency));
         world.run_cycles(50);
@@ -226,7 +227,7 @@ fn commands_of_the_way_down_and_up_are_sent_in_order() {
     assert_eq!(got, expected);
 }
 
-/// Outputs of a terminal without a state machine of its own: nothing else keeps them from acting in SAFEOP.
+/// Outputs of a terminal without a state machine: only the SyncManager disables them in SAFEOP.
 // covers: 4.4, sync-managers-declared
 #[test]
 fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down() {

@@ -1,5 +1,5 @@
-//! Orderly stops of segments whose SubDevices are not all alike: undeclared ones, such as are in lower states, copy AL
-//! control or refuse (protocol 5.3).
+//! Orderly stops of segments with different SubDevices: undeclared, in lower states, with device emulation, or refusing
+//! (protocol 5.3).
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use scenarios::tap::Tap;
 use scenarios::world::CYCLE;
 
 const LIMIT: Duration = Duration::from_secs(1);
-/// Two with a mailbox, two that copy AL control into AL status, two of neither kind.
+/// Two with a mailbox, two with device emulation, two with neither.
 const MIXED: [&str; 6] =
     ["servo", "digital-output-8", "emulated-output-8", "servo", "emulated-input-8", "digital-input-8"];
 
@@ -22,7 +22,7 @@ fn networks() -> [Network; 2] {
     [line(descriptions(&MIXED), options()), ring(descriptions(&MIXED), options())]
 }
 
-/// Runs until those that were declared are where they should be, and then some.
+/// Runs until the declared SubDevices are in their states, and a little longer.
 fn run(network: Network, declare: impl FnOnce(&Scan) -> Declaration) -> Application<Tap> {
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     let scan = main_device.scan().expect("six SubDevices");
@@ -101,7 +101,7 @@ fn a_subdevice_with_an_error_follows_and_its_error_is_acknowledged() {
     for state in [AlState::Init, AlState::PreOp, AlState::SafeOp] {
         for network in networks() {
             let mut application = run(network, |scan| automatic(&scan.subdevices, CYCLE));
-            // Longer than the watchdog, and no cycle in which the supervisor could bring anything back.
+            // Longer than the watchdog, without a cycle in which the supervisor could recover a SubDevice.
             application.links_mut().network_mut().advance_by(Duration::from_millis(150));
             let fallen = application.links().network().devices().filter(|device| device.al_status().error).count();
             assert!(fallen >= 3, "{fallen} fell");

@@ -1,4 +1,4 @@
-//! SubDevices that come back without an address: told apart, told who they are, and never in the way of the others.
+//! SubDevices that come back without an address: distinguished, identified, and without effect on the others.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ fn six(closed: bool) -> Network {
     build(descriptions(&SIX), NetworkOptions::default())
 }
 
-/// The first `declared` SubDevices are declared, the others are nobody's.
+/// The first `declared` SubDevices are declared, the others are not.
 fn world(network: Network, declared: usize) -> World {
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices[..declared], CYCLE);
     let mut world = World::with(1, network, &Options::default(), declare).expect("scan and activation");
@@ -47,7 +47,7 @@ fn states(world: &World) -> Vec<AlState> {
 
 /// All declared SubDevices are in OP, and the process data is complete.
 fn until_settled(world: &mut World) {
-    world.until(Duration::from_secs(3), "everybody in OP and complete", |world| {
+    world.until(Duration::from_secs(3), "all in OP and complete", |world| {
         let status = world.application().exchange().status(DomainId(0));
         world.application().all_settled() && status.wkc == status.expected
     });
@@ -63,7 +63,7 @@ fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
         world.run_cycles(500);
     };
     power_cycle(&mut world, 5);
-    // Out of reach, and forgotten.
+    // Unreachable, and no longer part of the segment.
     world.cut(CableId(5));
     world.run_cycles(300);
     power_cycle(&mut world, 4);
@@ -77,7 +77,7 @@ fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
     let before = world.application().acyclic_counters().datagrams;
     world.run_cycles(1000);
     let quiet = world.application().acyclic_counters().datagrams - before;
-    assert!(quiet <= 30, "one look a second, not a search without end: {quiet} datagrams");
+    assert!(quiet <= 30, "one check a second, not an endless search: {quiet} datagrams");
 }
 
 // covers: identity
@@ -145,9 +145,9 @@ fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
     world.application_mut().engine_mut().spawn(async move {
         let _ = bus.fpwr(temporary, map::STATION_ADDRESS, &0x1003u16.to_le_bytes()).await;
     });
-    // Nothing but the look once a second can show it.
+    // Only the check once a second can show it.
     world.run_cycles(1500);
-    assert!(!world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }), "it is not the one that is missed");
+    assert!(!world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }), "it is not the missing SubDevice");
     let given = stations(&world)[5];
     assert!(given >= 0xC000 && given != temporary.0, "it has a temporary address again, another one");
     assert_eq!(world.application().states()[2], SubDeviceState::Absent);
@@ -175,7 +175,7 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
                     world.power_on(DeviceIndex(device));
                     world.run_cycles(pause);
                 }
-                world.until(Duration::from_secs(2), "everybody in OP", |world| {
+                world.until(Duration::from_secs(2), "all in OP", |world| {
                     world.all_in_op() && world.application().all_settled()
                 });
                 assert_eq!(stations(&world), before, "cable {cut:?}, {order:?}, {pause} ms between");
@@ -184,8 +184,8 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
     }
 }
 
-/// The first of two alike has its cables again at the moment in which the second one, who answered from the redundant
-/// side before, is told who it is: nobody takes the place of the one who has not been seen yet.
+/// The cables of the first of two identical SubDevices are repaired while the second one, which responded on the
+/// redundant side before, is assigned: it must not take the place of the first, which has not been found yet.
 // covers: identity
 #[test]
 fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognised() {
@@ -200,9 +200,8 @@ fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognis
         world.power_on(DeviceIndex(3));
         world.fault_in(Duration::from_micros(250 * step), Fault::PowerOn(DeviceIndex(2)));
         world.run_cycles(20);
-        world.until(Duration::from_secs(2), "everybody in OP", |world| {
-            world.all_in_op() && world.application().all_settled()
-        });
+        world
+            .until(Duration::from_secs(2), "all in OP", |world| world.all_in_op() && world.application().all_settled());
         assert_eq!(stations(&world), before, "{} us between", 250 * step);
     }
 }
@@ -247,7 +246,7 @@ fn an_optional_subdevice_that_was_never_there_does_not_take_the_place_of_its_twi
     assert_eq!(world.application().states()[1], SubDeviceState::Absent);
 }
 
-/// A chain of categories without end: reading it takes seconds, and what is read makes no sense.
+/// An endless chain of categories: reading it takes seconds, and its contents are invalid.
 fn corrupt_sii(world: &mut World, device: DeviceIndex) {
     world.fault(Fault::CorruptSii { device, offset: 0x0E, mask: 0xFF });
     for offset in [124, 125, 130, 131] {
@@ -286,7 +285,7 @@ fn one_that_cannot_be_read_does_not_hide_those_behind_it() {
     world.until(Duration::from_millis(500), "back", |world| world.application().states()[4] == SETTLED);
 }
 
-/// Cuts, losses, one-way cables and power cycles, one upon the other, then everything is put right.
+/// Cuts, losses, one-way cables and power cycles in sequence, then all faults are ended.
 fn torture(seed: u64) {
     let kinds = [
         "coupler",
@@ -329,11 +328,9 @@ fn torture(seed: u64) {
         world.heal(cable);
     }
     (0..kinds.len()).for_each(|device| world.power_on(DeviceIndex(device)));
-    world.until(Duration::from_secs(20), "everybody in OP", |world| {
-        world.all_in_op() && world.application().all_settled()
-    });
+    world.until(Duration::from_secs(20), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     until_settled(&mut world);
-    assert_eq!(stations(&world), before, "everybody is who it was");
+    assert_eq!(stations(&world), before, "each SubDevice has its former identity");
     assert_eq!(states(&world), [AlState::Op; 8]);
 }
 

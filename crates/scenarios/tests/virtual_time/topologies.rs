@@ -1,4 +1,4 @@
-//! Segments that are no plain line or ring: crossed cables, unconnected ports, branches; and what is told about them.
+//! Segments other than a plain line or ring: crossed cables, unconnected ports, branches; and the reports about them.
 
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ fn a_crossed_subdevice_in_a_line_is_located() {
     let kinds = ["junction", "digital-output-8", "junction", "servo"];
     let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A))];
     let world = in_op(wired(&kinds, &cables));
-    // Frames meet it on their way back, behind the one that hangs on it (protocol 2.9).
+    // It processes frames on their way back, after the SubDevice connected to it (protocol 2.9).
     assert_eq!(crossed(world.events(world.beginning())), [(Some(3), Some(1))]);
     assert_eq!(world.device_of(3), Some(DeviceIndex(2)));
 }
@@ -61,7 +61,7 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
     let cables =
         [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B)), (at(2, A), at(3, A)), (at(3, B), REDUNDANT)];
     let mut world = in_op(wired(&kinds, &cables));
-    // The only one that the redundant copy meets.
+    // The only SubDevice that processes the redundant copy.
     assert_eq!(crossed(world.events(world.beginning())), [(Some(3), Some(1))]);
     assert_eq!(world.device_of(3), Some(DeviceIndex(2)));
     for cable in 0..cables.len() {
@@ -77,8 +77,8 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
     }
 }
 
-/// Who has one port cannot pass the ring on (CR-22): everybody behind it is a stub of the redundant link, from the
-/// start and for good, and a break of that stub costs whoever is behind it.
+/// A SubDevice with one port cannot be part of a ring (CR-22): the SubDevices behind it are permanently reached over
+/// the redundant link, and a break there cuts off those behind the break.
 // covers: CR-22, topology
 #[test]
 fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told() {
@@ -104,7 +104,7 @@ fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told() {
     assert_eq!(world.left_op(mark).iter().filter(|device| device.0 != 2).count(), 0);
 }
 
-/// A ring of five with a branch of two on a port of its second device. Cables 0 to 5 are the ring's, 6 leads to the
+/// A ring of five with a branch of two on a port of its second device. Cables 0 to 5 belong to the ring, 6 to the
 /// branch.
 pub(crate) fn ring_with_branch(port: Port) -> Network {
     use Port::{A, B};
@@ -125,7 +125,7 @@ pub(crate) fn ring_with_branch(port: Port) -> Network {
 // covers: topology
 #[test]
 fn a_ring_with_a_branch_keeps_all_in_op_when_any_cable_of_the_ring_is_cut() {
-    // On port 2 the branch is met by the redundant copy even in a closed ring (protocol 2.9).
+    // On port 2 the branch processes the redundant copy even in a closed ring (protocol 2.9).
     for port in [Port::C, Port::D] {
         let mut world = in_op(ring_with_branch(port));
         for cable in 0..6 {
@@ -197,8 +197,8 @@ fn a_tree_comes_to_op_and_its_branches_do_not_depend_on_each_other() {
     }
 }
 
-/// A ring of four, the third of which is plugged in the wrong way round, and a second branch that only the redundant
-/// copy meets: a closed ring cannot tell who of the two is crossed.
+/// A ring of four with the third SubDevice crossed, and a branch that processes only the redundant copy: a closed ring
+/// does not show which of the two is crossed.
 fn crossed_ring() -> Network {
     use Port::{A, B, C};
     let kinds = ["junction", "digital-output-8", "servo", "digital-input-8", "coupler"];
@@ -249,7 +249,7 @@ fn a_branch_on_port_2_of_a_closed_ring_is_suspicious_until_the_ring_is_opened() 
     assert_eq!(crossed(known.events(known.beginning())), []);
 }
 
-/// How often the device at the redundant link has lost it.
+/// Number of lost links of the device at the redundant link.
 fn lost_links(world: &World) -> u8 {
     world.network().device(DeviceIndex(4)).controller.register(map::LOST_LINK_COUNTER, 4)[1]
 }
@@ -259,7 +259,7 @@ fn lost_links(world: &World) -> u8 {
 fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges() {
     let mut world = enhanced(ring_with_branch(Port::D));
     world.run_cycles(100);
-    // The branch is pulled: ports change, the ring stays closed.
+    // The branch is unplugged: ports change, the ring stays closed.
     let (mark, before) = (world.mark(), lost_links(&world));
     world.cut(CableId(7));
     world.run_cycles(60);

@@ -1,4 +1,4 @@
-//! Several cycles of a domain under way: ways that are longer than a cycle, breaks and losses meanwhile.
+//! Several cycles of a domain under way: round trips longer than a cycle, breaks and losses meanwhile.
 
 use std::time::Duration;
 
@@ -21,10 +21,10 @@ use scenarios::world::{CYCLE, World};
 const DOMAIN: DomainId = DomainId(0);
 const KINDS: [&str; 5] =
     ["digital-input-8", "digital-output-8", "digital-input-16", "emulated-input-8", "analog-input-4"];
-/// A way through segment and host that takes three cycles.
+/// A round trip through segment and host that takes three cycles.
 const LONG: Duration = Duration::from_micros(2_600);
 
-/// Cycles in which frames that found somebody again may still bring what it had before.
+/// Cycles in which frames to a returned SubDevice may still deliver its former inputs.
 const AGAIN: u64 = 4;
 
 /// Inputs are the number of the cycle in which they were read, without its upper bits.
@@ -49,15 +49,15 @@ fn segment(closed: bool) -> Network {
     if closed { ring(described, options) } else { line(described, options) }
 }
 
-/// A world in OP that looks at how old the first SubDevice's inputs are.
+/// A world in OP that checks the age of inputs.
 struct Stamped {
     world: World,
     at: usize,
     stamp: u8,
-    /// Cycles that they are older than the cycle in which they are seen.
+    /// Age of the inputs in cycles.
     age: u8,
     oldest: u8,
-    /// Inputs of all SubDevices, and how old those were at most that counted as fresh.
+    /// Inputs of all SubDevices, and the maximum age of fresh ones.
     inputs: Vec<Input>,
     oldest_fresh: u8,
 }
@@ -65,9 +65,9 @@ struct Stamped {
 /// Inputs of a SubDevice.
 struct Input {
     subdevice: usize,
-    /// Where they are in the image.
+    /// Range in the image.
     at: usize,
-    /// Cycles in a row that they count as fresh.
+    /// Consecutive cycles with fresh inputs.
     fresh_for: u64,
 }
 
@@ -81,7 +81,7 @@ impl Stamped {
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
         let mut world = World::with(seed, network, &options, declare).expect("it fits");
         world.settle();
-        // Its checks know of one cycle under way.
+        // Its checks assume one cycle under way.
         world.judge_latched(false);
         let directory = world.application().directory();
         let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(subdevice));
@@ -92,14 +92,14 @@ impl Stamped {
             fresh_for: 0,
         };
         let inputs: Vec<Input> = inputs.map(input).collect();
-        let at = inputs.first().expect("somebody has inputs").at;
+        let at = inputs.first().expect("one has inputs").at;
         let mut stamped = Stamped { world, at, stamp: 0, age: 0, oldest: 0, inputs, oldest_fresh: 0 };
         stamped.stamp = stamped.look();
         stamped
     }
 
-    /// How old inputs are that count as fresh. Devices compute theirs after each exchange, so whoever was out of reach
-    /// has old ones for the frames that find it again.
+    /// Checks the age of fresh inputs. Devices compute their inputs after each exchange, so a SubDevice that was
+    /// unreachable has old inputs for the first frames after its return.
     fn look_at_all(&mut self, now: u8) {
         let exchange = self.world.application().exchange();
         for input in &mut self.inputs {
@@ -127,7 +127,7 @@ impl Stamped {
         }
     }
 
-    /// Frames out to the segment take so much longer from now on.
+    /// From now on sent frames take this much longer.
     fn lengthen(&mut self, by: Duration) {
         let (cable, direction) = (CableId(0), Some(Direction::AToB));
         self.world.fault(Fault::Delay { cable, direction, count: u32::MAX, by });
@@ -137,7 +137,7 @@ impl Stamped {
         self.world.application().cyclic_counters().incomplete
     }
 
-    /// Two cables are cut at once and healed one after the other.
+    /// Two cables are cut at once and repaired one after the other.
     fn cut_two(&mut self, first: CableId, second: CableId) {
         self.world.cut(first);
         self.world.cut(second);
@@ -242,8 +242,8 @@ fn inputs_never_become_older_whatever_breaks_and_all_is_complete_afterwards() {
     }
 }
 
-/// Rings behind junctions break and are mended, one cable or two at once, on one link and on two: at most what is under
-/// way is lost, and inputs that count as fresh are no older than that.
+/// Rings behind junctions break and are repaired, one cable or two at once, on one link and on two: at most the cycles
+/// under way are lost, and fresh inputs are no older than these.
 // covers: JR-02, under-way
 #[test]
 fn breaks_behind_junctions_cost_the_cycles_under_way_and_no_old_input_is_fresh() {

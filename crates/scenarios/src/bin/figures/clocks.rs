@@ -1,9 +1,8 @@
-//! Distributed clocks (issue 6): how exact delays are, how closely clocks stay together, how well the host follows
-//! them.
+//! Distributed clocks (issue 6): error of delays, spread of clocks, phase of the host.
 //!
-//! Everything runs in virtual time on clocks that are not ideal ([`scenarios::clocks`]): drift up to 50 or 100 ppm,
-//! slow wander, 40 ns of jitter on every receive time, a fourth of them with 32 bits. What the MainDevice cannot see,
-//! the truth about the clocks, comes from the simulator.
+//! All runs use virtual time and clocks with errors ([`scenarios::clocks`]): drift up to 50 or 100 ppm, slow wander, 40
+//! ns of jitter on every receive time, a fourth of them with 32 bits. The true times, which the MainDevice cannot read,
+//! come from the simulator.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -22,16 +21,16 @@ use scenarios::figures::{Figures, verdict};
 use scenarios::segments::{MAIN, at, line, ring};
 use scenarios::world::World;
 
-/// Most error of a delay per hop, in nanoseconds.
+/// Maximum error of a delay per hop, in nanoseconds.
 const HOP_BAR: f64 = 20.0;
-/// Most spread of all clocks in the steady state.
+/// Maximum spread of all clocks in the steady state.
 const SPREAD_BAR: f64 = 100.0;
-/// Most spread over a cut and its repair, inside of a part and across both.
+/// Maximum spread over a cut and its repair, inside a part and across both.
 const INSIDE_BAR: f64 = 1_000.0;
 const ACROSS_BAR: f64 = 5_000.0;
-/// Most of the mean of a second from where SYNC0 should be, seen from the scheduled wake-up.
+/// Maximum deviation of SYNC0 from its scheduled phase, mean of a second, relative to the scheduled wake-up.
 const PHASE_BAR: f64 = 5_000.0;
-/// Most virtual time from power-on to the lock of a hundred clocks.
+/// Maximum virtual time from power-on to the lock of a hundred clocks.
 const LOCK_BAR: f64 = 3.0;
 const HOST_JITTER: Duration = Duration::from_micros(50);
 
@@ -48,7 +47,7 @@ pub fn main() -> ExitCode {
     verdict(figures.print())
 }
 
-/// Devices with clocks, or the same ones with clocks that tell the truth.
+/// Devices with clocks, with errors or ideal.
 fn descriptions(count: usize, ideal: bool) -> Vec<DeviceDescription> {
     let mut all = clocked(count, 100);
     for device in all.iter_mut().filter(|_| ideal) {
@@ -58,7 +57,7 @@ fn descriptions(count: usize, ideal: bool) -> Vec<DeviceDescription> {
     all
 }
 
-/// Written delays against those that ideal clocks show.
+/// Written delays compared with those of ideal clocks.
 fn delays(figures: &mut Figures, name: &str, network: impl Fn(bool) -> Network) {
     let written = |ideal: bool| -> (Vec<f64>, Vec<u64>) {
         let mut world = world(1, network(ideal), config());
@@ -113,7 +112,7 @@ fn hundred(figures: &mut Figures) {
     figures.at_most("the same: spread in 10 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
 }
 
-/// Twice as many, with drift to either side that is twice as large.
+/// Twice as many clocks with twice the drift to either side.
 fn two_hundred(figures: &mut Figures) {
     let mut world = world(2, line(clocked(200, 100), NetworkOptions::default()), config());
     lock(&mut world, Duration::from_secs(20));
@@ -124,7 +123,7 @@ fn two_hundred(figures: &mut Figures) {
     figures.at_most("the same: spread in 2 s of 1 ms cycles", largest as f64, SPREAD_BAR, "ns");
 }
 
-/// From power-on to OP of the same devices when nobody asks for clocks.
+/// From power-on to OP of the same devices without clocks.
 fn without_clocks() -> f64 {
     let network = line(clocked(100, 50), NetworkOptions::default());
     let mut world = World::new(2, network);
@@ -132,7 +131,7 @@ fn without_clocks() -> f64 {
     world.now().0 as f64 / 1e9
 }
 
-/// A ring behind a junction: each of its cables cut and healed.
+/// A ring behind a junction: each of its cables is cut and repaired.
 fn junction(figures: &mut Figures) {
     let (a, b, c, d) = (Port::A, Port::B, Port::C, Port::D);
     let mut cables = vec![(MAIN, at(0, a)), (at(0, b), at(1, a)), (at(1, d), at(2, a))];
@@ -185,7 +184,7 @@ fn cuts(figures: &mut Figures) {
     figures.at_most("the same, 2 s after the repair", after as f64, SPREAD_BAR, "ns");
 }
 
-/// The host follows: where SYNC0 comes, seen from the scheduled wake-ups.
+/// The host follows the clocks: time of SYNC0 relative to the scheduled wake-ups.
 fn phase(figures: &mut Figures) {
     const PHASE_NS: i64 = 300_000;
     let mut world =

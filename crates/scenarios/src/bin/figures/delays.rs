@@ -1,6 +1,6 @@
-//! Delays that are written while process data goes on (issue 14): rings of 2 to 64, local rings, random trees with
-//! rings, against the truth of the simulator ([`scenarios::delays`]). `DELAYS` in the environment is how many changes
-//! of each kind; without it, a share of what is to hold.
+//! Delays that are written during process data exchange (issue 14): rings of 2 to 64, local rings, random trees with
+//! rings, compared with the true delays of the simulator ([`scenarios::delays`]). The environment variable `DELAYS` is
+//! the number of changes of each kind; the default is a share of the full number.
 
 use std::process::ExitCode;
 use std::thread;
@@ -9,7 +9,7 @@ use scenarios::delays::{Outcome, Shape, run};
 use scenarios::dice::Dice;
 use scenarios::figures::{Figures, verdict};
 
-/// Changes of each kind where nothing else was said.
+/// Default number of changes of each kind.
 const CHANGES: u64 = 60;
 /// Changes of one segment.
 const OF_ONE: u64 = 20;
@@ -59,7 +59,10 @@ fn print(figures: &mut Figures, name: &str, outcome: &Outcome) {
     let not_written: u64 = outcome.not_written.values().sum();
     figures.show("the same: changes after which some were not written", not_written);
     let hidden: u64 = outcome.hidden.iter().filter(|(count, _)| **count > 0).map(|(_, times)| times).sum();
-    figures.show("the same: changes after which some were hidden by forks without a clock, and told to be", hidden);
+    figures.show(
+        "the same: changes after which some were hidden by forks without a clock, and reported as hidden",
+        hidden,
+    );
     for (reason, count) in &outcome.not_written {
         println!("  {name}: not written {count} times: {reason}");
     }

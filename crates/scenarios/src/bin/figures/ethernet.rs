@@ -1,9 +1,9 @@
-//! TCP through the mailbox of one SubDevice in virtual time (issue 4): how much per second, and that it does not depend
-//! on the application's cycle.
+//! TCP through the mailbox of one SubDevice in virtual time (issue 4): throughput, and its independence of the
+//! application's cycle.
 //!
-//! The SubDevice has the simulator's IP stack behind its mailbox. It takes 200 us for a message that it gets and no
-//! time for those that it sends of itself, so what is measured is the wire and us. The host's end is another stack that
-//! works beside the acyclic half. Process data of the whole segment goes on meanwhile.
+//! The SubDevice has the simulator's IP stack behind its mailbox. It takes 200 us for a received message and no time
+//! for messages that it sends unsolicited, so the wire and the MainDevice are measured. The host's end is another stack
+//! that runs beside the acyclic half. Process data of the whole segment is exchanged meanwhile.
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
@@ -20,7 +20,7 @@ use scenarios::world::World;
 const TERMINAL: usize = 2;
 const BYTES: usize = 1_000_000;
 const LIMIT: Duration = Duration::from_secs(60);
-/// Least kilobytes per second with the largest mailbox.
+/// Minimum kilobytes per second with the largest mailbox.
 const BAR: f64 = 300.0;
 const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
 

@@ -1,7 +1,7 @@
-//! A file of 1 MiB through the mailbox of one SubDevice in virtual time (issue 4): how long a packet takes, in how many
-//! round trips, and that neither depends on the application's cycle.
+//! A file of 1 MiB through the mailbox of one SubDevice in virtual time (issue 4): time and round trips per packet, and
+//! their independence of the application's cycle.
 //!
-//! The SubDevice answers at once, or after 200 us. Process data of the whole segment goes on meanwhile.
+//! The SubDevice responds at once, or after 200 us. Process data of the whole segment is exchanged meanwhile.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const ALL: usize = 2;
 const MAILBOX: u16 = 1024;
 const BYTES: usize = 1 << 20;
 const LIMIT: Duration = Duration::from_secs(60);
-/// Most milliseconds of a packet.
+/// Maximum milliseconds per packet.
 const BAR: f64 = 3.0;
 
 pub fn main() -> ExitCode {
@@ -46,7 +46,7 @@ pub fn main() -> ExitCode {
 /// A packet, as the mean of all.
 struct Packet {
     time: Duration,
-    /// Accesses to the mailbox and its status, which follow one another.
+    /// Sequential accesses to the mailbox and its status.
     trips: f64,
     frames: f64,
 }

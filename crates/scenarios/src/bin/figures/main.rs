@@ -1,5 +1,5 @@
-//! Figures in virtual time, each with its bar: `figures SUBJECT`, without one all of them. One program for all, because
-//! each would be linked with everything.
+//! Figures in virtual time, each with its bar: `figures SUBJECT`, or all subjects. One program for all, which saves
+//! link time.
 
 mod clocks;
 mod delays;
@@ -12,7 +12,7 @@ mod startup;
 
 use std::process::ExitCode;
 
-/// A subject and what shows its figures.
+/// A subject and the function that prints its figures.
 type Subject = (&'static str, fn() -> ExitCode);
 
 const SUBJECTS: [Subject; 8] = [

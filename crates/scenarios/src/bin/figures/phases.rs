@@ -1,5 +1,5 @@
-//! Where the time of a start-up of a few SubDevices goes, in virtual time: the end of each phase, how long nothing was
-//! on the wire, and how many exchanges followed one another.
+//! Phases of a start-up of a few SubDevices, in virtual time: the end of each phase, the time with an idle wire, and
+//! the number of sequential exchanges.
 //!
 //! The segments are those of the tests on real interfaces: 1, 10 and 50 SubDevices of the catalogue with the
 //! simulator's usual timing (8 bytes of SII every 500 us, 1 ms per change of state).
@@ -12,7 +12,7 @@ use scenarios::figures::{Figures, verdict};
 use scenarios::phases::{Phase, start_up};
 use scenarios::segments::plant;
 
-/// Most milliseconds to OP, by SubDevices.
+/// Maximum milliseconds to OP, by number of SubDevices.
 const BARS: [(usize, f64); 3] = [(1, 60.0), (10, 60.0), (50, 60.0)];
 
 pub fn main() -> ExitCode {

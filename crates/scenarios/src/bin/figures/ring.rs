@@ -1,8 +1,8 @@
 //! Figures of the ring (issue 5), in virtual time: incomplete cycles per edge for every cable of rings of 2, 5, 16 and
-//! 64 in every phase of their life, how soon a break is told and placed, how soon the original direction is back, and
-//! ten thousand short random runs.
+//! 64 in every phase of their life, times until a break is reported and located, and until the original direction is
+//! restored, and ten thousand short random runs.
 //!
-//! Without arguments all of it; `ring SEED` runs one of the random runs again.
+//! Without arguments all figures; `ring SEED` repeats one of the random runs.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -19,13 +19,13 @@ use scenarios::segments::ring_of_16;
 use scenarios::short_runs;
 use scenarios::world::{CYCLE, World};
 
-/// Lengths of rings, and how many moments of the cycle each cable is cut at.
+/// Lengths of rings, and the moments of the cycle at which each cable is cut.
 const RINGS: [(usize, &[u32]); 4] = [(2, &[0, 40, 300, 900]), (5, &[0, 40, 300, 900]), (16, &[20, 500]), (64, &[30])];
 const FAST: Duration = Duration::from_micros(10);
-/// Rings whose ports notice late, and after how many microseconds.
+/// Rings with slow link detection, and their detection times in microseconds.
 const LATE_RINGS: [(usize, &[u64]); 4] = [(2, &[1_700, 20_000]), (5, &[1_700, 20_000]), (16, &[1_700]), (64, &[1_700])];
 const RANDOM_RUNS: u64 = 10_000;
-/// Workers of this bench.
+/// Worker threads of this bench.
 const THREADS: u64 = 2;
 
 pub fn main() -> ExitCode {
@@ -34,7 +34,7 @@ pub fn main() -> ExitCode {
         println!("seed {seed} holds");
         return ExitCode::SUCCESS;
     }
-    // Failures print what happened; a panic's own words are in it.
+    // Failures print the log of the run, with the message of the panic.
     let matrix = matrix();
     let late = late();
     let edges = edges();
@@ -42,7 +42,7 @@ pub fn main() -> ExitCode {
     verdict(matrix && late && edges && random)
 }
 
-/// A part of the matrix, or the words of what does not hold.
+/// A part of the matrix, or the message of a failed check.
 fn part(bed: &Bed, phases: &[Phase], cables: &[usize], moments: &[u32]) -> (Vec<Outcome>, usize) {
     let (mut outcomes, mut failed) = (Vec::new(), 0);
     for (number, phase) in phases.iter().copied().enumerate() {
@@ -59,7 +59,7 @@ fn part(bed: &Bed, phases: &[Phase], cables: &[usize], moments: &[u32]) -> (Vec<
     (outcomes, failed)
 }
 
-/// All cables, shared among the workers.
+/// All cables, distributed over the workers.
 fn parts(bed: &Bed, phases: &[Phase], moments: &[u32]) -> (Vec<Outcome>, usize) {
     let (even, odd): (Vec<usize>, Vec<usize>) = (0..=bed.count()).partition(|cable| cable % 2 == 0);
     let (left, right) = thread::scope(|scope| {
@@ -69,9 +69,10 @@ fn parts(bed: &Bed, phases: &[Phase], moments: &[u32]) -> (Vec<Outcome>, usize) 
     (left.0.into_iter().chain(right.0).collect(), left.1 + right.1)
 }
 
-/// Every cable again, with ports that notice late.
+/// Every cable again, with slow link detection.
 fn late() -> bool {
-    let mut figures = Figures::new("every cable cut and healed in OP and during a file, 1 ms, ports that notice late");
+    let mut figures =
+        Figures::new("every cable cut and repaired in OP and during a file transfer, 1 ms, slow link detection");
     let begin = Instant::now();
     for (count, delays) in LATE_RINGS {
         for detection in delays.iter().copied().map(Duration::from_micros) {
@@ -89,8 +90,7 @@ fn late() -> bool {
 }
 
 fn matrix() -> bool {
-    let mut figures =
-        Figures::new("every cable of a ring cut and healed in every phase of its life, 1 ms, detection 10 us");
+    let mut figures = Figures::new("every cable of a ring cut and repaired in every phase, 1 ms, detection 10 us");
     for (count, moments) in RINGS {
         let begin = Instant::now();
         let bed = Bed::new(count, FAST);
@@ -122,7 +122,7 @@ fn after(world: &World, mark: scenarios::world::Mark, seen: ringcat::Instant, wa
     found.map_or(f64::INFINITY, |timed| timed.at.since(seen).as_secs_f64() / CYCLE.as_secs_f64())
 }
 
-/// Lets a fault happen and runs until the exchange sees a state, and a little longer.
+/// Injects a fault and runs until the exchange detects a state, and a little longer.
 fn see(world: &mut World, fault: Fault, moment: u32, state: RingState) -> ringcat::Instant {
     world.fault_in(CYCLE * moment / 1000, fault);
     let mut seen = None;
@@ -152,7 +152,7 @@ fn edges() -> bool {
             let healing = world.mark();
             let seen = see(&mut world, Fault::Heal(CableId(cable)), moment, RingState::Closed);
             fixed = fixed.max(after(&world, healing, seen, |event| matches!(event, Event::RingClosed { .. })));
-            // With no copy under way from the cut until both ends have noticed, nothing is lost.
+            // If no copy is under way from the cut until both ends have detected it, nothing is lost.
             let in_flight = CYCLE * moment / 1000 < flight || CYCLE * moment / 1000 + FAST >= CYCLE;
             if !in_flight {
                 quiet += world.incomplete(mark);
@@ -177,7 +177,7 @@ fn edges() -> bool {
     figures.at_most("from the first frame that shows a break to the event", told, 1.0, "cycles");
     figures.at_most("from there to its place", placed, 5.0, "cycles");
     figures.at_most("incomplete cycles of edges with no copy under way", f64::from(quiet as u32), 0.0, "cycles");
-    figures.show("from the first frame that goes the original way to the event", format!("{fixed:.2} cycles"));
+    figures.show("from the first frame on the original path to the event", format!("{fixed:.2} cycles"));
     figures.show("the same after the second repair of a double break", format!("{:.2} cycles", double.1));
     figures.at_most("incomplete cycles of that second repair", double.0 as f64, 1.0, "cycles");
     figures.print()

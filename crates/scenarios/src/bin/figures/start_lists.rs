@@ -8,7 +8,7 @@ use scenarios::start_lists::{Cost, Lists};
 
 const DRIVES: usize = 100;
 const OBJECTS: u32 = 50;
-/// Most of the larger of one drive's time and the wire time of the mail.
+/// Maximum, as a multiple of the larger of one drive's time and the wire time of the mail.
 const BAR: f64 = 1.5;
 /// Bytes of a mailbox, ms of a cycle.
 const CASES: [(u16, u64); 4] = [(128, 1), (128, 4), (1024, 1), (1024, 4)];

@@ -1,17 +1,18 @@
-//! From power-on to all in OP in virtual time, and what it costs in bytes (issue 2, "What it must reach").
+//! From power-on to all in OP in virtual time, and its cost in bytes (issue 2, "What it must reach").
 //!
-//! Terminals as in [`scenarios::terminals`] hang on one link; the application cycles from activation on. Time runs from
-//! power-on, where the MainDevice begins to scan, until the last SubDevice shows OP, looked up in the devices.
+//! Terminals as in [`scenarios::terminals`] are connected to one link; the application cycles after activation. The
+//! time is measured from power-on, when the MainDevice begins to scan, until the last SubDevice is in OP, as read
+//! inside the devices.
 //!
 //! # The floor
 //!
-//! The bytes that cannot be done without, per SubDevice: for every 4 or 8 bytes of its SII one FPWR of command and word
-//! address (6 bytes) and one FPRD that polls and brings the data along (6 + 4 or 6 + 8 bytes); its station address (2);
-//! its SyncManager (8) and FMMU (16); AL control for PREOP, SAFEOP and OP (2 each). These are steps that follow one
-//! another, each with a datagram (12 bytes besides its data) for every SubDevice, packed into as few frames as hold
-//! them (16 bytes of header, at least 60, at most 1,514). Neither AL status nor anything else is read, no working
-//! counter is checked twice, and process data is not in it. What is compared with it are all bytes that left the
-//! interface until OP, cyclic frames too, without check sequences.
+//! The minimum number of bytes, per SubDevice: for every 4 or 8 bytes of its SII one FPWR of command and word address
+//! (6 bytes) and one FPRD that polls and returns the data (6 + 4 or 6 + 8 bytes); its station address (2); its
+//! SyncManager (8) and FMMU (16); AL control for PREOP, SAFEOP and OP (2 each). These are sequential steps, each with a
+//! datagram (12 bytes besides its data) for every SubDevice, packed into the smallest number of frames (16 bytes of
+//! header, at least 60, at most 1,514). Other reads such as AL status, second checks of working counters and process
+//! data are not included. The floor is compared with all bytes sent until OP, cyclic frames included, without frame
+//! check sequences.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -26,14 +27,14 @@ use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MAX_FRAME, M
 use scenarios::figures::{Figures, verdict};
 use scenarios::terminals::{HOP, Links, segment, sii_bytes_used};
 
-/// Beyond this virtual time a start has failed.
+/// Limit of the virtual time of a start.
 const LIMIT: Duration = Duration::from_secs(20);
-/// Most seconds for 1,000 terminals with 8-byte and with 4-byte reads.
+/// Maximum seconds for 1,000 terminals with 8-byte and with 4-byte reads.
 const BARS: [(bool, f64); 2] = [(true, 0.6), (false, 1.0)];
-/// Most bytes for 1,000 terminals, as a multiple of the floor.
+/// Maximum bytes for 1,000 terminals, as a multiple of the floor.
 const BYTES_BAR: f64 = 1.5;
 
-/// What a start cost.
+/// Cost of a start.
 struct Start {
     time: Duration,
     scanned: Duration,
@@ -106,7 +107,7 @@ fn start(count: usize, eight_byte_reads: bool, cache: bool) -> Result<Start, Err
         let now = Duration::from_nanos(application.now().0);
         assert!(now < LIMIT, "{count} terminals: {:?}", application.states());
     }
-    // The cycle that is under way is not looked into: times are up to one period too long.
+    // Devices are checked once per cycle: times are up to one period too long.
     Ok(Start {
         time: Duration::from_nanos(application.now().0),
         scanned,
@@ -120,7 +121,7 @@ fn all_in_op(network: &Network) -> bool {
     network.devices().all(|device| device.al_status().al_state() == Some(AlState::Op))
 }
 
-/// See the head of this file.
+/// See the module documentation.
 fn floor(network: &Network, read_bytes: usize) -> u64 {
     let used: Vec<usize> = network.devices().map(sii_bytes_used).collect();
     let reads = used.iter().map(|used| used.div_ceil(read_bytes)).max().unwrap_or(0);
@@ -138,7 +139,7 @@ fn floor(network: &Network, read_bytes: usize) -> u64 {
     floor
 }
 
-/// Bytes of the frames that carry a datagram with so much data to each of so many SubDevices.
+/// Bytes of the frames with one datagram of this length for each of `count` SubDevices.
 fn step(subdevices: usize, data: usize) -> u64 {
     const HEADERS: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
     let in_full_frame = (MAX_FRAME - HEADERS) / (OVERHEAD + data);

@@ -1,4 +1,4 @@
-//! The cables of a network held against `PreviousPort` of a file (protocol 8.2).
+//! The cables of a network compared with `PreviousPort` of a file (protocol 8.2).
 
 use ringcat::eni::segment;
 use ringcat::simulated::SimulatedSegment;
@@ -9,7 +9,7 @@ use ringcat_sim::network::Network;
 
 use super::{BUTTONS, DRIVE, EniFile, machine};
 
-/// What is found and told with one cable cut, or none.
+/// Scan result and reports with one cable cut, or none.
 fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan, Vec<String>) {
     if let Some(cable) = cut {
         network.cut(cable);
@@ -27,7 +27,8 @@ fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open() {
     let file = machine();
     assert_eq!(scanned(&file, file.simulated(false).expect("a segment"), None).1, [""; 0]);
     assert_eq!(scanned(&file, file.simulated(true).expect("a segment"), None).1, [""; 0]);
-    // The ring leads through coupler and drive; the terminals hang on the coupler, and are gone without their cable.
+    // The ring includes coupler and drive; the terminals are connected to the coupler, and are absent without their
+    // cable.
     for (cable, there) in [(0, 5), (1, 2), (2, 3), (3, 4), (4, 5), (5, 5)] {
         let (scan, told) = scanned(&file, file.simulated(true).expect("a segment"), Some(CableId(cable)));
         assert_eq!(scan.subdevices.len(), there, "cable {cable}");

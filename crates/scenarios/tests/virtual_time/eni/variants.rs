@@ -1,5 +1,5 @@
-//! What files say beside the usual: groups that come later, tasks of several speeds, objects that a drive does not
-//! have; and a ring behind a junction, of which no file says anything.
+//! Unusual files: groups that join later, tasks with several cycle times, objects that a drive does not have; and a
+//! ring behind a junction, which a file cannot describe.
 
 use std::time::Duration;
 
@@ -60,10 +60,10 @@ fn a_hot_connect_group_of_a_file_has_its_places_from_the_start() {
     assert_eq!(plant.device(DRIVE).outputs(), [4, 3, 2, 1, 0, 0]);
 }
 
-/// As [`activate_on`], whoever is there.
+/// As [`activate_on`], with any SubDevices.
 fn activate_on_any(network: Network, file: EniFile) -> Plant {
     let plant = super::start(network, file, false).expect("the others are there");
-    assert!(plant.image.unplaced().is_empty(), "who is absent has places too");
+    assert!(plant.image.unplaced().is_empty(), "absent SubDevices have places too");
     plant
 }
 
@@ -89,7 +89,7 @@ fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own() {
     set(&mut plant, "Drive.Target velocity", 0x0506_0708);
     plant.run(3);
     assert_eq!((plant.device(LAMPS).outputs(), get(&plant, "Buttons.Channel 3")), (&[1][..], 1));
-    // There and back takes the slow task two of its cycles, and may just have missed one.
+    // The slow task needs two of its cycles for both directions, and may just have missed one.
     plant.run(12);
     assert_eq!(get(&plant, "Drive.Position"), 0x0506_0708);
     let domain = |plant: &Plant, name: &str| plant.image.variable(name).expect("it is there").domain;
@@ -116,8 +116,8 @@ fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file() {
     assert_eq!(plant.device(LAMPS).outputs(), [1], "the others work");
 }
 
-/// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file knows nothing
-/// of it.
+/// Coupler, lamps, valves, buttons and back to the coupler, which has the drive on its port 2. The file does not
+/// describe this connection.
 // covers: JR-05, eni-run
 #[test]
 fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
@@ -149,7 +149,7 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
     }
 }
 
-/// As files of TwinCAT do with terminals: outputs that act in SAFEOP already would be dangerous.
+/// As in TwinCAT files for terminals: outputs that act already in SAFEOP would be dangerous.
 // covers: 8.2, sync-managers-declared
 #[test]
 fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop() {
@@ -175,7 +175,7 @@ fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop() {
     plant.settle();
 }
 
-/// The text without those blocks that contain something.
+/// The text without blocks that contain a string.
 fn without(text: &str, open: &str, close: &str, containing: &str) -> String {
     let mut kept = String::new();
     let mut rest = text;
@@ -216,7 +216,7 @@ fn registers_that_a_file_checks_are_those_that_a_simulated_eeprom_sets() {
     let masked = check(0x0150, "0180", "<DataMask>03f0</DataMask>");
     let mut plant = activate(with_commands_of_the_drive(&(check(0x0140, "0c06", "") + &masked)), false, false).unwrap();
     plant.settle();
-    // What the file says of a controller of another make is not made true.
+    // Values of another controller type are not adopted.
     let mut plant = activate(with_commands_of_the_drive(&check(0x0000, "9900", "")), false, false).unwrap();
     plant.run(300);
     let told = |event: &Event| {
@@ -239,7 +239,7 @@ fn pdos_that_a_file_only_assigns_are_as_long_as_their_simulated_sync_manager() {
     assert_eq!(get(&plant, "Drive.Position"), 0x0102_0304);
 }
 
-/// The SII of the drive knows nothing of its inputs, and where it does not even have a mailbox for a dictionary.
+/// The SII of the drive has no inputs, or not even a mailbox for a dictionary.
 // covers: eni-run
 #[test]
 fn a_file_that_says_more_than_the_sii_of_its_subdevices_is_followed() {

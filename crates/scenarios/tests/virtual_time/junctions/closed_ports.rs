@@ -1,5 +1,4 @@
-//! Ports of junctions that were closed on purpose, while rings are looked into of which no frame comes back (protocol
-//! 2.2).
+//! Ports of junctions that were closed on purpose, while rings without returned frames are examined (protocol 2.2).
 
 use std::time::Duration;
 
@@ -15,7 +14,7 @@ use scenarios::world::{CYCLE, World};
 use super::second_breaks::{ends_of_two, two_rings};
 use super::{change, in_op, told};
 
-/// Junctions are told with one order what to do about all of their ports: one that the application had closed stays so.
+/// One register controls all ports of a junction: a port that the application had closed stays closed.
 // covers: 2.2, junctions
 #[test]
 fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
@@ -67,8 +66,8 @@ fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
     }
 }
 
-/// Starts to have junction 3 of [`two_rings`] close its port 2, in one of several ways. What comes back says whether
-/// that has worked, once it is known.
+/// Starts to close port 2 of junction 3 of [`two_rings`], in one of several ways. The returned function gives the
+/// result when it is known.
 fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>> {
     let loops = vec![LoopControl::Closed.code() << 4];
     let register = map::DL_CONTROL.offset(1);
@@ -95,8 +94,8 @@ fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>>
     }
 }
 
-/// The order to close a port and both breaks come within some milliseconds: what the junction had been told when it was
-/// asked last is out of date, and the answer to the order may never come back. A port that was closed stays closed.
+/// The request to close a port and both breaks occur within some milliseconds: the last read port control of the
+/// junction is outdated, and the response to the request may be lost. A closed port stays closed.
 // covers: 2.2, junctions
 #[test]
 fn a_port_that_was_closed_right_before_two_rings_break_stays_closed() {
@@ -126,5 +125,5 @@ fn a_port_that_was_closed_right_before_two_rings_break_stays_closed() {
             assert!(world.saw(world.beginning(), blocked), "after {after_us} us, way {way}");
         }
     }
-    assert!(unanswered > 0, "in some of them the rings broke before the answer came back");
+    assert!(unanswered > 0, "in some of them the rings broke before the response came back");
 }

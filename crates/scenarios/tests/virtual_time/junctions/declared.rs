@@ -1,5 +1,5 @@
-//! Connections that are declared and are not there (JR-05, JR-06): they are refused, whatever open ports allow, and
-//! those that are there are not.
+//! Declared connections that do not exist (JR-05, JR-06): they are refused, even if open ports allow them; existing
+//! ones are accepted.
 
 use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, automatic};
 use ringcat_sim::cable::{CableId, Endpoint};
@@ -16,7 +16,7 @@ fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection
     JunctionConnection { head, head_port: 1, tail, tail_port }
 }
 
-/// Which connection is refused as one that is not there.
+/// The connection that is refused as missing.
 fn refused(seed: u64, network: Network, connections: &[JunctionConnection]) -> Option<JunctionConnection> {
     let options = Options::default().with_junctions(JunctionMode::Strict);
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
@@ -34,12 +34,12 @@ fn not_there(result: Result<World, Error>) -> Option<JunctionConnection> {
 // covers: JR-05, JR-06, junctions
 #[test]
 fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
-    // All but the last open ports allow as well as the truth.
+    // Open ports allow all of these but the last.
     for wrong in [(1, 2, 1), (1, 3, 1), (1, 5, 1), (1, 6, 1)].map(connection) {
         for broken in [None, Some(2), Some(3), Some(4), Some(5)] {
             let mut network = one_ring();
             broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
-            // With the closing cable out nothing shows where another one would be that is out as well.
+            // With the closing cable cut, another cut cable cannot be located.
             let is_hidden = broken == Some(5) && wrong.tail == 6;
             let expected = (!is_hidden).then_some(wrong);
             assert_eq!(refused(20, network, &[wrong]), expected, "{wrong}, cable {broken:?}");
@@ -51,7 +51,7 @@ fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
         assert_eq!(refused(21, network, &[STRICT]), None, "cable {broken}");
     }
     let mut world = in_op(22, one_ring(), (JunctionMode::Strict, &[STRICT]));
-    assert_eq!(told(&world, world.beginning()), [], "what was tried is no break");
+    assert_eq!(told(&world, world.beginning()), [], "a test is not reported as a break");
     let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
     assert_eq!(told(&world, mark), [changed(3, true)]);
 }
@@ -68,14 +68,14 @@ fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused() {
     assert_eq!(refused(23, two(), &[first]), Some(first), "the tail of the other ring");
     assert_eq!(refused(23, two(), &[right[0], second]), Some(second));
     assert!(refused(23, two(), &[(0, 1, 1), (3, 5, 1)].map(connection)).is_some());
-    // No ring at all: a line through port 1, with a branch on port 3, and with a second interface at its end.
+    // No ring: a line through port 1, with a branch on port 3, and with a second interface at its end.
     let line = [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, B), at(2, A)), (at(2, B), at(3, A))];
     let kinds = ["junction", "digital-output-8", "servo", "digital-input-8"];
     let wrong = connection((0, 1, 1));
     assert_eq!(refused(24, wired(&kinds, &line), &[wrong]), Some(wrong));
     let ring: Vec<(Endpoint, Endpoint)> = line.into_iter().chain([(at(3, B), REDUNDANT)]).collect();
     assert_eq!(refused(25, wired(&kinds, &ring), &[wrong]), Some(wrong));
-    // In a ring of two links, whole and broken in front of the junction.
+    // In a ring of two links, closed and broken before the junction.
     let cables = [
         (MAIN, at(0, A)),
         (at(0, B), at(1, A)),
@@ -113,7 +113,7 @@ fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused() {
         let cut = |network: &mut Network| broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
         assert_eq!(not_there(plan.try_world(seed, true, true, cut)), None, "{}, cable {broken:?}", what(&plan));
         taken += 1;
-        // One of them comes from another member.
+        // One connection has another member as its tail.
         let number = dice.below(plan.connections.len() as u64) as usize;
         let tails = (0..plan.kinds.len()).filter(|node| plan.connections.iter().all(|it| it.tail != *node));
         let tails: Vec<usize> = tails.filter(|node| *node > plan.connections[number].head).collect();

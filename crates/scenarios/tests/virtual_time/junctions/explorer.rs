@@ -1,6 +1,6 @@
-//! Random segments with rings behind junctions, one in another or side by side, hot connect groups in them or beside
-//! them, one link or two: groups come and go, cables break and are mended, the segment is looked at anew, at any
-//! moment. What is told is held against what was done. Frames get lost meanwhile.
+//! Random segments with rings behind junctions, nested or separate, hot connect groups inside or outside of them, one
+//! link or two: groups join and leave, cables break and are repaired, the segment is rescanned, at any moment. Reports
+//! are compared with the injected changes. Frames are lost meanwhile.
 //!
 //! `SEED=17 cargo test --workspace --test virtual_time junctions::explorer::seeds -- --nocapture` runs one seed,
 //! `SEED=1000..2000` many.
@@ -25,25 +25,25 @@ struct Run {
     dice: Dice,
     group_is_on: bool,
     broken: Option<usize>,
-    /// The group has joined or left as it was made to.
+    /// The group has joined or left as requested.
     is_settled: bool,
-    /// A look at the segment has taken over the cabling as it is.
+    /// A rescan has updated the cabling.
     is_known: bool,
     looking: Option<Pending<Result<ringcat::Rescan, ringcat::ServiceError>>>,
-    /// The cable that is broken was told while the cabling was known.
+    /// The broken cable was reported while the cabling was known.
     was_told: bool,
     mark: Mark,
 }
 
 impl Run {
     fn changes(&mut self, since: Mark) -> Vec<Event> {
-        // Who has joined has an address since then.
+        // SubDevices that have joined have an address since then.
         self.world.recognise();
         let events = self.world.events(since).iter().map(|timed| timed.event.clone());
         events.filter(|event| matches!(event, Event::JunctionChanged { .. })).collect()
     }
 
-    /// Who is told of has these ports.
+    /// Ports of the SubDevices in an event.
     fn ends(&self, event: &Event) -> [Option<(DeviceIndex, u8)>; 2] {
         let Event::JunctionChanged { near, far, declared, .. } = event else { return [None; 2] };
         let end = |port: Option<u8>, declared: Option<usize>| Some((self.world.device_of(declared?)?, port?));
@@ -75,12 +75,12 @@ impl Run {
         self.world.application().ring() == RingState::Closed || !self.plan.two_links
     }
 
-    /// A look, which may go on while other things happen.
+    /// A rescan, which may continue during other changes.
     fn look(&mut self) {
         self.world.say("a look");
         self.looking = Some(self.world.application_mut().engine_mut().start_rescan(LIMIT));
         if self.dice.one_in(3) {
-            // Whatever comes next meets it.
+            // The next change happens during the rescan.
             let cycles = self.dice.below(4);
             return self.cycles(cycles);
         }
@@ -93,7 +93,7 @@ impl Run {
         let begin = self.world.now();
         while self.looking.is_some() {
             self.cycles(1);
-            assert!(self.world.now().since(begin) < 3 * LIMIT, "a look ends");
+            assert!(self.world.now().since(begin) < 3 * LIMIT, "a rescan ends");
         }
     }
 
@@ -109,7 +109,7 @@ impl Run {
             let pause = self.dice.below(4);
             self.cycles(pause);
         }
-        // Sometimes nobody waits until it is settled.
+        // Sometimes the run does not wait until the group is settled.
         self.is_settled = false;
         if !self.dice.one_in(4) {
             self.settle();
@@ -148,7 +148,7 @@ impl Run {
         let of_group =
             |end: Endpoint| matches!(end, Endpoint::Device(device, _) if self.plan.group().contains(&device));
         let (one, other) = self.plan.cables[cable];
-        // While it is away there is a break there already.
+        // While the group is absent the ring is broken there already.
         if !self.group_is_on && (self.plan.in_ring || of_group(one) || of_group(other)) {
             return;
         }
@@ -166,7 +166,7 @@ impl Run {
         }
     }
 
-    /// Frames get lost or damaged, which tells nothing about cables.
+    /// Frames are lost or damaged, without a change of cables.
     fn disturb(&mut self) {
         let cable = CableId(self.dice.below(self.plan.cables.len() as u64) as usize);
         let count = 1 + self.dice.below(2) as u32;
@@ -179,7 +179,7 @@ impl Run {
         self.world.fault_in(pause, fault);
     }
 
-    /// A plug with bad contact: broken at most once, and whole at most once.
+    /// A plug with bad contact: at most one break and one repair are reported.
     fn flap(&mut self) {
         if self.broken.is_some() || !self.is_settled || (self.plan.in_ring && !self.group_is_on) {
             return;
@@ -200,8 +200,8 @@ impl Run {
         assert!(broken <= 1 && told.len() == 2 * broken, "cable {cable}: {told:?}");
     }
 
-    /// More than is tolerated: two cables of local rings. Whatever that costs, both are told, each with its place where
-    /// the cabling is known, and all is well when they are mended.
+    /// More breaks than tolerated: two cables of local rings. Both are reported, with their places if the cabling is
+    /// known, and all SubDevices return after the repair.
     fn break_two(&mut self) {
         if self.broken.is_some() || self.looking.is_some() || !self.is_settled || !self.is_known {
             return;
@@ -251,12 +251,12 @@ impl Run {
         }
     }
 
-    /// What must never be.
+    /// Checks that hold at all times.
     fn check(&self) {
         let group = if self.plan.has_group { self.plan.group().to_vec() } else { Vec::new() };
         let left: Vec<DeviceIndex> =
             self.world.left_op(self.mark).into_iter().filter(|it| !group.contains(it)).collect();
-        assert_eq!(left, [], "nobody but the group leaves OP");
+        assert_eq!(left, [], "only the group leaves OP");
         let is_wrong = |event: &Event| {
             matches!(
                 event,
@@ -277,18 +277,18 @@ fn run(seed: u64) {
     let mut dice = Dice::new(seed);
     let plan = Plan::random(&mut dice);
     let strict = plan.connections.iter().all(|it| it.head_port == 1) && dice.one_in(2);
-    // A ring whose end is not there is not learned.
+    // A ring with an absent end is not learned.
     let is_tail = plan.connections.iter().any(|it| it.tail >= plan.kinds.len());
     let group_is_on = plan.has_group && (is_tail || dice.one_in(2));
     let mut world = plan.world(seed, strict, group_is_on);
     world.say(format!("{plan:?}, strict: {strict}"));
     world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
     world.recognise();
-    // Joining, they latch outputs that others had before.
+    // Joining SubDevices latch former outputs.
     world.judge_latched(false);
     world.run_cycles(60);
     let mark = world.mark();
-    // With the group away a ring is broken where it will be.
+    // While the group is absent its ring is broken at its place.
     let is_known = !plan.in_ring || group_is_on;
     let mut run = Run {
         plan,
@@ -318,7 +318,7 @@ fn run(seed: u64) {
     run.finish_looking();
     run.cycles(60);
     run.is_known = true;
-    // Then every cable of a ring is told with its true place.
+    // Then every cable of a ring is reported with its true place.
     for cable in run.plan.local.clone() {
         for broken in [true, false] {
             let mark = run.world.mark();
@@ -341,7 +341,7 @@ fn runs(seeds: impl IntoIterator<Item = u64>) {
 // covers: CR-17, JR-07, junctions
 #[test]
 fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done() {
-    // The last ones showed faults.
+    // The last seeds have found faults.
     runs([0, 1, 2, 3, 12, 36, 70, 77]);
 }
 

@@ -1,4 +1,4 @@
-//! Hot connect groups in rings behind junctions and behind their members, on one link and on two, whole and broken.
+//! Hot connect groups in rings behind junctions and behind their members, on one link and on two, closed and broken.
 
 mod at_the_end;
 
@@ -19,7 +19,7 @@ use scenarios::world::{CYCLE, Mark, World};
 use super::{Setting, change, crossed, edge, told};
 use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
 
-/// Those that are always there: the junction is the second one, the tail of its ring the fourth one.
+/// Permanent SubDevices: the second is the junction, the fourth the tail of its ring.
 const BASE: [&str; 5] = ["digital-output-8", "junction", "junction", "digital-input-8", "coupler"];
 const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
 /// The group's devices.
@@ -44,7 +44,7 @@ fn world(seed: u64, network: Network, setting: Setting<'_>) -> World {
     world_that(true, seed, network, setting)
 }
 
-/// `follow`: the cabling is looked at anew with each group that joins or leaves.
+/// `follow`: the cabling is read again with each group that joins or leaves.
 fn world_that(follow: bool, seed: u64, network: Network, (mode, connections): Setting<'_>) -> World {
     let options = Options::default().with_junctions(mode).with_follow_groups(follow);
     let mut world = World::with_junctions(seed, network, &options, declare, connections).expect("it fits");
@@ -66,11 +66,11 @@ fn until_joined(world: &mut World) {
 
 fn until_left(world: &mut World) {
     world.until(LIMIT, "the group has left", |world| world.application().groups()[0].present == 0);
-    // Its outputs fall to their watchdogs.
+    // Its outputs are stopped by their watchdogs.
     world.run_cycles(150);
 }
 
-/// Nobody but the group leaves OP since the beginning.
+/// Only the group has left OP since the beginning.
 fn others_stay(world: &World, what: &str) {
     let left = world.left_op(world.beginning());
     assert!(left.iter().all(|device| GROUP.contains(device)), "{what}: {left:?}");
@@ -117,7 +117,7 @@ fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
             world.cut(PLUG);
             until_left(&mut world);
             assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![], 0), "{what}");
-            // It stays while the ring breaks and is mended, too.
+            // It also stays while the ring breaks and is repaired.
             world.heal(PLUG);
             until_joined(&mut world);
             for cable in &broken {
@@ -136,7 +136,7 @@ fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
     }
 }
 
-/// The group between the two that are always members: cables 3 to 5 are the group's.
+/// The group between the two permanent members: cables 3 to 5 belong to the group.
 const PIECE: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, A)),
     (at(0, B), at(1, A)),
@@ -154,7 +154,7 @@ fn piece(follow: bool, seed: u64, two_links: bool, setting: Setting<'_>) -> Worl
     world_that(follow, seed, network, setting)
 }
 
-/// Looks at the whole segment; the places of the declared ones.
+/// Rescans the segment; returns the places of the declared SubDevices.
 fn rescan(world: &mut World) -> Vec<Option<usize>> {
     let mark = world.mark();
     let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
@@ -169,7 +169,7 @@ fn own(near: (usize, u8), far: (usize, u8), broken: bool) -> Event {
     change(Some(port(near)), port(far), broken, usize::from(broken))
 }
 
-/// Both ends of a cable of the ring with the group in it, once that is known.
+/// Both ends of a cable of the ring with the group in it, after the group is known.
 fn own_with_group(cable: usize, broken: bool) -> Event {
     let (near, far) = match cable {
         2 => ((1, 3), (2, 0)),
@@ -179,7 +179,8 @@ fn own_with_group(cable: usize, broken: bool) -> Event {
     own(near, far, broken)
 }
 
-/// Events name who is where with the group: station address, indices in the declaration (JR-07, CR-12).
+/// Events identify the SubDevices of the ring with the group: station address, indices in the declaration (JR-07,
+/// CR-12).
 fn names_fit(world: &World, mark: Mark) -> bool {
     let stations = world.application().engine().stations();
     world.events(mark).iter().all(|timed| match timed.event {
@@ -207,7 +208,7 @@ fn power_on_group(world: &mut World) {
 const WITH_GROUP: [Option<usize>; 7] = [Some(0), Some(1), Some(2), Some(5), Some(6), Some(3), Some(4)];
 const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), Some(4)];
 
-/// By itself, and otherwise when somebody asks for a rescan.
+/// Automatically, or with a requested rescan.
 // covers: CR-17, JR-07, junctions, ring-events
 #[test]
 fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
@@ -251,10 +252,10 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
                 change(near, far, true, 2)
             }];
             assert_eq!(told(&world, mark), ends, "{what}: both of its ends are open");
-            // What is behind the gap is known: it is one cable now.
+            // The SubDevices behind the gap are known: the gap is one cable now.
             look(&mut world, &WITHOUT_GROUP);
             world.run_cycles(60);
-            assert_eq!(told(&world, mark).len(), 2, "{what}: which was told");
+            assert_eq!(told(&world, mark).len(), 2, "{what}: as reported");
             if round == 0 && !follow {
                 let mark = world.mark();
                 power_on_group(&mut world);
@@ -270,8 +271,7 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
     }
 }
 
-/// Broken and whole again, once each, the latter with its true place, however the break and the look at the segment
-/// meet.
+/// One break and one repair are reported, the repair with its true place, for any order of the break and the rescan.
 // covers: JR-07, junctions
 #[test]
 fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
@@ -281,7 +281,7 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
         let mut world = piece(number % 2 == 0, 30 + number as u64, two_links, setting);
         power_on_group(&mut world);
         let mark = world.mark();
-        // Before the look, while it goes on, and right behind it.
+        // Before, during and right after the rescan.
         world.fault_in(Duration::from_micros([0, 1_500, 4_000][number % 3]), Fault::Cut(CableId(cable)));
         let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
         let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
@@ -297,7 +297,7 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
     }
 }
 
-/// Two breaks of one ring, or one of each ring: nothing is taken over until the segment is whole but for the gap.
+/// Two breaks of one ring, or one of each ring: the cabling is not updated until the gap is the only break.
 // covers: junctions
 #[test]
 fn a_group_that_left_while_a_ring_was_broken_is_no_piece_of_it_afterwards() {
@@ -355,7 +355,7 @@ fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_look
                     assert_eq!(crossed(&world, mark), 0, "{what}");
                     let expected = match cable {
                         2 => vec![own((1, 3), (2, 0), broken)],
-                        // The group is not part of the cabling that was scanned: both of its ends are between these.
+                        // The group is not part of the scanned cabling: both of its ends are reported between these.
                         3 | 5 => vec![own((2, 1), (3, 0), broken)],
                         4 => vec![],
                         _ => vec![own((3, 1), (1, 1), broken)],

@@ -1,5 +1,5 @@
-//! What a scan knows of rings behind junctions: in mode automatic several of them, one in another, one of them broken,
-//! though open ports allow many answers (JR-03); of one that is broken, all but an end of the broken cable.
+//! Rings behind junctions that a scan learns: in mode automatic several rings, nested, one of them broken, although
+//! open ports allow many solutions (JR-03); of a broken ring all but one end of the broken cable.
 
 use ringcat::{Cable, Event, JunctionMode};
 use ringcat_engine::topology::{Closing, PortOf};
@@ -10,7 +10,7 @@ use scenarios::world::World;
 
 use super::{STRICT, crossed, edge, in_op, one_ring, told};
 
-/// Junction 0 has a ring with two more of them, 1 and 3, with a ring each, and behind it another one, 5.
+/// Junction 0 has a ring with two more junctions, 1 and 3, with a ring each, and behind it another junction, 5.
 const KINDS: [&str; 8] = [
     "junction",
     "junction",
@@ -48,7 +48,7 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken() {
         if two_links {
             cables.push((at(7, B), REDUNDANT));
         }
-        // Those that lead into the rings and from one member to the next. One that closes a ring hides it (JR-03).
+        // First cables of rings and cables between members. A broken closing cable hides its ring (JR-03).
         let some: &[Option<usize>] =
             if two_links { &[None, Some(4)] } else { &[None, Some(1), Some(4), Some(5), Some(9)] };
         for broken in some.iter().copied() {
@@ -73,8 +73,8 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken() {
     }
 }
 
-/// A cable that was broken at the scan has an end that nobody knows: it is no cable of an interface, and is among the
-/// others once it has been whole.
+/// A cable that was broken at the scan has an unknown end: it is not a cable of an interface, and is listed after its
+/// first repair.
 // covers: JR-07, cable-errors
 #[test]
 fn a_local_cable_broken_at_the_scan_is_listed_with_its_ends_once_whole() {
@@ -91,7 +91,7 @@ fn a_local_cable_broken_at_the_scan_is_listed_with_its_ends_once_whole() {
         assert_eq!(cables(&world), others, "{what}");
         edge(&mut world, &what, |world| world.heal(CableId(broken)));
         assert_eq!(cables(&world), whole, "{what}");
-        // Errors are counted for it like for any other.
+        // Errors are counted for it as for any other cable.
         world.corrupt(CableId(broken), 30);
         world.run_cycles(1_600);
         let told = |timed: &&ringcat::TimedEvent| {

@@ -1,4 +1,4 @@
-//! Random segments with rings behind junctions and a hot connect group, put together port by port.
+//! Random segments with rings behind junctions and a hot connect group, built port by port.
 
 use ringcat::{
     Declaration, DomainMember, Error, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic,
@@ -13,18 +13,18 @@ use scenarios::world::{CYCLE, World};
 use crate::hot_connect::{TOOL, group, infos, tool};
 
 const KINDS: [&str; 5] = ["digital-output-8", "digital-input-8", "servo", "analog-input-4", "block"];
-/// The group's devices while it is not known how many others there are.
+/// Numbers of the group's devices until the number of the others is known.
 const FIRST: usize = 1_000;
 
 fn kind(dice: &mut Dice) -> &'static str {
     KINDS[dice.below(KINDS.len() as u64) as usize]
 }
 
-/// Where the group is.
+/// Place of the group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Nowhere,
-    /// A piece of a ring: before the member of this number.
+    /// A part of a ring: before the member with this number.
     Before(u64),
     /// The end of a ring.
     Tail,
@@ -34,7 +34,7 @@ enum Place {
     End,
 }
 
-/// A segment that is being put together.
+/// A segment under construction.
 #[derive(Debug, Default)]
 pub struct Plan {
     pub kinds: Vec<&'static str>,
@@ -42,7 +42,7 @@ pub struct Plan {
     pub connections: Vec<JunctionConnection>,
     /// Cables of local rings.
     pub local: Vec<usize>,
-    /// The group is a piece of a ring.
+    /// The group is a part of a ring.
     pub in_ring: bool,
     pub has_group: bool,
     pub two_links: bool,
@@ -61,7 +61,7 @@ impl Plan {
         at(FIRST + 1, B)
     }
 
-    /// Puts a ring behind a junction; returns where the line goes on.
+    /// Adds a ring behind a junction; returns the port from which the line continues.
     fn ring(&mut self, dice: &mut Dice, junction: usize, ports: (Port, Port), place: &mut Place, nested: bool) {
         let begin = self.cables.len();
         let (mut last, mut inner) = (at(junction, ports.0), Vec::new());
@@ -121,7 +121,7 @@ impl Plan {
             Place::End,
         ]);
         let mut end = MAIN;
-        // Somebody has process data.
+        // At least one device has process data.
         for _ in 0..1 + dice.below(2) {
             end = at(plan.hang(kind(dice), end), B);
         }
@@ -166,7 +166,7 @@ impl Plan {
         self.try_world(seed, strict, group_is_on, |_| ()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// A world in which something was done before power-on, if the declaration is taken.
+    /// A world with a change before power-on, if the declaration is accepted.
     pub fn try_world(
         &self,
         seed: u64,
@@ -201,7 +201,7 @@ impl Plan {
         [DeviceIndex(self.kinds.len()), DeviceIndex(self.kinds.len() + 1)]
     }
 
-    /// Cables of which one may break without anybody being lost.
+    /// Cables of which one may break without the loss of a SubDevice.
     pub fn redundant_cables(&self) -> Vec<usize> {
         let mut cables = self.local.clone();
         if self.two_links {

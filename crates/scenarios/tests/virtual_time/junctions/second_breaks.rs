@@ -1,4 +1,4 @@
-//! More than one break: in one local ring, in two of them, in a local ring and in that of two links (JR-02).
+//! More than one break: in one local ring, in two local rings, in a local ring and in the ring of two links (JR-02).
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use scenarios::world::{CYCLE, World};
 
 use super::{STRICT, change, crossed, edge, ends, in_op, one_ring, told, without_names};
 
-/// Those of [`TWO_RINGS`].
+/// Devices of [`TWO_RINGS`].
 const KINDS: [&str; 7] =
     ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "servo", "digital-input-8"];
 
@@ -51,8 +51,8 @@ fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is() {
         };
         assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }, second(true, 2)]);
         assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
-        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "nobody knows who is there");
-        // One of them is mended: everybody comes back, the other one is still broken.
+        assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "the present SubDevices are unknown");
+        // One of them is repaired: all SubDevices come back, the other ring is still broken.
         world.heal(CableId(6));
         world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         world.run_cycles(100);
@@ -63,7 +63,7 @@ fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is() {
     }
 }
 
-/// Both ends of a cable of [`two_rings`], where it is none of those that close.
+/// Both ends of a cable of [`two_rings`] that is not a closing cable.
 pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
     let (near, port) = match cable {
         1 => (0, 3),
@@ -75,8 +75,8 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
     (PortOf { node: near, port }, PortOf { node: far, port: 0 })
 }
 
-/// Both breaks of two rings come within one cycle, so that no frame can tell where. Nothing comes back, and that is
-/// said; then each ring is looked into while the other one is left out.
+/// Two rings break within one cycle, so that no frame shows the places. No frame comes back, which is reported; then
+/// each ring is examined while the other one is closed off.
 // covers: JR-02, junctions
 #[test]
 fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places() {
@@ -89,7 +89,7 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places()
         world.fault_in(CYCLE / 2 + apart[number % apart.len()], Fault::Cut(CableId(second)));
         world.run_cycles(300);
         let what = format!("cables {first} and {second}: {:?}", told(&world, mark));
-        // The closing cable leaves no port 0 unconnected: nothing is blocked by it.
+        // The closing cable leaves no port 0 unconnected: it does not block frames.
         let closing = [first, second].iter().filter(|cable| [3, 7].contains(*cable)).count();
         if closing > 0 {
             let broken = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
@@ -105,8 +105,8 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places()
             assert_eq!(told(&world, mark), [blocked(true, 0), place(one, true, 1), place(other, true, 2)], "{what}");
             assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero), "{what}");
             let lost = |event: &Event| matches!(event, Event::Lost { .. } | Event::LineCrossed { .. });
-            assert!(!world.saw(mark, lost), "{what}: who is out of reach on purpose is not lost");
-            // Within the time that outputs have until their watchdogs (100 ms) it is known where.
+            assert!(!world.saw(mark, lost), "{what}: SubDevices that are unreachable on purpose are not lost");
+            // The places are known before the watchdogs of outputs expire (100 ms).
             let told_at =
                 world.events(mark).iter().filter(|timed| without_names(timed.event.clone()) == place(other, true, 2));
             let at = told_at.map(|timed| timed.at).next().expect("it was told");
@@ -127,7 +127,7 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places()
     }
 }
 
-/// The same in a closed ring of two links, in which copies of the redundant link come back and have met nobody.
+/// The same in a closed ring of two links, in which unprocessed copies of the redundant link come back.
 // covers: JR-02, junctions
 #[test]
 fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too() {
@@ -152,7 +152,7 @@ fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_
     edge(&mut world, "the other one", |world| world.heal(CableId(2)));
 }
 
-/// A ring behind a member of another one, before the break of that one and behind it.
+/// A ring behind a member of another ring, before and behind the break of the other ring.
 // covers: JR-02, junctions
 #[test]
 fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places() {
@@ -225,7 +225,7 @@ fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     edge(&mut world, "second repair", |world| world.heal(CableId(4)));
     let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
-    assert!(left.iter().all(|device| *device == 3), "{left:?}: the others go on");
+    assert!(left.iter().all(|device| *device == 3), "{left:?}: the others continue");
     assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
 }
 
@@ -244,7 +244,7 @@ fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_bac
     assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
 }
 
-/// Those of [`RING_IN_RING`]: an output, the junction, and an input.
+/// Devices of [`RING_IN_RING`]: an output, the junction, and an input.
 fn ring_in_ring() -> Network {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
     wired(&kinds, &RING_IN_RING)
@@ -268,13 +268,14 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
             }
         }
         assert_eq!(crossed(&world, world.beginning()), 0);
-        // Both in the half of the main interface: its frames meet one unconnected port 0, those of the other one too.
+        // Both in the half of the main interface: its frames pass one unconnected port 0, those of the other interface
+        // too.
         edge(&mut world, "main ring behind the junction", |world| world.cut(CableId(5)));
         let mark = edge(&mut world, "local ring", |world| world.cut(CableId(3)));
         assert_eq!(told(&world, mark).len(), 1);
         edge(&mut world, "local ring whole", |world| world.heal(CableId(3)));
         edge(&mut world, "main ring whole", |world| world.heal(CableId(5)));
-        // In the half of the redundant interface its frames are destroyed; the other half goes on.
+        // In the half of the redundant interface its frames are destroyed; the other half continues.
         edge(&mut world, "main ring before the junction", |world| world.cut(CableId(1)));
         let mark = world.mark();
         world.cut(CableId(3));
@@ -287,8 +288,8 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
     }
 }
 
-/// Enhanced detection opens the ring of two links for a moment whenever ports change, and finds nobody crossed in a
-/// local ring that is entered from behind.
+/// Enhanced detection opens the ring of two links for a moment when ports change, and reports no crossing in a local
+/// ring that is entered from behind.
 // covers: LC-03, LC-06, crossed-enhanced
 #[test]
 fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {

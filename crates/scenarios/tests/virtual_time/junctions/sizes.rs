@@ -1,4 +1,4 @@
-//! Mode automatic learns rings behind junctions of any length, and says so where it does not (JR-03).
+//! Mode automatic learns rings behind junctions of any length, and reports those that it does not learn (JR-03).
 
 use std::time::Duration;
 
@@ -12,8 +12,8 @@ use scenarios::world::World;
 
 use super::{crossed, in_op, told};
 
-/// Rings with so many members each, one behind the other, with a SubDevice in front of, between and behind them, and
-/// where they close.
+/// Rings with these numbers of members, one behind the other, with a SubDevice before, between and behind them; and
+/// their closing cables.
 fn rings(members: &[usize], two_links: bool) -> (Network, Vec<Closing>, Vec<CableId>) {
     let (mut kinds, mut cables, mut closings, mut within) =
         (vec!["digital-input-8"], vec![(MAIN, at(0, A))], vec![], vec![]);
@@ -33,7 +33,7 @@ fn rings(members: &[usize], two_links: bool) -> (Network, Vec<Closing>, Vec<Cabl
         cables.push((last, at(junction, B)));
         let port = |node, port| PortOf { node, port };
         closings.push(Closing { head: port(junction, 1), tail: port(junction + count, 1) });
-        // Two in a row: open ports allow the ring to end at either.
+        // Two SubDevices in a row: open ports allow the ring to end at either.
         for _ in 0..2 {
             let behind = kinds.len();
             kinds.push("digital-input-8");
@@ -85,7 +85,7 @@ fn rings_of_any_length_are_learned_and_no_line_is_said_to_be_crossed() {
     }
 }
 
-/// Where the ring is broken at the scan as well.
+/// The same with a ring that is broken at the scan.
 // covers: JR-03, junctions
 #[test]
 fn long_rings_that_are_broken_at_the_scan_are_learned() {
@@ -102,8 +102,8 @@ fn long_rings_that_are_broken_at_the_scan_are_learned() {
     }
 }
 
-/// More rings than are looked for: that is told, all exchange process data as if there were none, and no line is said
-/// to be crossed.
+/// More rings than the search limit: this is reported, process data is exchanged as without rings, and no crossed line
+/// is reported.
 // covers: JR-03, junctions
 #[test]
 fn rings_that_are_not_learned_are_told_and_hold_up_nobody() {
@@ -121,7 +121,7 @@ fn rings_that_are_not_learned_are_told_and_hold_up_nobody() {
     assert_eq!(learned(&world), []);
     world.settle();
     assert_eq!(crossed(&world, world.beginning()), 0);
-    // As many as are looked for.
+    // The number of rings of the search limit.
     let (network, closings, _) = rings(&[2; 16], false);
     let world = in_op(73, network, (JunctionMode::Automatic, &[]));
     assert_eq!((not_learned(&world), learned(&world)), (Vec::new(), closings));

@@ -1,8 +1,8 @@
-//! A hot connect group that is the end of a ring behind a junction: seen before, and never seen.
+//! A hot connect group at the end of a ring behind a junction: known from before, and unknown.
 
 use super::*;
 
-/// The group between the last of those that are always members and the junction: cables 4 to 6 are its.
+/// The group between the last permanent member and the junction: cables 4 to 6 belong to the group.
 const END: [(Endpoint, Endpoint); 8] = [
     (MAIN, at(0, A)),
     (at(0, B), at(1, A)),
@@ -14,8 +14,9 @@ const END: [(Endpoint, Endpoint); 8] = [
     (at(1, C), at(4, A)),
 ];
 
-/// The group is the end of the ring. Where it is away the ring ends at the one before it; until it is known who comes
-/// back it is nobody's, and the ring must be taken neither for another one nor for crossed lines.
+/// The group is the end of the ring. While it is absent the ring ends at the SubDevice before it. Until returned
+/// SubDevices are identified they are unassigned, and the ring must not be reported as another ring or as crossed
+/// lines.
 // covers: JR-03, JR-04, junctions
 #[test]
 fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
@@ -27,7 +28,7 @@ fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
         let mut network = network(&END, number == 2);
         let closing = |node: usize, broken| own((node, 1), (1, 1), broken);
         let mut world = if number == 3 {
-            // It has not been there yet: the connection is watched from the look on that finds it.
+            // It was never present: the connection is supervised after the rescan that finds it.
             GROUP.iter().for_each(|device| network.power_off(*device));
             let mut world = world(60 + number as u64, network, setting);
             power_on_group(&mut world);
@@ -67,7 +68,7 @@ fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
     }
 }
 
-/// Nobody knows that it is a piece of the ring; but what is entered from where the ring closes is not crossed.
+/// The group is not known as a part of the ring; but SubDevices entered from the closing cable are not crossed.
 // covers: JR-04, junctions
 #[test]
 fn a_group_not_yet_seen_in_a_local_ring_is_no_crossed_line_when_it_breaks() {
