@@ -84,7 +84,7 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         "demo --segment DIR/kind.toml",
         Read,
         2,
-        "DIR/kind.toml:3: device \"coupler\": invalid type: string \"two\", expected a number of its range",
+        "DIR/kind.toml:3: device \"coupler\": count: expected a whole number, not negative, got the text \"two\"",
     ),
     ("demo --segment DIR/image.toml", Read, 2, "DIR/image.toml:"),
     ("demo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: there is no device"),
