@@ -1,8 +1,7 @@
 //! `ringcat capture`: what passes on network interfaces, recorded without taking part.
 //!
-//! In go the interfaces of any MainDevice on this host, out comes one pcapng file with both directions of all of them.
+//! Input: the interfaces of any MainDevice on this host. Output: one pcapng file with both directions of all of them.
 
-use std::io::{IsTerminal, stdout};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -11,54 +10,57 @@ use ringcat_link::{PacketSocket, ReceiveMode, Recorder, Sniffer, Tap, interface,
 
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{describe_down, two_interfaces};
-use crate::output::{say, write};
+use crate::interfaces::{LinkNames, describe_down};
+use crate::json::capture::{Capture, Interface};
+use crate::json::data::Data;
+use crate::output::{is_terminal, say, warn, write};
 use crate::recording::{DESCRIPTIONS, lines};
 use crate::times::time;
-use crate::verdict::Verdict;
+use crate::verdict::{Report, Verdict};
 
-/// The user's wish to end, and the live line, are looked at so often.
+/// Period of checks for the end, and of the live line.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// What to do with the file.
 const ABOUT_CAPTURE: &str = "\
-Sees both directions of the interfaces and never sends; a MainDevice on them, of whatever make, does not notice. Open
-the file with Wireshark, or: tshark -r FILE.pcapng
+Records both directions of the interfaces and never sends; a MainDevice on them,
+of whatever make, does not notice. Open the file with Wireshark, or:
+tshark -r FILE.pcapng
 
-Where the MainDevice is `ringcat scan` or `ringcat run`, --capture of these does the same without a second program.";
+Where the MainDevice is `ringcat scan` or `ringcat run`, their option --capture
+does the same without a second program.";
 
 /// Options of `ringcat capture`.
 #[derive(Args, Debug)]
-#[command(after_help = ABOUT_CAPTURE)]
+#[command(after_long_help = ABOUT_CAPTURE)]
 pub struct CaptureArguments {
-    /// Network interface that the first SubDevice is plugged into.
-    #[arg(long, value_name = "IF")]
-    main: String,
-    /// Network interface at the other end of a ring.
-    #[arg(long, value_name = "IF")]
-    redundant: Option<String>,
-    /// File to write, for Wireshark. An older one is overwritten.
-    #[arg(long, value_name = "FILE.pcapng")]
+    #[command(flatten)]
+    links: LinkNames,
+    /// File to write, for Wireshark
+    ///
+    /// An existing file is overwritten.
+    #[arg(long, value_name = "FILE.pcapng", help_heading = "Output")]
     out: PathBuf,
-    /// How long, such as 10s or 5min; until Ctrl-C by default.
-    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    /// How long, such as 10s or 5min; until Ctrl-C by default
+    #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Output")]
     lasts: Option<Duration>,
-    /// Record frames of all protocols, not only EtherCAT (EtherType 0x88A4, with or without a VLAN tag).
-    #[arg(long)]
+    /// Record frames of all protocols, not only EtherCAT
+    ///
+    /// Without it only frames with EtherType 0x88A4 are recorded, with or without a VLAN tag.
+    #[arg(long, help_heading = "Output")]
     all: bool,
 }
 
 /// Records, and says how many frames there were.
-pub fn run(arguments: &CaptureArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &CaptureArguments) -> Result<Report, Failure> {
     let end = EndRequest::watch(None)?;
-    let (main, redundant) = (arguments.main.as_str(), arguments.redundant.as_deref());
-    two_interfaces(main, redundant)?;
-    let names: Vec<&str> = std::iter::once(main).chain(redundant).collect();
+    arguments.links.check()?;
+    let names: Vec<&str> = arguments.links.all().collect();
     let mut sniffers = Vec::new();
     for name in &names {
         sniffers.push(Sniffer::open(name, arguments.all)?);
         if !interface::carrier(name).unwrap_or(true) {
-            eprintln!("ringcat: {}", describe_down(name));
+            warn(describe_down(name));
         }
     }
     let described: Vec<(&str, &str)> = names.iter().copied().zip(DESCRIPTIONS).collect();
@@ -68,7 +70,7 @@ pub fn run(arguments: &CaptureArguments) -> Result<Verdict, Failure> {
     say!("recording {what} of {} into {}; Ctrl-C ends it", names.join(" and "), arguments.out.display());
     let lasts = arguments.lasts.map(|lasts| u64::try_from(lasts.as_nanos()).unwrap_or(u64::MAX));
     let until = lasts.map_or(u64::MAX, |lasts| monotonic::now_ns().saturating_add(lasts));
-    let terminal = stdout().is_terminal();
+    let terminal = is_terminal();
     let (mut frames, mut shown) = (0, 0);
     while !end.is_asked() && monotonic::now_ns() < until && recorder.failure().is_none() {
         let sockets: Vec<&PacketSocket> = sniffers.iter().map(Sniffer::socket).collect();
@@ -89,12 +91,21 @@ pub fn run(arguments: &CaptureArguments) -> Result<Verdict, Failure> {
         recorder.set_lost_by_kernel(number, sniffer.lost());
     }
     let recorded = recorder.finish()?;
-    for line in lines(names.into_iter(), &recorded) {
+    for line in lines(names.iter().copied(), &recorded) {
         say!("{line}");
     }
+    let interfaces = names.iter().zip(&recorded).map(|(name, recorded)| Interface {
+        interface: (*name).to_owned(),
+        received_frames: recorded.received,
+        sent_frames: recorded.sent,
+        unrecorded_frames: recorded.lost + recorded.lost_by_kernel,
+    });
+    let file = arguments.out.display().to_string();
+    let data = Data::Capture(Capture { file, frames, interfaces: interfaces.collect() });
     let lacking: u64 = recorded.iter().map(|frames| frames.lost + frames.lost_by_kernel).sum();
     let lacking = (lacking > 0).then(|| format!("the capture lacks {lacking} frames"));
-    Ok(Verdict::Held(format!("{frames} frames")).and(lacking).and(end.cut_short(arguments.lasts)))
+    let verdict = Verdict::Held(format!("{frames} frames")).and(lacking).and(end.cut_short(arguments.lasts));
+    Ok(Report { verdict, data })
 }
 
 /// Records what has passed so far; how many frames that is. Bounded, however fast they come.

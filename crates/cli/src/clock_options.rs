@@ -1,7 +1,6 @@
-//! What `ringcat run` and `ringcat clocks` are told about distributed clocks: who follows whom, and SYNC signals.
+//! The options of `ringcat run` and `ringcat clocks` about distributed clocks: the reference, and SYNC signals.
 //!
-//! In go options and what a scan found, out come declarations; what does not fit together is an error that says what
-//! would.
+//! Input: options and the result of a scan. Output: a declaration, or an error with what is allowed.
 
 mod sync;
 
@@ -12,35 +11,44 @@ use ringcat::{
 
 use crate::failure::Failure;
 use crate::interfaces::now;
+use crate::output::warn;
 use crate::times::{shift, us};
 use sync::{Sync, choose, sync};
 
 /// How `--sync` is explained.
-const SYNC_HELP: &str = "SYNC signals: auto (as the EEPROMs say, where they do), or POSITION:SYNC0[:SYNC1] with cycles \
-    and shifts, as in 3:1ms, 3:1ms+250us, 3:500us:1ms-100us; POSITION may be all, SYNC0 may be auto. Can be given more \
-    than once, what names a position counts";
+const SYNC_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us";
+const SYNC_LONG_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us\n\n\
+    auto takes the operation modes of the EEPROMs. SYNC0 and SYNC1 are a cycle with or without a shift: 3:1ms, \
+    3:1ms+250us, 3:500us:1ms-100us. POSITION may be all, SYNC0 may be auto. The option may be given several times; one \
+    with a position goes before one for all.";
 
 /// Options about clocks.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Clocks")]
 pub struct ClockOptions {
-    /// When cycles begin: so long after the multiples of the cycle time in the system time of the segment, at which
-    /// SYNC0 comes too unless it is shifted. Such as 300us or -300us; 0us by default. Cycles follow the reference clock
-    /// for that (master shift).
+    /// When cycles begin, relative to the system time of the segment
+    ///
+    /// The time from the multiples of the cycle time, which is also that of an unshifted SYNC0, to the begin of a cycle:
+    /// 300us or -300us; 0us by default. Cycles then follow the reference clock (master shift).
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = shift, conflicts_with = "bus_shift")]
     phase: Option<i64>,
-    /// The reference clock follows this host (bus shift); otherwise the cycles follow the reference clock (master
-    /// shift).
+    /// The reference clock follows this host (bus shift)
+    ///
+    /// Without it the cycles follow the reference clock (master shift).
     #[arg(long)]
     pub bus_shift: bool,
-    /// Whose clock all others follow: first (the first one with a clock), sync (the first one with SYNC signals), or a
-    /// position.
-    #[arg(long, value_name = "WHO", default_value = "first", value_parser = reference)]
+    /// Reference clock: first, sync or a position
+    ///
+    /// first is the first SubDevice with a clock, sync the first one with SYNC signals.
+    #[arg(long, value_name = "CLOCK", default_value = "first", value_parser = reference)]
     reference: ReferenceClock,
-    /// Where a fork without a clock hides the propagation delay of a SubDevice, write the middle of what it can be.
-    /// Otherwise none is written there, and SubDevices with SYNC signals stay in SAFEOP.
+    /// Write estimates for propagation delays that cannot be measured
+    ///
+    /// A fork without a clock hides the delay of the SubDevices behind it. The estimate is the middle of the possible
+    /// range. Without this option no delay is written there, and SubDevices with SYNC signals stay in SAFEOP.
     #[arg(long)]
     estimate_delays: bool,
-    #[arg(long, value_name = "SIGNALS", value_parser = sync, help = SYNC_HELP)]
+    #[arg(long, value_name = "SIGNALS", value_parser = sync, help = SYNC_HELP, long_help = SYNC_LONG_HELP)]
     sync: Vec<Sync>,
 }
 
@@ -57,7 +65,7 @@ fn reference(text: &str) -> Result<ReferenceClock, String> {
 }
 
 impl ClockOptions {
-    /// Whether one of them was given: clocks are wanted.
+    /// Whether one of them is given: clocks are then in use.
     pub fn are_given(&self) -> bool {
         let given = self.phase.is_some() || self.bus_shift || self.estimate_delays || !self.sync.is_empty();
         given || self.reference != ReferenceClock::default()
@@ -83,7 +91,7 @@ impl ClockOptions {
             ..ClockConfig::default()
         };
         if let Some(words) = in_front(self.reference, found, declaration) {
-            eprintln!("ringcat: {words}");
+            warn(words);
         }
         declaration.clocks = Some(config);
         Ok(())
@@ -100,24 +108,26 @@ impl ClockOptions {
         match self.reference {
             ReferenceClock::FirstWithClock => Ok(()),
             ReferenceClock::FirstConfigured if signals.iter().any(Option::is_some) => Ok(()),
-            ReferenceClock::FirstConfigured => Err("--reference sync: nobody has SYNC signals; add --sync".into()),
+            ReferenceClock::FirstConfigured => {
+                Err("--reference sync: no SubDevice has SYNC signals; add --sync".into())
+            }
             ReferenceClock::Declared(position) => match found.get(position) {
                 None => Err(format!("--reference {position}: there are SubDevices 0 to {}", found.len() - 1)),
                 Some(info) if info.controller.features.dc => Ok(()),
                 Some(info) => Err(format!(
                     "--reference {position}: SubDevice {position} \"{}\" has no distributed clock; `ringcat clocks` \
-                     lists who has",
+                     lists all clocks",
                     info.name
                 )),
             },
         }
     }
 
-    /// As [`ClockOptions::declare`] for a declaration that brings its clocks with it, from an ENI: who has SYNC signals
-    /// and who is followed is said there, which of host and reference follows the other may be chosen.
+    /// As [`ClockOptions::declare`] for the declaration of an ENI: SYNC signals and the reference are those of the file,
+    /// master shift or bus shift is an option.
     pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
         if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
-            return Err(Failure::new("--sync and --reference: the ENI says who has SYNC signals and who is followed"));
+            return Err(Failure::new("--sync and --reference: the ENI has the SYNC signals and the reference clock"));
         }
         let Some(config) = &mut declaration.clocks else {
             return if asked { Err(Failure::new("the ENI has no distributed clocks")) } else { Ok(()) };
@@ -134,7 +144,7 @@ impl ClockOptions {
     }
 }
 
-/// A warning where frames meet other clocks before the reference: these do not see its time but this host's idea of it.
+/// A warning where frames reach other clocks before the reference: those receive this host's estimate of its time.
 fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &Declaration) -> Option<String> {
     let position = match reference {
         ReferenceClock::FirstWithClock => return None,
@@ -143,8 +153,8 @@ fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &De
     };
     let first = found[..position].iter().position(|info| info.controller.features.dc)?;
     Some(format!(
-        "the clock of position {first} is in front of the reference clock, position {position}: it follows what this \
-         host believes of that, and locks only as exactly as this host sends"
+        "the clock of position {first} is in front of the reference clock, position {position}: it follows this host's \
+         estimate of the reference, and locks only as exactly as this host sends"
     ))
 }
 
@@ -185,7 +195,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn what_does_not_fit_is_told_with_what_would() {
+    fn options_that_do_not_fit_are_refused_with_what_is_allowed() {
         let mut found = vec![SubDeviceInfo::default(), SubDeviceInfo::default()];
         found[1].controller.features.dc = true;
         found[0].name = "coupler".to_owned();
@@ -205,7 +215,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn clocks_in_front_of_the_reference_are_told() {
+    fn clocks_in_front_of_the_reference_are_warned_of() {
         let mut found = vec![SubDeviceInfo::default(); 3];
         found[1].controller.features.dc = true;
         let mut declaration = ringcat::automatic(&found, std::time::Duration::from_millis(1));
@@ -216,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn signals_are_told_in_microseconds() {
+    fn signals_are_printed_in_microseconds() {
         assert_eq!(signals_in_words(&SyncSignals::sync0(62_500, -100_000)), "SYNC0 62.5-100");
         let both = SyncSignals {
             assign_activate: 0x0700,

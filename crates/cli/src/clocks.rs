@@ -1,7 +1,7 @@
 //! `ringcat clocks`: brings the distributed clocks of a segment together and shows how well they keep.
 //!
-//! Everything on the wire goes to OP as its SII says, with SYNC signals where they are asked for. Once all clocks are
-//! locked their differences are watched for a while; then comes a table, and a picture if one is wanted.
+//! All SubDevices go to OP as their SII says, with the SYNC signals of the options. Once all clocks are locked their
+//! differences are recorded for a while; then comes a table and, with `--plot`, a picture.
 
 mod plot;
 mod table;
@@ -23,79 +23,77 @@ use ringcat::{
     automatic,
 };
 
+use crate::access::AccessArguments;
 use crate::clock_options::{ClockOptions, farthest};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{InterfaceArguments, ThreadArguments, now};
-use crate::output::{counted, say};
-use crate::recording::RecordingArguments;
+use crate::interfaces::now;
+use crate::json::data::Data;
+use crate::output::{counted, say, warn, write_event};
 use crate::run_log::{RunLog, Shown};
 use crate::surroundings::Surroundings;
 use crate::times::{cycle, time};
-use crate::verdict::Verdict;
+use crate::verdict::{Report, Verdict};
 use plot::{Course, plot};
-use table::{json, lines};
+pub use table::json;
+use table::lines;
 
 /// From activation to the lock at the most.
 const LOCK_LIMIT: Duration = Duration::from_secs(60);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
-/// Pause between two looks.
+/// Pause between two readings.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// How to read what it prints.
 const TABLE_HELP: &str = "\
-  delay       nanoseconds from the reference clock, as measured (register 0x0928); -: a fork without a clock hides it
-              and none was written; ~: the middle of what it can be (--estimate-delays)
-  offset      from the clock's own time to system time (0x0920)
-  drift       how much faster than the reference it would run by itself (0x0932)
-  now, worst  its difference to the reference (0x092C): when it was read last, and the largest since it was locked
-  SYNC        signals in microseconds: cycle, and shift with its sign
+Columns of the table:
+  delay       from the reference clock, as measured (register 0x0928);
+              -: a fork without a clock hides it and none was written;
+              ~: the middle of what it can be (--estimate-delays)
+  drift       how much faster than the reference the clock would run by itself
+              (register 0x0932)
+  now, worst  difference to the reference (register 0x092C): at the last
+              reading, and the largest since the lock
+  offset      from the clock's own time to system time (register 0x0920)
+  SYNC        signals: cycle, and shift with its sign
 
-Exit status: 0 all clocks locked and stayed within 1 us, their delays are known or estimated, and all SubDevices were in
-OP in the end, 1 they did not.";
+Exit status: 0 all clocks locked and stayed within 1 us, their delays are known
+or estimated, and all SubDevices were in OP in the end; 1 otherwise.";
 
 /// Options of `ringcat clocks`.
 #[derive(Args, Debug)]
-#[command(after_help = TABLE_HELP)]
+#[command(after_long_help = TABLE_HELP)]
 pub struct ClocksArguments {
     #[command(flatten)]
-    interfaces: InterfaceArguments,
-    #[command(flatten)]
-    thread: ThreadArguments,
-    #[command(flatten)]
-    recording: RecordingArguments,
+    access: AccessArguments,
     #[command(flatten)]
     options: ClockOptions,
-    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s.
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle)]
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Cycle")]
     cycle: Duration,
-    /// How long to watch once all clocks are locked, such as 10s; until Ctrl-C with a time that long.
-    #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = time)]
+    /// How long to record differences once all clocks are locked, such as 10s
+    #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = time, help_heading = "Cycle")]
     lasts: Duration,
-    /// Draw the differences over time into this file.
-    #[arg(long, value_name = "FILE.svg")]
+    /// Draw the differences over time into this file
+    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
-    /// Print JSON instead of a table; what happens meanwhile goes to the standard error output.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Runs. It has held where all clocks locked and stayed together.
-pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
-    arguments.interfaces.check_names()?;
-    // Nothing is measured in vain.
+pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
+    let AccessArguments { interfaces, thread, .. } = &arguments.access;
+    interfaces.links.check()?;
+    // An unwritable file shows before the measurement.
     let mut picture = arguments.plot.as_ref().map(|path| Picture::create(path)).transpose()?;
-    let thread = arguments.thread;
+    let thread = *thread;
     let end = EndRequest::watch(thread.priority)?;
-    let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
-    let surroundings = Surroundings::watch(&arguments.interfaces, &cyclic);
-    let recording = arguments.recording.start(&arguments.interfaces)?;
-    let (cyclic, acyclic) = (recording.tee(cyclic), recording.tee(acyclic));
+    let halves = interfaces.open_halves(thread)?;
+    let surroundings = Surroundings::watch(interfaces, &halves.0);
+    let (recording, cyclic, acyclic) = arguments.access.record(halves)?;
     let _awake = thread.prepare_process();
     let begin = now();
-    let supervisor =
-        SupervisorThread::start(acyclic, &arguments.interfaces.options(), move || thread.prepare_supervisor())?;
+    let supervisor = SupervisorThread::start(acyclic, &interfaces.options(), move || thread.prepare_supervisor())?;
     let scan = supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
@@ -103,8 +101,8 @@ pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     let cycles = start_cycles(arguments, application, &end)?;
-    let log = RunLog::new(EventLog::new(begin, names), surroundings);
-    let mut watch = Watch { begin, log, end: &end, json: arguments.json };
+    let log = RunLog::new(begin, EventLog::new(begin, names), surroundings);
+    let mut watch = Watch { begin, log, end: &end };
     let mut course = Course::default();
     let locked = watch.until(&cycles, &mut course, now() + LOCK_LIMIT, true)?;
     cycles.news().restart_histograms();
@@ -119,7 +117,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
     let news = cycles.news_handle();
     if let Some(picture) = &mut picture {
         reasons.extend(picture.draw(&plot(&course, &clocks)).err());
-        tell(arguments.json, &format!("differences over time: {}", picture.path.display()));
+        say!("differences over time: {}", picture.path.display());
     }
     let application = cycles.end().unwrap_or_else(|panicked| {
         reasons.push(panicked.to_string());
@@ -129,17 +127,12 @@ pub fn run(arguments: &ClocksArguments) -> Result<Verdict, Failure> {
     reasons.extend(recording.finish());
     let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
     let phase_errors = news.phase_errors();
-    if arguments.json {
-        let mut json = json(&clocks, watch.log.events().names(), &signals, locked, phase_errors);
-        json["result"] = verdict.words().into();
-        say!("{json:#}");
-    } else {
-        lines(&clocks, watch.log.events().names(), &signals).iter().for_each(|line| say!("{line}"));
-        if phase_errors.count() > 0 {
-            say!("cycles from their phase: {phase_errors}");
-        }
+    let names = watch.log.events().names();
+    lines(&clocks, names, &signals).iter().for_each(|line| say!("{line}"));
+    if phase_errors.count() > 0 {
+        say!("cycles from their phase: {phase_errors}");
     }
-    Ok(verdict)
+    Ok(Report { verdict, data: Data::Clocks(json(&clocks, names, &signals, locked, phase_errors)) })
 }
 
 /// Gives the cycles a thread.
@@ -149,10 +142,10 @@ fn start_cycles(
     end: &EndRequest,
 ) -> Result<CyclicThread<Tee<PacketLinks>>, Failure> {
     application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
-    let (thread, asked) = (arguments.thread, end.clone());
+    let (thread, asked) = (arguments.access.thread, end.clone());
     Ok(application.start_cycles(
         move || thread.prepare_cycles(),
-        // Here too: this thread runs whatever starves.
+        // Here too: this thread runs where others get no processor time.
         move |_| if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
     )?)
 }
@@ -205,18 +198,11 @@ struct Watch<'a> {
     begin: Instant,
     log: RunLog,
     end: &'a EndRequest,
-    /// The standard output belongs to the JSON.
-    json: bool,
-}
-
-/// Says it, beside the JSON where the standard output is for that.
-fn tell(json: bool, line: &str) {
-    if json { eprintln!("{line}") } else { say!("{line}") }
 }
 
 impl Watch<'_> {
-    /// Tells events and notes differences until a time, or until all clocks are locked and all SubDevices, which may
-    /// wait for that, are where they belong; whether clocks are locked.
+    /// Prints events and records differences until a time or, with `ends_with_lock`, until all clocks are locked and all
+    /// SubDevices, which may wait for that, are in their state. Whether clocks are locked.
     fn until(
         &mut self,
         cycles: &CyclicThread<Tee<PacketLinks>>,
@@ -227,8 +213,11 @@ impl Watch<'_> {
         self.end.limit(until);
         loop {
             self.log.news(cycles, now(), |shown| match shown {
-                Shown::Line(line) => tell(self.json, &line),
-                Shown::Warning(words) => eprintln!("ringcat: {words}"),
+                Shown::Event { line, time, name, text } => {
+                    say!("{line}");
+                    write_event(time, name, &text);
+                }
+                Shown::Warning(words) => warn(words),
             });
             let supervisor = cycles.supervisor();
             let (locked, clocks) = supervisor.with(|engine| (engine.clocks_locked(), engine.clocks()))?;

@@ -1,6 +1,5 @@
-//! `ringcat demo`: a simulated segment goes from power-on to OP, exchanges process data at 1 kHz, loses and regains a
-//! cable, loses and regains a SubDevice's power; the program looks into the simulated devices and checks that all of it
-//! held.
+//! `ringcat demo`: a simulated segment goes from power-on to OP and exchanges process data at 1 kHz. A cable is cut and
+//! repaired, a SubDevice loses its power and gets it back. The program compares all of it with the simulated devices.
 
 mod drive;
 mod incident;
@@ -19,7 +18,12 @@ use ringcat::text::Names;
 use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
 
 use crate::failure::Failure;
-use crate::verdict::Verdict;
+use crate::json::data::Data;
+use crate::json::demo;
+use crate::json::scan::SubDevice;
+use crate::json::values::State;
+use crate::table;
+use crate::verdict::{Report, Verdict};
 use incident::Incident;
 use plan::Plan;
 use report::Reporter;
@@ -39,23 +43,28 @@ const OP_LIMIT: Duration = Duration::from_secs(30);
 /// Options of `ringcat demo`.
 #[derive(Args, Debug, Default)]
 pub struct DemoArguments {
-    /// Segment file to run on (see docs/segments.md); the embedded ring of 19 SubDevices by default.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Segment file (see docs/segments.md); an embedded ring by default
+    #[arg(long, value_name = "FILE.toml", help_heading = "Segment")]
     segment: Option<PathBuf>,
-    /// Cycle time in microseconds; 1000 by default, 4000 above 200 SubDevices.
-    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u64).range(50..=1_000_000))]
+    /// Cycle time in microseconds; 1000 by default, 4000 above 200 SubDevices
+    #[arg(
+        long,
+        value_name = "US",
+        help_heading = "Cycle",
+        value_parser = clap::value_parser!(u64).range(50..=1_000_000)
+    )]
     cycle_us: Option<u64>,
-    /// Run in virtual time, as fast as the machine can.
-    #[arg(long)]
+    /// Run in virtual time, as fast as the machine can
+    #[arg(long, help_heading = "Cycle")]
     fast: bool,
 }
 
 /// Runs the demonstration.
-pub fn run(arguments: &DemoArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
     Ok(show(arguments)?)
 }
 
-fn show(arguments: &DemoArguments) -> Result<Verdict, Error> {
+fn show(arguments: &DemoArguments) -> Result<Report, Error> {
     let segment = load(arguments)?;
     let title = segment_title(arguments);
     let mut links = SimulatedSegment::new(Network::from_description(segment)?);
@@ -103,6 +112,8 @@ struct Demo {
     plan: Plan,
     watch: Watch,
     reporter: Reporter,
+    /// The SubDevices as keys of JSON.
+    found: Vec<SubDevice>,
 }
 
 impl Demo {
@@ -115,12 +126,14 @@ impl Demo {
     ) -> Demo {
         let watch = Watch::new(&application, scan.subdevices.len());
         let plan = Plan::new(&scan, &watch, application.links().network());
-        Demo { application, names, cycle, plan, watch, reporter }
+        let found = table::json_subdevices(&scan);
+        Demo { application, names, cycle, plan, watch, reporter, found }
     }
 
-    fn run(mut self) -> Verdict {
+    fn run(mut self) -> Report {
         if !self.reach_op() {
-            return Verdict::Failed(format!("not all SubDevices reached OP within {} s", OP_LIMIT.as_secs()));
+            let verdict = Verdict::Failed(format!("not all SubDevices reached OP within {} s", OP_LIMIT.as_secs()));
+            return self.report(verdict);
         }
         let steps = self.plan.steps.clone();
         for step in &steps {
@@ -134,10 +147,33 @@ impl Demo {
                 self.one_cycle();
             }
         }
-        self.reporter.summary(&self.application, &self.watch, &self.plan, &self.names)
+        let verdict = self.reporter.summary(&self.application, &self.watch, &self.plan, &self.names);
+        self.report(verdict)
     }
 
-    /// Cycles until all SubDevices are in OP.
+    /// The verdict with the keys of JSON.
+    fn report(self, verdict: Verdict) -> Report {
+        let Demo { application, names, cycle, plan, watch, reporter, found } = self;
+        let incidents = watch.accounts.iter().map(|account| demo::Incident {
+            text: account.incident.describe(&names),
+            cycles: account.cycles,
+            incomplete_cycles: account.incomplete,
+            allowed_cycles: account.incident.edges(plan.cables_of_device),
+            held_back_cycles: account.held_back,
+            lacking_one_cycles: account.without_one,
+        });
+        let data = demo::Demo {
+            cycle_ns: cycle.as_nanos() as u64,
+            subdevices: found,
+            states: State::of_all(&application.states(), &names.0),
+            op_after_ns: reporter.reached_op_at().map(|at| at.0),
+            incidents: incidents.collect(),
+            checks: reporter.into_checks(),
+        };
+        Report { verdict, data: Data::Demo(data) }
+    }
+
+    /// Cycles until all SubDevices are in OP. False where that takes too long.
     fn reach_op(&mut self) -> bool {
         let until = self.application.now() + OP_LIMIT;
         while !self.application.all_settled() {
@@ -148,7 +184,7 @@ impl Demo {
             }
             self.one_cycle();
         }
-        // A few more cycles, so that the outputs of the last one to reach OP have arrived.
+        // A few more cycles, so that the outputs of the last SubDevice have arrived.
         for _ in 0..3 {
             self.one_cycle();
         }

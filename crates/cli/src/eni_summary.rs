@@ -15,52 +15,50 @@ use ringcat::eni::EniFile;
 use ringcat::{ConfigAddress, ReferenceClock, SubDeviceConfig, SyncManagerRole};
 
 use crate::failure::Failure;
+use crate::json::data::Data;
 use crate::output::{counted, say};
-use crate::verdict::Verdict;
+use crate::verdict::{Report, Verdict};
 use words::{one_line, ranges, time};
 
 /// How to read what it prints.
 const ABOUT_ENI: &str = "\
-The file counts: SyncManagers, start-up commands, watchdogs and clocks are those of the file, also where the SII of a
-SubDevice says otherwise. What RingCAT does in its own way (state changes, addresses on the wire, FMMUs, delays of
-clocks) is held against the file and not listed. What is not followed is listed at the end, with the reason. An ENI
-comes from the tool that configured the network: TwinCAT (EtherCAT device, \"Export Configuration File\"), EC-Engineer
-(\"Export ENI\").
+SyncManagers, start-up commands, watchdogs and clocks are those of the file,
+also where the SII of a SubDevice differs. What RingCAT does in its own way
+(state changes, addresses on the wire, FMMUs, delays of clocks) is compared with
+the file and not listed. What is not followed is listed at the end, with the
+reason. An ENI comes from the tool that configured the network: TwinCAT
+(EtherCAT device, \"Export Configuration File\"), EC-Engineer (\"Export ENI\").
 
-Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it cannot be followed, and why is on the
-standard error output.";
+Exit status: 0 the file can be followed, 1 it describes no SubDevice, 2 it
+cannot be followed, with the reason on the standard error output.";
 
 /// Options of `ringcat eni`.
 #[derive(Args, Debug)]
-#[command(after_help = ABOUT_ENI)]
+#[command(after_long_help = ABOUT_ENI)]
 pub struct EniArguments {
-    /// The ENI.
+    /// The ENI
     file: PathBuf,
-    /// List SyncManagers, PDOs, start-up commands and variables too.
-    #[arg(long)]
+    /// List SyncManagers, PDOs, start-up commands and variables too
+    ///
+    /// JSON always has them.
+    #[arg(long, help_heading = "Output")]
     details: bool,
-    /// Print JSON, always with the details.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Reads the file and prints what follows.
-pub fn run(arguments: &EniArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &EniArguments) -> Result<Report, Failure> {
     let EniFile { eni: model, configuration } =
         EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
-    if arguments.json {
-        say!("{:#}", json::json(&model, &configuration));
-        return Ok(verdict(&configuration));
-    }
     summary(&model, &configuration).iter().for_each(|line| say!("{line}"));
     if arguments.details {
         details::lines(&model, &configuration).iter().for_each(|line| say!("{line}"));
     }
     not_followed(&configuration).iter().for_each(|line| say!("{line}"));
-    Ok(verdict(&configuration))
+    let data = Data::Eni(Box::new(json::json(&model, &configuration)));
+    Ok(Report { verdict: verdict(&configuration), data })
 }
 
-/// A file that describes no network cannot be followed. What is done in another way was told.
+/// A file that describes no SubDevice cannot be followed. What is done in another way is printed before.
 fn verdict(configuration: &Configuration) -> Verdict {
     let subdevices = configuration.declaration.subdevices.len();
     if subdevices == 0 {
@@ -124,7 +122,7 @@ fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
 
 fn row(index: usize, config: &SubDeviceConfig, subdevice: &SubDevice, configuration: &Configuration) -> String {
     let id = |expected: Option<u32>, said: Option<u32>| match expected.or(said) {
-        // In brackets: said, but not compared.
+        // In brackets: in the file, but not compared.
         Some(id) if expected.is_none() => format!("({id:#x})"),
         Some(id) => format!("{id:#010x}"),
         None => "-".to_owned(),
@@ -168,11 +166,11 @@ fn not_followed(configuration: &Configuration) -> Vec<String> {
     }
     let mut lines = vec![String::new(), "not followed as written:".to_owned()];
     for notice in &configuration.notices {
-        let whom = match &notice.subdevices[..] {
+        let concerned = match &notice.subdevices[..] {
             [] => String::new(),
             some => format!(" [SubDevice {}]", ranges(some)),
         };
-        lines.push(format!("  {}{whom}", one_line(&notice.to_string())));
+        lines.push(format!("  {}{concerned}", one_line(&notice.to_string())));
     }
     lines
 }
@@ -223,13 +221,13 @@ mod tests {
     #[test]
     fn the_same_is_there_as_json() {
         let (model, configuration) = small();
-        let json = json::json(&model, &configuration);
+        let json = serde_json::to_value(json::json(&model, &configuration)).unwrap();
         assert_eq!(json["subdevices"][3]["station"], 1004);
         assert_eq!(json["subdevices"][3]["sync_managers"][2]["length"], 6);
         assert_eq!(json["subdevices"][3]["startup"].as_array().unwrap().len(), 8);
         assert_eq!(json["image"]["areas"][1]["image_bit"], 20);
         assert_eq!(json["image"]["copies"][1]["output_bit"], 20);
-        assert_eq!(json["tasks"][0]["period_ns"], 2_000_000);
+        assert_eq!(json["tasks"][0]["cycle_ns"], 2_000_000);
         assert_eq!(json["lrw"][0]["subdevices"][0], 3);
         assert_eq!(json["not_followed"].as_array().unwrap().len(), configuration.notices.len());
     }

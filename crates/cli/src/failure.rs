@@ -1,4 +1,4 @@
-//! Why a command did not do what it was asked for.
+//! Why a command could not do what was asked.
 
 use std::fmt;
 
@@ -6,12 +6,12 @@ use ringcat::sim::segment::SegmentError;
 use ringcat::{Error, ScanError};
 use ringcat_link::LinkError;
 
-/// Why a command did not do what it was asked for, in words that say what to do.
+/// Why a command could not do what was asked, in words that say what to do. The first line is the reason.
 #[derive(Debug)]
 pub struct Failure(String);
 
 impl Failure {
-    /// In these words.
+    /// A failure with these words.
     pub fn new(text: impl Into<String>) -> Failure {
         Failure(text.into())
     }

@@ -1,151 +1,91 @@
-//! What the commands on network interfaces share: how to wait, what is wrong with an interface, who else uses it.
+//! The network interfaces of a command: their names, how frames are marked, checks before anything is sent.
 
-use std::fmt;
-use std::sync::Once;
-use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::packet::PacketLinks;
 use ringcat::{Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options};
-use ringcat_link::ReceiveMode;
 use ringcat_link::interface;
-use ringcat_link::realtime::{self, CpuLatency};
 
 use crate::failure::Failure;
 use crate::others::{check_frames, check_sockets};
+use crate::output::warn;
+use crate::thread::ThreadArguments;
 
-/// A hybrid wait spins for so long: most segments answer within.
-const SPIN: Duration = Duration::from_micros(200);
-/// A link that was just switched on gets this long to find its partner.
+/// Time for a link that was just switched on to get a carrier.
 const LINK_UP_LIMIT: Duration = Duration::from_secs(3);
-/// Pause between two looks at the carrier.
+/// Pause between two checks of the carrier.
 const LINK_PAUSE: Duration = Duration::from_millis(20);
 
-/// How to wait for frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Receive {
-    /// Spinning: fastest, takes a whole processor.
-    Busy,
-    /// Asleep: saves the processor, costs tens of microseconds per frame.
-    Block,
-    /// Spinning for 200 us, then asleep.
-    Hybrid,
-}
-
-/// The options of the thread that sends and receives.
-#[derive(Args, Clone, Copy, Debug)]
-pub struct ThreadArguments {
-    /// How to wait for frames.
-    #[arg(long, value_enum, default_value = "busy")]
-    receive: Receive,
-    /// Real-time priority (SCHED_FIFO) of the thread that sends and receives; memory is locked and processors kept
-    /// awake with it. A spinning thread with a priority leaves its processor to no other one. 99 is left to the kernel
-    /// and to the thread that takes signals.
-    #[arg(long, value_name = "1-98", value_parser = clap::value_parser!(i32).range(1..=98))]
-    pub priority: Option<i32>,
-    /// Processor to keep that thread on.
-    #[arg(long, value_name = "NUMBER")]
-    cpu: Option<usize>,
-}
-
-impl ThreadArguments {
-    /// As the links take it.
-    pub fn mode(self) -> ReceiveMode {
-        match self.receive() {
-            Receive::Busy => ReceiveMode::BusyPoll,
-            Receive::Block => ReceiveMode::Blocking,
-            Receive::Hybrid => ReceiveMode::Hybrid { spin: SPIN },
-        }
-    }
-
-    /// The same in words.
-    pub fn mode_in_words(self) -> &'static str {
-        match self.receive() {
-            Receive::Busy => "waiting busy",
-            Receive::Block => "waiting blocked",
-            Receive::Hybrid => "waiting hybrid",
-        }
-    }
-
-    /// How frames are really waited for. A thread that spins needs a processor of its own: on the only one it would
-    /// keep everything else in this program from running, and with a priority for ever.
-    fn receive(self) -> Receive {
-        static TOLD: Once = Once::new();
-        let processors = available_parallelism().map_or(1, usize::from);
-        if self.receive == Receive::Block || processors > 1 {
-            return self.receive;
-        }
-        TOLD.call_once(|| {
-            tell("this process may use one processor only, so no thread spins on it: as with --receive block");
-        });
-        Receive::Block
-    }
-
-    /// Gives the calling thread and the process what was asked for. The result keeps processors awake while it lives.
-    pub fn apply(self) -> Option<CpuLatency> {
-        self.prepare_cycles();
-        self.prepare_process()
-    }
-
-    /// Gives the calling thread, which runs the cycles, what was asked for, as far as that is permitted; what is not is
-    /// told.
-    pub fn prepare_cycles(self) {
-        realtime::precise_timers();
-        if let Some(cpu) = self.cpu {
-            let _ = realtime::affinity(cpu).map_err(tell);
-        }
-        if let Some(priority) = self.priority
-            && realtime::fifo(priority).map_err(tell).is_ok()
-            && self.receive() == Receive::Busy
-            && let Some(warning) = realtime::throttling()
-        {
-            tell(warning);
-        }
-    }
-
-    /// Has the calling thread, which does everything but the cycles, run just below those.
-    pub fn prepare_supervisor(self) {
-        realtime::precise_timers();
-        if let Some(priority) = self.priority {
-            // Where it is not permitted, the thread of the cycles tells so.
-            let _ = realtime::fifo((priority - 1).max(1));
-        }
-    }
-
-    /// Locks memory and keeps processors awake, where a priority is asked for. The result does that while it lives.
-    pub fn prepare_process(self) -> Option<CpuLatency> {
-        self.priority?;
-        let _ = realtime::lock_memory().map_err(tell);
-        CpuLatency::request(0).map_err(tell).ok()
-    }
-}
-
-fn tell(warning: impl fmt::Display) {
-    eprintln!("ringcat: {warning}");
-}
-
-/// The options that name the interfaces.
+/// The names of the interfaces.
 #[derive(Args, Clone, Debug)]
-pub struct InterfaceArguments {
-    /// Network interface that the first SubDevice is plugged into.
+#[command(next_help_heading = "Links")]
+pub struct LinkNames {
+    /// Network interface of the main link
+    ///
+    /// The first SubDevice of the segment is behind it.
     #[arg(long, value_name = "IF")]
     pub main: String,
-    /// Network interface at the other end of a ring.
+    /// Network interface at the other end of a ring
     #[arg(long, value_name = "IF")]
     pub redundant: Option<String>,
-    /// How frames are marked in their source address: flags-first, or id-last as older MainDevices with two interfaces
-    /// do.
-    #[arg(long, value_name = "HOW", value_enum, default_value_t = SourceAddress::FlagsFirst)]
+}
+
+impl LinkNames {
+    /// Refuses one interface for both ends of a ring.
+    pub fn check(&self) -> Result<(), Failure> {
+        let main = &self.main;
+        if self.redundant.as_ref() != Some(main) {
+            return Ok(());
+        }
+        Err(Failure::new(format!(
+            "--main and --redundant name one interface, {main}: a ring has its ends at two of them"
+        )))
+    }
+
+    /// The interfaces, the main one first.
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.main.as_str()).chain(self.redundant.as_deref())
+    }
+
+    /// Name of the interface of a link.
+    pub fn of(&self, link: Link) -> &str {
+        match link {
+            Link::Main => &self.main,
+            Link::Redundant => self.redundant.as_deref().unwrap_or(&self.main),
+        }
+    }
+
+    /// What to do where a cable of the segment is plugged into an interface that the command line does not name.
+    pub fn advice(&self, found: &str) -> String {
+        match &self.redundant {
+            None => format!("add --redundant {found} to run a ring, or unplug that cable"),
+            Some(redundant) => format!("unplug it, or put {found} in the place of {redundant}"),
+        }
+    }
+}
+
+/// The options of the interfaces of a MainDevice.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Links")]
+pub struct InterfaceArguments {
+    #[command(flatten)]
+    pub links: LinkNames,
+    /// How frames are marked in their source address
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t = SourceAddress::FlagsFirst)]
     pub source_address: SourceAddress,
-    /// Put at most so many datagrams into a frame: some gateways and simulators take no more (often 15).
+    /// Put at most this number of datagrams into a frame
+    ///
+    /// Some gateways and simulators accept no more than 15.
     #[arg(
         long,
         value_name = "COUNT",
         value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..)
     )]
     pub max_datagrams: Option<u16>,
-    /// Go on although another MainDevice uses the interface. SubDevices then leave its OP.
+    /// Go on although another MainDevice uses the interface
+    ///
+    /// Its SubDevices then leave OP.
     #[arg(long)]
     pub force: bool,
 }
@@ -153,21 +93,26 @@ pub struct InterfaceArguments {
 /// Marks in the source address (protocol 9.7.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum SourceAddress {
-    /// Flags and retries in the first byte, the frame's number in the second.
+    /// Flags and retries in the first byte, the frame's number in the second
     #[default]
     FlagsFirst,
-    /// Flags in the first byte, retries in the second, the frame's number in the last.
+    /// Flags in the first byte, retries in the second, the frame's number in the last, as in older MainDevices with two
+    /// interfaces
     IdLast,
 }
 
 impl InterfaceArguments {
-    /// Options of a MainDevice on these interfaces.
-    pub fn options(&self) -> Options {
-        let source_address = match self.source_address {
+    /// Where the marks of a frame are in its source address.
+    pub fn codec(&self) -> MacCodec {
+        match self.source_address {
             SourceAddress::FlagsFirst => MacCodec::FlagsFirst,
             SourceAddress::IdLast => MacCodec::IdLast,
-        };
-        let options = Options::default().with_source_address(source_address);
+        }
+    }
+
+    /// Options of a MainDevice on these interfaces.
+    pub fn options(&self) -> Options {
+        let options = Options::default().with_source_address(self.codec());
         match self.max_datagrams {
             Some(datagrams) => options.with_max_datagrams_per_frame(datagrams),
             None => options,
@@ -176,61 +121,36 @@ impl InterfaceArguments {
 
     /// Opens the interfaces. Refuses where another MainDevice uses one of them, and fails where no cable is plugged in.
     pub fn open(&self, thread: ThreadArguments) -> Result<PacketLinks, Failure> {
-        self.check_names()?;
-        let links = PacketLinks::open(&self.main, self.redundant.as_deref(), thread.mode())?;
+        self.links.check()?;
+        let links = PacketLinks::open(&self.links.main, self.links.redundant.as_deref(), thread.mode())?;
         self.check()?;
         Ok(links)
     }
 
     /// As [`InterfaceArguments::open`], for a thread of the cycles and one of the supervisor.
     pub fn open_halves(&self, thread: ThreadArguments) -> Result<(PacketLinks, PacketLinks), Failure> {
-        self.check_names()?;
-        let halves = PacketLinks::open_halves(&self.main, self.redundant.as_deref(), thread.mode())?;
+        self.links.check()?;
+        let links = &self.links;
+        let halves = PacketLinks::open_halves(&links.main, links.redundant.as_deref(), thread.mode())?;
         self.check()?;
         Ok(halves)
     }
 
-    /// Refuses one interface for two links.
-    pub fn check_names(&self) -> Result<(), Failure> {
-        two_interfaces(&self.main, self.redundant.as_deref())
-    }
-
-    /// What there is to find before anything is sent. The sockets are open: of two commands that begin at one time at
-    /// least one sees the other.
+    /// Looks for other MainDevices before anything is sent. The sockets are open already: of two commands that begin at
+    /// one time at least one sees the other.
     fn check(&self) -> Result<(), Failure> {
-        check_sockets(self.names(), self.force)?;
+        check_sockets(self.links.all(), self.force)?;
         self.await_carrier()?;
-        if self.force { Ok(()) } else { check_frames(self.names()) }
+        if self.force { Ok(()) } else { check_frames(self.links.all()) }
     }
 
-    /// Name of the interface of a link.
-    pub fn name(&self, link: Link) -> &str {
-        match link {
-            Link::Main => &self.main,
-            Link::Redundant => self.redundant.as_deref().unwrap_or(&self.main),
-        }
-    }
-
-    /// What to do where a cable of the segment is plugged into an interface that was not named.
-    pub fn advice(&self, found: &str) -> String {
-        match &self.redundant {
-            None => format!("add --redundant {found} to run a ring, or unplug that cable"),
-            Some(redundant) => format!("unplug it, or put {found} in the place of {redundant}"),
-        }
-    }
-
-    /// The interfaces that are in use.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
-        std::iter::once(self.main.as_str()).chain(self.redundant.as_deref())
-    }
-
-    /// Waits a little for a link that was just switched on. One end of a ring may do without.
+    /// Waits for the carrier of links that were just switched on. One end of a ring may be without.
     fn await_carrier(&self) -> Result<(), Failure> {
         let until = Instant::now() + LINK_UP_LIMIT;
         loop {
-            // A driver that cannot tell is believed to have a carrier.
+            // A driver that does not report a carrier is assumed to have one.
             let (up, down): (Vec<&str>, Vec<&str>) =
-                self.names().partition(|name| interface::carrier(name).unwrap_or(true));
+                self.links.all().partition(|name| interface::carrier(name).unwrap_or(true));
             if down.is_empty() {
                 return Ok(());
             }
@@ -239,7 +159,7 @@ impl InterfaceArguments {
                 if up.is_empty() {
                     return Err(Failure::new(text));
                 }
-                eprintln!("ringcat: {text}");
+                warn(text);
                 return Ok(());
             }
             std::thread::sleep(LINK_PAUSE);
@@ -257,15 +177,7 @@ pub fn describe_down(name: &str) -> String {
     }
 }
 
-/// Monotonic time, as the links have it.
+/// Monotonic time, the one of the links.
 pub fn now() -> ringcat::Instant {
     ringcat::Instant(ringcat_link::monotonic::now_ns())
-}
-
-/// Refuses one interface for both ends of a ring.
-pub fn two_interfaces(main: &str, redundant: Option<&str>) -> Result<(), Failure> {
-    if redundant != Some(main) {
-        return Ok(());
-    }
-    Err(Failure::new(format!("--main and --redundant name one interface, {main}: a ring has its ends at two of them")))
 }

@@ -1,5 +1,6 @@
 //! The `ringcat` program. Without arguments it runs the demonstration.
 
+mod access;
 mod bench;
 mod capture;
 mod clock_options;
@@ -9,6 +10,7 @@ mod ending;
 mod eni_summary;
 mod failure;
 mod interfaces;
+mod json;
 mod others;
 mod output;
 mod recording;
@@ -19,59 +21,96 @@ mod scan;
 mod sim;
 mod surroundings;
 mod table;
+mod thread;
 mod times;
+mod under_way;
 mod verdict;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use verdict::{LastLine, conclude};
+use verdict::{conclude, conclude_error_told};
 
-/// What a newcomer wants to know first.
+/// What a new user needs first.
 const FIRST_STEPS: &str = "\
 First steps:
-  ringcat                               a demonstration on a simulated ring: no network, no permission
-  ip link                               the network interfaces of this computer
-  sudo ringcat scan --main eth1         who is on the cable in eth1?
+  ringcat                              a demonstration on a simulated ring:
+                                       no network, no permission
+  ip link                              the network interfaces of this computer
+  sudo ringcat scan --main eth1        the SubDevices on the cable in eth1
   sudo ringcat run --main eth1 --for 10s
-                                        everybody to OP, ten seconds of process data, figures
-  ringcat sim --help                    a simulated segment on an interface, for any MainDevice
+                                       all SubDevices to OP, ten seconds of
+                                       process data, figures
+  ringcat sim --help                   a simulated segment on an interface
 
-The interface must be for EtherCAT alone: no IP address, no bridge, no NetworkManager. Raw frames need root, or once:
-  sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep $(which ringcat)
+An interface must be for EtherCAT alone: no IP address, no bridge, no
+NetworkManager. Raw frames need root or, once per build:
+  sudo setcap cap_net_raw,cap_net_admin,cap_ipc_lock,cap_sys_nice=ep \\
+      PROGRAM
 
-Exit status: 0 all went well, 1 it ran and something did not hold, 2 it could not do what was asked. The last line says
-what: `result: ok: ...` or `result: FAILED: ...`. Commands that send refuse to begin beside another MainDevice.
-`ringcat COMMAND --help` explains a command.";
+`ringcat COMMAND -h` lists the options of a command, `ringcat COMMAND --help`
+explains them. `ringcat help bench` works too.
+
+Exit status: 0 everything held, 1 something did not hold, 2 the command could
+not do what was asked. The last line says what: `result: ok: ...` or
+`result: FAILED: ...`. With --json it is an object on the standard output, see
+docs/json.md. Commands that send refuse to begin beside another MainDevice.";
+
+/// The same with the path of this very program: capabilities belong to a file.
+fn first_steps() -> String {
+    let program = std::env::current_exe().unwrap_or_else(|_| "ringcat".into());
+    FIRST_STEPS.replace("PROGRAM", &program.display().to_string())
+}
 
 /// RingCAT: an EtherCAT MainDevice for Linux.
 #[derive(Debug, Parser)]
-#[command(version, about = "RingCAT: an EtherCAT MainDevice for Linux", after_help = FIRST_STEPS)]
+#[command(version, about = "RingCAT: an EtherCAT MainDevice for Linux", after_help = first_steps())]
+#[command(max_term_width = 100)]
 struct Arguments {
+    /// Print JSON for programs, one object per line
+    ///
+    /// The last line is the result, also where the command fails; nothing else is printed on the standard output.
+    /// docs/json.md explains every key.
+    #[arg(long, global = true, help_heading = "Output", display_order = 900)]
+    json: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Shows a simulated ring: to OP, a cut cable, a power failure
+    ///
     /// Brings a simulated segment to OP, cuts and heals a cable, power-cycles a SubDevice, and checks all of it.
     Demo(demo::DemoArguments),
-    /// Lists the SubDevices on a network interface. They are in INIT afterwards.
+    /// Lists the SubDevices on a network interface
+    ///
+    /// All SubDevices are in INIT afterwards.
     Scan(scan::ScanArguments),
+    /// Exchanges process data with outputs zero
+    ///
     /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
     Run(run::RunArguments),
-    /// Shows how a ring is: who answers on which interface, where it is broken, errors of each cable. It only reads.
+    /// Shows the state of a ring and of its cables
+    ///
+    /// Which SubDevices answer on which interface, where the ring is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
-    /// Brings the distributed clocks of a segment together and shows how well they keep.
+    /// Synchronizes the distributed clocks and shows their differences
     Clocks(clocks::ClocksArguments),
-    /// Records what passes on network interfaces into a file for Wireshark, without taking part.
+    /// Records what passes on network interfaces into a file for Wireshark
+    ///
+    /// It never sends: a MainDevice on these interfaces does not notice.
     Capture(capture::CaptureArguments),
-    /// Puts a simulated segment on network interfaces, for any EtherCAT MainDevice at their other end.
+    /// Puts a simulated segment on network interfaces
+    ///
+    /// Any EtherCAT MainDevice at their other end can work with it.
     Sim(sim::SimArguments),
-    /// Shows what an ENI (a network configured with TwinCAT, EC-Engineer, ...) says and what follows from it.
+    /// Shows what an ENI says and what follows from it
+    ///
+    /// An ENI is a network that TwinCAT, EC-Engineer or another tool has configured. No interface is needed.
     Eni(eni_summary::EniArguments),
-    /// Measures: round trips against a bare echo, cycles back to back, start-up.
+    /// Measures round trips, cycle rates and start-up
     Bench(bench::BenchArguments),
 }
 
@@ -81,8 +120,10 @@ fn main() -> ExitCode {
         Err(error) => return explain(&error),
     };
     let command = arguments.command.unwrap_or_else(|| Command::Demo(demo::DemoArguments::default()));
-    let last_line = if command.prints_json() { LastLine::Beside } else { LastLine::StandardOutput };
-    let outcome = match command {
+    if arguments.json {
+        output::switch_to_json(Some(command.name()));
+    }
+    conclude(match command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
@@ -92,34 +133,41 @@ fn main() -> ExitCode {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
-    };
-    conclude(outcome, last_line)
+    })
 }
 
 impl Command {
-    /// Whether the standard output is for JSON.
-    fn prints_json(&self) -> bool {
+    /// As the command line has it.
+    fn name(&self) -> &'static str {
         match self {
-            Command::Scan(arguments) => arguments.json,
-            Command::Ring(arguments) => arguments.json,
-            Command::Clocks(arguments) => arguments.json,
-            Command::Eni(arguments) => arguments.json,
-            Command::Demo(_) | Command::Run(_) | Command::Capture(_) | Command::Sim(_) | Command::Bench(_) => false,
+            Command::Demo(_) => "demo",
+            Command::Scan(_) => "scan",
+            Command::Run(_) => "run",
+            Command::Ring(_) => "ring",
+            Command::Clocks(_) => "clocks",
+            Command::Capture(_) => "capture",
+            Command::Sim(_) => "sim",
+            Command::Eni(_) => "eni",
+            Command::Bench(arguments) => arguments.name(),
         }
     }
 }
 
 /// Help, the version, or what is wrong with the command line.
 fn explain(error: &clap::Error) -> ExitCode {
-    // The only error that is likely is that nothing reads it any more.
+    // The only error that is likely is a closed pipe.
     let _ = error.print();
     if !error.use_stderr() {
         return ExitCode::SUCCESS;
     }
+    if std::env::args_os().any(|argument| argument == "--json") {
+        output::switch_to_json(None);
+    }
     let text = error.to_string();
-    let first = text.lines().next().unwrap_or_default();
-    eprintln!("result: FAILED: {}", first.strip_prefix("error: ").unwrap_or(first));
-    ExitCode::from(2)
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let first = lines.next().unwrap_or_default();
+    let message = first.strip_prefix("error: ").unwrap_or(first);
+    conclude_error_told(message, lines.map(str::to_owned).collect())
 }
 
 #[cfg(test)]
@@ -128,17 +176,47 @@ mod tests {
 
     use super::*;
 
+    /// All commands, those of `bench` too.
+    fn commands(of: &clap::Command) -> Vec<&clap::Command> {
+        of.get_subcommands().flat_map(|command| std::iter::once(command).chain(commands(command))).collect()
+    }
+
     // covers: run
     #[test]
-    fn every_command_and_option_is_explained() {
-        let program = Arguments::command();
+    fn every_command_and_option_is_explained_in_a_line_and_has_a_heading() {
+        let mut program = Arguments::command();
+        program.build();
         program.clone().debug_assert();
         assert!(program.get_after_help().is_some());
-        for command in program.get_subcommands() {
-            assert!(command.get_about().is_some(), "{}", command.get_name());
+        for command in commands(&program).into_iter().filter(|command| command.get_name() != "help") {
+            let name = command.get_name();
+            let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+            assert!((1..=80).contains(&about.len()), "{name}: {about}");
             for option in command.get_arguments() {
-                assert!(option.get_help().is_some(), "{} --{}", command.get_name(), option.get_id());
+                let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+                assert!((1..=80).contains(&help.len()), "{name} --{}: {help}", option.get_id());
+                let is_named = matches!(option.get_id().as_str(), "help" | "version") || option.is_positional();
+                assert!(is_named || option.get_help_heading().is_some(), "{name} --{}", option.get_id());
             }
+        }
+    }
+
+    // covers: run
+    #[test]
+    fn every_help_fits_a_terminal_of_80_columns() {
+        let mut program = Arguments::command().term_width(80);
+        program.build();
+        let names: Vec<String> = commands(&program).iter().map(|command| command.get_name().to_owned()).collect();
+        assert!(names.len() >= 13, "{names:?}");
+        let mut pending = vec![program];
+        while let Some(mut command) = pending.pop() {
+            let long = command.render_long_help().to_string();
+            let short = command.render_help().to_string();
+            let program = std::env::current_exe().expect("a test has a file").display().to_string();
+            for line in long.lines().chain(short.lines()).filter(|line| line.trim() != program) {
+                assert!(line.chars().count() <= 80, "{}: {line}", command.get_name());
+            }
+            pending.extend(command.get_subcommands().map(|command| command.clone().term_width(80)));
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Another MainDevice on the interface: commands that send refuse to begin beside it.
 //!
-//! Two MainDevices on one segment take each other's SubDevices down: a scan brings all of them to INIT, and reading a
-//! register such as 0x0110 clears what its owner waits for. Another one shows by its socket, on this host, or by its
-//! frames, wherever it is. Nothing is sent before both were looked for. What sees nothing here: a MainDevice that takes
-//! its frames from the interface below the packet sockets (AF_XDP) and is silent while it is listened to.
+//! Two MainDevices on one segment disturb each other: a scan brings all SubDevices to INIT, and reading a register such
+//! as 0x0110 clears what the other one waits for. A MainDevice on this host is found by its socket, any other one by
+//! its frames. Both checks come before anything is sent. They do not find a MainDevice that takes its frames from the
+//! interface below the packet sockets (AF_XDP) and sends nothing meanwhile.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -15,8 +15,9 @@ use ringcat_link::pcapng::Direction;
 use ringcat_link::{PacketSocket, ReceiveMode, Sniffer, monotonic};
 
 use crate::failure::Failure;
+use crate::output::warn;
 
-/// Frames are listened for so long: longer than the cycle of all but the slowest MainDevices.
+/// How long frames are listened for: longer than the cycle of all but the slowest MainDevices.
 const LISTEN: Duration = Duration::from_millis(250);
 /// What comes before may still be the frames of a MainDevice that has just ended.
 const LAST_FRAMES: Duration = Duration::from_millis(25);
@@ -28,17 +29,16 @@ const TAG: usize = 4;
 const COMMANDS: u8 = 1;
 
 /// What to do about it.
-const ADVICE: &str = "nothing was sent: stop the other one first. --force goes on all the same, and takes its \
-                      SubDevices\n\
-                      out of OP. `ringcat capture` only listens";
+const ADVICE: &str = "nothing was sent: stop the other one first. --force goes on all the same, and its SubDevices\n\
+                      leave OP. `ringcat capture` only listens";
 
-/// Tells how the interfaces are used otherwise, and refuses where another process has a socket for EtherCAT on one.
+/// Warns of other uses of the interfaces, and refuses where another process has a socket for EtherCAT on one.
 pub fn check_sockets<'a>(names: impl Iterator<Item = &'a str>, force: bool) -> Result<(), Failure> {
     let mut found = Vec::new();
     for warning in names.flat_map(exclusive_use) {
         let is_socket = matches!(warning, UseWarning::Socket { .. });
         if !is_socket || force {
-            eprintln!("ringcat: {warning}");
+            warn(warning);
         } else if let UseWarning::Socket { interface, owner } = warning {
             let owner = owner.map_or_else(
                 || "another program (sudo ss -0p shows which)".to_owned(),
@@ -50,7 +50,7 @@ pub fn check_sockets<'a>(names: impl Iterator<Item = &'a str>, force: bool) -> R
     refuse(&found)
 }
 
-/// Listens, and refuses where frames of another MainDevice pass. The interfaces have a carrier, as far as they can.
+/// Listens, and refuses where frames of another MainDevice pass. Called once the interfaces have their carriers.
 pub fn check_frames<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), Failure> {
     let mut sniffers = Vec::new();
     for name in names {
@@ -87,7 +87,7 @@ impl fmt::Display for Heard<'_> {
             Direction::In => "arrive on",
             Direction::Out => "leave through",
         };
-        write!(f, "another MainDevice leads this segment: its frames, from {}, {way} {}", address(source), self.name)
+        write!(f, "another MainDevice controls this segment: its frames, from {}, {way} {}", address(source), self.name)
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn each_finding_is_told_with_what_to_do() {
+    fn each_finding_is_reported_with_what_to_do() {
         assert!(refuse(&[]).is_ok());
         let text = refuse(&["a".to_owned(), "b".to_owned()]).expect_err("refused").to_string();
         assert!(text.starts_with("a\nb\nnothing was sent") && text.contains("--force"), "{text}");

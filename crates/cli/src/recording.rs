@@ -1,7 +1,7 @@
 //! `--capture FILE`: what a command exchanges with the segment, as a file that Wireshark reads.
 //!
-//! In goes the option, out come [`Tee`]s around the command's links, and when the command is over a line that says what
-//! is in the file.
+//! Input: the option. Output: [`Tee`]s around the command's links and, at the end of the command, a line with what is
+//! in the file.
 
 use std::path::PathBuf;
 
@@ -12,22 +12,25 @@ use ringcat_link::recorder::Recorded;
 use ringcat_link::{Recorder, RecorderError};
 
 use crate::failure::Failure;
-use crate::interfaces::InterfaceArguments;
+use crate::interfaces::{InterfaceArguments, LinkNames};
+use crate::output::warn;
 
 /// The option.
 #[derive(Args, Clone, Debug)]
 pub struct RecordingArguments {
-    /// Record all frames of both links into this file, for Wireshark: interface names, directions, nanoseconds.
-    #[arg(long, value_name = "FILE.pcapng")]
+    /// Record all frames of both links into this file, for Wireshark
+    ///
+    /// The file has interface names, directions and times in nanoseconds.
+    #[arg(long, value_name = "FILE.pcapng", help_heading = "Output")]
     capture: Option<PathBuf>,
 }
 
 impl RecordingArguments {
     /// Begins the recording, if one is wanted.
     pub fn start(&self, interfaces: &InterfaceArguments) -> Result<Recording, Failure> {
-        let names: Vec<(&str, &str)> = interfaces.names().zip(DESCRIPTIONS).collect();
+        let names: Vec<(&str, &str)> = interfaces.links.all().zip(DESCRIPTIONS).collect();
         let recorder = self.capture.as_ref().map(|path| Recorder::start(path, &names)).transpose()?;
-        Ok(Recording { recorder, arguments: self.clone(), interfaces: interfaces.clone(), is_told: false })
+        Ok(Recording { recorder, arguments: self.clone(), links: interfaces.links.clone(), is_reported: false })
     }
 }
 
@@ -40,14 +43,14 @@ impl From<RecorderError> for Failure {
     }
 }
 
-/// A recording that goes on until it is dropped, then says what it recorded.
+/// A recording that goes on until it is dropped; then it prints what it recorded.
 #[derive(Debug)]
 pub struct Recording {
     recorder: Option<Recorder>,
     arguments: RecordingArguments,
-    interfaces: InterfaceArguments,
-    /// That it has failed is told.
-    is_told: bool,
+    links: LinkNames,
+    /// The failure is reported.
+    is_reported: bool,
 }
 
 impl Recording {
@@ -61,10 +64,10 @@ impl Recording {
     /// Why nothing is recorded any more; once.
     pub fn failure(&mut self) -> Option<String> {
         let failure = self.recorder.as_ref()?.failure()?.to_owned();
-        (!std::mem::replace(&mut self.is_told, true)).then_some(failure)
+        (!std::mem::replace(&mut self.is_reported, true)).then_some(failure)
     }
 
-    /// Completes the file and says what is in it. Why it is not everything.
+    /// Completes the file and prints what is in it. The reason, where frames are missing.
     pub fn finish(mut self) -> Option<String> {
         self.end()
     }
@@ -73,7 +76,7 @@ impl Recording {
         let (recorder, path) = (self.recorder.take()?, self.arguments.capture.as_ref()?);
         match recorder.finish() {
             Ok(recorded) => {
-                for line in lines(self.interfaces.names(), &recorded) {
+                for line in lines(self.links.all(), &recorded) {
                     eprintln!("{}: {line}", path.display());
                 }
                 let lacking: u64 = recorded.iter().map(|frames| frames.lost + frames.lost_by_kernel).sum();
@@ -86,8 +89,8 @@ impl Recording {
 
 impl Drop for Recording {
     fn drop(&mut self) {
-        // A command that failed for another reason; that one is told last.
-        self.end().iter().for_each(|reason| eprintln!("ringcat: {reason}"));
+        // The command has failed for another reason, which is the last line.
+        self.end().iter().for_each(warn);
     }
 }
 

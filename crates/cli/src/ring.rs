@@ -1,57 +1,56 @@
-//! `ringcat ring`: how a ring is, without changing anything: who answers on which link, where it is broken, what the
-//! ports at the ends of each cable have counted.
+//! `ringcat ring`: the state of a ring, without changing anything: SubDevices on each link, the place of a break, the
+//! error counters at the ends of each cable.
 
 use std::time::Duration;
 
 use clap::Args;
 use ringcat::text::Names;
+use ringcat::wire::address::StationAddress;
 use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
 
+use crate::access::AccessArguments;
 use crate::failure::Failure;
-use crate::interfaces::{InterfaceArguments, ThreadArguments};
+use crate::json::data::Data;
+use crate::json::ring;
 use crate::output::{counted, say};
-use crate::recording::RecordingArguments;
 use crate::times::time;
-use crate::verdict::Verdict;
+use crate::verdict::{Report, Verdict};
 
 /// How to read what it prints.
 const ABOUT_RING: &str = "\
-It only reads, so that a segment without a MainDevice stays as it is. Beside another MainDevice it refuses to begin:
-reading clears what that one waits for. Counters end at 255, and nothing here clears them: look at them twice (--for) to
-see which ones rise. A cable whose counter rises has a bad plug, or is bent, or lies beside something that disturbs it.
+It only reads, so that a segment without a MainDevice stays as it is. Beside
+another MainDevice it refuses to begin: reading clears registers that the other
+one waits for. Counters end at 255, and this command does not clear them: read
+them twice (--for) to see which ones rise. A rising counter means a bad plug, a
+damaged cable, or a source of disturbance beside the cable.
 
-It knows nobody who does not answer: with two breaks, those between them are missing in the counts, the positions of
-those behind are lower, and the line break is named as if they did not exist. Compare the counts with what should be
-there.
+SubDevices that do not answer are unknown to it: with two breaks, those between
+them are missing in the counts, the positions behind are lower, and the break is
+named as if the missing SubDevices did not exist. Compare the counts with those
+of the machine.
 
-Exit status: 0 the ring is closed (or there is one link), 1 it is open or copies of frames are lost, 2 it could not be
-looked at.";
+Exit status: 0 the ring is closed (or there is one link), 1 it is open or copies
+of frames are lost, 2 it could not be read.";
 
 /// Options of `ringcat ring`.
 #[derive(Args, Debug)]
-#[command(after_help = ABOUT_RING)]
+#[command(after_long_help = ABOUT_RING)]
 pub struct RingArguments {
     #[command(flatten)]
-    interfaces: InterfaceArguments,
-    #[command(flatten)]
-    thread: ThreadArguments,
-    #[command(flatten)]
-    recording: RecordingArguments,
-    /// Look again after this time, such as 10s, and show what the counters have gained.
-    #[arg(long = "for", value_name = "TIME", value_parser = time)]
+    access: AccessArguments,
+    /// Read again after this time, such as 10s, and show what the counters have gained
+    #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Output")]
     lasts: Option<Duration>,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    pub json: bool,
 }
 
-/// Looks and prints; it has not held where the ring is open.
-pub fn run(arguments: &RingArguments) -> Result<Verdict, Failure> {
-    let links = arguments.interfaces.open(arguments.thread)?;
-    let recording = arguments.recording.start(&arguments.interfaces)?;
+/// Reads and prints; it has not held where the ring is open.
+pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
+    let AccessArguments { interfaces, thread, recording } = &arguments.access;
+    let links = interfaces.open(*thread)?;
+    let recording = recording.start(interfaces)?;
     let links = recording.tee(links);
-    let _awake = arguments.thread.apply();
-    let mut main_device = MainDevice::request(links, &arguments.interfaces.options());
+    let _awake = thread.apply();
+    let mut main_device = MainDevice::request(links, &interfaces.options());
     let mut look = main_device.look_at_ring()?;
     if let Some(lasts) = arguments.lasts {
         std::thread::sleep(lasts);
@@ -62,17 +61,11 @@ pub fn run(arguments: &RingArguments) -> Result<Verdict, Failure> {
             }
         }
     }
-    let two_links = arguments.interfaces.redundant.is_some();
+    let two_links = interfaces.links.redundant.is_some();
     drop(main_device);
     let verdict = verdict(&look, two_links).and(recording.finish());
-    if arguments.json {
-        let mut json = json(&look);
-        json["result"] = verdict.words().into();
-        say!("{json:#}");
-    } else {
-        lines(&look, two_links).iter().for_each(|line| say!("{line}"));
-    }
-    Ok(verdict)
+    lines(&look, two_links).iter().for_each(|line| say!("{line}"));
+    Ok(Report { verdict, data: Data::Ring(json(&look, two_links)) })
 }
 
 /// Whether there is a ring where two links are to make one.
@@ -93,10 +86,14 @@ fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
     }
 }
 
-/// Who is at both ends of a cable: nobody is declared, but whoever operates the segment has given station addresses.
+/// The station address of a position, where the MainDevice in charge has given one.
+fn station(look: &RingLook, node: usize) -> Option<StationAddress> {
+    look.stations.get(node).copied().filter(|station| station.0 != 0)
+}
+
+/// The SubDevices at both ends of a cable. This command knows no declaration.
 fn ends(look: &RingLook, cable: Cable) -> [Option<Occupant>; 2] {
-    let station = |node: usize| look.stations.get(node).copied().filter(|station| station.0 != 0);
-    cable.positions().map(|node| Some(Occupant { station: station(node?)?, declared: None }))
+    cable.positions().map(|node| Some(Occupant { station: station(look, node?)?, declared: None }))
 }
 
 fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
@@ -105,7 +102,7 @@ fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
     let state = match look.state {
         _ if !two_links => "one link",
         RingState::Closed => "closed",
-        RingState::Open => "OPEN: the next break isolates somebody",
+        RingState::Open => "OPEN: the next break isolates SubDevices",
         RingState::Unknown => "unknown: not all copies come back",
     };
     let mut lines = vec![format!("ring        {state}")];
@@ -134,34 +131,28 @@ fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
     lines
 }
 
-fn json(look: &RingLook) -> serde_json::Value {
+fn json(look: &RingLook, two_links: bool) -> ring::Ring {
     let end = |port: Option<ringcat::PortOf>| {
-        let station = |node: usize| look.stations.get(node).map(|station| station.0);
-        port.map(|at| serde_json::json!({ "position": at.node, "station": station(at.node), "port": at.port }))
-    };
-    let cable = |cable: Cable| serde_json::json!({ "near": end(cable.near), "far": end(cable.far) });
-    let cables: Vec<_> = look
-        .cables
-        .iter()
-        .map(|(it, errors)| {
-            serde_json::json!({
-                "cable": cable(*it),
-                "damaged_frames": errors.invalid_frames,
-                "lost_links": errors.lost_links,
-            })
+        port.map(|at| ring::CableEnd {
+            position: at.node,
+            station: station(look, at.node).map(|it| it.0),
+            port: at.port,
         })
-        .collect();
-    serde_json::json!({
-        "state": match look.state {
-            RingState::Unknown => "unknown",
-            RingState::Closed => "closed",
-            RingState::Open => "open",
-        },
-        "main": look.counts.0,
-        "redundant": look.counts.1,
-        "line_break": look.place.map(cable),
-        "cables": cables,
-    })
+    };
+    let cable = |cable: Cable| ring::Cable { near: end(cable.near), far: end(cable.far) };
+    let errors = |(it, errors): &(Cable, CableErrors)| ring::CableErrors {
+        near: end(it.near),
+        far: end(it.far),
+        damaged_frames: errors.invalid_frames,
+        lost_links: errors.lost_links,
+    };
+    ring::Ring {
+        ring: two_links.then(|| look.state.into()),
+        main_subdevices: look.counts.0,
+        redundant_subdevices: look.counts.1,
+        line_break: look.place.map(cable),
+        cables: look.cables.iter().map(errors).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -250,13 +241,13 @@ mod tests {
             assert_eq!((look.state, look.counts), (RingState::Open, (cable as u16, 3 - cable as u16)));
             assert_eq!(look.place, Some(look.cables[cable].0), "cable {cable}");
             assert!(lines(&look, true).iter().any(|line| line.ends_with("<- line break")));
-            assert_eq!(json(&look)["state"], "open");
+            assert_eq!(json(&look, true).ring, Some(crate::json::values::Ring::Open));
         }
         for cable in 0..=3 {
             let look = look(None, Some(cable));
             let counted: Vec<u64> = look.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
             let at_the_host = cable == 0 || cable == 3;
-            // What is damaged on the way to the host is counted by nobody.
+            // No port counts what is damaged on the way to the host.
             let expected = if at_the_host { 1..=2 } else { 2..=4 };
             assert!(expected.contains(&counted[cable]), "cable {cable}: {counted:?}");
             assert_eq!(counted.iter().sum::<u64>(), counted[cable], "cable {cable}: {counted:?}");

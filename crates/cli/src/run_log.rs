@@ -1,30 +1,42 @@
-//! What happens while cycles run, in lines: the condensed log of the library, and warnings about frames of other
-//! MainDevices.
+//! What happens while cycles run: the condensed log of the library, and warnings about frames of other MainDevices.
+
+use std::time::Duration;
 
 use ringcat::event_log::EventLog;
-use ringcat::{CyclicThread, Instant, Links};
+use ringcat::text::describe;
+use ringcat::{CyclicThread, Event, Instant, Links};
 
 use crate::surroundings::Surroundings;
 
 /// What is shown.
 #[derive(Debug)]
 pub enum Shown {
-    /// Something that happened, with its time.
-    Line(String),
-    /// Something that the user should do something about.
+    /// Something that happened.
+    Event {
+        /// The line for people, with the time.
+        line: String,
+        /// Time since the beginning.
+        time: Duration,
+        /// The variant of [`Event`]; `None` for a count of many.
+        name: Option<String>,
+        /// The words without the time.
+        text: String,
+    },
+    /// Something that the user should act on.
     Warning(String),
 }
 
 /// The log of a run.
 pub struct RunLog {
+    begin: Instant,
     events: EventLog,
     surroundings: Surroundings,
 }
 
 impl RunLog {
-    /// A log over this one.
-    pub fn new(events: EventLog, surroundings: Surroundings) -> RunLog {
-        RunLog { events, surroundings }
+    /// A log over this one, whose times count from `begin`.
+    pub fn new(begin: Instant, events: EventLog, surroundings: Surroundings) -> RunLog {
+        RunLog { begin, events, surroundings }
     }
 
     /// The log of events.
@@ -37,19 +49,51 @@ impl RunLog {
         &self.surroundings
     }
 
+    /// Words that are no event of the MainDevice.
+    pub fn words(&self, at: Instant, text: &str) -> Shown {
+        let (line, time) = (self.events.line(at, text), at.since(self.begin));
+        Shown::Event { line, time, name: None, text: text.to_owned() }
+    }
+
     /// Shows what has happened since the last call.
     pub fn news<L: Links + Send>(&mut self, cycles: &CyclicThread<L>, now: Instant, mut show: impl FnMut(Shown)) {
-        let RunLog { events, surroundings } = self;
+        let RunLog { begin, events, surroundings } = self;
         if let Some((link, source)) = cycles.news().foreign() {
             surroundings.note_sender(link, source).map(Shown::Warning).into_iter().for_each(&mut show);
         }
         while let Some(event) = cycles.supervisor().pop_event() {
             match surroundings.note(&event.event) {
                 Some(words) => words.map(Shown::Warning).into_iter().for_each(&mut show),
-                None => events.event(&event).map(Shown::Line).into_iter().for_each(&mut show),
+                None => {
+                    let Some(line) = events.event(&event) else { continue };
+                    let (time, text) = (event.at.since(*begin), describe(&event, events.names()));
+                    show(Shown::Event { line, time, name: Some(name_of(&event.event)), text });
+                }
             }
         }
-        events.left_out(cycles.news().pace().skipped, now).map(Shown::Line).into_iter().for_each(&mut show);
-        events.counts(now).into_iter().map(Shown::Line).for_each(&mut show);
+        let counts = events.left_out(cycles.news().pace().skipped, now).into_iter().chain(events.counts(now));
+        let before = events.line(now, "");
+        for line in counts {
+            let text = line.strip_prefix(&before).unwrap_or(&line).to_owned();
+            show(Shown::Event { line, time: now.since(*begin), name: None, text });
+        }
+    }
+}
+
+/// The variant of an event.
+pub fn name_of(event: &Event) -> String {
+    let text = format!("{event:?}");
+    text.chars().take_while(char::is_ascii_alphanumeric).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: json
+    #[test]
+    fn an_event_is_named_by_its_variant() {
+        assert_eq!(name_of(&Event::ScanFinished { subdevices: 3 }), "ScanFinished");
+        assert_eq!(name_of(&Event::InterfacesSwapped), "InterfacesSwapped");
     }
 }

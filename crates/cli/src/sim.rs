@@ -20,61 +20,63 @@ use ringcat_link::{CarrierWatch, monotonic};
 
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{ThreadArguments, two_interfaces};
+use crate::interfaces::LinkNames;
+use crate::json::data::Data;
+use crate::json::sim::{LateWakeUps, Sim};
 use crate::others::check_sockets;
-use crate::output::{counted, say};
-use crate::verdict::Verdict;
+use crate::output::{counted, say, write_event};
+use crate::thread::ThreadArguments;
+use crate::verdict::{Report, Verdict};
 use doors::Doors;
 use orders::{Outcome, carry_out};
 use plant::Plant;
 use wires::{Pace, Wires};
 
-/// The carriers of the interfaces are looked at so often.
+/// Period of checks of the carriers.
 const CARRIER_PERIOD: Duration = Duration::from_millis(1);
 
 /// Options of `ringcat sim`.
 #[derive(Args, Debug)]
-#[command(after_help = format!("Orders on the standard input and on the control socket:\n\n{}", orders::HELP))]
+#[command(after_long_help = format!("Orders on the standard input and on the control socket:\n\n{}", orders::HELP))]
 pub struct SimArguments {
-    /// Network interface that the segment's main host cable ends at.
-    #[arg(long, value_name = "IF")]
-    main: String,
-    /// Network interface of the redundant host cable, for a segment that is a ring.
-    #[arg(long, value_name = "IF")]
-    redundant: Option<String>,
-    /// Segment file (see docs/segments.md).
-    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni")]
-    segment: Option<PathBuf>,
-    /// Make the segment from this ENI, with the SubDevices that it describes; a ring with --redundant (see
-    /// docs/eni.md).
-    #[arg(long, value_name = "FILE", conflicts_with = "segment")]
-    eni: Option<PathBuf>,
-    /// Unix socket at which orders are taken; each answer ends with a line `ok` or `error: ...`.
-    #[arg(long, value_name = "PATH")]
-    control: Option<PathBuf>,
-    /// How long frames take: as long as at 100 Mbit/s through real SubDevices, or as long as this machine needs to
-    /// compute the answer. Timers of SubDevices then run a little ahead of the clock, never behind it.
-    #[arg(long, value_enum, default_value = "real-time")]
-    pace: Pace,
-    /// Go on although another program answers or sends EtherCAT frames on the interface.
-    #[arg(long)]
+    #[command(flatten)]
+    links: LinkNames,
+    /// Go on although another program sends or answers EtherCAT frames there
+    #[arg(long, help_heading = "Links")]
     force: bool,
+    /// Segment file (see docs/segments.md)
+    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni", help_heading = "Segment")]
+    segment: Option<PathBuf>,
+    /// Make the segment from this ENI
+    ///
+    /// It has the SubDevices that the file describes, and is a ring with --redundant (see docs/eni.md).
+    #[arg(long, value_name = "FILE", conflicts_with = "segment", help_heading = "Segment")]
+    eni: Option<PathBuf>,
+    /// How long frames take
+    #[arg(long, value_enum, default_value = "real-time", help_heading = "Segment")]
+    pace: Pace,
+    /// Unix socket that takes orders
+    ///
+    /// Each answer ends with a line `ok` or `error: ...`. The standard input takes orders too; with --json its answers
+    /// are objects.
+    #[arg(long, value_name = "PATH", help_heading = "Output")]
+    control: Option<PathBuf>,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
-/// Runs the simulator until it is told to end.
-pub fn run(arguments: &SimArguments) -> Result<Verdict, Failure> {
-    two_interfaces(&arguments.main, arguments.redundant.as_deref())?;
+/// Runs the simulator until an order or a signal ends it.
+pub fn run(arguments: &SimArguments) -> Result<Report, Failure> {
+    let links = &arguments.links;
+    links.check()?;
     let end = EndRequest::watch(arguments.thread.priority)?;
     let mut plant = Plant::new(load(arguments)?);
-    let mut wires =
-        Wires::open(&arguments.main, arguments.redundant.as_deref(), arguments.thread.mode(), arguments.pace)?;
-    let names: Vec<&str> = std::iter::once(arguments.main.as_str()).chain(arguments.redundant.as_deref()).collect();
+    let mut wires = Wires::open(&links.main, links.redundant.as_deref(), arguments.thread.mode(), arguments.pace)?;
+    let names: Vec<&str> = links.all().collect();
     // Two simulators would both answer each frame.
     check_sockets(names.iter().copied(), arguments.force)?;
     let carriers = CarrierWatch::start(&names, CARRIER_PERIOD)?;
-    if arguments.redundant.is_none() {
+    if links.redundant.is_none() {
         // A ring without its second interface is one whose last cable is not plugged in.
         plant.set_carrier(HostLink::Redundant, false);
     }
@@ -84,7 +86,11 @@ pub fn run(arguments: &SimArguments) -> Result<Verdict, Failure> {
     // The threads above stay ordinary ones.
     let _awake = arguments.thread.apply();
     let begin = monotonic::now_ns();
-    let say = |now: u64, text: &str| say!("{:>12.3} ms  {text}", now.saturating_sub(begin) as f64 / 1e6);
+    let say = |now: u64, text: &str| {
+        let time = Duration::from_nanos(now.saturating_sub(begin));
+        say!("{:>12.3} ms  {text}", time.as_secs_f64() * 1e3);
+        write_event(time, None, text);
+    };
     say(begin, &format!("{} SubDevices are on the wire", plant.network().devices().len()));
     loop {
         let now = wires.turn(plant.network_mut());
@@ -102,16 +108,16 @@ pub fn run(arguments: &SimArguments) -> Result<Verdict, Failure> {
                 Outcome::Answer(text) => (text, false),
                 Outcome::Quit => ("ok\n".to_owned(), true),
             };
-            // Whoever asked may have gone.
+            // The client may be gone.
             let _ = order.answer.send(text);
             if quit {
                 say(now, &wires.summary());
-                return Ok(ended(&plant, "quit"));
+                return Ok(ended(&plant, &wires, "quit"));
             }
         }
         if let Some(by) = end.by() {
             say(now, &wires.summary());
-            return Ok(ended(&plant, &by));
+            return Ok(ended(&plant, &wires, &by));
         }
         if let Some(line) = wires.lateness.line(now) {
             say(now, &line);
@@ -120,17 +126,23 @@ pub fn run(arguments: &SimArguments) -> Result<Verdict, Failure> {
     }
 }
 
-/// A simulator ends when it is told to.
-fn ended(plant: &Plant, by: &str) -> Verdict {
-    let count = counted(plant.network().devices().len(), "SubDevice", "SubDevices");
-    Verdict::Held(format!("{count} simulated until {by}"))
+/// The report of a simulator that an order or a signal has ended.
+fn ended(plant: &Plant, wires: &Wires, by: &str) -> Report {
+    let subdevices = plant.network().devices().len();
+    let count = counted(subdevices, "SubDevice", "SubDevices");
+    let ns = |time: Duration| time.as_nanos() as u64;
+    let lateness = &wires.lateness;
+    let late_wake_ups =
+        LateWakeUps { count: lateness.count, longest_ns: ns(lateness.longest), total_ns: ns(lateness.total) };
+    let data = Data::Sim(Sim { subdevices, interfaces: wires.json(), late_wake_ups });
+    Report { verdict: Verdict::Held(format!("{count} simulated until {by}")), data }
 }
 
 fn load(arguments: &SimArguments) -> Result<Network, Failure> {
     let (path, network) = match (&arguments.eni, &arguments.segment) {
         (Some(path), _) => {
             let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
-            (path.display(), file.simulated(arguments.redundant.is_some())?)
+            (path.display(), file.simulated(arguments.links.redundant.is_some())?)
         }
         (None, Some(path)) => (path.display(), Network::from_description(Segment::load(path)?)?),
         (None, None) => return Err(Failure::new("expected --segment FILE.toml or --eni FILE")),
@@ -138,7 +150,7 @@ fn load(arguments: &SimArguments) -> Result<Network, Failure> {
     if network.host_cable(HostLink::Main).is_none() {
         return Err(Failure::new(format!("{path}: no device is plugged into the main interface")));
     }
-    match (network.host_cable(HostLink::Redundant), &arguments.redundant) {
+    match (network.host_cable(HostLink::Redundant), &arguments.links.redundant) {
         (None, Some(name)) => Err(Failure::new(format!(
             "{path} is no ring, so nothing can be plugged into {name}: give its [segment] table `ring = true`, or \
              leave --redundant out"

@@ -1,9 +1,10 @@
-//! What goes wrong around a segment and looks like a dead cable: a cable of it that ends at another interface of this
-//! host, and MainDevices of others.
+//! Faults around a segment that look like a dead cable: a cable of the segment that ends at another interface of this
+//! host, and other MainDevices.
 //!
-//! Another interface is found by our own frames: a ring that is plugged into an interface which was not named lets no
-//! frame return, they all arrive there. A thread of its own listens on all other interfaces, from before the scan until
-//! the program ends. The frames of others come as events of the engine; each sender is told once.
+//! The other interface is found by this MainDevice's own frames: with a ring that is plugged into an interface the
+//! command line does not name, no frame returns, they all arrive there. A thread of its own listens on all other
+//! interfaces, from before the scan until the program ends. Frames of other MainDevices are events of the engine; each
+//! sender is reported once.
 
 use std::os::unix::net::UnixStream;
 use std::sync::{Arc, OnceLock};
@@ -13,48 +14,49 @@ use ringcat::links::Links;
 use ringcat::packet::PacketLinks;
 use ringcat::text::{address, address_of_sender};
 use ringcat::wire::frame::MacAddress;
-use ringcat::{Classified, Error, Event, Identity, Link, Options, ScanError};
+use ringcat::{Classified, Error, Event, Identity, Link, MacCodec, ScanError};
 use ringcat_link::{Listener, Sender};
 
 use crate::failure::Failure;
-use crate::interfaces::InterfaceArguments;
+use crate::interfaces::{InterfaceArguments, LinkNames};
+use crate::output::warn;
 
-/// Bytes of the source address that MainDevices and controllers leave alone (protocol 9.7.1): they tell senders apart.
-const SENDER_MASK: [u8; 6] = [0, 0, 0, 0xFF, 0xFF, 0xFF];
-/// Senders that are told; a segment has one MainDevice, and one too many is one.
-const SENDERS_TOLD: usize = 4;
+/// Most senders that are reported: a second MainDevice is one.
+const MOST_SENDERS: usize = 4;
 
 /// What was noticed.
 #[derive(Debug)]
 pub struct Surroundings {
-    interfaces: InterfaceArguments,
+    links: LinkNames,
     /// The interface that our frames arrive on and should not.
     elsewhere: Arc<OnceLock<String>>,
+    /// Bytes that tell senders apart, and the senders.
+    mask: [u8; 6],
     senders: Vec<(Link, [u8; 6])>,
     /// Ends the thread that listens when it is dropped.
     _end: Option<UnixStream>,
 }
 
 impl Surroundings {
-    /// Begins to listen on the interfaces that are not in use; where that is not possible, without a word. The thread
+    /// Begins to listen on the interfaces that are not in use; silently does not where that is not possible. The thread
     /// inherits the priority of the calling one.
     pub fn watch(interfaces: &InterfaceArguments, links: &PacketLinks) -> Surroundings {
         let elsewhere = Arc::new(OnceLock::new());
         let end = listen(interfaces, links, elsewhere.clone());
-        Surroundings { interfaces: interfaces.clone(), elsewhere, senders: Vec::new(), _end: end }
+        let mask = unmarked(interfaces.codec());
+        Surroundings { links: interfaces.links.clone(), elsewhere, mask, senders: Vec::new(), _end: end }
     }
 
-    /// Takes note of an event. Whether it was a frame of another MainDevice; with it the words to tell, if there are
-    /// new ones.
+    /// Takes note of an event. `Some` for a frame of another MainDevice; in it the warning, if the sender is new.
     pub fn note(&mut self, event: &Event) -> Option<Option<String>> {
         let Event::ForeignFrame { arrived_on, bytes } = event else { return None };
         Some(self.note_sender(*arrived_on, address_of_sender(bytes)?))
     }
 
-    /// Takes note of the sender of a foreign frame. The words to tell, if there are new ones.
+    /// Takes note of the sender of a foreign frame. The warning, if the sender is new.
     pub fn note_sender(&mut self, arrived_on: Link, source: MacAddress) -> Option<String> {
-        let sender = (arrived_on, std::array::from_fn(|at| source.0[at] & SENDER_MASK[at]));
-        if self.senders.contains(&sender) || self.senders.len() == SENDERS_TOLD {
+        let sender = (arrived_on, std::array::from_fn(|at| source.0[at] & self.mask[at]));
+        if self.senders.contains(&sender) || self.senders.len() == MOST_SENDERS {
             return None;
         }
         self.senders.push(sender);
@@ -62,13 +64,13 @@ impl Surroundings {
             "another MainDevice sends into this segment: frames from {} arrive on {} ({arrived_on}); the first bytes \
              of the address may carry marks. Stop one of the two, or unplug its cable",
             address(source),
-            self.interfaces.name(arrived_on)
+            self.links.of(arrived_on)
         ))
     }
 
-    /// Tells of the sender of a foreign frame, if it has not been told of.
-    pub fn tell_sender(&mut self, arrived_on: Link, source: MacAddress) {
-        self.note_sender(arrived_on, source).iter().for_each(|words| eprintln!("ringcat: {words}"));
+    /// Warns of the sender of a foreign frame, if it is new.
+    pub fn report_sender(&mut self, arrived_on: Link, source: MacAddress) {
+        self.note_sender(arrived_on, source).iter().for_each(warn);
     }
 
     /// Why a scan or a run failed, with what was noticed; `foreign` counts the frames of others.
@@ -76,7 +78,7 @@ impl Surroundings {
         let silent = matches!(error, Error::Scan(ScanError::NoAnswer | ScanError::Bus(_)));
         let mut text = match self.elsewhere.get() {
             Some(name) if silent => {
-                format!("scan: no frame returns, they arrive on {name}; {}", self.interfaces.advice(name))
+                format!("scan: no frame returns, they arrive on {name}; {}", self.links.advice(name))
             }
             _ => Failure::from(error).to_string(),
         };
@@ -90,55 +92,61 @@ impl Surroundings {
     pub fn senders(&self) -> String {
         let one = |(link, source): &(Link, [u8; 6])| {
             let [.., a, b, c] = source;
-            format!("from ..:{a:02x}:{b:02x}:{c:02x} on {}", self.interfaces.name(*link))
+            format!("from ..:{a:02x}:{b:02x}:{c:02x} on {}", self.links.of(*link))
         };
         self.senders.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Bytes of the source address that carry no marks (protocol 9.7.1): they tell senders apart.
+fn unmarked(codec: MacCodec) -> [u8; 6] {
+    match codec {
+        MacCodec::FlagsFirst => [0, 0, 0, 0xFF, 0xFF, 0xFF],
+        MacCodec::IdLast => [0, 0, 0xFF, 0xFF, 0xFF, 0],
     }
 }
 
 /// Starts the thread that listens.
 fn listen(interfaces: &InterfaceArguments, links: &PacketLinks, found: Arc<OnceLock<String>>) -> Option<UnixStream> {
     let (main, redundant) = links.addresses();
-    let identity = Identity::new(Options::default().source_address, main, redundant);
+    let codec = interfaces.codec();
+    let identity = Identity::new(codec, main, redundant);
     let (end, ours) = UnixStream::pair().ok()?;
-    let interfaces = interfaces.clone();
-    // Opened in the thread: nobody waits for that, and a scan that finds nobody asks for seconds.
-    let ears = move || {
-        let names: Vec<&str> = interfaces.names().collect();
-        let Ok(listener) = Listener::open(Sender { address: main.0, mask: SENDER_MASK }, &names) else { return };
+    let links = interfaces.links.clone();
+    // The sockets are opened in the thread: that takes time, which the command need not wait for.
+    let body = move || {
+        let names: Vec<&str> = links.all().collect();
+        let Ok(listener) = Listener::open(Sender { address: main.0, mask: unmarked(codec) }, &names) else { return };
         while let Some(heard) = listener.hear(&end) {
             if matches!(identity.classify(&heard.bytes), Classified::Ours(_)) {
-                eprintln!(
-                    "ringcat: frames sent on {} arrive on {}: a cable of this segment, such as the other end of a \
-                     ring, is plugged in there; {}",
-                    interfaces.main,
+                warn(format_args!(
+                    "frames sent on {} arrive on {}: a cable of this segment, such as the other end of a ring, is \
+                     plugged in there; {}",
+                    links.main,
                     heard.interface,
-                    interfaces.advice(&heard.interface)
-                );
+                    links.advice(&heard.interface)
+                ));
                 // Only this thread sets it, and once.
                 let _ = found.set(heard.interface);
                 return;
             }
         }
     };
-    thread::Builder::new().name("ringcat-listen".to_owned()).spawn(ears).ok()?;
+    thread::Builder::new().name("ringcat-listen".to_owned()).spawn(body).ok()?;
     Some(ours)
 }
 
 #[cfg(test)]
 mod tests {
+    use ringcat::wire::source_address::SourceMarks;
+
     use super::*;
 
     fn surroundings(elsewhere: Option<&str>) -> Surroundings {
         Surroundings {
-            interfaces: InterfaceArguments {
-                main: "eth1".to_owned(),
-                redundant: None,
-                source_address: crate::interfaces::SourceAddress::default(),
-                max_datagrams: None,
-                force: false,
-            },
+            links: LinkNames { main: "eth1".to_owned(), redundant: None },
             elsewhere: Arc::new(elsewhere.map_or_else(OnceLock::new, |name| OnceLock::from(name.to_owned()))),
+            mask: unmarked(MacCodec::FlagsFirst),
             senders: Vec::new(),
             _end: None,
         }
@@ -153,7 +161,7 @@ mod tests {
 
     // covers: other-main-device
     #[test]
-    fn each_sender_is_told_once_whatever_marks_its_frames_carry() {
+    fn each_sender_is_reported_once_whatever_marks_its_frames_carry() {
         let mut surroundings = surroundings(None);
         assert_eq!(surroundings.note(&Event::ScanFinished { subdevices: 1 }), None);
         let words = surroundings.note(&foreign([2, 7, 0x5e, 0xaa, 0xbb, 0xcc], 60)).flatten().expect("a new one");
@@ -162,8 +170,22 @@ mod tests {
         for sender in 0..100 {
             surroundings.note(&foreign([2, 0, 0, 0, 0, sender], 60));
         }
-        assert_eq!(surroundings.senders.len(), SENDERS_TOLD);
+        assert_eq!(surroundings.senders.len(), MOST_SENDERS);
         surroundings.note(&foreign([0; 6], 3));
+    }
+
+    // covers: stray-ring-cable
+    #[test]
+    fn own_frames_pass_the_filter_of_the_listener_whatever_marks_they_carry() {
+        let nic = MacAddress([0x02, 0x11, 0x22, 0x33, 0x44, 0x55]);
+        for codec in [MacCodec::FlagsFirst, MacCodec::IdLast] {
+            let mask = unmarked(codec);
+            let masked = |mac: MacAddress| -> [u8; 6] { std::array::from_fn(|at| mac.0[at] & mask[at]) };
+            for frame_id in [0, 1, 0x80, 0xFF] {
+                let marks = SourceMarks { frame_id, retry: 3, processed: true, ..SourceMarks::default() };
+                assert_eq!(masked(codec.encode(nic, &marks)), masked(nic), "{codec:?} {frame_id:#x}");
+            }
+        }
     }
 
     // covers: other-main-device

@@ -1,10 +1,12 @@
-//! What a scan found, as a table for people and as JSON for programs.
+//! The result of a scan, as a table for people and as the keys of JSON.
 
 use ringcat::{Direction, Scan, SubDeviceConfig, SubDeviceInfo, plan};
-use serde_json::{Value, json};
 
-/// Bytes of outputs and inputs that a MainDevice exchanges without any declaration; `None` where the SII cannot be
-/// followed.
+use crate::json::scan;
+use crate::json::values::Port;
+
+/// Bytes of outputs and inputs that a MainDevice exchanges without a declaration; `None` where the SII contradicts
+/// itself.
 fn bytes(info: &SubDeviceInfo) -> Option<[u32; 2]> {
     let plan = plan(&SubDeviceConfig::from_info(info), info).ok()?;
     let of = |direction: Direction| {
@@ -40,27 +42,33 @@ pub fn lines(scan: &Scan) -> Vec<String> {
     std::iter::once(heading).chain(scan.subdevices.iter().map(line)).collect()
 }
 
-/// The same as JSON.
-pub fn json(scan: &Scan) -> Value {
+/// The result of a scan as JSON.
+pub fn json(scan: &Scan) -> scan::Scan {
+    scan::Scan {
+        main_subdevices: scan.main_count,
+        redundant_subdevices: scan.redundant_count,
+        subdevices: json_subdevices(scan),
+    }
+}
+
+/// The SubDevices that a scan found.
+pub fn json_subdevices(scan: &Scan) -> Vec<scan::SubDevice> {
     let subdevice = |info: &SubDeviceInfo| {
+        let bytes = bytes(info);
         let connection = scan.topology.connection_to(usize::from(info.position.0));
-        json!({
-            "position": info.position.0,
-            "station": info.station.0,
-            "alias": info.alias,
-            "name": info.name,
-            "vendor_id": info.identity.vendor_id,
-            "product_code": info.identity.product_code,
-            "revision": info.identity.revision,
-            "serial": info.identity.serial,
-            "output_bytes": bytes(info).map(|both| both[0]),
-            "input_bytes": bytes(info).map(|both| both[1]),
-            "connected_to": connection.map(|c| json!({ "position": c.near.node, "port": c.near.port })),
-        })
+        scan::SubDevice {
+            position: info.position.0,
+            station: info.station.0,
+            alias: info.alias,
+            name: info.name.clone(),
+            vendor_id: info.identity.vendor_id,
+            product_code: info.identity.product_code,
+            revision: info.identity.revision,
+            serial: info.identity.serial,
+            output_bytes: bytes.map(|both| both[0]),
+            input_bytes: bytes.map(|both| both[1]),
+            connected_to: connection.map(|c| Port { position: c.near.node, port: c.near.port }),
+        }
     };
-    json!({
-        "main_count": scan.main_count,
-        "redundant_count": scan.redundant_count,
-        "subdevices": scan.subdevices.iter().map(subdevice).collect::<Vec<_>>(),
-    })
+    scan.subdevices.iter().map(subdevice).collect()
 }

@@ -1,19 +1,25 @@
 //! The last line of every command, and the exit status that goes with it.
 //!
-//! `result: ok: ...` and 0, or `result: FAILED: ...` and 1 where it ran and something did not hold, or 2 where it could
-//! not do what was asked. It goes to the standard output, or beside it where that is for JSON.
+//! `result: ok: ...` and 0, `result: FAILED: ...` and 1 where the command ran and something did not hold, or 2 where it
+//! could not do what was asked. With `--json` the last line of the standard output is the same as an object, and the
+//! words go to the standard error output.
 
+use std::fs::File;
+use std::io::{Write, stdout};
+use std::os::fd::AsFd;
 use std::process::ExitCode;
 
 use crate::failure::Failure;
-use crate::output::{self, say};
+use crate::json::data::Data;
+use crate::json::line::{Ending, Kind, Outcome, ResultLine};
+use crate::output::{self, head, say, warn};
 
-/// What a command that ran has to say in the end.
+/// Whether everything held that a command was to show.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Everything held, in a few words.
     Held(String),
-    /// What did not.
+    /// What did not hold.
     Failed(String),
 }
 
@@ -32,53 +38,97 @@ impl Verdict {
         }
     }
 
-    /// Whether everything held.
-    pub fn has_held(&self) -> bool {
-        matches!(self, Verdict::Held(_))
-    }
-
     /// The words behind `result: `.
-    pub fn words(&self) -> String {
+    fn words(&self) -> String {
         match self {
             Verdict::Held(words) => format!("ok: {words}"),
             Verdict::Failed(words) => format!("FAILED: {words}"),
         }
     }
+
+    fn ending(&self) -> Ending {
+        let (outcome, exit_code, message) = match self {
+            Verdict::Held(words) => (Outcome::Ok, 0, words),
+            Verdict::Failed(words) => (Outcome::Failed, FAILED, words),
+        };
+        Ending { outcome, exit_code, message: message.clone(), details: Vec::new() }
+    }
 }
 
-/// Where the last line goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastLine {
-    /// To the standard output, behind what else is there.
-    StandardOutput,
-    /// To the standard error output: the standard output is for JSON.
-    Beside,
+/// Exit status where something did not hold.
+const FAILED: u8 = 1;
+/// Exit status where a command could not do what was asked.
+const ERROR: u8 = 2;
+
+/// What a command that ran has found.
+#[derive(Debug)]
+pub struct Report {
+    /// Whether everything held.
+    pub verdict: Verdict,
+    /// The keys of its last line of JSON.
+    pub data: Data,
 }
 
 /// Prints the last line; the exit status.
-pub fn conclude(outcome: Result<Verdict, Failure>, last_line: LastLine) -> ExitCode {
-    let verdict = match outcome {
-        Ok(verdict) => verdict,
-        Err(failure) => {
-            let text = failure.to_string();
-            let (first, more) = text.split_once('\n').unwrap_or((&text, ""));
-            more.lines().for_each(|line| eprintln!("ringcat: {line}"));
-            eprintln!("result: FAILED: {first}");
-            return ExitCode::from(2);
-        }
-    };
-    match last_line {
-        LastLine::StandardOutput => say!("result: {}", verdict.words()),
-        LastLine::Beside => eprintln!("result: {}", verdict.words()),
+pub fn conclude(outcome: Result<Report, Failure>) -> ExitCode {
+    match outcome {
+        Ok(Report { verdict, data }) => conclude_report(&verdict, &data),
+        Err(failure) => conclude_error(&failure.to_string()),
     }
-    match output::failure() {
-        Some(error) => {
-            eprintln!("result: FAILED: the standard output cannot be written: {error}");
-            ExitCode::FAILURE
-        }
-        None if verdict.has_held() => ExitCode::SUCCESS,
-        None => ExitCode::FAILURE,
+}
+
+fn conclude_report(verdict: &Verdict, data: &Data) -> ExitCode {
+    let ending = verdict.ending();
+    let exit_code = ending.exit_code;
+    if output::is_json() {
+        output::write_json(&ResultLine { head: head(Kind::Result), result: ending, data: Some(data) });
+    } else {
+        say!("result: {}", verdict.words());
     }
+    if let Some(error) = output::failure() {
+        eprintln!("result: FAILED: the standard output cannot be written: {error}");
+        return ExitCode::from(FAILED);
+    }
+    if output::is_json() {
+        eprintln!("result: {}", verdict.words());
+    }
+    ExitCode::from(exit_code)
+}
+
+/// The last line of a command that could not do what was asked: the first line of the text says what is wrong, further
+/// ones what to do. The exit status.
+pub fn conclude_error(text: &str) -> ExitCode {
+    let (first, more) = text.split_once('\n').unwrap_or((text, ""));
+    more.lines().for_each(warn);
+    conclude_error_told(first, more.lines().map(str::to_owned).collect())
+}
+
+/// As [`conclude_error`], where the details have been printed.
+pub fn conclude_error_told(message: &str, details: Vec<String>) -> ExitCode {
+    if output::is_json() {
+        output::write_json(&error_line(Outcome::Error, ERROR, message, details));
+    }
+    eprintln!("result: FAILED: {message}");
+    ExitCode::from(ERROR)
+}
+
+/// Ends the program as it is, from any thread: the threads that print may hold the standard output for ever.
+pub fn end_at_once(message: &str) -> ! {
+    if output::is_json()
+        && let Ok(out) = stdout().as_fd().try_clone_to_owned()
+    {
+        let line = error_line(Outcome::Failed, FAILED, message, Vec::new());
+        let text = serde_json::to_string(&line).unwrap_or_default();
+        // The program ends with a failure in any case.
+        let _ = File::from(out).write_all(format!("{text}\n").as_bytes());
+    }
+    eprintln!("result: FAILED: {message}");
+    std::process::exit(i32::from(FAILED));
+}
+
+fn error_line(outcome: Outcome, exit_code: u8, message: &str, details: Vec<String>) -> ResultLine<'static> {
+    let result = Ending { outcome, exit_code, message: message.to_owned(), details };
+    ResultLine { head: head(Kind::Result), result, data: None }
 }
 
 #[cfg(test)]
@@ -89,11 +139,11 @@ mod tests {
     #[test]
     fn a_verdict_has_held_only_without_reasons_against_it() {
         let held = Verdict::of(Vec::new(), "3 SubDevices");
-        assert_eq!((held.words().as_str(), held.has_held()), ("ok: 3 SubDevices", true));
+        assert_eq!((held.words().as_str(), held.ending().exit_code), ("ok: 3 SubDevices", 0));
         assert_eq!(held.clone().and(None), held);
         let failed = held.and(Some("the file is full".to_owned()));
         assert_eq!(failed.words(), "FAILED: the file is full");
         let more = Verdict::of(vec!["a".to_owned(), "b".to_owned()], "x").and(Some("c".to_owned()));
-        assert_eq!((more.words().as_str(), more.has_held()), ("FAILED: a; b; c", false));
+        assert_eq!((more.words().as_str(), more.ending().exit_code), ("FAILED: a; b; c", 1));
     }
 }

@@ -7,6 +7,7 @@
 mod devices;
 mod error;
 mod format;
+mod keys;
 mod services;
 mod topology;
 
@@ -43,8 +44,13 @@ impl Segment {
     /// # Errors
     /// A file that cannot be read, and the errors of [`Segment::from_toml`].
     pub fn load(path: &Path) -> Result<Segment, SegmentError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
+        let bytes =
+            std::fs::read(path).map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
+            SegmentError::new("expected UTF-8 text").at_line(line).in_file(path)
+        })?;
         let base_dir = path.parent().unwrap_or(Path::new("."));
         Segment::from_toml(&text, base_dir).map_err(|error| error.in_file(path))
     }
@@ -55,6 +61,7 @@ impl Segment {
     /// Text that is not TOML, unknown or missing keys, values out of range, unknown device types, SII images that
     /// cannot be read, duplicate names, and cables with a missing end or at a port with another cable.
     pub fn from_toml(text: &str, base_dir: &Path) -> Result<Segment, SegmentError> {
+        keys::check(text)?;
         let file = format::File::parse(text)?;
         let options = file.options(text)?;
         let plan = devices::describe(&file, text, base_dir, options.seed)?;

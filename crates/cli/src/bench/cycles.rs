@@ -1,6 +1,6 @@
 //! All SubDevices to OP, and process data as fast as the frames come back.
 //!
-//! A cycle is receive, judge, work, queue, send; it begins when all frames of the last one are back, or, with several
+//! A cycle is receive, process, work, queue, send; it begins when all frames of the last one are back, or, with several
 //! cycles under way, those of the oldest one. The halves run as in `ringcat run`, the cycles in the thread that
 //! measures.
 
@@ -10,17 +10,22 @@ use clap::Args;
 use ringcat::AlState;
 use ringcat::packet::PacketLinks;
 use ringcat::{
-    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MAX_UNDER_WAY, MainDevice, Scan, SupervisorThread,
-    Trigger, automatic,
+    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MainDevice, Scan, SupervisorThread, Trigger,
+    automatic,
 };
 use ringcat_link::monotonic;
 
 use super::quantile::quantile_us;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{InterfaceArguments, ThreadArguments};
+use crate::interfaces::InterfaceArguments;
+use crate::json::bench;
+use crate::json::data::Data;
+use crate::json::values::Times;
 use crate::output::say;
-use crate::verdict::Verdict;
+use crate::thread::ThreadArguments;
+use crate::under_way::UnderWayArgument;
+use crate::verdict::{Report, Verdict};
 
 /// The domain that `automatic` declares.
 pub const DOMAIN: DomainId = DomainId(0);
@@ -40,32 +45,29 @@ pub struct CyclesArguments {
     interfaces: InterfaceArguments,
     #[command(flatten)]
     thread: ThreadArguments,
-    /// Cycles to be measured; 0 for the start-up alone.
+    /// Cycles to be measured; 0 for the start-up alone
     #[arg(
         long,
+        help_heading = "Cycle",
         value_name = "CYCLES",
         default_value = "20000",
         value_parser = clap::value_parser!(u32).range(0..=10_000_000)
     )]
     count: u32,
-    /// Cycles that may be under way at once: one begins when the oldest is back.
-    #[arg(
-        long,
-        value_name = "CYCLES",
-        default_value = "1",
-        value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY))
-    )]
-    under_way: u8,
-    /// Leaves the supervision datagram out, for a comparison with those that send process data alone.
-    #[arg(long)]
+    #[command(flatten)]
+    under_way: UnderWayArgument,
+    /// Leave the supervision datagram out
+    ///
+    /// For a comparison with MainDevices that send process data alone.
+    #[arg(long, help_heading = "Cycle")]
     unsupervised: bool,
-    /// Both halves in one thread, as small applications have them.
-    #[arg(long)]
+    /// Run both halves in one thread, as small applications do
+    #[arg(long, help_heading = "Thread")]
     one_thread: bool,
 }
 
 /// Measures. It has held where every cycle was complete and SubDevices were stopped in order.
-pub fn run(arguments: &CyclesArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
     let thread = arguments.thread;
     let end = EndRequest::watch(thread.priority)?;
     let options = arguments.interfaces.options().with_supervision(!arguments.unsupervised);
@@ -75,36 +77,43 @@ pub fn run(arguments: &CyclesArguments) -> Result<Verdict, Failure> {
         let begin = monotonic::now_ns();
         let mut main_device = MainDevice::request(links, &options);
         let scan = main_device.scan()?;
-        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
+        let (declaration, start_up) = declare(&scan, begin);
+        let declaration = declaration.with_under_way(arguments.under_way.under_way);
         let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
-        let reasons = exchange(&mut application, arguments.count, begin, &end);
-        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
+        let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
+        let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
+        Ok(report(reasons, stop, arguments.count, data))
     } else {
         let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
         let begin = monotonic::now_ns();
         let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
         let _awake = thread.apply();
         let scan = supervisor.scan()?;
-        let declaration = declare(&scan, begin).with_under_way(arguments.under_way);
+        let (declaration, start_up) = declare(&scan, begin);
+        let declaration = declaration.with_under_way(arguments.under_way.under_way);
         let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
-        let reasons = exchange(&mut application, arguments.count, begin, &end);
-        Ok(verdict(reasons, application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err(), arguments.count))
+        let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
+        let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
+        Ok(report(reasons, stop, arguments.count, data))
     }
 }
 
-fn verdict(mut reasons: Vec<String>, stop: Option<ringcat::Error>, count: u32) -> Verdict {
+fn report(mut reasons: Vec<String>, stop: Option<ringcat::Error>, count: u32, data: bench::Cycles) -> Report {
     reasons.extend(stop.map(|error| error.to_string()));
-    Verdict::of(reasons, format!("{count} cycles, all complete"))
+    let verdict = Verdict::of(reasons, format!("{count} cycles, all complete"));
+    Report { verdict, data: Data::Cycles(data) }
 }
 
-/// Everything as its SII says; tells of the scan.
-pub fn declare(scan: &Scan, begin: u64) -> Declaration {
-    say!("SubDevices: {}", scan.subdevices.len());
-    say!("scanned after: {:.1} ms", (monotonic::now_ns() - begin) as f64 / 1e6);
-    automatic(&scan.subdevices, START_UP_CYCLE)
+/// Everything as its SII says. Prints how long the scan took; also returns it.
+pub fn declare(scan: &Scan, begin: u64) -> (Declaration, bench::StartUp) {
+    let (subdevices, scanned_after_ns) = (scan.subdevices.len(), monotonic::now_ns() - begin);
+    say!("SubDevices: {subdevices}");
+    say!("scanned after: {:.1} ms", scanned_after_ns as f64 / 1e6);
+    let start_up = bench::StartUp { subdevices, scanned_after_ns, op_after_ns: None };
+    (automatic(&scan.subdevices, START_UP_CYCLE), start_up)
 }
 
-/// Cycles until all are in OP.
+/// Cycles until all are in OP; how long that took, in nanoseconds.
 ///
 /// # Errors
 /// Why that does not come, in words.
@@ -112,7 +121,7 @@ pub fn reach_op<H: AcyclicHalf>(
     application: &mut Application<PacketLinks, H>,
     begin: u64,
     end: &EndRequest,
-) -> Result<(), String> {
+) -> Result<u64, String> {
     let until = application.now() + OP_LIMIT;
     while !application.all_settled() {
         application.cycle(|_| ());
@@ -120,25 +129,29 @@ pub fn reach_op<H: AcyclicHalf>(
             return Err(format!("ended by {by} before all SubDevices were in OP"));
         }
         if application.now() >= until {
-            return Err("not all SubDevices get to OP; `ringcat run` tells which, and why".to_owned());
+            return Err("not all SubDevices get to OP; `ringcat run` shows which, and why".to_owned());
         }
     }
-    say!("all in OP after: {:.1} ms", (application.now().0 - begin) as f64 / 1e6);
-    Ok(())
+    let after_ns = application.now().0 - begin;
+    say!("all in OP after: {:.1} ms", after_ns as f64 / 1e6);
+    Ok(after_ns)
 }
 
-/// To OP, then cycles back to back; what did not hold.
+/// To OP, then cycles back to back; what did not hold, and what was measured.
 fn exchange<H: AcyclicHalf>(
     application: &mut Application<PacketLinks, H>,
     count: u32,
+    start_up: bench::StartUp,
     begin: u64,
     end: &EndRequest,
-) -> Vec<String> {
-    if let Err(reason) = reach_op(application, begin, end) {
-        return vec![reason];
+) -> (Vec<String>, bench::Cycles) {
+    let mut data = bench::Cycles { start_up, cycle_times: None, rate_hz: None, incomplete_cycles: None };
+    match reach_op(application, begin, end) {
+        Ok(after_ns) => data.start_up.op_after_ns = Some(after_ns),
+        Err(reason) => return (vec![reason], data),
     }
     if count == 0 {
-        return Vec::new();
+        return (Vec::new(), data);
     }
     application.set_trigger(Trigger::FramesReturned { at_least: Duration::ZERO });
     for _ in 0..WARM_UP {
@@ -158,7 +171,11 @@ fn exchange<H: AcyclicHalf>(
     let incomplete = after.incomplete - before.incomplete + after.skipped - before.skipped;
     let cycles = times_ns.len();
     times_ns.sort_unstable();
-    say!("cycles per second: {:.0}", cycles as f64 * 1e9 / (last - first).max(1) as f64);
+    let rate_hz = cycles as f64 * 1e9 / (last - first).max(1) as f64;
+    data.cycle_times = Times::of_sorted(&times_ns);
+    data.rate_hz = (cycles > 0).then_some(rate_hz);
+    data.incomplete_cycles = (cycles > 0).then_some(incomplete);
+    say!("cycles per second: {rate_hz:.0}");
     say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
     say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
     say!("incomplete: {incomplete} of {cycles}");
@@ -167,7 +184,7 @@ fn exchange<H: AcyclicHalf>(
         reasons.push(format!("{incomplete} of {cycles} cycles incomplete"));
     }
     reasons.extend(end.by().map(|by| format!("ended by {by} after {cycles} of {count} cycles")));
-    reasons
+    (reasons, data)
 }
 
 /// A cycle with an application's part: an output changes, and answers to an input. Returns when it began, in

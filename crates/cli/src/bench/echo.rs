@@ -12,31 +12,33 @@ use ringcat_link::{PacketOptions, PacketSocket, monotonic, wait};
 
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::ThreadArguments;
+use crate::json::bench::Echo;
+use crate::json::data::Data;
 use crate::others::check_sockets;
 use crate::output::say;
-use crate::verdict::Verdict;
+use crate::thread::ThreadArguments;
+use crate::verdict::{Report, Verdict};
 
 /// Offset of the source address.
 const SOURCE: usize = 6;
-/// Whether the end was asked for is looked at so often.
+/// Period of checks for the end.
 const LOOK_NS: u64 = 20_000_000;
 
 /// Options of `ringcat bench echo`.
 #[derive(Args, Debug)]
 pub struct EchoArguments {
-    /// Network interface at whose other end frames come from.
-    #[arg(long, value_name = "IF")]
+    /// Network interface that the frames arrive on
+    #[arg(long, value_name = "IF", help_heading = "Links")]
     main: String,
-    /// Go on although another program answers or sends EtherCAT frames on the interface.
-    #[arg(long)]
+    /// Go on although another program sends or answers EtherCAT frames there
+    #[arg(long, help_heading = "Links")]
     force: bool,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
-/// Answers until it is told to end.
-pub fn run(arguments: &EchoArguments) -> Result<Verdict, Failure> {
+/// Answers until a signal ends it.
+pub fn run(arguments: &EchoArguments) -> Result<Report, Failure> {
     let end = EndRequest::watch(arguments.thread.priority)?;
     let options = PacketOptions { receive: arguments.thread.mode(), ..PacketOptions::default() };
     let socket = PacketSocket::open(&arguments.main, &options)?;
@@ -44,10 +46,11 @@ pub fn run(arguments: &EchoArguments) -> Result<Verdict, Failure> {
     let _awake = arguments.thread.apply();
     say!("echo on {}", arguments.main);
     let answered = answer_all(socket, &end);
-    Ok(Verdict::Held(format!("{answered} frames answered")))
+    let verdict = Verdict::Held(format!("{answered} frames answered"));
+    Ok(Report { verdict, data: Data::Echo(Echo { frames_answered: answered }) })
 }
 
-/// Answers until the end is asked for; how many frames.
+/// Answers until a request to end; the number of frames.
 fn answer_all(mut socket: PacketSocket, end: &EndRequest) -> u64 {
     let mode = socket.mode();
     let mut answered = 0;
@@ -103,7 +106,7 @@ mod tests {
 
     // covers: bench
     #[test]
-    fn every_datagram_gets_what_one_subdevice_adds_and_the_source_its_mark() {
+    fn working_counters_grow_and_the_source_address_is_marked() {
         let mut frame = vec![0; 1514];
         let source = MacAddress([0, 1, 2, 3, 4, 5]);
         let mut builder = FrameBuilder::ethernet(&mut frame, MacAddress::BROADCAST, source).expect("room");

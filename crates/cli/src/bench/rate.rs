@@ -1,8 +1,8 @@
-//! The largest cycle rate: ever shorter cycles on a fixed grid, until one has to be left out.
+//! The largest cycle rate: ever shorter cycles on a fixed grid, until a cycle has to be left out.
 //!
-//! A cycle is skipped because its time has passed when the thread looks, or because the frames of the last one are
-//! still out. Stalls of the machine do both at any rate and come by chance; they are counted apart: a thread that does
-//! nothing but spin and run cycles is never [`STALL`] late by itself, nor is a segment that answers within less.
+//! A cycle is skipped because its time has passed when the thread checks, or because the frames of the last one are
+//! still out. Stalls of the machine cause both at any rate, by chance; they are counted apart: a thread that only spins
+//! and runs cycles is never [`STALL`] late by itself, nor is a segment that answers within less.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -15,17 +15,20 @@ use ringcat_link::monotonic;
 use super::cycles::{DOMAIN, STOP_LIMIT, declare, reach_op};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{InterfaceArguments, ThreadArguments};
+use crate::interfaces::InterfaceArguments;
+use crate::json::bench;
+use crate::json::data::Data;
 use crate::output::say;
-use crate::verdict::Verdict;
+use crate::thread::ThreadArguments;
+use crate::verdict::{Report, Verdict};
 
 /// Cycle times that are tried, in microseconds.
 const PERIODS_US: [u64; 17] = [1000, 500, 250, 200, 150, 125, 100, 80, 70, 60, 50, 40, 35, 30, 25, 20, 15];
-/// How long each is held.
+/// How long each is tried.
 const HELD: Duration = Duration::from_millis(300);
 /// Tries of each.
 const TRIES: usize = 3;
-/// What is later than this was held up by the machine.
+/// A delay of this length is a stall of the machine.
 const STALL: Duration = Duration::from_micros(30);
 
 /// Options of `ringcat bench rate`.
@@ -37,7 +40,7 @@ pub struct RateArguments {
     thread: ThreadArguments,
 }
 
-/// What a try has seen.
+/// Counters of one try.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     cycles: u64,
@@ -49,7 +52,7 @@ struct Seen {
 }
 
 /// Measures. It has held where a rate was kept and SubDevices were stopped in order.
-pub fn run(arguments: &RateArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &RateArguments) -> Result<Report, Failure> {
     let thread = arguments.thread;
     let end = EndRequest::watch(thread.priority)?;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
@@ -57,14 +60,15 @@ pub fn run(arguments: &RateArguments) -> Result<Verdict, Failure> {
     let options = arguments.interfaces.options();
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let _awake = thread.apply();
-    let declaration = declare(&supervisor.scan()?, begin);
+    let (declaration, mut start_up) = declare(&supervisor.scan()?, begin);
     let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     let mut reasons = Vec::new();
-    let mut shortest = None;
+    let (mut shortest, mut tried) = (None, Vec::new());
     match reach_op(&mut application, begin, &end) {
-        Ok(()) => {
+        Ok(after_ns) => {
+            start_up.op_after_ns = Some(after_ns);
             for period in PERIODS_US.map(Duration::from_micros) {
-                if end.is_asked() || tries(&mut application, period, &end).is_continue() {
+                if end.is_asked() || tries(&mut application, period, &end, &mut tried).is_continue() {
                     break;
                 }
                 shortest = Some(period);
@@ -74,20 +78,27 @@ pub fn run(arguments: &RateArguments) -> Result<Verdict, Failure> {
         Err(reason) => reasons.push(reason),
     }
     reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
-    let rate = shortest.map(|period| format!("{:.0} Hz", 1.0 / period.as_secs_f64()));
+    let data = bench::Rate {
+        start_up,
+        tries: tried,
+        shortest_cycle_ns: shortest.map(|period| period.as_nanos() as u64),
+        largest_rate_hz: shortest.map(|period| 1.0 / period.as_secs_f64()),
+    };
+    let rate = data.largest_rate_hz.map(|rate| format!("{rate:.0} Hz"));
     match &rate {
         Some(rate) => say!("largest rate without a skipped cycle: {rate}"),
         None if reasons.is_empty() => reasons.push("no rate was held without a skipped cycle".to_owned()),
         None => {}
     }
-    Ok(Verdict::of(reasons, rate.unwrap_or_default()))
+    Ok(Report { verdict: Verdict::of(reasons, rate.unwrap_or_default()), data: Data::Rate(data) })
 }
 
-/// Breaks where the period is held.
+/// Tries a period, and notes each try; breaks where the period is kept.
 fn tries(
     application: &mut Application<PacketLinks, SupervisorThread>,
     period: Duration,
     end: &EndRequest,
+    tried: &mut Vec<bench::Try>,
 ) -> ControlFlow<()> {
     for attempt in (1..=TRIES).take_while(|_| !end.is_asked()) {
         let Seen { cycles, skipped, stalled, latest, .. } = hold(application, period, end);
@@ -97,6 +108,13 @@ fn tries(
             period.as_micros(),
             latest.as_nanos() as f64 / 1e3
         );
+        tried.push(bench::Try {
+            cycle_ns: period.as_nanos() as u64,
+            cycles,
+            skipped_cycles: skipped,
+            stalled_cycles: stalled,
+            longest_delay_ns: latest.as_nanos() as u64,
+        });
         if skipped == 0 && stalled < cycles / 2 {
             return ControlFlow::Break(());
         }
@@ -149,7 +167,7 @@ impl Seen {
     }
 }
 
-/// Takes in frames until the time has come, and tells when none is out any more; returns what time it is then.
+/// Receives frames until the time has come, and calls `returned` when none is out any more; returns the time then.
 fn wait_until(
     application: &mut Application<PacketLinks, SupervisorThread>,
     until: Instant,
@@ -174,7 +192,7 @@ mod tests {
 
     // covers: bench
     #[test]
-    fn what_a_stall_has_skipped_is_counted_apart() {
+    fn cycles_that_a_stall_has_skipped_are_counted_apart() {
         let us = Duration::from_micros;
         let mut seen =
             Seen { cycles: 0, skipped: 0, stalled: 0, latest: Duration::ZERO, shortest_round_trip: Duration::MAX };

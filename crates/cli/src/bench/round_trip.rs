@@ -26,10 +26,13 @@ use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, monotonic, wait};
 use super::quantile::quantile_us;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::ThreadArguments;
+use crate::json::bench;
+use crate::json::data::Data;
+use crate::json::values::Times;
 use crate::others::{check_frames, check_sockets};
 use crate::output::say;
-use crate::verdict::Verdict;
+use crate::thread::ThreadArguments;
+use crate::verdict::{Report, Verdict};
 
 /// Cycles before the measured ones of a block.
 const WARM_UP: usize = 200;
@@ -43,38 +46,53 @@ const SOURCE: usize = 6;
 const INDEX: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN + 1;
 /// Bits of Idx that the bare client counts in: all but the class.
 const COUNT: u8 = 0x7f;
-/// Events that nobody fetches.
+/// Room for events, which are not read.
 const EVENTS: usize = 8;
 
 /// Options of `ringcat bench round-trip`.
 #[derive(Args, Debug)]
 pub struct RoundTripArguments {
-    /// Network interface with `ringcat bench echo` at its other end.
-    #[arg(long, value_name = "IF")]
+    /// Network interface with `ringcat bench echo` at its other end
+    #[arg(long, value_name = "IF", help_heading = "Links")]
     main: String,
-    /// Bytes of the frame without check sequence, 60 to 1514.
-    #[arg(long, value_name = "BYTES", default_value = "60", value_parser = clap::value_parser!(u16).range(60..=1514))]
-    size: u16,
-    /// Cycles of each client.
+    /// Go on although another MainDevice uses the interface
+    #[arg(long, help_heading = "Links")]
+    force: bool,
+    /// Bytes of the frame without check sequence, 60 to 1514
     #[arg(
         long,
+        value_name = "BYTES",
+        default_value = "60",
+        help_heading = "Cycle",
+        value_parser = clap::value_parser!(u16).range(60..=1514)
+    )]
+    size: u16,
+    /// Cycles of each client
+    #[arg(
+        long,
+        help_heading = "Cycle",
         value_name = "CYCLES",
         default_value = "100000",
         value_parser = clap::value_parser!(u32).range(1..=10_000_000)
     )]
     count: u32,
-    /// Pairs of blocks that these are divided into. With 0 the MainDevice runs alone, without blocks.
-    #[arg(long, value_name = "PAIRS", default_value = "20", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    /// Pairs of blocks that the cycles are divided into
+    ///
+    /// With 0 the MainDevice runs alone, without blocks.
+    #[arg(
+        long,
+        value_name = "PAIRS",
+        default_value = "20",
+        help_heading = "Cycle",
+        value_parser = clap::value_parser!(u32).range(0..=1000)
+    )]
     blocks: u32,
-    /// Go on although another MainDevice uses the interface.
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     thread: ThreadArguments,
 }
 
 /// Measures. It has held where no frame was lost or came back wrong.
-pub fn run(arguments: &RoundTripArguments) -> Result<Verdict, Failure> {
+pub fn run(arguments: &RoundTripArguments) -> Result<Report, Failure> {
     let end = EndRequest::watch(arguments.thread.priority)?;
     let main = || std::iter::once(arguments.main.as_str());
     check_sockets(main(), arguments.force)?;
@@ -87,7 +105,10 @@ pub fn run(arguments: &RoundTripArguments) -> Result<Verdict, Failure> {
     if arguments.blocks == 0 {
         measure(&mut Cyclic::open(&arguments.main, mode, size)?, count, &mut whole, &end);
         whole.print("MainDevice");
-        return Ok(verdict(&[&whole], &end));
+        let verdict = verdict(&[&whole], &end);
+        let main_device = whole.json();
+        let alone = bench::RoundTrip { frame_bytes: size, blocks: 0, bare: None, main_device, median_ratio: None };
+        return Ok(Report { verdict, data: Data::RoundTrip(alone) });
     }
     let (mut bare, mut ratios) = (Measured::default(), Vec::new());
     for _ in 0..arguments.blocks {
@@ -107,8 +128,16 @@ pub fn run(arguments: &RoundTripArguments) -> Result<Verdict, Failure> {
     say!("{size} bytes, {}, {} pairs of blocks", arguments.thread.mode_in_words(), ratios.len());
     bare.print("bare echo client");
     whole.print("MainDevice");
-    say!("median ratio: {:.3}", ratios[ratios.len() / 2]);
-    Ok(verdict(&[&bare, &whole], &end))
+    let median_ratio = ratios[ratios.len() / 2];
+    say!("median ratio: {median_ratio:.3}");
+    let data = bench::RoundTrip {
+        frame_bytes: size,
+        blocks: ratios.len(),
+        bare: Some(bare.json()),
+        main_device: whole.json(),
+        median_ratio: median_ratio.is_finite().then_some(median_ratio),
+    };
+    Ok(Report { verdict: verdict(&[&bare, &whole], &end), data: Data::RoundTrip(data) })
 }
 
 fn verdict(measured: &[&Measured], end: &EndRequest) -> Verdict {
@@ -122,9 +151,9 @@ fn verdict(measured: &[&Measured], end: &EndRequest) -> Verdict {
     Verdict::of(reasons, format!("{cycles} cycles, none lost"))
 }
 
-/// Somebody who sends frames and waits for each.
+/// A client that sends frames and waits for each.
 trait Client {
-    /// One cycle that begins now; when it ended, and whether all was as it should.
+    /// One cycle that begins now; the time of its end, and whether the frame came back as expected.
     fn cycle(&mut self, now: u64) -> (u64, bool);
 }
 
@@ -142,6 +171,11 @@ impl Measured {
         say!("{name} minimum: {:.3} us", quantile_us(&self.times_ns, 0));
         say!("{name} 99 %: {:.3} us", quantile_us(&self.times_ns, 99));
         say!("{name} lost or wrong: {} of {}", self.failed, self.times_ns.len());
+    }
+
+    /// The same as keys of JSON; the times are sorted.
+    fn json(&self) -> bench::Measured {
+        bench::Measured { cycle_times: Times::of_sorted(&self.times_ns), failed_frames: self.failed }
     }
 }
 
@@ -202,7 +236,7 @@ impl Client for Bare {
 struct Cyclic {
     links: PacketLinks,
     exchange: Exchange,
-    /// What the exchange tells the other half, which is not there.
+    /// The other end of the queue of events: this bench has no acyclic half.
     _events: Consumer,
 }
 

@@ -1,4 +1,4 @@
-//! The option `--sync`: who gets which SYNC signals (protocol 4.6, 7.3).
+//! The option `--sync`: the SYNC signals of SubDevices (protocol 4.6, 7.3).
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use ringcat::{SubDeviceInfo, SyncSignals};
 
 use crate::times::{shift, time, us};
 
-/// AssignActivate without a word from the EEPROM: SYNC0, and SYNC0 with SYNC1.
+/// AssignActivate where the EEPROM has none: SYNC0, and SYNC0 with SYNC1.
 const SYNC0: u16 = 0x0300;
 const BOTH: u16 = 0x0700;
 /// Bits of that word which activate signals.
@@ -15,7 +15,7 @@ const ACTIVATION: u16 = 0x0700;
 /// One `--sync`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sync {
-    /// A position; `None`: everybody who can.
+    /// A position; `None`: all SubDevices with a clock.
     position: Option<usize>,
     /// SYNC0 and SYNC1; `None`: as the EEPROM says.
     signals: Option<(Signal, Option<Signal>)>,
@@ -28,21 +28,22 @@ struct Signal {
     shift_ns: i32,
 }
 
-/// Reads `auto` or `WHO:auto` or `WHO:SYNC0[:SYNC1]`.
+/// Reads `auto`, `PLACE:auto` or `PLACE:SYNC0[:SYNC1]`.
 pub fn sync(text: &str) -> Result<Sync, String> {
     if text == "auto" {
         return Ok(Sync { position: None, signals: None });
     }
     let parts: Vec<&str> = text.split(':').collect();
-    let (who, signals) = match parts.as_slice() {
-        [who, "auto"] => (who, None),
-        [who, sync0] => (who, Some((signal(sync0)?, None))),
-        [who, sync0, sync1] => (who, Some((signal(sync0)?, Some(signal(sync1)?)))),
+    let (place, signals) = match parts.as_slice() {
+        [place, "auto"] => (place, None),
+        [place, sync0] => (place, Some((signal(sync0)?, None))),
+        [place, sync0, sync1] => (place, Some((signal(sync0)?, Some(signal(sync1)?)))),
         _ => return Err(format!("expected auto or POSITION:SYNC0[:SYNC1], as in 3:1ms+250us, got \"{text}\"")),
     };
-    let position = match *who {
+    let wrong = |place: &str| format!("expected a position or all before the colon, got \"{place}\"");
+    let position = match *place {
         "all" => None,
-        who => Some(who.parse().map_err(|_| format!("expected a position or all before the colon, got \"{who}\""))?),
+        place => Some(place.parse().map_err(|_| wrong(place))?),
     };
     Ok(Sync { position, signals })
 }
@@ -62,8 +63,8 @@ fn signal(text: &str) -> Result<Signal, String> {
 /// The signals of each SubDevice of a scan, for a MainDevice with this cycle.
 pub fn choose(options: &[Sync], found: &[SubDeviceInfo], cycle: Duration) -> Result<Vec<Option<SyncSignals>>, String> {
     let mut chosen = vec![None; found.len()];
-    let mut for_everybody = options.iter().filter(|option| option.position.is_none());
-    if let Some(option) = for_everybody.next() {
+    let mut for_all = options.iter().filter(|option| option.position.is_none());
+    if let Some(option) = for_all.next() {
         for (position, info) in found.iter().enumerate().filter(|(_, info)| takes_part(option, info)) {
             chosen[position] = Some(signals(option, position, info, cycle)?);
         }
@@ -73,8 +74,8 @@ pub fn choose(options: &[Sync], found: &[SubDeviceInfo], cycle: Duration) -> Res
             );
         }
     }
-    if for_everybody.next().is_some() {
-        return Err("--sync: auto and all are for everybody; give one of them, and positions beside it".into());
+    if for_all.next().is_some() {
+        return Err("--sync: auto and all are for all SubDevices; give one of them, and positions beside it".into());
     }
     let mut named = vec![false; found.len()];
     for (option, position) in options.iter().filter_map(|option| Some((option, option.position?))) {
@@ -94,7 +95,7 @@ pub fn choose(options: &[Sync], found: &[SubDeviceInfo], cycle: Duration) -> Res
     Ok(chosen)
 }
 
-/// Whether a SubDevice that is not named gets signals.
+/// Whether a SubDevice without an option of its own gets signals.
 fn takes_part(option: &Sync, info: &SubDeviceInfo) -> bool {
     let has_mode = || info.dc_modes.iter().any(SyncSignals::are_in);
     info.controller.features.dc && (option.signals.is_some() || has_mode())
@@ -130,7 +131,7 @@ fn given(sync0: Signal, sync1: Option<Signal>, info: &SubDeviceInfo) -> SyncSign
     }
 }
 
-/// Signals and cycles must not drift apart.
+/// Refuses signals that would drift against the cycles.
 fn fit(signals: &SyncSignals, cycle: Duration) -> Result<(), String> {
     let (cycle, sync0, sync1) = (cycle.as_nanos() as i64, signals.sync0_cycle_ns.into(), signals.sync1_cycle_ns.into());
     if sync0 == 0 || (sync0 % cycle != 0 && cycle % sync0 != 0) {
@@ -187,7 +188,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn signals_that_make_no_sense_are_refused_with_what_would() {
+    fn signals_that_make_no_sense_are_refused_with_what_is_allowed() {
         let found = [info(false, &[]), info(true, &[0x0300]), info(true, &[])];
         for (options, part) in [
             (&["3:1ms"][..], "there are SubDevices 0 to 2"),

@@ -1,11 +1,12 @@
-//! Clocks as a table for people and as JSON for programs.
+//! Clocks as a table for people and as the keys of JSON.
 
 use ringcat::histogram::Histogram;
 use ringcat::text::Names;
 use ringcat::{ClockStatus, SyncSignals};
-use serde_json::{Value, json};
 
 use crate::clock_options::signals_in_words;
+use crate::json::clocks::{Clock, Clocks, HiddenDelay};
+use crate::json::values::Times;
 
 fn name<'a>(clock: &ClockStatus, names: &'a Names) -> &'a str {
     clock.subdevice.and_then(|subdevice| names.0.get(subdevice)).map_or("", String::as_str)
@@ -58,57 +59,34 @@ pub fn lines(clocks: &[ClockStatus], names: &Names, signals: &[Option<SyncSignal
     std::iter::once(heading).chain(clocks.iter().map(line)).collect()
 }
 
-/// The same as JSON, with how far cycles were from their phase.
+/// Clocks as JSON, with how far cycles began from their phase.
 pub fn json(
     clocks: &[ClockStatus],
     names: &Names,
     signals: &[Option<SyncSignals>],
     locked: bool,
     phase_errors: &Histogram,
-) -> Value {
-    let clock = |clock: &ClockStatus| {
-        let sync = signals_of(clock, signals).map(|signals| {
-            json!({
-                "assign_activate": signals.assign_activate,
-                "sync0_cycle_ns": signals.sync0_cycle_ns,
-                "sync0_shift_ns": signals.sync0_shift_ns,
-                "sync1_cycle_ns": signals.sync1_cycle_ns,
-                "sync1_shift_ns": signals.sync1_shift_ns,
-            })
-        });
-        let hidden = clock.hidden.map(|hidden| {
-            json!({
-                "fork": hidden.fork.map(|fork| fork.0),
-                "least_ns": hidden.range_ns.map(|(least, _)| least),
-                "most_ns": hidden.range_ns.map(|(_, most)| most),
-                "estimated": hidden.is_estimated,
-            })
-        });
-        json!({
-            "position": clock.position,
-            "station": clock.station.0,
-            "name": name(clock, names),
-            "reference": clock.is_reference,
-            "locked": clock.is_locked,
-            "delay_ns": is_written(clock).then_some(clock.delay_ns),
-            "delay_hidden": hidden,
-            "offset_ns": clock.offset_ns,
-            "drift_ppb": clock.drift_ppb,
-            "difference_ns": clock.difference_ns,
-            "worst_ns": clock.worst_ns,
-            "sync": sync,
-        })
+) -> Clocks {
+    let clock = |clock: &ClockStatus| Clock {
+        position: clock.position,
+        station: clock.station.0,
+        name: name(clock, names).to_owned(),
+        reference: clock.is_reference,
+        locked: clock.is_locked,
+        delay_ns: is_written(clock).then_some(clock.delay_ns),
+        delay_hidden: clock.hidden.map(|hidden| HiddenDelay {
+            fork: hidden.fork.map(|fork| fork.0),
+            least_ns: hidden.range_ns.map(|(least, _)| least),
+            most_ns: hidden.range_ns.map(|(_, most)| most),
+            estimated: hidden.is_estimated,
+        }),
+        offset_ns: clock.offset_ns,
+        drift_ppb: clock.drift_ppb,
+        difference_ns: clock.difference_ns,
+        worst_ns: clock.worst_ns,
+        sync: signals_of(clock, signals).map(Into::into),
     };
-    let ns = |parts_per_million| phase_errors.quantile(parts_per_million).as_nanos() as u64;
-    let phase = (phase_errors.count() > 0).then(|| {
-        json!({
-            "readings": phase_errors.count(),
-            "median_ns": ns(500_000),
-            "most_99_ns": ns(990_000),
-            "largest_ns": phase_errors.longest().as_nanos() as u64,
-        })
-    });
-    json!({ "locked": locked, "phase_errors": phase, "clocks": clocks.iter().map(clock).collect::<Vec<_>>() })
+    Clocks { locked, phase_errors: Times::of(phase_errors), clocks: clocks.iter().map(clock).collect() }
 }
 
 #[cfg(test)]
@@ -150,32 +128,28 @@ mod tests {
         let one = |is_estimated| ClockStatus { hidden: Some(HiddenDelay { is_estimated, ..hidden }), ..clock() };
         let words = |clock: ClockStatus| {
             let lines = lines(&[clock], &Names::default(), &[None]);
-            let value = json(&[clock], &Names::default(), &[None], true, &Histogram::default());
-            let one = &value["clocks"][0];
-            (
-                lines[1].split_whitespace().nth(2).map(str::to_owned),
-                one["delay_ns"].as_i64(),
-                one["delay_hidden"].clone(),
-            )
+            let clocks = json(&[clock], &Names::default(), &[None], true, &Histogram::default());
+            let hidden = clocks.clocks[0].delay_hidden.expect("it is hidden");
+            assert_eq!((hidden.fork, hidden.least_ns, hidden.most_ns), (Some(2), Some(0), Some(2_100)));
+            let delay = lines[1].split_whitespace().nth(2).map(str::to_owned);
+            (delay, clocks.clocks[0].delay_ns, hidden.estimated)
         };
-        let json = |is_estimated| json!({ "fork": 2, "least_ns": 0, "most_ns": 2_100, "estimated": is_estimated });
-        assert_eq!(words(one(true)), (Some("~1050".to_owned()), Some(1_050), json(true)));
-        assert_eq!(words(one(false)), (Some("-".to_owned()), None, json(false)));
+        assert_eq!(words(one(true)), (Some("~1050".to_owned()), Some(1_050), true));
+        assert_eq!(words(one(false)), (Some("-".to_owned()), None, false));
     }
 
     // covers: dc-tools
     #[test]
     fn json_has_the_same_figures() {
         let phase_errors = Histogram::default();
-        let value = json(&[clock()], &Names::default(), &[None], true, &phase_errors);
-        let one = &value["clocks"][0];
+        let clocks = json(&[clock()], &Names::default(), &[None], true, &phase_errors);
         assert_eq!(
-            (one["delay_ns"].as_i64(), one["sync"].is_null(), &value["locked"]),
-            (Some(1_050), true, &Value::Bool(true))
+            (clocks.clocks[0].delay_ns, clocks.clocks[0].sync.is_none(), clocks.locked),
+            (Some(1_050), true, true)
         );
-        assert!(value["phase_errors"].is_null());
+        assert!(clocks.phase_errors.is_none());
         phase_errors.record(std::time::Duration::from_micros(3));
-        let value = json(&[], &Names::default(), &[], false, &phase_errors);
-        assert_eq!(value["phase_errors"]["largest_ns"], 3_000);
+        let clocks = json(&[], &Names::default(), &[], false, &phase_errors);
+        assert_eq!(clocks.phase_errors.map(|times| (times.count, times.longest_ns)), Some((1, 3_000)));
     }
 }

@@ -1,4 +1,4 @@
-//! Servo drives of the demonstrated segment: enabled by the book of CiA 402, then moved back and forth.
+//! Servo drives of the demonstrated segment: enabled as CiA 402 says, then moved back and forth.
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Application, Entry, ProcessData};
@@ -39,7 +39,7 @@ impl State {
         }
     }
 
-    /// The controlword that leads on towards operation enabled.
+    /// The controlword for the next step to operation enabled.
     fn controlword(self) -> u64 {
         match self {
             State::NotReady => 0x00,
@@ -64,11 +64,11 @@ pub struct Drive {
     state: State,
     wanted: i32,
     moves: i32,
-    /// Where the drive said it is.
+    /// The actual position, as last read.
     pub position: i32,
     /// Cycles in which it was enabled and moved.
     pub enabled_cycles: u64,
-    /// The farthest it was from its target while enabled.
+    /// The largest distance from its target while enabled.
     pub lag: i32,
 }
 
@@ -92,7 +92,7 @@ impl Drive {
         })
     }
 
-    /// One cycle: looks at the state, commands the next one, moves where that is allowed.
+    /// One cycle: reads the state, commands the next one, moves when enabled.
     pub fn cycle(&mut self, data: &mut ProcessData<'_>) {
         self.state = State::decode(data.read(&self.statusword));
         self.position = data.read_signed(&self.actual) as i32;
@@ -111,7 +111,7 @@ impl Drive {
         }
     }
 
-    /// Its inputs are old: it was away, and what it lagged behind until now says nothing.
+    /// Its inputs are old: the drive was absent, and its lag until now means nothing.
     pub fn note_absence(&mut self) {
         self.state = State::NotReady;
         self.lag = 0;

@@ -1,6 +1,5 @@
-//! What the demonstration prints.
+//! The output of the demonstration.
 
-use std::io::{IsTerminal, stdout};
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
@@ -10,7 +9,9 @@ use ringcat::{Application, Event, Instant, Scan, SubDeviceState, TimedEvent};
 use super::incident::Incident;
 use super::plan::Plan;
 use super::watch::{Account, Watch};
-use crate::output::{say, write};
+use crate::json::demo::Check;
+use crate::output::{is_terminal, say, write, write_event};
+use crate::run_log::name_of;
 use crate::table;
 use crate::verdict::Verdict;
 
@@ -21,12 +22,13 @@ pub struct Reporter {
     /// A progress line is on the screen and has not been ended.
     line_open: bool,
     reached_op: Option<Instant>,
+    checks: Vec<Check>,
 }
 
 impl Reporter {
     /// A reporter on the standard output.
     pub fn new() -> Reporter {
-        Reporter { terminal: stdout().is_terminal(), line_open: false, reached_op: None }
+        Reporter { terminal: is_terminal(), line_open: false, reached_op: None, checks: Vec::new() }
     }
 
     /// A line without a time.
@@ -42,7 +44,18 @@ impl Reporter {
         }
     }
 
-    fn timed(&mut self, at: Instant, mark: &str, text: &str) {
+    /// When all SubDevices were in OP.
+    pub fn reached_op_at(&self) -> Option<Instant> {
+        self.reached_op
+    }
+
+    /// What was checked in the end.
+    pub fn into_checks(self) -> Vec<Check> {
+        self.checks
+    }
+
+    fn timed(&mut self, at: Instant, mark: &str, name: Option<String>, text: &str) {
+        write_event(at.since(Instant(0)), name, text);
         self.end_line();
         say!("{:>10.3} ms {mark} {text}", at.0 as f64 / 1e6);
     }
@@ -54,24 +67,24 @@ impl Reporter {
             write(format_args!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6));
             self.line_open = true;
         } else {
-            self.timed(event.at, " ", &text);
+            self.timed(event.at, " ", Some(name_of(&event.event)), &text);
         }
     }
 
     /// Any other event.
     pub fn event(&mut self, event: &TimedEvent, names: &Names) {
-        self.timed(event.at, " ", &describe(event, names));
+        self.timed(event.at, " ", Some(name_of(&event.event)), &describe(event, names));
     }
 
     /// Something the demonstration does.
     pub fn incident(&mut self, at: Instant, text: &str) {
-        self.timed(at, ">", text);
+        self.timed(at, ">", None, text);
     }
 
     /// All SubDevices are in OP.
     pub fn reached_op(&mut self, at: Instant, cycle: Duration) {
         self.reached_op = Some(at);
-        self.timed(at, ">", &format!("all SubDevices are in OP; cycle {} us", cycle.as_micros()));
+        self.timed(at, ">", None, &format!("all SubDevices are in OP; cycle {} us", cycle.as_micros()));
     }
 
     /// The SubDevices that were found.
@@ -83,7 +96,7 @@ impl Reporter {
         self.say("");
     }
 
-    /// Where every SubDevice is.
+    /// The state of every SubDevice.
     pub fn states(&mut self, application: &Application<SimulatedSegment>, names: &Names) {
         for (subdevice, state) in application.states().iter().enumerate() {
             let state = match state {
@@ -157,18 +170,19 @@ impl Reporter {
                 failed.push(text.clone());
             }
             reporter.say(&format!("  {} {text}", if held { "ok    " } else { "FAILED" }));
+            reporter.checks.push(Check { held, text });
         };
         let left: Vec<String> =
             watch.left_op.iter().map(|(subdevice, status)| format!("{subdevice} ({status})")).collect();
         let text = if left.is_empty() {
-            "nobody left OP but the one that lost its power".to_owned()
+            "no SubDevice left OP except the one without power".to_owned()
         } else {
             format!("left OP: SubDevices {}", left.join(", "))
         };
         verdict(self, left.is_empty(), text);
         if cycled {
             let back = watch.without_power.is_none() && application.all_settled();
-            verdict(self, back, "the one that lost its power is back in OP".to_owned());
+            verdict(self, back, "the SubDevice that lost its power is back in OP".to_owned());
         }
         let held = watch.accounts.iter().all(within);
         verdict(self, held, "at most one incomplete cycle per edge of a cable".to_owned());

@@ -1,5 +1,5 @@
-//! The demonstration's witness: runs the cycles with an application of its own, and compares what the MainDevice sees
-//! with what the simulated devices did.
+//! The checker of the demonstration: runs the cycles with an application of its own, and compares the process image with
+//! the simulated devices.
 //!
 //! Outputs: every cycle all output bytes change; one cycle later each device in OP must hold the bytes that were sent.
 //! Inputs: what each device offers is noted before a frame passes; the image must show just that one cycle later.
@@ -16,7 +16,7 @@ use super::incident::Incident;
 
 /// The only domain.
 const DOMAIN: DomainId = DomainId(0);
-/// A disagreement is described so often; further ones are only counted.
+/// Most disagreements that are described; further ones are only counted.
 const DESCRIBED: usize = 5;
 
 /// What was counted since an incident.
@@ -28,7 +28,7 @@ pub struct Account {
     pub cycles: u64,
     /// Cycles in which SubDevices that have power did not answer: the working counter lacked more than the one without.
     pub incomplete: u64,
-    /// Of the others, cycles in which inputs were held back because it was not known yet who was missing.
+    /// Of the others, cycles in which inputs were held back because it was not known yet which SubDevice is missing.
     pub held_back: u64,
     /// Of the others, cycles that lacked just the SubDevice without power.
     pub without_one: u64,
@@ -52,7 +52,7 @@ struct Place {
 #[derive(Debug)]
 pub struct Watch {
     places: Vec<Place>,
-    /// One account per incident; before the first, nothing is judged.
+    /// One account per incident; before the first, nothing is checked.
     pub accounts: Vec<Account>,
     /// The SubDevice that lost its power, until it is back in OP.
     pub without_power: Option<usize>,
@@ -70,7 +70,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A witness of all declared SubDevices.
+    /// A checker of all declared SubDevices.
     pub fn new(application: &Application<SimulatedSegment>, count: usize) -> Watch {
         let places = (0..count).map(|subdevice| Place::new(application, subdevice)).collect();
         Watch {
@@ -108,19 +108,19 @@ impl Watch {
     pub fn cycle(&mut self, application: &mut Application<SimulatedSegment>) {
         let Watch { places, drives, .. } = self;
         let number = application.cyclic_counters().sent;
-        let mut judgement = Judgement::default();
+        let mut finding = Finding::default();
         let mut wrong_inputs = Vec::new();
         let without_power = self.without_power;
         application.cycle(|data| {
-            judgement.status = data.status(DOMAIN);
-            judgement.missing = without_power.map_or(0, |subdevice| data.directory().contribution(subdevice));
+            finding.status = data.status(DOMAIN);
+            finding.missing = without_power.map_or(0, |subdevice| data.directory().contribution(subdevice));
             for (subdevice, place) in places.iter_mut().enumerate() {
                 let fresh = data.freshness(DOMAIN, subdevice) == Freshness::Fresh;
                 if !place.inputs.is_empty() {
-                    judgement.note(subdevice, fresh, without_power);
+                    finding.note(subdevice, fresh, without_power);
                     // Below SAFEOP a device offers nothing; it may have got there since.
                     if fresh && !place.offered.is_empty() {
-                        judgement.compared += 1;
+                        finding.compared += 1;
                         let seen = gather(data.image(DOMAIN), &place.inputs);
                         if seen != place.offered {
                             wrong_inputs.push((subdevice, seen, place.offered.clone()));
@@ -143,31 +143,31 @@ impl Watch {
             self.offer(application.links_mut().network_mut(), number);
             return;
         }
-        self.compared += judgement.compared;
+        self.compared += finding.compared;
         for (subdevice, seen, offered) in wrong_inputs {
             self.disagree(format!(
                 "inputs of SubDevice {subdevice}: the device offered {offered:02x?}, seen {seen:02x?}"
             ));
         }
-        self.keep_account(&judgement);
+        self.keep_account(&finding);
         self.check_devices(application.links().network());
         self.offer(application.links_mut().network_mut(), number);
     }
 
-    fn keep_account(&mut self, judgement: &Judgement) {
-        self.last_complete = judgement.all_with_power_answered();
+    fn keep_account(&mut self, finding: &Finding) {
+        self.last_complete = finding.all_with_power_answered();
         let Some(account) = self.accounts.last_mut() else { return };
         account.cycles += 1;
-        if !judgement.all_with_power_answered() {
+        if !finding.all_with_power_answered() {
             account.incomplete += 1;
-        } else if judgement.stale {
+        } else if finding.stale {
             account.held_back += 1;
-        } else if judgement.status.state != DomainState::Complete {
+        } else if finding.status.state != DomainState::Complete {
             account.without_one += 1;
         }
     }
 
-    /// States and outputs of all devices, seen from inside.
+    /// States and outputs of all devices, read inside the simulated device.
     fn check_devices(&mut self, network: &Network) {
         for subdevice in 0..self.places.len() {
             let device = network.device(self.places[subdevice].device);
@@ -226,7 +226,7 @@ impl Watch {
 
 /// What a cycle showed.
 #[derive(Debug, Default)]
-struct Judgement {
+struct Finding {
     status: DomainStatus,
     /// What the SubDevice without power would add to the working counter.
     missing: u32,
@@ -235,7 +235,7 @@ struct Judgement {
     stale: bool,
 }
 
-impl Judgement {
+impl Finding {
     fn note(&mut self, subdevice: usize, fresh: bool, without_power: Option<usize>) {
         if !fresh && without_power != Some(subdevice) {
             self.stale = true;

@@ -1,4 +1,4 @@
-//! What runs beside process data where it is asked for: network interfaces for EoE, the mailbox gateway.
+//! Optional services beside process data: network interfaces for EoE, the mailbox gateway.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -11,20 +11,26 @@ use ringcat_link::interface;
 
 use crate::failure::Failure;
 use crate::interfaces::InterfaceArguments;
-use crate::output::say;
+use crate::json::run;
+use crate::output::{say, warn};
 
-/// Options for it.
+/// Their options.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Mailboxes")]
 pub struct BesideArguments {
-    /// Make a network interface for each SubDevice that speaks Ethernet over EtherCAT: eoeXsY with this MainDevice's
-    /// number X and the position Y, or eoeXaY with the alias Y. Needs cap_net_admin.
+    /// Make a network interface for each SubDevice with Ethernet over EtherCAT
+    ///
+    /// Their names are eoeXsY with this MainDevice's number X and the position Y, or eoeXaY with the alias Y. Needs
+    /// cap_net_admin.
     #[arg(long)]
     eoe: bool,
-    /// Number of this MainDevice in the names of those interfaces.
+    /// Number of this MainDevice in the names of these interfaces
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     index: u16,
-    /// Open the mailbox gateway (ETG.8200, UDP and TCP) on this address, 127.0.0.1:34980 by default. It knows no
-    /// password: whoever reaches it may change SubDevices.
+    /// Open the mailbox gateway (ETG.8200, UDP and TCP)
+    ///
+    /// On 127.0.0.1:34980 where no address is given. It has no password: every program that reaches it may change
+    /// SubDevices.
     #[arg(
         long,
         value_name = "ADDR[:PORT]",
@@ -43,11 +49,11 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 impl BesideArguments {
-    /// Starts what was asked for.
+    /// Starts the services of the options.
     pub fn start(&self, supervisor: &SupervisorThread, interfaces: &InterfaceArguments) -> Result<Beside, Failure> {
         let mut beside = Beside { ethernet: None, gateway: None };
         if self.eoe {
-            let main = interface::list().into_iter().find(|found| found.name == interfaces.main);
+            let main = interface::list().into_iter().find(|found| found.name == interfaces.links.main);
             let main = main.map(|found| found.mac).unwrap_or_default();
             beside.ethernet = Some(supervisor.start_ethernet(EthernetOptions { index: self.index, main })?);
         }
@@ -55,9 +61,9 @@ impl BesideArguments {
             let gateway = supervisor.start_gateway(GatewayOptions { address, ..GatewayOptions::default() })?;
             say!("mailbox gateway on {} (UDP and TCP)", gateway.address());
             if !address.ip().is_loopback() {
-                eprintln!(
-                    "ringcat: the mailbox gateway has no password: whoever reaches {address} may change SubDevices"
-                );
+                warn(format_args!(
+                    "the mailbox gateway has no password: every program that reaches {address} may change SubDevices"
+                ));
             }
             beside.gateway = Some(gateway);
         }
@@ -65,7 +71,7 @@ impl BesideArguments {
     }
 }
 
-/// What was started; it ends when this is dropped.
+/// The services that run; they end when this is dropped.
 #[derive(Debug)]
 pub struct Beside {
     ethernet: Option<Ethernet>,
@@ -73,13 +79,46 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// What has happened since this was asked last.
+    /// What has happened since the last call.
     pub fn news(&self) -> Vec<String> {
         let news = self.ethernet.iter().flat_map(Ethernet::take_news);
         news.map(|news| news.to_string()).collect()
     }
 
-    /// What passed, for the summary.
+    /// The network interfaces for EoE, as keys of JSON.
+    pub fn json_ethernet(&self) -> Vec<run::Ethernet> {
+        let interfaces = self.ethernet.iter().flat_map(Ethernet::interfaces);
+        let json = |EthernetInterface { name, subdevice, status, refused }: EthernetInterface| run::Ethernet {
+            interface: name,
+            subdevice: subdevice.subdevice,
+            sent_frames: status.counters.tx_frames,
+            sent_bytes: status.counters.tx_bytes,
+            dropped_frames: status.counters.tx_dropped,
+            received_frames: status.counters.rx_frames,
+            received_bytes: status.counters.rx_bytes,
+            incomplete_frames: status.counters.rx_lost + status.counters.malformed,
+            overrun_frames: status.counters.rx_overruns,
+            refused_frames: refused,
+        };
+        interfaces.map(json).collect()
+    }
+
+    /// The mailbox gateway, as keys of JSON.
+    pub fn json_gateway(&self) -> Option<run::Gateway> {
+        let counters = self.gateway.as_ref()?.counters();
+        let relay = counters.relay;
+        Some(run::Gateway {
+            connections: counters.connections,
+            closed_connections: counters.ended,
+            messages: relay.messages,
+            answers: relay.answers,
+            refused_messages: relay.refused + relay.malformed,
+            unanswered_messages: relay.unanswered,
+            ended_transfers: relay.ended,
+        })
+    }
+
+    /// Prints what passed, for the summary.
     pub fn account(&self) {
         if let Some(ethernet) = &self.ethernet {
             let interfaces = ethernet.interfaces();

@@ -13,29 +13,38 @@ use ringcat::text::Names;
 use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
 
 use crate::failure::Failure;
-use crate::output::say;
+use crate::json::run;
+use crate::output::{say, warn};
 
-/// Values of a variable are told so often at most.
-const TELL_PERIOD: Duration = Duration::from_secs(1);
-/// Names that are told where one is not known: as many, and so like it (1 is equal).
+/// Shortest time between two printed values of a variable.
+const PRINT_PERIOD: Duration = Duration::from_secs(1);
+/// Similar names in an error: at most this number, at least this alike (1 is equal).
 const NEAR: usize = 3;
 const LIKE: f64 = 0.6;
 
 /// Options about an ENI.
 #[derive(Args, Debug, Default)]
+#[command(next_help_heading = "Segment")]
 pub struct EniArguments {
-    /// Bring the network of this ENI to OP (TwinCAT, EC-Engineer and others export it) instead of whatever is there;
-    /// see docs/eni.md, and `ringcat eni FILE` for what of it is followed.
+    /// Bring the network of this ENI to OP, instead of the SubDevices found
+    ///
+    /// TwinCAT, EC-Engineer and other tools export an ENI. `ringcat eni FILE` shows what of it is followed; see
+    /// docs/eni.md.
     #[arg(long, value_name = "FILE", conflicts_with = "cycle")]
     eni: Option<PathBuf>,
-    /// Send LRD and LWR where the file has an LRW over several SubDevices, which two interfaces cannot have.
+    /// Send LRD and LWR where the file has an LRW over several SubDevices
+    ///
+    /// With two interfaces that is necessary: a break of the ring would divide the LRW.
     #[arg(long, requires = "eni")]
     split_lrw: bool,
-    /// Output variable of the file with the value that it has from the first cycle on; may be given several times.
+    /// Give this output variable of the file a value from the first cycle on
+    ///
+    /// May be given several times.
     #[arg(long, value_name = "NAME=VALUE", requires = "eni")]
     set: Vec<String>,
-    /// Variable of the file whose value is told when it changes, at most once a second, and in the end; may be given
-    /// several times.
+    /// Print the value of this variable of the file when it changes
+    ///
+    /// At most once a second, and in the end. May be given several times.
     #[arg(long, value_name = "NAME", requires = "eni")]
     watch: Vec<String>,
 }
@@ -50,7 +59,7 @@ pub struct EniNetwork {
 }
 
 impl EniArguments {
-    /// Reads the file, if there is one, and tells what of it is not followed.
+    /// Reads the file, if there is one, and prints what of it is not followed.
     pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
         let Some(path) = &self.eni else { return Ok(None) };
         let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
@@ -71,12 +80,12 @@ impl EniArguments {
 }
 
 impl EniNetwork {
-    /// What people call the SubDevices.
+    /// Names of the SubDevices.
     pub fn names(&self) -> Names {
         self.file.names()
     }
 
-    /// Whether nothing about process data is left to the SubDevices themselves.
+    /// Whether the file declares the process data of every SubDevice.
     pub fn is_complete(&self) -> bool {
         self.file.configuration.declaration.subdevices.iter().all(|config| config.declared.is_some())
     }
@@ -86,11 +95,11 @@ impl EniNetwork {
         self.file.configuration.at_station(station)
     }
 
-    /// What is activated, where the SubDevices that were found are those of the file. Each that is not is told.
+    /// The declaration, where the SubDevices that were found are those of the file. Prints each difference.
     pub fn declaration(&self, found: &[SubDeviceInfo]) -> Result<Declaration, Failure> {
         let differences = self.file.compare(found);
         for difference in &differences {
-            eprintln!("ringcat: {difference}");
+            warn(difference);
         }
         if differences.iter().any(|difference| difference.is_grave) {
             return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
@@ -98,15 +107,15 @@ impl EniNetwork {
         Ok(self.file.declaration(self.split_lrw))
     }
 
-    /// How many SubDevices are there and not in the file. [`EniNetwork::declaration`] tells each; they stay in INIT.
+    /// Number of SubDevices on the bus that the file lacks. [`EniNetwork::declaration`] prints each; they stay in INIT.
     pub fn undeclared(&self, found: &[SubDeviceInfo]) -> usize {
         self.file.compare(found).iter().filter(|difference| difference.subdevice.is_none()).count()
     }
 
-    /// Cables that are not where the file says. The network works all the same.
-    pub fn tell_cables(&self, scan: &Scan) {
+    /// Warns of cables that are not where the file says. The network works all the same.
+    pub fn report_cables(&self, scan: &Scan) {
         for difference in self.file.compare_cables(&scan.subdevices, &scan.topology) {
-            eprintln!("ringcat: {difference}");
+            warn(difference);
         }
     }
 
@@ -115,22 +124,23 @@ impl EniNetwork {
         match error {
             Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw)) => {
                 let names = self.names().0;
-                let who: Vec<&str> = lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
+                let members: Vec<&str> =
+                    lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
                 Failure::new(format!(
                     "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a \
                      break of the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave \
                      --redundant out",
                     lrw.name,
                     lrw.length,
-                    who.len(),
-                    who.join(", ")
+                    members.len(),
+                    members.join(", ")
                 ))
             }
             other => Failure::from(other),
         }
     }
 
-    /// All that can be wrong with variables shows before anything is sent.
+    /// Checks all variables of the options before anything is sent.
     fn check_variables(&self) -> Result<(), Failure> {
         self.set.iter().try_for_each(|text| self.assignment(text).map(|_| ()))?;
         self.watch.iter().try_for_each(|name| self.variable("--watch", name, Direction::Inputs).map(|_| ()))
@@ -152,7 +162,7 @@ impl EniNetwork {
         })?;
         if variable.subdevice.is_none() {
             return Err(Failure::new(format!(
-                "{option}: \"{name}\" is nobody's process data: nothing writes or reads it"
+                "{option}: \"{name}\" belongs to no SubDevice: nothing writes or reads it"
             )));
         }
         Ok((number, variable))
@@ -180,7 +190,7 @@ impl EniNetwork {
         Ok((number, bits))
     }
 
-    /// What the cycles do, and what they show.
+    /// The work of the cycles, and the variables to print.
     pub fn work(&self, directory: &Directory) -> Result<(Work, Watched), Failure> {
         let mut image =
             EniImage::new(&self.file.configuration, directory).map_err(|error| Failure::new(error.to_string()))?;
@@ -191,7 +201,7 @@ impl EniNetwork {
         }
         for subdevice in image.unplaced() {
             let name = self.names().0.get(*subdevice).cloned().unwrap_or_default();
-            eprintln!("ringcat: SubDevice {subdevice} \"{name}\" has places in the file's image and no process data");
+            warn(format_args!("SubDevice {subdevice} \"{name}\" has places in the file's image and no process data"));
         }
         let watched = self.watch.iter().map(|name| {
             let (number, _) = self.variable("--watch", name, Direction::Inputs)?;
@@ -200,12 +210,12 @@ impl EniNetwork {
         let watched: Vec<EniVariable> = watched.collect::<Result<_, Failure>>()?;
         let values: Arc<[AtomicU64]> = watched.iter().map(|_| AtomicU64::new(0)).collect();
         let work = Work { image, watched: watched.clone(), values: values.clone() };
-        let told = vec![None; watched.len()];
-        Ok((work, Watched { watched, values, told, next: Instant(0) }))
+        let printed = vec![None; watched.len()];
+        Ok((work, Watched { watched, values, printed, next: Instant(0) }))
     }
 }
 
-/// Names that look like one that is not there, the likest first, in quotation marks.
+/// Names similar to an unknown one, the most similar first, in quotation marks.
 fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let wanted = wanted.to_lowercase();
     let likeness = |name: &str| {
@@ -219,7 +229,7 @@ fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
     near.into_iter().take(NEAR).map(|(_, name)| format!("\"{name}\"")).collect()
 }
 
-/// What is done in each cycle; it neither allocates nor waits.
+/// The work of each cycle; it neither allocates nor waits.
 #[derive(Debug)]
 pub struct Work {
     image: EniImage,
@@ -237,39 +247,48 @@ impl Work {
         self.image.give_outputs(data);
     }
 
-    /// What the file copies from inputs to outputs.
+    /// Inputs that the file copies to outputs.
     pub fn copies(&self) -> &[ringcat::CopyRule] {
         self.image.copies()
     }
 }
 
-/// Variables that are told.
+/// Variables that are printed.
 #[derive(Debug, Default)]
 pub struct Watched {
     watched: Vec<EniVariable>,
     values: Arc<[AtomicU64]>,
-    told: Vec<Option<u64>>,
+    printed: Vec<Option<u64>>,
     next: Instant,
 }
 
 impl Watched {
-    /// Lines about what has changed since the last ones, where it is time for them.
+    /// Lines for variables that have changed since the last call, at most once a second.
     pub fn news(&mut self, now: Instant) -> Vec<String> {
         if now < self.next || self.watched.is_empty() {
             return Vec::new();
         }
-        self.next = now + TELL_PERIOD;
+        self.next = now + PRINT_PERIOD;
         let mut lines = Vec::new();
-        for ((variable, value), told) in self.watched.iter().zip(self.values.iter()).zip(&mut self.told) {
+        for ((variable, value), printed) in self.watched.iter().zip(self.values.iter()).zip(&mut self.printed) {
             let value = value.load(Ordering::Relaxed);
-            if told.replace(value) != Some(value) {
+            if printed.replace(value) != Some(value) {
                 lines.push(line(variable, value));
             }
         }
         lines
     }
 
-    /// The last values.
+    /// The last values as keys of JSON.
+    pub fn json(&self) -> Vec<run::Variable> {
+        let json = |(variable, value): (&EniVariable, &AtomicU64)| run::Variable {
+            name: variable.name.clone(),
+            value: shown(variable, value.load(Ordering::Relaxed)),
+        };
+        self.watched.iter().zip(self.values.iter()).map(json).collect()
+    }
+
+    /// Prints the last values.
     pub fn account(&self) {
         for (variable, value) in self.watched.iter().zip(self.values.iter()) {
             say!("  {}", line(variable, value.load(Ordering::Relaxed)));
@@ -278,9 +297,14 @@ impl Watched {
 }
 
 fn line(variable: &EniVariable, value: u64) -> String {
+    format!("{} = {}", variable.name, shown(variable, value))
+}
+
+/// A value as its type writes it.
+fn shown(variable: &EniVariable, value: u64) -> String {
     let bits = u16::try_from(variable.bits.min(64)).unwrap_or(64);
     let value: Value = variable.data_type.value(value, bits);
-    format!("{} = {value}", variable.name)
+    value.to_string()
 }
 
 #[cfg(test)]
@@ -300,7 +324,7 @@ mod tests {
 
     // covers: eni-run
     #[test]
-    fn variables_are_set_and_told_and_what_cannot_be_is_refused_with_its_name() {
+    fn variables_are_set_and_printed_and_unknown_ones_are_refused_by_name() {
         let segment = SimulatedSegment::new(network(&[], &[]).file.simulated(false).unwrap());
         let mut main_device = MainDevice::request(segment, &Options::default());
         let found = main_device.scan().unwrap().subdevices;
@@ -348,13 +372,13 @@ mod tests {
             let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
             EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
         };
-        // Byte 1 of the images belongs to nobody.
-        let nobodys = "<BitOffs>8</BitOffs>";
-        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["Lamps.Channel 1=1"], &[]);
-        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
-        let free = changed("<BitOffs>0</BitOffs>", nobodys, &[], &["Buttons.Channel 1"]);
-        assert!(free.check_variables().unwrap_err().to_string().contains("nobody's process data"));
-        let free = changed("<BitOffs>0</BitOffs>", nobodys, &["uttons.Channel 1=1"], &[]);
+        // Byte 1 of the images belongs to no SubDevice.
+        let unowned = "<BitOffs>8</BitOffs>";
+        let free = changed("<BitOffs>0</BitOffs>", unowned, &["Lamps.Channel 1=1"], &[]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("belongs to no SubDevice"));
+        let free = changed("<BitOffs>0</BitOffs>", unowned, &[], &["Buttons.Channel 1"]);
+        assert!(free.check_variables().unwrap_err().to_string().contains("belongs to no SubDevice"));
+        let free = changed("<BitOffs>0</BitOffs>", unowned, &["uttons.Channel 1=1"], &[]);
         let text = free.check_variables().unwrap_err().to_string();
         assert!(text.contains("similar: ") && !text.contains("\"Buttons.Channel 1\""), "{text}");
         let same = changed("Lamps.Channel 1", "Buttons.Channel 1", &["Buttons.Channel 1=1"], &["Buttons.Channel 1"]);
@@ -370,7 +394,7 @@ mod tests {
         let network = network(&[], &[]);
         let lrw = network.file.configuration.declaration.explicit_lrw[0].clone();
         let text = network.explain(Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw))).to_string();
-        let who = "(Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))";
-        assert!(text.contains(who) && text.contains("add --split-lrw"), "{text}");
+        let members = "(Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))";
+        assert!(text.contains(members) && text.contains("add --split-lrw"), "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! The exchange of process data: until all SubDevices are in OP, and then until its end, with what is told meanwhile.
+//! The exchange of process data: until all SubDevices are in OP, and then until its end, with the events meanwhile.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -12,24 +12,24 @@ use super::eni::Watched;
 use super::live::{self, Live};
 use crate::ending::EndRequest;
 use crate::interfaces::now;
-use crate::output::say;
+use crate::output::{say, warn, write_event};
 use crate::recording::Recording;
 use crate::run_log::{RunLog, Shown};
 use crate::times::in_words;
 
-/// From then to complete process data at the most, before that is told.
+/// From OP to complete process data at the most, before incomplete process data is reported.
 const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
-/// Pause between two looks at what the threads do.
+/// Pause between two checks of the threads.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// Cycles that run, and what is told of them.
+/// Cycles that run, and what is printed about them.
 pub struct Run {
     pub cycles: CyclicThread<Tee<PacketLinks>>,
     pub log: RunLog,
     pub live: Live,
     /// Distributed clocks are in use.
     pub clocks: bool,
-    /// How many domains there are.
+    /// Number of domains.
     pub domains: usize,
     pub beside: Beside,
     /// Variables of a file.
@@ -38,26 +38,22 @@ pub struct Run {
 }
 
 impl Run {
-    /// Tells what has happened since the last look.
+    /// Prints what has happened since the last call.
     fn look(&mut self) {
         self.log.news(&self.cycles, now(), |shown| {
             self.live.clear();
-            match shown {
-                Shown::Line(line) => say!("{line}"),
-                Shown::Warning(words) => eprintln!("ringcat: {words}"),
-            }
+            print(shown);
         });
-        for words in self.beside.news() {
+        for words in self.beside.news().into_iter().chain(self.recording.failure()) {
             self.live.clear();
-            eprintln!("ringcat: {words}");
-        }
-        if let Some(words) = self.recording.failure() {
-            self.live.clear();
-            eprintln!("ringcat: {words}");
+            warn(words);
         }
         for line in self.watched.news(now()) {
             self.live.clear();
             say!("{line}");
+            if let Shown::Event { time, text, .. } = self.log.words(now(), &line) {
+                write_event(time, None, &text);
+            }
         }
     }
 
@@ -84,7 +80,7 @@ impl Run {
             if !in_op && now() >= until {
                 self.look();
                 self.live.clear();
-                self.tell_states(limit);
+                self.print_states(limit);
                 return Err(self.what_is_missing(limit));
             }
             self.look();
@@ -97,18 +93,18 @@ impl Run {
         let reached = now();
         self.look();
         self.live.clear();
-        say!("{}", self.log.events().line(reached, "all SubDevices are in OP"));
+        print(self.log.words(reached, "all SubDevices are in OP"));
         for words in self.incomplete() {
-            say!("{}", self.log.events().line(reached, &format!("process data is not exchanged as declared: {words}")));
+            print(self.log.words(reached, &format!("process data is not exchanged as declared: {words}")));
         }
         self.cycles.news().restart_histograms();
         Ok(())
     }
 
-    /// Domains whose last judgement is not complete, in words.
+    /// Domains whose last cycle was not complete, in words.
     pub fn incomplete(&self) -> Vec<String> {
-        let judged = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
-        let incomplete = judged.filter(|(_, status)| status.state != DomainState::Complete);
+        let statuses = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
+        let incomplete = statuses.filter(|(_, status)| status.state != DomainState::Complete);
         incomplete
             .map(|(domain, status)| {
                 let (wkc, expected) = (status.wkc, status.expected);
@@ -121,7 +117,7 @@ impl Run {
         self.incomplete().is_empty()
     }
 
-    /// Why OP was not reached.
+    /// The reason why OP was not reached.
     fn what_is_missing(&self, limit: Duration) -> String {
         let limit = in_words(limit);
         let states = self.cycles.supervisor().states();
@@ -132,7 +128,7 @@ impl Run {
         format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
     }
 
-    fn tell_states(&self, limit: Duration) {
+    fn print_states(&self, limit: Duration) {
         let what = if self.clocks_locked() { "reached OP" } else { "reached OP with all clocks locked" };
         say!("not all SubDevices {what} within {}:", in_words(limit));
         for (subdevice, state) in self.cycles.supervisor().states().iter().enumerate() {
@@ -150,7 +146,7 @@ impl Run {
         }
     }
 
-    /// Tells how the exchange goes, until a time or until an end is asked for.
+    /// Prints events of the exchange, until a time or a request to end.
     pub fn exchange(&mut self, until: Instant, end: &EndRequest) {
         end.limit(until);
         while now() < until && !end.is_asked() && !self.cycles.has_ended() {
@@ -160,5 +156,16 @@ impl Run {
         }
         self.look();
         self.live.clear();
+    }
+}
+
+/// Prints an event, as a line for people or of JSON, or a warning.
+fn print(shown: Shown) {
+    match shown {
+        Shown::Event { line, time, name, text } => {
+            say!("{line}");
+            write_event(time, name, &text);
+        }
+        Shown::Warning(words) => warn(words),
     }
 }

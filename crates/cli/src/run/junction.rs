@@ -1,12 +1,14 @@
-//! The option `--junction`: what becomes of rings behind junctions.
+//! The option `--junction`: how rings behind junctions are handled.
 
 use ringcat::{JunctionConnection, JunctionMode};
 
 /// How the option is explained.
-pub const HELP: &str = "Rings behind junctions: disabled, automatic (those that are there at the scan are learned), or \
-    strict=HEAD:PORT-TAIL:PORT[,...] with the positions of the junction and of the last SubDevice of its ring, and the \
-    ports of the cable between them (head: port 1). With --eni, @ and the station address of the file may take the \
-    place of a position, as in @1001:1-@1004:1";
+pub const HELP: &str = "Rings behind junctions: disabled, automatic or strict=CONNECTIONS";
+pub const LONG_HELP: &str = "Rings behind junctions: disabled, automatic or strict=CONNECTIONS\n\n\
+    automatic learns the rings that are closed at the scan. strict takes HEAD:PORT-TAIL:PORT[,...]: the positions of \
+    the junction and of the last SubDevice of its ring, and the ports of the cable between them (head: port 1), as in \
+    strict=1:1-4:1. With --eni, @ and the station address of the file may take the place of a position, as in \
+    @1001:1-@1004:1.";
 
 /// A mode, and the connections that strict needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -17,28 +19,28 @@ pub struct Junctions {
     pub connections: Vec<Connection>,
 }
 
-/// A connection as it is written.
+/// A connection of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Connection {
-    head: (Who, u8),
-    tail: (Who, u8),
+    head: (Place, u8),
+    tail: (Place, u8),
 }
 
-/// A SubDevice as it is written.
+/// A SubDevice of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Who {
-    /// `4`: by its position.
+enum Place {
+    /// `4`: its position.
     Position(usize),
-    /// `@1004`: by the station address that an ENI gives it.
+    /// `@1004`: the station address that an ENI gives it.
     Station(u16),
 }
 
 impl Connection {
     /// With indices in the declaration; `at_station` finds those of station addresses.
     pub fn resolve(&self, at_station: impl Fn(u16) -> Option<usize>) -> Result<JunctionConnection, String> {
-        let index = |who: Who| match who {
-            Who::Position(position) => Ok(position),
-            Who::Station(station) => at_station(station).ok_or_else(|| {
+        let index = |place: Place| match place {
+            Place::Position(position) => Ok(position),
+            Place::Station(station) => at_station(station).ok_or_else(|| {
                 format!("--junction: no SubDevice has station address {station} in an ENI (--eni FILE)")
             }),
         };
@@ -67,20 +69,20 @@ fn connection(text: &str) -> Result<Connection, String> {
         return Err(format!("expected HEAD:PORT-TAIL:PORT, as in 1:1-4:1, got \"{text}\""));
     };
     let connection = Connection { head, tail };
-    // How many SubDevices there are is not known yet, nor who has which station address.
+    // The number of SubDevices and their station addresses are not known yet.
     let known = JunctionConnection { head: 0, head_port: head.1, tail: 1, tail_port: tail.1 };
     let known = connection.resolve(|_| None).unwrap_or(known);
     known.check(&[], usize::MAX).map_err(|error| error.to_string())?;
     Ok(connection)
 }
 
-fn end(text: &str) -> Option<(Who, u8)> {
-    let (who, port) = text.split_once(':')?;
-    let who = match who.strip_prefix('@') {
-        Some(station) => Who::Station(station.parse().ok()?),
-        None => Who::Position(who.parse().ok()?),
+fn end(text: &str) -> Option<(Place, u8)> {
+    let (place, port) = text.split_once(':')?;
+    let place = match place.strip_prefix('@') {
+        Some(station) => Place::Station(station.parse().ok()?),
+        None => Place::Position(place.parse().ok()?),
     };
-    Some((who, port.parse().ok()?))
+    Some((place, port.parse().ok()?))
 }
 
 #[cfg(test)]
@@ -95,8 +97,8 @@ mod tests {
             connections: list
                 .iter()
                 .map(|&(head, head_port, tail, tail_port)| Connection {
-                    head: (Who::Position(head), head_port),
-                    tail: (Who::Position(tail), tail_port),
+                    head: (Place::Position(head), head_port),
+                    tail: (Place::Position(tail), tail_port),
                 })
                 .collect(),
         };

@@ -1,9 +1,8 @@
-//! A table on a terminal that is drawn anew over itself: how the cycles go, and which SubDevice is how far.
+//! A table on a terminal that is drawn over itself: figures of the cycles, states of the SubDevices.
 //!
 //! Where the standard output is no terminal, nothing is drawn.
 
 use std::fmt::Write as _;
-use std::io::{IsTerminal, stdout};
 use std::time::Duration;
 
 use ringcat::news::News;
@@ -13,12 +12,12 @@ use ringcat::{
     SupervisorThread,
 };
 
-use crate::output::write;
+use crate::output::{is_terminal, write};
 use crate::times::us;
 
-/// It is drawn anew so often.
+/// Time between two drawings.
 const PERIOD: Duration = Duration::from_millis(500);
-/// SubDevices that are listed; of more of them, first those that are not in OP.
+/// Most SubDevices in the list; of more of them those that are not in OP.
 const LISTED: usize = 16;
 /// Lines must not break on any terminal, or there would be more of them than are drawn over.
 const WIDTH: usize = 79;
@@ -27,7 +26,7 @@ const WIDTH: usize = 79;
 #[derive(Debug)]
 pub struct Live {
     terminal: bool,
-    /// Whether there is a ring whose state is worth a word.
+    /// Whether there is a ring.
     ring: bool,
     /// Whether there are distributed clocks.
     clocks: bool,
@@ -40,10 +39,10 @@ impl Live {
     /// A table on the standard output, if that is a terminal, of a MainDevice with two links or one, with distributed
     /// clocks or without.
     pub fn new(ring: bool, clocks: bool) -> Live {
-        Live { terminal: stdout().is_terminal(), ring, clocks, next: Instant(0), drawn: 0 }
+        Live { terminal: is_terminal(), ring, clocks, next: Instant(0), drawn: 0 }
     }
 
-    /// Draws it where it is time to.
+    /// Draws the table, when it is time for that.
     pub fn show(&mut self, now: Instant, news: &News, supervisor: &SupervisorThread, names: &Names) {
         if !self.terminal || now < self.next {
             return;
@@ -58,7 +57,7 @@ impl Live {
         write(format_args!("{}\n", lines.join("\n")));
     }
 
-    /// Takes it off the terminal, so that something else can be told.
+    /// Removes the table from the terminal, so that other lines can be printed.
     pub fn clear(&mut self) {
         if self.drawn > 0 {
             // To the first line of the table, then clear to the end of the screen (ECMA-48: CPL, ED).
@@ -141,7 +140,7 @@ fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
     lines
 }
 
-/// How far a SubDevice is, in words.
+/// State of a SubDevice in words.
 pub fn word(state: SubDeviceState) -> String {
     match state {
         SubDeviceState::Absent => "does not answer".to_owned(),
@@ -150,7 +149,7 @@ pub fn word(state: SubDeviceState) -> String {
     }
 }
 
-/// How many are how far.
+/// Number of SubDevices in each state.
 fn count(states: &[SubDeviceState]) -> String {
     let mut kinds: Vec<(SubDeviceState, usize)> = Vec::new();
     for state in states {

@@ -8,7 +8,7 @@ use super::exchange::Run;
 use super::live;
 use crate::output::counted;
 
-/// A cycle time is not kept where more cycles than this part were left out.
+/// The cycle time was not kept if more than one cycle in this many was left out.
 const LEFT_OUT_PART: u64 = 10;
 
 /// Counters at a moment.
@@ -19,7 +19,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Now.
+    /// The present ones.
     pub fn of(news: &News) -> Seen {
         Seen { counters: news.counters(), pace: news.pace() }
     }
@@ -41,7 +41,7 @@ pub struct Exchanged {
 
 impl Exchanged {
     /// At the end of the exchange, while cycles still run.
-    pub fn look(run: &Run, before: &Seen, is_ring: bool, clocks: &[ClockStatus]) -> Exchanged {
+    pub fn of(run: &Run, before: &Seen, is_ring: bool, clocks: &[ClockStatus]) -> Exchanged {
         let supervisor = run.cycles.supervisor();
         Exchanged {
             before: *before,
@@ -54,7 +54,7 @@ impl Exchanged {
         }
     }
 
-    /// What did not hold; nothing where all did. What says the same of the same frames is said once.
+    /// What did not hold; empty where everything held. Frames that several counters have counted are named once.
     pub fn reasons(&self, names: &Names) -> Vec<String> {
         let (before, after) = (&self.before.counters, &self.after.counters);
         let gained = |count: fn(&CyclicCounters) -> u64| count(after).saturating_sub(count(before));
@@ -69,7 +69,7 @@ impl Exchanged {
                 reasons.push(format!("{} {what}", counted(count as usize, "frame", "frames")));
             }
         }
-        // A frame that did not come back in time makes its cycle incomplete; that was said.
+        // A frame that did not come back in time makes its cycle incomplete, and is named already.
         let incomplete = gained(|counters| counters.incomplete).saturating_sub(lost);
         let cycles = self.after.pace.cycles.saturating_sub(self.before.pace.cycles);
         if incomplete > 0 {
@@ -92,6 +92,21 @@ impl Exchanged {
             reasons.push(format!("{unlocked} of {} clocks not locked", self.clocks.len()));
         }
         reasons
+    }
+
+    /// The clocks.
+    pub fn clocks(&self) -> &[ClockStatus] {
+        &self.clocks
+    }
+
+    /// The SubDevices.
+    pub fn states(&self) -> &[SubDeviceState] {
+        &self.states
+    }
+
+    /// The ring, where there is to be one.
+    pub fn ring(&self) -> Option<RingState> {
+        self.ring
     }
 
     /// SubDevices that left their state; the first by name.
@@ -156,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn subdevices_the_ring_and_clocks_have_to_be_as_they_should_at_the_end() {
+    fn subdevices_ring_and_clocks_are_checked_at_the_end() {
         let states = vec![SubDeviceState::Absent, SubDeviceState::Settled(AlState::Op), SubDeviceState::Configuring];
         let mut exchanged = Exchanged { states, all_settled: false, ring: Some(RingState::Open), ..settled() };
         exchanged.clocks = vec![ClockStatus::default(), ClockStatus { is_reference: true, ..ClockStatus::default() }];

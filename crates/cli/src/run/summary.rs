@@ -1,4 +1,4 @@
-//! What `ringcat run` tells in the end.
+//! The summary of `ringcat run`, as text and as the keys of JSON.
 
 use std::time::Duration;
 
@@ -6,17 +6,94 @@ use ringcat::news::News;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::Names;
-use ringcat::{Application, ClockStatus, Link, Links, SupervisorThread};
+use ringcat::{AcyclicCounters, Application, ClockStatus, Link, Links, SupervisorThread, SyncSignals};
 
+use super::reasons::Exchanged;
 use crate::clock_options::farthest;
-use crate::interfaces::now;
+use crate::clocks;
+use crate::interfaces::{LinkNames, now};
+use crate::json::run;
+use crate::json::values::{State, Times};
 use crate::output::say;
 use crate::surroundings::Surroundings;
 
-/// What is under way when the last frame was sent is back within.
+/// Frames that are under way when the last frame was sent are back within this time.
 const LAST_FRAMES: Duration = Duration::from_millis(20);
 
-/// How the exchange of process data went.
+/// What is known at the end of the exchange of process data, before the stop.
+pub struct End {
+    /// Cycle time.
+    pub cycle: Duration,
+    /// Whether all SubDevices reached OP.
+    pub reached_op: bool,
+    /// SYNC signals by SubDevice.
+    pub signals: Vec<Option<SyncSignals>>,
+    /// States, ring and clocks.
+    pub exchanged: Exchanged,
+}
+
+/// The keys of JSON, as of the end of the exchange.
+pub fn json(
+    application: &Application<Tee<PacketLinks>, SupervisorThread>,
+    end: &End,
+    names: &Names,
+    clocks_in_use: bool,
+) -> run::Run {
+    let (pace, cyclic, news) = (application.pace(), application.cyclic_counters(), application.news());
+    let exchanged = &end.exchanged;
+    let locked = exchanged.clocks().iter().all(|clock| clock.is_locked || clock.is_reference);
+    run::Run {
+        cycle_ns: end.cycle.as_nanos() as u64,
+        reached_op: end.reached_op,
+        states: State::of_all(exchanged.states(), &names.0),
+        ring: exchanged.ring().map(Into::into),
+        cycles: run::Cycles {
+            count: pace.cycles,
+            incomplete: cyclic.incomplete,
+            frames_still_out: cyclic.skipped,
+            left_out: pace.skipped,
+            late_wake_ups: pace.late,
+            longest_delay_ns: pace.longest_delay.as_nanos() as u64,
+            postponed: pace.paused,
+        },
+        process_data: run::ProcessData {
+            sent_frames: cyclic.sent,
+            missing_frames: cyclic.missing(),
+            late_frames: cyclic.lost_late,
+            damaged_frames: cyclic.lost_damaged,
+            lost_copies: cyclic.copies_lost + cyclic.half,
+            late_copies: cyclic.late,
+            damaged_copies: cyclic.corrupt,
+            foreign_frames: cyclic.foreign,
+        },
+        acyclic: application.acyclic_counters().into(),
+        round_trips: Times::of(application.round_trips()),
+        wake_ups: Times::of(news.wake_ups()),
+        clocks: clocks_in_use
+            .then(|| clocks::json(exchanged.clocks(), names, &end.signals, locked, news.phase_errors())),
+        interfaces: Vec::new(),
+        ethernet: Vec::new(),
+        gateway: None,
+        variables: Vec::new(),
+        stopped: false,
+    }
+}
+
+impl From<AcyclicCounters> for run::Acyclic {
+    fn from(counters: AcyclicCounters) -> run::Acyclic {
+        run::Acyclic {
+            sent_frames: counters.sent,
+            lost_frames: counters.lost,
+            lost_copies: counters.half,
+            late_copies: counters.late,
+            datagrams: counters.datagrams,
+            resent_datagrams: counters.resent,
+            foreign_frames: counters.foreign,
+        }
+    }
+}
+
+/// Prints how the exchange of process data went.
 pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surroundings: &Surroundings) {
     let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
     say!("\nsummary");
@@ -54,7 +131,7 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
     say!("  wake-ups: {}", application.news().wake_ups());
 }
 
-/// How the clocks kept together.
+/// Prints how the clocks kept together.
 pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
     let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
     say!("  clocks: {locked} of {} locked", clocks.len());
@@ -71,8 +148,14 @@ pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
     }
 }
 
-/// What the interfaces have carried from the first frame to the last, the stop included.
-pub fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread) {
+/// Prints what the interfaces have carried from the first frame to the last, the stop included; the same as keys of
+/// JSON.
+pub fn final_account(
+    links: &mut Tee<PacketLinks>,
+    supervisor: &SupervisorThread,
+    names: &LinkNames,
+) -> Vec<run::Interface> {
+    let mut interfaces = Vec::new();
     let until = now() + LAST_FRAMES;
     while now() < until {
         while links.receive(&mut |_, _| ()) {}
@@ -87,6 +170,14 @@ pub fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread
             counters.overrun
         );
         let (down, busy, refused) = (counters.down, counters.busy, counters.refused);
+        interfaces.push(run::Interface {
+            link: if link == Link::Main { "main" } else { "redundant" },
+            interface: names.of(link).to_owned(),
+            sent_frames: counters.sent,
+            received_frames: counters.received,
+            overrun_frames: counters.overrun,
+            unsent_frames: down + busy + refused,
+        });
         if down + busy + refused > 0 {
             say!("    not sent: {down} interface down, {busy} queue full, {refused} refused");
         }
@@ -100,4 +191,5 @@ pub fn final_account(links: &mut Tee<PacketLinks>, supervisor: &SupervisorThread
         acyclic.late
     );
     say!("    {} datagrams, {} of them sent again", acyclic.datagrams, acyclic.resent);
+    interfaces
 }

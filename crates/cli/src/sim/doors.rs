@@ -1,6 +1,6 @@
 //! Where orders come in: lines of the standard input, and connections to a Unix socket.
 //!
-//! Each door has a thread that reads lines and waits for the answer; the simulator itself looks for orders between two
+//! Each of these doors has a thread that reads lines and waits for the answer; the simulator takes orders between two
 //! events and never waits for them.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -10,9 +10,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
-/// A line has at most so many bytes: the longest order carries the inputs of a large SubDevice.
+use crate::output;
+
+/// Most bytes of a line: the longest order carries the inputs of a large SubDevice.
 const LONGEST_LINE: u64 = 16_384;
-/// So many connections are served at once.
+/// Most connections at a time.
 const MOST_CONNECTIONS: usize = 32;
 
 /// A line, and where its answer goes.
@@ -20,7 +22,7 @@ const MOST_CONNECTIONS: usize = 32;
 pub struct Order {
     /// The line.
     pub line: String,
-    /// Takes the answer. Whoever asked may have gone.
+    /// Takes the answer. The client may be gone.
     pub answer: Sender<String>,
 }
 
@@ -46,12 +48,12 @@ impl Doors {
         }
         thread::Builder::new().name("standard input".into()).spawn(move || {
             // An end of the input, or an error, ends this door and nothing else.
-            let _ = serve(io::stdin().lock(), &mut io::stdout(), &sender);
+            let _ = serve(io::stdin().lock(), &mut io::stdout(), &sender, output::answer);
         })?;
         Ok(Doors { orders, socket: socket.map(Path::to_owned) })
     }
 
-    /// The oldest order that was not taken yet.
+    /// The oldest order that is waiting.
     pub fn next(&self) -> Option<Order> {
         self.orders.try_recv().ok()
     }
@@ -66,7 +68,7 @@ impl Drop for Doors {
     }
 }
 
-/// A socket at this path; one that a killed simulator has left behind is replaced, one that is in use is not.
+/// A socket at this path. A socket that a killed simulator has left behind is replaced, a socket in use is not.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     use std::os::unix::fs::PermissionsExt;
     let listener = match UnixListener::bind(path) {
@@ -85,15 +87,15 @@ fn accept(listener: &UnixListener, sender: &Sender<Order>) {
     for mut connection in listener.incoming().flatten() {
         let (sender, held) = (sender.clone(), open.clone());
         if Arc::strong_count(&open) > MOST_CONNECTIONS + 1 {
-            // Whoever asked may have hung up.
+            // The client may have hung up.
             let _ = connection.write_all(b"error: too many connections\n");
             continue;
         }
         let served = thread::Builder::new().name("control connection".into()).spawn(move || {
             let _held = held;
             let Ok(mut output) = connection.try_clone() else { return };
-            // Whoever asked has hung up: nobody is left to be told.
-            let _ = serve(BufReader::new(connection), &mut output, &sender);
+            // An error means that the client has hung up.
+            let _ = serve(BufReader::new(connection), &mut output, &sender, |_, answer| answer.to_owned());
         });
         if let Err(error) = served {
             eprintln!("ringcat sim: a control connection is not served: {error}");
@@ -101,23 +103,29 @@ fn accept(listener: &UnixListener, sender: &Sender<Order>) {
     }
 }
 
-fn serve(mut input: impl BufRead, output: &mut impl Write, sender: &Sender<Order>) -> io::Result<()> {
+/// Passes lines on as orders, and writes the answers as `format` makes them of an order and its answer.
+fn serve(
+    mut input: impl BufRead,
+    output: &mut impl Write,
+    sender: &Sender<Order>,
+    format: impl Fn(&str, &str) -> String,
+) -> io::Result<()> {
     loop {
         let mut bytes = Vec::new();
         if (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut bytes)? == 0 {
             return Ok(());
         }
         if bytes.len() as u64 == LONGEST_LINE && bytes.last() != Some(&b'\n') {
-            output.write_all(b"error: a line is too long; nothing more is read here\n")?;
+            output.write_all(format("", "error: a line is too long; nothing more is read here\n").as_bytes())?;
             return Ok(());
         }
         let line = String::from_utf8_lossy(&bytes).trim_end_matches(['\n', '\r']).to_owned();
         let (answer, answered) = channel();
-        if sender.send(Order { line, answer }).is_err() {
+        if sender.send(Order { line: line.clone(), answer }).is_err() {
             return Ok(());
         }
         let Ok(text) = answered.recv() else { return Ok(()) };
-        output.write_all(text.as_bytes())?;
+        output.write_all(format(&line, &text).as_bytes())?;
         output.flush()?;
     }
 }
@@ -126,7 +134,7 @@ fn serve(mut input: impl BufRead, output: &mut impl Write, sender: &Sender<Order
 mod tests {
     use super::*;
 
-    /// What a door answers when each order is answered with itself.
+    /// The output of a door where each order is its own answer.
     fn echo(input: &[u8]) -> String {
         let (sender, orders) = channel::<Order>();
         let simulator = thread::spawn(move || {
@@ -135,7 +143,7 @@ mod tests {
             }
         });
         let mut output = Vec::new();
-        assert!(serve(input, &mut output, &sender).is_ok());
+        assert!(serve(input, &mut output, &sender, |_, answer| answer.to_owned()).is_ok());
         drop(sender);
         assert!(simulator.join().is_ok());
         String::from_utf8_lossy(&output).into_owned()
@@ -153,7 +161,7 @@ mod tests {
         let endless = BufReader::new(io::repeat(0));
         let (sender, _orders) = channel();
         let mut output = Vec::new();
-        assert!(serve(endless, &mut output, &sender).is_ok());
+        assert!(serve(endless, &mut output, &sender, |_, answer| answer.to_owned()).is_ok());
         assert!(output.starts_with(b"error: a line is too long"));
         let longest = vec![b'x'; LONGEST_LINE as usize - 1];
         assert_eq!(echo(&longest).len(), LONGEST_LINE as usize);

@@ -1,11 +1,11 @@
-//! How well the simulator keeps up with the clock: turns that came later than they were asked for.
+//! How well the simulator keeps up with the clock: turns that came later than they were due.
 //!
-//! A stall of the machine that this program runs on, or a frame that takes long to simulate, delays frames without any
-//! fault of the MainDevice or of the simulated segment; it is counted and told, so that nobody looks for it elsewhere.
+//! A stall of this machine, or a frame that takes long to simulate, delays frames without any fault of the MainDevice or
+//! of the simulated segment. It is counted and reported, so that a delayed frame can be traced to it.
 
 use std::time::Duration;
 
-/// A wake-up that came later than this is late.
+/// A wake-up is late from this delay on.
 pub const LATE: Duration = Duration::from_micros(200);
 /// At most one line about late wake-ups in this time.
 const QUIET: Duration = Duration::from_secs(1);
@@ -19,7 +19,7 @@ pub struct Lateness {
     pub longest: Duration,
     /// All of them together.
     pub total: Duration,
-    told: u64,
+    reported: u64,
     longest_since: Duration,
     quiet_until_ns: u64,
 }
@@ -38,16 +38,16 @@ impl Lateness {
 
     /// A line about what happened since the last one, if it is time for one.
     pub fn line(&mut self, now_ns: u64) -> Option<String> {
-        if self.told == self.count || now_ns < self.quiet_until_ns {
+        if self.reported == self.count || now_ns < self.quiet_until_ns {
             return None;
         }
         let text = format!(
             "the simulator was late {} times, by up to {:.3} ms (this machine stalled, or a frame was much work); \
              frames were delayed by that",
-            self.count - self.told,
+            self.count - self.reported,
             self.longest_since.as_secs_f64() * 1e3
         );
-        self.told = self.count;
+        self.reported = self.count;
         self.longest_since = Duration::ZERO;
         self.quiet_until_ns = now_ns + QUIET.as_nanos() as u64;
         Some(text)
@@ -72,7 +72,7 @@ mod tests {
 
     // covers: sim-interfaces
     #[test]
-    fn late_wake_ups_are_counted_and_told_once_a_second() {
+    fn late_wake_ups_are_counted_and_reported_once_a_second() {
         let mut lateness = Lateness::default();
         lateness.note(1_000_000, 1_150_000);
         assert_eq!(lateness.line(2_000_000), None);

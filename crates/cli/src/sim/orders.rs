@@ -1,6 +1,6 @@
-//! Orders to a running simulator: what they look like, and what they do.
+//! Orders to a running simulator: their syntax, and what they do.
 //!
-//! In goes a line of text, out comes an answer whose last line is `ok` or begins with `error:`.
+//! Input: a line of text. Output: an answer. Its last line is `ok` or begins with `error:`.
 
 use ringcat::sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat::sim::device::Device;
@@ -17,21 +17,24 @@ const MOST_BYTES: usize = 256;
 
 /// What `help` says.
 pub const HELP: &str = "\
-cut A-B          cut the cable between devices A and B, numbers or names
-cut main         cut the cable of the main interface (or: redundant)
-heal A-B         heal it again (or: main, redundant, all)
-drop A-B N       lose the next N frames on that cable, in each direction (or: main, redundant)
-power off A      take the power from device A
-power on A       give it back
-hang A           the application of device A hangs, its controller works
-wake A           it goes on
-outputs A        the process data outputs of device A, in hexadecimal
-inputs A HEX     its process data inputs, as far as its application leaves them alone
-register A R N   N bytes of its controller from register R on, as in `register 2 0x0928 4`, in hexadecimal
-clocks           what all clocks show at this moment less what the first one shows, in nanoseconds; - has none
-mail             orders about mailboxes: `help mail` lists them
-status           devices and their states, cut cables, counters
-quit             end the simulator";
+cut A-B         cut the cable between devices A and B, numbers or names
+cut main        cut the cable of the main interface (or: redundant)
+heal A-B        repair the cable (or: main, redundant, all)
+drop A-B N      lose the next N frames on that cable, in each direction
+                (or: main, redundant)
+power off A     switch device A off
+power on A      switch device A on
+hang A          the application of device A hangs, its controller works
+wake A          the application of device A goes on
+outputs A       process data outputs of device A, in hexadecimal
+inputs A HEX    process data inputs of device A, as far as its application
+                does not set them
+register A R N  N bytes of the controller of device A from register R on, as in
+                `register 2 0x0928 4`, in hexadecimal
+clocks          each clock minus the first one, in nanoseconds; -: no clock
+mail            orders about mailboxes: `help mail` lists them
+status          devices and their states, cut cables, counters
+quit            end the simulator";
 
 /// What follows from an order.
 #[derive(Clone, Debug, PartialEq, Eq)]

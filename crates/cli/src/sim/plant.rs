@@ -1,6 +1,6 @@
-//! A segment with the cables that were cut by order and the interfaces that have lost their carrier.
+//! A segment with the cables that an order has cut and the interfaces that have lost their carrier.
 //!
-//! Both break a host cable, and it is whole only when neither does.
+//! Both break a host cable: it works when it is not cut and its interface has a carrier.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -44,7 +44,7 @@ impl Plant {
         self.network.apply(Fault::Cut(cable));
     }
 
-    /// Heals a cable; one whose interface has no carrier stays dead until it has.
+    /// Heals a cable; a host cable without a carrier stays dead until the carrier is back.
     pub fn heal(&mut self, cable: CableId) {
         self.cut.remove(&cable.0);
         let dark =
@@ -69,18 +69,18 @@ impl Plant {
         !self.carrier[link as usize]
     }
 
-    /// The carrier of an interface came or went. Whether that is news.
+    /// The carrier of an interface is up or down. Whether that has changed.
     pub fn set_carrier(&mut self, link: HostLink, up: bool) -> bool {
-        let news = self.carrier[link as usize] != up;
+        let changed = self.carrier[link as usize] != up;
         self.carrier[link as usize] = up;
-        if let (true, Some(cable)) = (news, self.network.host_cable(link)) {
+        if let (true, Some(cable)) = (changed, self.network.host_cable(link)) {
             if up && !self.cut.contains(&cable.0) {
                 self.network.apply(Fault::Heal(cable));
             } else if !up {
                 self.network.apply(Fault::Cut(cable));
             }
         }
-        news
+        changed
     }
 
     /// Devices, cut cables and counters.

@@ -1,8 +1,8 @@
 //! Between network interfaces and a segment in virtual time.
 //!
-//! Virtual time follows `CLOCK_MONOTONIC`: before anything else, each turn lets everything happen in the segment that
-//! is due by now. A frame that has arrived on an interface then begins its way at the segment's host interface, and one
-//! that has come back there leaves on the network interface.
+//! Virtual time follows `CLOCK_MONOTONIC`: each turn first processes everything in the segment that is due by now. A
+//! frame that has arrived on an interface then enters the segment at its host interface, and a frame that has come back
+//! there leaves on the network interface.
 //!
 //! The segment's host interface takes a frame's wire time at 100 Mbit/s once, when the frame enters; the way out adds
 //! nothing, because what comes out is due when its last bit is. On a veth pair, which takes no time itself, a round
@@ -21,10 +21,11 @@ use ringcat::sim::time::SimTime;
 use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
 
 use super::lateness::Lateness;
+use crate::json::sim::Interface;
 
-/// Orders are looked for at least this often while the simulator spins.
+/// Longest time between two checks for orders while the simulator spins.
 const SPIN: Duration = Duration::from_micros(50);
-/// And this often while it sleeps: a stall of this machine that is not longer goes unnoticed.
+/// The same while it sleeps: a stall of this machine that is not longer goes unnoticed.
 const NAP: Duration = Duration::from_micros(500);
 
 /// Time that frames under way may take at most in one leap.
@@ -33,29 +34,29 @@ const LONGEST_LEAP: Duration = Duration::from_millis(100);
 /// How long frames take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Pace {
-    /// As long as in a real segment.
+    /// As long as at 100 Mbit/s through real SubDevices
     RealTime,
-    /// As long as this machine needs to compute their way.
+    /// As long as this machine needs to compute the answer; timers of SubDevices then run a little ahead of the clock
     AsFastAsPossible,
 }
 
-/// What time it is in the segment.
+/// Time in the segment.
 #[derive(Clone, Copy, Debug)]
 struct Clock {
     /// The monotonic time at which virtual time began.
     begin_ns: u64,
-    /// What virtual time has gained since by leaps.
+    /// How far leaps have brought virtual time ahead since.
     lead_ns: u64,
 }
 
 impl Clock {
-    /// Virtual time has gone on by so much while no real time passed.
+    /// Virtual time has gone on by this time while no real time passed.
     fn leap(&mut self, by: Duration) {
         let by_ns = u64::try_from(by.as_nanos()).unwrap_or(u64::MAX);
         self.lead_ns = self.lead_ns.saturating_add(by_ns);
     }
 
-    /// What time it is in the segment at a monotonic time.
+    /// Virtual time at a monotonic time.
     fn virtual_time(self, now_ns: u64) -> SimTime {
         SimTime(now_ns.saturating_sub(self.begin_ns).saturating_add(self.lead_ns))
     }
@@ -73,9 +74,9 @@ pub struct Wires {
     mode: ReceiveMode,
     pace: Pace,
     clock: Clock,
-    /// When the next turn is asked for.
+    /// When the next turn is due.
     asked_ns: u64,
-    /// How well that is kept.
+    /// How late turns came.
     pub lateness: Lateness,
 }
 
@@ -138,7 +139,23 @@ impl Wires {
         };
     }
 
-    /// What the interfaces have carried, and how well this simulator has kept up.
+    /// Counters of the interfaces as keys of JSON.
+    pub fn json(&self) -> Vec<Interface> {
+        let interface = |(link, socket): &(HostLink, PacketSocket)| {
+            let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
+            Interface {
+                link: link.to_string(),
+                received_frames: received,
+                overrun_frames: overrun,
+                truncated_frames: truncated,
+                sent_frames: sent,
+                unsent_frames: down + busy + refused,
+            }
+        };
+        self.sockets.iter().map(interface).collect()
+    }
+
+    /// Counters of the interfaces, and how late this simulator was.
     pub fn summary(&self) -> String {
         let line = |(link, socket): &(HostLink, PacketSocket)| {
             let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();

@@ -24,7 +24,7 @@ const FILES: [(&str, &str); 7] = [
     ("image.toml", "[[device]]\nsii = \"no-such.bin\"\n"),
     ("broken.xml", "<EtherCATConfig><Config>"),
     (
-        "nobody.xml",
+        "empty.xml",
         "<EtherCATConfig Version=\"1.3\"><Config><Master><Info><Name>M</Name></Info>\
          </Master></Config></EtherCATConfig>",
     ),
@@ -54,7 +54,7 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         "clocks --main lo --reference last",
         Read,
         2,
-        "invalid value 'last' for '--reference <WHO>': expected first, sync or",
+        "invalid value 'last' for '--reference <CLOCK>': expected first, sync or",
     ),
     ("demo --cycle-us 10", Read, 2, "invalid value '10' for '--cycle-us <US>': 10 is not in 50..=1000000"),
     ("sim --main lo", Read, 2, "the following required arguments were not provided:"),
@@ -84,7 +84,7 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         "demo --segment DIR/kind.toml",
         Read,
         2,
-        "DIR/kind.toml:3: device \"coupler\": invalid type: string \"two\", expected a number of its range",
+        "DIR/kind.toml:3: device \"coupler\": count: expected a whole number, not negative, got the text \"two\"",
     ),
     ("demo --segment DIR/image.toml", Read, 2, "DIR/image.toml:"),
     ("demo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: there is no device"),
@@ -97,8 +97,8 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
     ),
     ("eni DIR/missing.xml", Read, 2, "DIR/missing.xml: cannot be read: No such file or directory"),
     ("eni DIR/broken.xml", Read, 2, "DIR/broken.xml: "),
-    ("eni DIR/nobody.xml", Read, 1, "the file describes no SubDevice"),
-    ("run --main lo --eni DIR/nobody.xml", Read, 2, "DIR/nobody.xml: the file describes no SubDevice"),
+    ("eni DIR/empty.xml", Read, 1, "the file describes no SubDevice"),
+    ("run --main lo --eni DIR/empty.xml", Read, 2, "DIR/empty.xml: the file describes no SubDevice"),
     (
         "clocks --main lo --plot DIR/missing/x.svg",
         Read,
@@ -122,7 +122,7 @@ fn run(line: &str, output: Output) -> (Option<i32>, String) {
         command.args(line.split(' ')).stdin(Stdio::null()).stdout(stdout).output().expect("the program starts");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_end().to_owned();
     let (said, errors) = (text(&output.stdout), text(&output.stderr));
-    // A result stands in one of the two; where it is an error, that was said last.
+    // The result is the last line of one of the two.
     let last = |text: &str| text.lines().last().unwrap_or_default().to_owned();
     let lasts = [last(&errors), last(&said)];
     let result = lasts.iter().find(|line| line.starts_with("result: ")).cloned();

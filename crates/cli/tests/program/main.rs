@@ -1,4 +1,6 @@
 //! The program `ringcat` as a user calls it: what needs no network interface.
 
 mod demo;
+mod documented;
 mod exit_codes;
+mod json;

@@ -159,9 +159,15 @@ fn a_real_image_with_another_alias_has_a_valid_checksum() {
 
 /// Texts of segment files with their errors; `{known}` is the list of all devices.
 const REFUSED: &[(&str, &str)] = &[
-    ("[segment]\nspeed = 3", "line 2: unknown field `speed`"),
-    ("[[device]]\nname = \"x\"\ntyp = \"servo\"", "line 3: device \"x\": unknown field `typ`"),
-    ("[[device]]\ntype = \"servo\"\n[[device]]\nalias = 70000", "line 4: device \"number 2\": invalid value"),
+    ("[segment]\nspeed = 3", "line 2: unknown key \"speed\" in [segment]: expected one of name, seed, "),
+    (
+        "[[device]]\nname = \"x\"\ntyp = \"servo\"",
+        "line 3: device \"x\": unknown key \"typ\" in [[device]]: expected one of name, type, ",
+    ),
+    (
+        "[[device]]\ntype = \"servo\"\n[[device]]\nalias = 70000",
+        "line 4: device \"number 2\": alias: expected a whole number from 0 to 65535, got 70000",
+    ),
     (
         "[[device]]\nname = \"x\"\ntype = \"servvo\"",
         "line 3: device \"x\": type: expected one of {known}, got \"servvo\"",

@@ -1,0 +1,32 @@
+//! The keys that a command adds to its last line.
+
+use serde::Serialize;
+
+use super::bench::{Cycles, Echo, Rate, RoundTrip};
+use super::capture::Capture;
+use super::clocks::Clocks;
+use super::demo::Demo;
+use super::eni::EniFile;
+use super::ring::Ring;
+use super::run::Run;
+use super::scan::Scan;
+use super::sim::Sim;
+
+/// The keys of one command.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+#[allow(missing_docs)]
+pub enum Data {
+    Scan(Scan),
+    Run(Box<Run>),
+    Ring(Ring),
+    Clocks(Clocks),
+    Capture(Capture),
+    Sim(Sim),
+    Eni(Box<EniFile>),
+    Demo(Demo),
+    Echo(Echo),
+    RoundTrip(RoundTrip),
+    Cycles(Cycles),
+    Rate(Rate),
+}
