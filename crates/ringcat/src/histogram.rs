@@ -135,7 +135,7 @@ mod tests {
         }
     }
 
-    // covers: scan-command
+    // covers: run
     #[test]
     fn quantiles_are_at_most_an_eighth_too_long() {
         let histogram = Histogram::default();

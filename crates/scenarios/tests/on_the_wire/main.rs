@@ -91,7 +91,7 @@ fn show_summary(title: &str, output: &str) {
     println!("ringcat run, {title}:\n{summary}");
 }
 
-// covers: scan-command
+// covers: run
 #[test]
 fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() {
     let Some(mut bench) = Bench::new(1) else { return };
