@@ -54,18 +54,22 @@ pub(super) trait Known {
     fn note_look(&self);
     /// Clocks are being measured, which need the receive times of their own frame.
     fn are_measuring(&self) -> bool;
+    /// The redundant link has to come up soon, since a more urgent disturbance waits for that.
+    fn is_outranked(&self) -> bool;
 }
 
 /// Looks at the segment after a change of ports, and hands what it shows to the model.
 pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
     bus.sleep(SETTLE).await;
     // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
-    let in_control = enhanced && stays_closed(&bus).await && segment.disturb(Disturbance::OpenByLink, LINK_LIMIT).await;
+    let turn = match enhanced && stays_closed(&bus).await {
+        true => segment.disturb(Disturbance::OpenByLink, LINK_LIMIT).await,
+        false => None,
+    };
+    let in_control = turn.is_some();
     let told = segment.view().told_crossings().clone();
     let found = cabling(&bus, &segment, in_control, &told).await;
-    if in_control {
-        segment.undisturb();
-    }
+    drop(turn);
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
@@ -80,11 +84,11 @@ pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, tol
     if !in_control {
         return look_often(bus, known, told).await;
     }
-    wait_for(bus, RingState::Open).await;
+    wait_for(bus, known, RingState::Open).await;
     let found = look_often(bus, known, told).await;
     bus.force_disconnect(Link::Redundant, false).await;
-    wait_for(bus, RingState::Closed).await;
-    // Carriers are looked at less often than frames come.
+    wait_for(bus, known, RingState::Closed).await;
+    // A carrier that is still missing would be reported as lost. The links read it less often than frames come.
     let until = bus.now() + LINK_LIMIT;
     while bus.carriers().contains(&Some(false)) && bus.now() < until {
         bus.sleep(LINK_PAUSE).await;
@@ -92,9 +96,9 @@ pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, tol
     found
 }
 
-async fn wait_for(bus: &Bus, state: RingState) {
+async fn wait_for(bus: &Bus, known: &impl Known, state: RingState) {
     let until = bus.now() + LINK_LIMIT;
-    while bus.ring() != state && bus.now() < until {
+    while bus.ring() != state && bus.now() < until && !known.is_outranked() {
         bus.sleep(LINK_PAUSE).await;
         // Before activation nothing else shows it.
         let _ = bus.brd(map::TYPE, 1).await;
@@ -118,6 +122,9 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<L
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
             bus.sleep(PAUSE).await;
+        }
+        if known.is_outranked() {
+            return None;
         }
         if known.are_measuring() {
             before = None;
@@ -208,6 +215,11 @@ impl Known for SharedSegment {
 
     fn are_measuring(&self) -> bool {
         self.view().disturbance() == Some(Disturbance::OpenByPort)
+    }
+
+    fn is_outranked(&self) -> bool {
+        let view = self.view();
+        view.disturbance() == Some(Disturbance::OpenByLink) && view.is_outranked()
     }
 
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {

@@ -13,7 +13,7 @@ use super::sii::SiiCache;
 use crate::board::Board;
 use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
-use crate::segment::disturbance::Disturbance;
+use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
 use crate::segment::{Observation, Segment, Words};
 use crate::supervisor::{Bus, Posted, Signal};
@@ -31,6 +31,8 @@ pub struct SharedSegment {
     /// Something was observed that the cyclic half has not posted.
     news: Rc<Cell<bool>>,
     changed: Signal,
+    /// Disturbances that were wanted so far.
+    disturbances: Rc<Cell<u32>>,
     /// Number of the next temporary station address.
     next_temporary: Rc<Cell<u16>>,
     /// Before then it is not tried how many datagrams a frame may hold.
@@ -64,6 +66,7 @@ impl SharedSegment {
             tasks: Rc::default(),
             news: Rc::default(),
             changed: bus.signal(),
+            disturbances: Rc::default(),
             next_temporary: Rc::default(),
             next_frame_trial: Rc::default(),
             bus,
@@ -140,21 +143,26 @@ impl SharedSegment {
         self.changed.until(|| self.tasks.borrow_mut().pop_front()).await
     }
 
-    /// Waits until nothing else puts SubDevices or links out of reach, and keeps others from it; false where that does
-    /// not come within a time. To be ended with [`SharedSegment::undisturb`], after everything has been undone.
-    pub(super) async fn disturb(&self, wanted: Disturbance, limit: Duration) -> bool {
-        self.observe(Observation::Wanted(wanted));
-        let granted = self.until(|segment| (segment.disturbance() == Some(wanted)).then_some(()));
-        if self.bus.within(limit, granted).await.is_err() {
-            self.observe(Observation::Renounced(wanted));
-            return false;
-        }
-        true
+    /// Waits until no other disturbance is under way, and keeps others from beginning; `None` where that takes longer
+    /// than a limit. What is returned is to be dropped after everything has been undone.
+    pub(super) async fn disturb(&self, disturbance: Disturbance, limit: Duration) -> Option<Turn> {
+        let turn = Turn::new(self, disturbance);
+        let granted = self.until(|segment| segment.is_granted(turn.number).then_some(()));
+        self.bus.within(limit, granted).await.is_ok().then_some(turn)
     }
 
-    /// Nothing is out of reach on purpose any more.
-    pub(super) fn undisturb(&self) {
-        self.observe(Observation::Undisturbed);
+    /// The same without a limit, as long as the disturbance is needed; `None` where it is not needed any more.
+    pub(super) async fn disturb_while(
+        &self,
+        disturbance: Disturbance,
+        is_needed: impl Fn(&Segment) -> bool,
+    ) -> Option<Turn> {
+        let turn = Turn::new(self, disturbance);
+        let granted = |segment: &Segment| match segment.is_granted(turn.number) {
+            true => Some(true),
+            false => (!is_needed(segment)).then_some(false),
+        };
+        self.until(granted).await.then_some(turn)
     }
 
     /// A member's mailbox.
@@ -180,5 +188,27 @@ impl SharedSegment {
     /// It is not tried again before then.
     pub(super) fn set_next_frame_trial(&self, at: Instant) {
         self.next_frame_trial.set(at);
+    }
+}
+
+/// The turn of a disturbance, or its place among those that wait. Its end is the end of the disturbance, also of a
+/// procedure that is given up.
+#[derive(Debug)]
+pub(super) struct Turn {
+    segment: SharedSegment,
+    number: u32,
+}
+
+impl Turn {
+    fn new(segment: &SharedSegment, disturbance: Disturbance) -> Turn {
+        let number = segment.disturbances.replace(segment.disturbances.get().wrapping_add(1));
+        segment.observe(Observation::Wanted(Wanted { disturbance, number }));
+        Turn { segment: segment.clone(), number }
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        self.segment.observe(Observation::Undisturbed(self.number));
     }
 }

@@ -30,6 +30,7 @@ use super::shared_segment::SharedSegment;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::Observation;
+use crate::segment::disturbance::Disturbance;
 use crate::segment::member::Phase;
 use crate::segment::unassigned::{Knowledge, Matches, UnassignedSubDevice};
 use crate::supervisor::{Bus, BusError};
@@ -42,6 +43,8 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 const PATIENCE: u32 = 100;
 /// Searches without success in a row before it is tried whether frames hold too many datagrams.
 const DOUBT: u32 = 3;
+/// So long a search may wait for the end of another disturbance; then it is tried again.
+const LIMIT: Duration = Duration::from_millis(20);
 /// Failures of the bus in a row before they are reported.
 const BUS_PATIENCE: u32 = 3;
 
@@ -56,7 +59,10 @@ impl Search {
     /// Finds SubDevices without a known station address, gives them one and has them read. True where none is left that
     /// is not known.
     pub(super) async fn run(&self, bus: &Bus, segment: &SharedSegment) -> bool {
-        let (complete, reason) = match find(bus, segment).await {
+        let Some(turn) = segment.disturb(Disturbance::Readdress, LIMIT).await else { return false };
+        let found = find(bus, segment).await;
+        drop(turn);
+        let (complete, reason) = match found {
             Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
             Err(error) => (false, error.to_string()),
         };

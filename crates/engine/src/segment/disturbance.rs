@@ -1,99 +1,137 @@
-//! What puts SubDevices out of reach, or a link out of use, on purpose: one at a time.
+//! Procedures that put SubDevices out of reach, take a link out of use or change station addresses, on purpose, and
+//! those that need all of that to stay as it is: one at a time.
 //!
-//! None of these can be cancelled: each runs to its undo. Where several are wanted at once the one that is needed most
-//! is next, and each ends by itself within its own time limit, so that a segment that changes all the time starves
-//! none.
+//! None of these can be cancelled: each runs to its undo. Where several are wanted at once the most urgent one is next.
+//! Each ends within its own time limit, and sooner where a more urgent one waits, so that a segment that changes all the
+//! time starves none.
 
 use alloc::vec::Vec;
 
-/// A kind of disturbance; the one that is needed most first.
+/// A kind of disturbance; the most urgent one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Disturbance {
-    /// No frame comes back: one ring behind a junction after the other is looked into, while the others are left out.
+    /// No frame comes back: one ring behind a junction after the other is examined, while the others are left out.
     IsolateRings,
     /// Rings are opened at a port, so that propagation delays of their cables can be measured.
     OpenByPort,
-    /// The redundant link is down, so that crossed lines have places.
+    /// SubDevices without a known station address get one.
+    Readdress,
+    /// The redundant link is down, so that crossed lines are located.
     OpenByLink,
+    /// Ports and station addresses of the whole segment are read.
+    Rescan,
 }
 
-/// What is under way, and what waits for its end.
+/// A disturbance, and the number of the procedure's wish for it: several may want the same kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// The kind.
+    pub disturbance: Disturbance,
+    /// The number.
+    pub number: u32,
+}
+
+/// The disturbance under way, and those that wait for its end.
 #[derive(Debug, Default)]
 pub(super) struct Slot {
-    running: Option<Disturbance>,
-    waiting: Vec<Disturbance>,
+    running: Option<Wanted>,
+    waiting: Vec<Wanted>,
     /// How often SubDevices were put out of reach.
     isolations: u32,
 }
 
 impl Slot {
-    /// What is under way.
+    /// The disturbance under way.
     pub fn running(&self) -> Option<Disturbance> {
-        self.running
+        self.running.map(|running| running.disturbance)
     }
 
-    /// How often SubDevices were put out of reach: what was seen across such a moment says nothing of who is there.
+    /// Whether that is this one.
+    pub fn is_granted(&self, number: u32) -> bool {
+        self.running.is_some_and(|running| running.number == number)
+    }
+
+    /// Whether a more urgent one waits for the end of the one under way.
+    pub fn is_outranked(&self) -> bool {
+        self.running().is_some_and(|running| self.waiting.iter().any(|waiting| waiting.disturbance < running))
+    }
+
+    /// How often SubDevices were put out of reach: a scan across such a moment does not show which SubDevices answer.
     pub fn isolations(&self) -> u32 {
         self.isolations
     }
 
-    /// Something is wanted. It is under way at once where nothing else is.
-    pub fn want(&mut self, wanted: Disturbance) {
+    /// A disturbance is wanted. It is under way at once where no other is.
+    pub fn want(&mut self, wanted: Wanted) {
         self.waiting.push(wanted);
         self.grant();
     }
 
-    /// Something is not wanted any more, before it was under way.
-    pub fn renounce(&mut self, wanted: Disturbance) {
-        if let Some(at) = self.waiting.iter().position(|waiting| *waiting == wanted) {
-            self.waiting.remove(at);
+    /// A disturbance has been undone, or is not wanted any more before it began.
+    pub fn end(&mut self, number: u32) {
+        self.waiting.retain(|waiting| waiting.number != number);
+        if self.is_granted(number) {
+            self.running = None;
+            self.grant();
         }
-    }
-
-    /// What is under way has been undone.
-    pub fn end(&mut self) {
-        self.running = None;
-        self.grant();
     }
 
     fn grant(&mut self) {
         if self.running.is_some() {
             return;
         }
-        let Some(next) = self.waiting.iter().copied().min() else { return };
-        self.renounce(next);
+        let Some(next) = self.waiting.iter().copied().min_by_key(|waiting| waiting.disturbance) else { return };
+        self.waiting.retain(|waiting| waiting.number != next.number);
         self.running = Some(next);
-        self.isolations = self.isolations.wrapping_add(u32::from(next == Disturbance::IsolateRings));
+        let is_isolation = next.disturbance == Disturbance::IsolateRings;
+        self.isolations = self.isolations.wrapping_add(u32::from(is_isolation));
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Disturbance::{IsolateRings, OpenByLink, OpenByPort};
+    use super::Disturbance::{IsolateRings, OpenByLink, OpenByPort, Rescan};
     use super::*;
 
+    fn want(slot: &mut Slot, wanted: impl IntoIterator<Item = Disturbance>) {
+        for (number, disturbance) in (0..).zip(wanted) {
+            slot.want(Wanted { disturbance, number });
+        }
+    }
+
     #[test]
-    fn one_at_a_time_and_what_is_needed_most_is_next() {
+    fn one_is_under_way_at_a_time_and_the_most_urgent_one_is_next() {
         let mut slot = Slot::default();
-        slot.want(OpenByLink);
-        slot.want(OpenByPort);
-        slot.want(IsolateRings);
+        want(&mut slot, [OpenByLink, OpenByPort, IsolateRings]);
         assert_eq!((slot.running(), slot.isolations()), (Some(OpenByLink), 0));
-        slot.end();
+        assert!(slot.is_outranked());
+        slot.end(0);
+        assert!(!slot.is_outranked());
         assert_eq!((slot.running(), slot.isolations()), (Some(IsolateRings), 1));
-        slot.end();
+        slot.end(2);
         assert_eq!(slot.running(), Some(OpenByPort));
-        slot.end();
+        slot.end(1);
         assert_eq!(slot.running(), None);
     }
 
     #[test]
-    fn what_is_not_wanted_any_more_is_not_granted() {
+    fn a_disturbance_that_is_not_wanted_any_more_is_not_granted() {
         let mut slot = Slot::default();
-        slot.want(IsolateRings);
-        slot.want(OpenByPort);
-        slot.renounce(OpenByPort);
-        slot.end();
+        want(&mut slot, [IsolateRings, OpenByPort]);
+        slot.end(1);
+        assert_eq!(slot.running(), Some(IsolateRings));
+        slot.end(0);
         assert_eq!(slot.running(), None);
+    }
+
+    #[test]
+    fn two_of_a_kind_are_under_way_one_after_the_other() {
+        let mut slot = Slot::default();
+        want(&mut slot, [Rescan, Rescan]);
+        assert!(slot.is_granted(0) && !slot.is_granted(1));
+        slot.end(0);
+        assert!(slot.is_granted(1));
+        slot.end(0);
+        assert!(slot.is_granted(1));
     }
 }

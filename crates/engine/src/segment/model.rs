@@ -127,6 +127,21 @@ impl Segment {
         self.slot.running()
     }
 
+    /// Whether the disturbance with this number is under way.
+    pub fn is_granted(&self, number: u32) -> bool {
+        self.slot.is_granted(number)
+    }
+
+    /// Whether a more urgent disturbance waits for the end of the one under way.
+    pub fn is_outranked(&self) -> bool {
+        self.slot.is_outranked()
+    }
+
+    /// Whether no frame comes back because of broken local rings.
+    pub fn is_blocked(&self) -> bool {
+        self.silence.is_blocked
+    }
+
     /// What a question that is asked now is about.
     pub fn asked(&self) -> Asked {
         Asked { cabling: self.cabling.version, isolations: self.slot.isolations() }

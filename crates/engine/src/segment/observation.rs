@@ -12,7 +12,7 @@ use ringcat_wire::register::DlControl;
 use super::asked::Asked;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
-use super::disturbance::Disturbance;
+use super::disturbance::Wanted;
 use super::look::Look;
 use super::looked::Looked;
 use super::port_control::BlockedPort;
@@ -228,12 +228,10 @@ pub enum Observation<'a> {
     /// Clocks were measured, written, read or lost.
     Clocks(ClockObservation<'a>),
 
-    /// Something that puts SubDevices out of reach is wanted.
-    Wanted(Disturbance),
-    /// It is not wanted any more, before it began.
-    Renounced(Disturbance),
-    /// It has been undone.
-    Undisturbed,
+    /// A disturbance is wanted.
+    Wanted(Wanted),
+    /// The one with this number has been undone, or is not wanted any more.
+    Undisturbed(u32),
     /// Rings behind junctions have been looked into, and all is as before.
     Isolated {
         /// What it was about.

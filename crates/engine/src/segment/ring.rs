@@ -114,7 +114,7 @@ impl Ring {
                 self.changes = words.ring.changes;
                 return again;
             }
-            Some(Disturbance::IsolateRings) | None => {}
+            Some(Disturbance::IsolateRings | Disturbance::Readdress | Disturbance::Rescan) | None => {}
         }
         let again = self.observe_carriers(words.carriers, now, effects);
         // One link is a ring of one, which is no news.

@@ -13,7 +13,7 @@ use ringcat_wire::register::{DlStatus, PortKind};
 use ringcat_wire::sii::Identity;
 
 use super::clocks::Clocks;
-use super::disturbance::Disturbance;
+use super::disturbance::{Disturbance, Wanted};
 use super::effect::{Check, Effect, Shown, Task};
 use super::member::{Member, Phase};
 use super::start::Start;
@@ -233,13 +233,13 @@ fn counts_of_the_closed_ring_are_not_taken_for_those_of_the_open_one() {
 fn what_is_opened_on_purpose_is_no_news_and_ends_without_any() {
     for disturbance in [Disturbance::OpenByLink, Disturbance::OpenByPort] {
         let mut ring = Ring::closed(4);
-        ring.observe(Observation::Wanted(disturbance));
+        ring.observe(Observation::Wanted(Wanted { disturbance, number: 0 }));
         assert_eq!(ring.segment.disturbance(), Some(disturbance));
         ring.counts(4, 0, RingState::Open);
         assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
         ring.counts(4, 0, RingState::Closed);
         assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
-        ring.observe(Observation::Undisturbed);
+        ring.observe(Observation::Undisturbed(0));
         assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
     }
 }
@@ -271,8 +271,8 @@ fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look()
 fn looks_across_an_isolation_say_nothing_of_who_is_there() {
     let mut ring = Ring::closed(3);
     let asked = ring.segment.asked();
-    ring.observe(Observation::Wanted(Disturbance::IsolateRings));
-    ring.observe(Observation::Undisturbed);
+    ring.observe(Observation::Wanted(Wanted { disturbance: Disturbance::IsolateRings, number: 0 }));
+    ring.observe(Observation::Undisturbed(0));
     let before = [Phase::Settled(AlState::Op); 3];
     for _ in 0..3 {
         let looked =

@@ -135,9 +135,9 @@ async fn measure_open(
     let text = |error: BusError| error.to_string();
     let before = controls(bus, &ports).await.map_err(text)?;
     let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
-    if !segment.disturb(Disturbance::OpenByPort, LIMIT).await {
-        return Err("rings are kept from being opened: others are being looked into".to_string());
-    }
+    let Some(turn) = segment.disturb(Disturbance::OpenByPort, LIMIT).await else {
+        return Err("rings cannot be opened: another procedure needs their ports".to_string());
+    };
     let result = match write(bus, closed.collect()).await {
         Ok(()) => {
             let mut open = survey.clone();
@@ -155,7 +155,7 @@ async fn measure_open(
     if survey.is_closed {
         wait_for_ring(bus).await;
     }
-    segment.undisturb();
+    drop(turn);
     result
 }
 

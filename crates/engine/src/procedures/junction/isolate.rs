@@ -36,8 +36,6 @@ const WRITTEN: usize = 2;
 const MOST: usize = 16;
 /// Pause after it.
 const PAUSE: Duration = Duration::from_millis(5);
-/// So long other disturbances may keep it waiting.
-const LIMIT: Duration = Duration::from_secs(5);
 /// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the
 /// next.
 const TRIES: usize = 4;
@@ -96,16 +94,15 @@ impl Ring {
     }
 }
 
-/// Looks into all local rings, and hands what is found to the model.
+/// Examines all local rings, and hands the ports of their members to the model. Waits for the end of any other
+/// disturbance, which has a limit of its own, as long as no frame comes back.
 pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
-    if !segment.disturb(Disturbance::IsolateRings, LIMIT).await {
-        return;
-    }
+    let Some(turn) = segment.disturb_while(Disturbance::IsolateRings, Segment::is_blocked).await else { return };
     let asked = segment.view().asked();
     let found = look_inside(&bus, &segment).await;
     // Frames that left before the last loop opened may still be on their way.
     bus.sleep(PAUSE).await;
-    segment.undisturb();
+    drop(turn);
     segment.observe(Observation::Isolated { asked, found: &found, words: segment.words() });
 }
 

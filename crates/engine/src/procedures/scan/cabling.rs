@@ -46,6 +46,10 @@ impl Known for Scan {
         false
     }
 
+    fn is_outranked(&self) -> bool {
+        false
+    }
+
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let info = self.subdevices.iter().find(|info| info.station == station);
         info.map(|info| info.controller.ports).unwrap_or_default()

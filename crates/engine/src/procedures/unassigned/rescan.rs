@@ -17,14 +17,17 @@ use crate::event::Event;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
+use crate::segment::disturbance::Disturbance;
 use crate::segment::unassigned::Knowledge;
 use crate::segment::view::View;
 use crate::segment::{Observation, Seen, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
-/// Pause between two looks.
+/// Pause between two scans.
 const PAUSE: Duration = Duration::from_millis(10);
+/// So long a scan may wait for the end of a disturbance; then it is tried again.
+const LIMIT: Duration = Duration::from_millis(100);
 
 /// So long the segment may take to hold still after a group has joined or left.
 const FOLLOW_LIMIT: Duration = Duration::from_millis(200);
@@ -131,7 +134,11 @@ async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
     let until = bus.now() + limit;
     segment.observe(Observation::LookAgain);
     loop {
-        let looked = look(bus, segment).await;
+        // What puts SubDevices out of reach or gives them other addresses would show in the middle of it.
+        let looked = match segment.disturb(Disturbance::Rescan, LIMIT).await {
+            Some(_turn) => look(bus, segment).await,
+            None => Ok(None),
+        };
         // Whose ports changed in between has told it to this look.
         segment.observe(Observation::LookAgain);
         let is_last = bus.now() >= until;

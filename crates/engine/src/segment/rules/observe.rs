@@ -61,9 +61,8 @@ impl Segment {
 
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
 
-            Observation::Wanted(disturbance) => self.slot.want(disturbance),
-            Observation::Renounced(disturbance) => self.slot.renounce(disturbance),
-            Observation::Undisturbed => self.slot.end(),
+            Observation::Wanted(wanted) => self.slot.want(wanted),
+            Observation::Undisturbed(number) => self.slot.end(number),
             Observation::Isolated { asked, found, words } => {
                 self.end_silence(&words, now);
                 self.observe_isolated(asked, found, now, effects);

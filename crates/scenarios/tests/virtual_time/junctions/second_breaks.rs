@@ -321,3 +321,47 @@ fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
         assert!(lost_links(&world) > before, "the redundant link was down in between");
     }
 }
+
+/// The redundant link is down on purpose, so that crossed lines are located, when two local rings break at once: the
+/// link does not get its partner back in the usual time, since no frame comes back. The breaks are located all the same.
+// covers: JR-02, LC-03, junctions
+#[test]
+fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {
+    let mut cables = TWO_RINGS.to_vec();
+    cables.push((at(6, B), REDUNDANT));
+    let options = Options::default().with_junctions(JunctionMode::Automatic).with_enhanced_line_crossed(true);
+    let place = |cable: usize, breaks| {
+        let (near, far) = ends_of_two(cable);
+        change(Some(near), far, true, breaks)
+    };
+    for cycles in [1, 2, 4, 6, 8, 10, 14, 20, 30] {
+        let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
+        let network = wired(&KINDS, &cables);
+        let mut world = World::with_junctions(41, network, &options, declare, &[]).expect("scan and activation");
+        world.settle();
+        world.run_cycles(100);
+        // Its ports change, so that the segment is scanned for crossed lines with the redundant link down.
+        world.cut(CableId(2));
+        world.run_cycles(100);
+        world.heal(CableId(2));
+        let mark = world.mark();
+        world.run_cycles(cycles);
+        world.cut(CableId(2));
+        world.cut(CableId(6));
+        // The first one was reported as broken before, and not yet as mended.
+        let is_located = |world: &World| told(world, mark).contains(&place(6, 2));
+        let begin = world.now();
+        for _ in 0..400 {
+            world.run_cycles(100);
+            if is_located(&world) {
+                break;
+            }
+        }
+        println!(
+            "cuts {cycles} cycles after the change: {:?} later: {:?}",
+            world.now().since(begin),
+            told(&world, mark)
+        );
+        assert!(is_located(&world), "cuts {cycles} cycles after the change: {:?}", told(&world, mark));
+    }
+}
