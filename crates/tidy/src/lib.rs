@@ -23,8 +23,8 @@
 //! * [`words`]: words for people, used for devices.
 //!
 //! The last three count ([`rules`]); what is not mended yet is in `known.toml`, which only shrinks ([`known`]).
-//! `cargo run -p tidy` prints it, with the longest chain of files of each crate, `-- figures` all of it against the bars
-//! of issue 15 ([`bars`]). [`coverage`] lists what of the protocol no test covers.
+//! `cargo run -p tidy` prints it, with the longest chain of files of each crate, `-- figures` the bars of issue 15
+//! ([`bars`]). [`coverage`] lists what of the protocol no test covers.
 //!
 //! [`tokens`] is the little Rust lexer under some of them, so that words in comments and strings are not taken for
 //! code; the younger ones read with `syn`.
