@@ -24,7 +24,7 @@ static ALLOCATOR: Bump = Bump { block: Block(UnsafeCell::new([0; SIZE])), used: 
 // SAFETY: no byte of the block is handed out twice, since `used` only grows and grows atomically.
 unsafe impl Sync for Bump {}
 
-// SAFETY: what is handed out lies inside the block, is aligned as asked, and belongs to nobody else.
+// SAFETY: what is handed out lies inside the block, is aligned as requested, and overlaps no other block.
 unsafe impl GlobalAlloc for Bump {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if layout.align() > ALIGN {

@@ -103,7 +103,7 @@ fn describe(socket: libc::c_int, index: u32, name: String) -> Option<Interface> 
     Some(Interface {
         name,
         index,
-        mac: std::array::from_fn(|i| address.sa_data[i] as u8),
+        mac: kernel::hardware_address(&address),
         up: has(libc::IFF_UP),
         carrier,
         mtu: u32::try_from(mtu).unwrap_or(0),

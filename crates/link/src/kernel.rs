@@ -118,6 +118,11 @@ impl Clone for Statistics {
 }
 impl Copy for Statistics {}
 
+/// The Ethernet address in an answer; `c_char` is signed on x86 and unsigned on ARM.
+pub fn hardware_address(address: &libc::sockaddr) -> [u8; 6] {
+    std::array::from_fn(|i| address.sa_data[i].to_ne_bytes()[0])
+}
+
 /// Reads a property of an interface by name (`SIOCGIF...`); `ENODEV` for an invalid name.
 pub fn interface_request(fd: RawFd, name: &str, request: libc::c_ulong) -> Result<libc::ifreq, i32> {
     let mut ifreq = named(name)?;

@@ -230,7 +230,7 @@ fn ethernet(name: &str) -> Result<(libc::c_int, [u8; 6]), LinkError> {
     if address.sa_family != libc::ARPHRD_ETHER {
         return Err(LinkError::NotEthernet { name: name.to_owned() });
     }
-    Ok((index as libc::c_int, std::array::from_fn(|i| address.sa_data[i] as u8)))
+    Ok((index as libc::c_int, kernel::hardware_address(&address)))
 }
 
 pub(crate) fn attach(fd: RawFd, program: &mut [libc::sock_filter]) -> Result<(), i32> {

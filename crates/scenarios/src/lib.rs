@@ -27,6 +27,7 @@ pub mod namespaces;
 pub mod odd_images;
 pub mod phases;
 pub mod ring_matrix;
+pub mod seeds;
 pub mod segments;
 pub mod short_runs;
 pub mod start_lists;

@@ -17,6 +17,7 @@ use ringcat_wire::frame::Frame;
 use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
 use scenarios::dice::Dice;
 use scenarios::meddler::{Meddled, Verdict};
+use scenarios::seeds;
 use scenarios::segments::{descriptions, line, ring};
 
 #[global_allocator]
@@ -222,10 +223,7 @@ fn answers_that_lie_do_no_harm_beyond_their_time_seeds_0_to_149() {
 
 #[test]
 fn seeds_from_the_environment() {
-    let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
-    let (first, last) = text.split_once("..").unwrap_or((&text, ""));
-    let first: u64 = first.parse().expect("SEED=17 or SEED=1000..2000");
-    let seeds = first..last.parse().unwrap_or(first + 1);
+    let Some(seeds) = seeds::from_environment() else { return println!("skipped: no SEED given") };
     runs(seeds.clone(), eeproms);
     runs(seeds, lies);
 }

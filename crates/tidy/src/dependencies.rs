@@ -4,6 +4,7 @@
 //! and for more crates than the bar.
 
 use std::collections::BTreeSet;
+use std::process::Command;
 
 use crate::Finding;
 use crate::tokens::tokens;
@@ -28,6 +29,16 @@ const USERS: [(&str, &[&str]); 3] = [
     // What the kernel says of interfaces is not EtherCAT.
     ("crates/cli/", &["ringcat_link"]),
 ];
+
+/// What `cargo tree` prints for an application with these features of the library.
+pub fn cargo_tree(features: &str) -> Result<String, String> {
+    let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
+    cargo.args(["tree", "--offline", "--package", "ringcat", "--edges", "normal", "--prefix", "none"]);
+    cargo.args(["--no-default-features", "--features", features]);
+    let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().map_err(|error| error.to_string())?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if output.status.success() { Ok(text(&output.stdout)) } else { Err(text(&output.stderr)) }
+}
 
 /// Names of crates from the registry in what `cargo tree --prefix none` prints, and of ours.
 pub fn crates_in(tree: &str) -> (BTreeSet<&str>, BTreeSet<&str>) {

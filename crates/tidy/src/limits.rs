@@ -66,7 +66,8 @@ pub fn long_files(tree: &Tree) -> Counts {
     tree.rust().filter(|file| !is_test(&file.path)).map(lines).filter(|(_, lines)| *lines > FILE_LINES).collect()
 }
 
-fn is_test(path: &str) -> bool {
+/// Whether a file has nothing but tests.
+pub fn is_test(path: &str) -> bool {
     path.contains("/tests/") || path.ends_with("/tests.rs")
 }
 

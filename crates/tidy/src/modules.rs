@@ -47,11 +47,12 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event"]),
     ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
-        "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
+    ("procedures", &["time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config",
+        "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status", "config",
-        "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request", "junction", "procedures"]),
+    ("main_device", &["time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status",
+        "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request", "junction",
+        "procedures"]),
 ];
 
 /// Where the engine's sources are.

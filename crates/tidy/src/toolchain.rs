@@ -10,7 +10,7 @@ use crate::tree::Tree;
 const WORKSPACE: &str = "Cargo.toml";
 const README: &str = "README.md";
 /// What builds, and has to look at it.
-const CI: &str = ".ci/run";
+const CI: &str = ".ci/steps.sh";
 
 /// Places that name another version, or none.
 pub fn disagreements(tree: &Tree) -> Vec<Finding> {
@@ -49,7 +49,7 @@ mod tests {
 
     fn tree(readme: &str, member: &str, proof: &str) -> Tree {
         let files = [
-            (".ci/run", "rust-version"),
+            (".ci/steps.sh", "rust-version"),
             ("Cargo.toml", "[workspace.package]\nrust-version = \"1.95\"\n"),
             ("README.md", readme),
             ("ci/proof/Cargo.toml", proof),

@@ -38,7 +38,17 @@ pub struct Tree {
 const ROOTS: [&str; 4] = ["crates", "ci", "docs", "fuzz"];
 
 /// Files at the root that are read.
-const AT_THE_ROOT: [&str; 5] = [".ci/run", "CHANGELOG.md", "Cargo.toml", "README.md", "rustfmt.toml"];
+const AT_THE_ROOT: [&str; 9] = [
+    ".ci/run",
+    ".ci/steps.sh",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "Cargo.toml",
+    "README.md",
+    "SECURITY.md",
+    "deny.toml",
+    "rustfmt.toml",
+];
 
 /// Kinds of files that are read.
 const EXTENSIONS: [&str; 5] = ["rs", "toml", "md", "sh", "py"];

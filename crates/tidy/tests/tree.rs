@@ -1,13 +1,11 @@
 //! The rules, applied to this repository.
 
-use std::process::Command;
-
 use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
-    Finding, coverage, covers, crates, deny, dependencies, evidence, features, files, interface, modules, paths,
-    protocol, safety, toolchain,
+    Finding, coverage, covers, crates, deny, dependencies, evidence, explorers, features, files, interface, modules,
+    paths, protocol, publishing, safety, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -59,12 +57,7 @@ fn crates_depend_on_each_other_as_the_map_says() {
 #[test]
 fn an_application_on_interfaces_takes_in_few_crates() {
     for features in dependencies::FEATURE_SETS {
-        let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["tree", "--offline", "--package", "ringcat", "--edges", "normal", "--prefix", "none"]);
-        cargo.args(["--no-default-features", "--features", features]);
-        let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("cargo starts");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let tree = String::from_utf8_lossy(&output.stdout);
+        let tree = dependencies::cargo_tree(features).expect("cargo tree works");
         let (others, ours) = dependencies::crates_in(&tree);
         println!("ringcat with \"{features}\": {} crates from the registry, {} of ours", others.len(), ours.len());
         none(dependencies::not_in(features, &tree));
@@ -122,6 +115,18 @@ fn what_tests_cover_exists() {
     none(covers::unresolved_covers(&tree, &features::ids(&tree)));
 }
 
+// covers: library
+#[test]
+fn crates_are_private_or_fit_to_be_published() {
+    none(publishing::faults(&tree()));
+}
+
+// covers: tree
+#[test]
+fn the_list_of_random_scenarios_is_complete() {
+    none(explorers::faults(&tree()));
+}
+
 #[test]
 fn the_map_leads_somewhere() {
     none(paths::leading_nowhere(&tree()));
@@ -165,6 +170,7 @@ fn lines_fit_120_columns() {
 #[test]
 fn devices_are_not_spoken_of_as_people() {
     only_what_is_known("words");
+    none(words::stale(&tree()));
 }
 
 #[test]

@@ -199,7 +199,7 @@ fn check_capture(path: &Path, clocks: usize) {
     std::fs::remove_file(path).expect("it was written");
     let (text, errors) = said(&output);
     println!("{text}{errors}");
-    assert!(output.status.success() && text.contains(&format!("judged: {clocks} delays")), "{text}{errors}");
+    assert!(output.status.success() && text.contains(&format!("checked: {clocks} delays")), "{text}{errors}");
 }
 
 // covers: 7.3, 7.4, dc-tools

@@ -171,14 +171,14 @@ fn with_gaps(count: usize) -> Vec<DeviceDescription> {
 fn written_delays_and_offsets_are_those_that_a_capture_gives() {
     let mut cases = Cases::default();
     let options = NetworkOptions::default;
-    cases.fine("line", line(clocked(12, 100), options()), "judged: 12 delays", |_| ());
-    cases.fine("tree", clock_tree(clocked(20, 100)), "judged: 20 delays", |_| ());
-    cases.fine("without a clock", line(with_gaps(11), options()), "judged: 7 delays", |_| ());
-    cases.fine("ring", ring(clocked(8, 100), options()), "judged: 8 delays", |_| ());
+    cases.fine("line", line(clocked(12, 100), options()), "checked: 12 delays", |_| ());
+    cases.fine("tree", clock_tree(clocked(20, 100)), "checked: 20 delays", |_| ());
+    cases.fine("without a clock", line(with_gaps(11), options()), "checked: 7 delays", |_| ());
+    cases.fine("ring", ring(clocked(8, 100), options()), "checked: 8 delays", |_| ());
     let mut broken = ring(clocked(8, 100), options());
     broken.cut(CableId(3));
     broken.advance_by(Duration::from_millis(1));
-    cases.fine("broken ring", broken, "judged: 8 delays", |_| ());
+    cases.fine("broken ring", broken, "checked: 8 delays", |_| ());
     cases.judge();
 }
 
@@ -187,7 +187,7 @@ fn written_delays_and_offsets_are_those_that_a_capture_gives() {
 fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delays() {
     let mut cases = Cases::default();
     let network = ring(clocked(8, 100), NetworkOptions::default());
-    cases.fine("ring that breaks", network, "judged: 21 delays", |run| {
+    cases.fine("ring that breaks", network, "checked: 21 delays", |run| {
         cycles(run, 20);
         apply(run, Fault::Cut(CableId(3)));
         cycles(run, 100);
@@ -242,8 +242,8 @@ fn fork() -> Network {
 #[test]
 fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged() {
     let mut cases = Cases::default();
-    cases.fine("crossed", crossed(), "judged: 6 delays", |_| ());
-    cases.fine("fork without a clock", fork(), "judged: 6 delays", |_| ());
+    cases.fine("crossed", crossed(), "checked: 6 delays", |_| ());
+    cases.fine("fork without a clock", fork(), "checked: 6 delays", |_| ());
     cases.judge();
 }
 
@@ -252,7 +252,7 @@ fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged() {
 fn rings_behind_junctions_are_judged_whole_and_broken() {
     let mut cases = Cases::default();
     let network = || wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
-    cases.fine("ring behind a junction", network(), "judged: 63 delays", |run| {
+    cases.fine("ring behind a junction", network(), "checked: 63 delays", |run| {
         cycles(run, 20);
         for cable in RING_OF_THREE {
             apply(run, Fault::Cut(CableId(cable)));
@@ -264,7 +264,7 @@ fn rings_behind_junctions_are_judged_whole_and_broken() {
     let mut broken = network();
     broken.cut(CableId(3));
     broken.advance_by(Duration::from_millis(1));
-    cases.fine("ring that is whole later", broken, "judged: 14 delays", |run| {
+    cases.fine("ring that is whole later", broken, "checked: 14 delays", |run| {
         cycles(run, 20);
         apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
@@ -372,7 +372,7 @@ fn tampered_delays_are_found_crossed_behind_clockless_forks_and_in_rings() {
 fn clocks_that_were_tampered_with_are_found() {
     let tampering = Tampering::with(line(clocked(6, 100), NetworkOptions::default()), |run| cycles(run, 20));
     let mut cases = Cases::default();
-    tampering.add(&mut cases, Case::Fine("written anew", "judged: 6 delays"), &mut |_, _, _, _| ());
+    tampering.add(&mut cases, Case::Fine("written anew", "checked: 6 delays"), &mut |_, _, _, _| ());
     let is_own = |bytes: &[u8]| bytes[2..4] == STATION;
     let mut expect =
         |finding: &'static str, tamper: &mut Tamper<'_>| tampering.add(&mut cases, Case::Finding(finding), tamper);

@@ -9,6 +9,7 @@ use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_wire::address::Position;
 use scenarios::clocks::{clocked, config, delay, lock, spread, wired, with_clocks};
 use scenarios::delays::{Shape, run};
+use scenarios::seeds;
 use scenarios::segments::{MAIN, at};
 use scenarios::tap::Tap;
 use scenarios::world::World;
@@ -176,9 +177,7 @@ fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
 // covers: dc-delays
 #[test]
 fn delays_in_random_trees_with_gaps_are_right_or_not_written() {
-    let seeds =
-        std::env::var("SEED").ok().and_then(|text| text.parse::<u64>().ok()).map_or(0..6, |seed| seed..seed + 1);
-    for seed in seeds {
+    for seed in seeds::from_environment().unwrap_or(0..6) {
         let outcome = run(Shape::Gaps, seed, 6);
         assert!(outcome.wrong.is_empty(), "{:#?}", outcome.wrong);
         assert!(outcome.right > 0, "seed {seed}: {:?}", outcome.not_written);

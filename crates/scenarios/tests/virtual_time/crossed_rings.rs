@@ -9,6 +9,7 @@ use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port;
 use scenarios::check::ring_events;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
@@ -157,9 +158,10 @@ fn sorted(mut ends: Ends) -> Ends {
 // covers: CR-12, ring-branches
 #[test]
 fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unknown() {
-    let seeds = std::env::var("RINGCAT_SEEDS").ok().and_then(|it| it.parse().ok()).unwrap_or(60);
+    let seeds = seeds::from_environment().unwrap_or(0..60);
+    let runs = seeds.end - seeds.start;
     let (mut known, mut unknown, mut wrong) = (0, 0, Vec::new());
-    for seed in 0..seeds {
+    for seed in seeds {
         let mut dice = Dice::new(seed);
         let (cables, trunk, total) = random_ring(&mut dice);
         let kinds = vec!["junction"; total];
@@ -209,5 +211,6 @@ fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unkn
     }
     println!("{known} known, {unknown} unknown, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    assert!(known > 4 * unknown, "{known} known, {unknown} unknown");
+    // The share says nothing about a few seeds of choice.
+    assert!(runs < 60 || known > 4 * unknown, "{known} known, {unknown} unknown");
 }

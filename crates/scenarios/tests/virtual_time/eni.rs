@@ -19,6 +19,7 @@ use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::sii_image;
 use ringcat_wire::al::{AlState, AlStatus};
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{descriptions, line};
 
 /// A RingCAT example: packed outputs, a copy, a drive with its own mapping and SYNC0, one LRW for all.
@@ -423,52 +424,66 @@ fn places_for_more_than_a_subdevice_has_are_refused_with_both_numbers() {
     assert_eq!(text, "SubDevice 0: its outputs end at bit 8 of the process image, which has 0");
 }
 
+/// Changed files of each seed.
+const FILES: usize = 40;
+
 /// With any numbers in a file, the segment starts or an error states the reason.
 // covers: eni-run
 #[test]
 fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
     let text = std::str::from_utf8(MACHINE).expect("it is text");
     let numbers: Vec<(usize, usize)> = numbers(text);
-    let mut dice = Dice::new(1);
     let (mut refused, mut started) = (0, 0);
-    for _ in 0..std::env::var("RINGCAT_FILES").ok().and_then(|count| count.parse().ok()).unwrap_or(40) {
-        let mut changed = text.to_owned();
-        let mut places: Vec<(usize, usize)> = (0..=dice.below(3)).map(|_| *dice.pick(&numbers)).collect();
-        places.sort_unstable();
-        places.dedup();
-        for (start, end) in places.into_iter().rev() {
-            let hex = changed[start..end].len() > 3 && dice.one_in(2);
-            let number = match dice.below(5) {
-                0 => "0".to_owned(),
-                1 => "65535".to_owned(),
-                2 => dice.below(300).to_string(),
-                3 if hex => format!("{:016x}", dice.roll()),
-                _ => dice.below(1 << 33).to_string(),
-            };
-            changed.replace_range(start..end, &number);
+    for seed in seeds::from_environment().unwrap_or(1..2) {
+        let mut dice = Dice::new(seed);
+        for _ in 0..FILES {
+            let changed = with_other_numbers(text, &numbers, &mut dice);
+            match EniFile::from_bytes(changed.as_bytes()) {
+                Ok(file) => started += usize::from(starts(&file, dice.one_in(2))),
+                Err(_) => refused += 1,
+            }
         }
-        let Ok(file) = EniFile::from_bytes(changed.as_bytes()) else {
-            refused += 1;
-            continue;
-        };
-        let ring = dice.one_in(2);
-        let Ok(network) = file.simulated(ring) else { continue };
-        let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
-        let Ok(scan) = main_device.scan() else { continue };
-        file.compare(&scan.subdevices);
-        let Ok(mut application) = main_device.activate(file.declaration(ring)) else { continue };
-        let Ok(mut image) = EniImage::new(&file.configuration, application.directory()) else { continue };
-        let _ = application.set_copies(image.copies());
-        for _ in 0..30 {
-            application.cycle(|data| {
-                image.take_inputs(data);
-                image.give_outputs(data);
-            });
-        }
-        started += 1;
     }
     println!("{refused} refused, {started} started");
     assert!(refused > 0 && started > 0);
+}
+
+/// A file with up to three of its numbers replaced.
+fn with_other_numbers(text: &str, numbers: &[(usize, usize)], dice: &mut Dice) -> String {
+    let mut changed = text.to_owned();
+    let mut places: Vec<(usize, usize)> = (0..=dice.below(3)).map(|_| *dice.pick(numbers)).collect();
+    places.sort_unstable();
+    places.dedup();
+    for (start, end) in places.into_iter().rev() {
+        let hex = changed[start..end].len() > 3 && dice.one_in(2);
+        let number = match dice.below(5) {
+            0 => "0".to_owned(),
+            1 => "65535".to_owned(),
+            2 => dice.below(300).to_string(),
+            3 if hex => format!("{:016x}", dice.roll()),
+            _ => dice.below(1 << 33).to_string(),
+        };
+        changed.replace_range(start..end, &number);
+    }
+    changed
+}
+
+/// Whether a file is followed as far as cycles; each step may refuse it.
+fn starts(file: &EniFile, ring: bool) -> bool {
+    let Ok(network) = file.simulated(ring) else { return false };
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let Ok(scan) = main_device.scan() else { return false };
+    file.compare(&scan.subdevices);
+    let Ok(mut application) = main_device.activate(file.declaration(ring)) else { return false };
+    let Ok(mut image) = EniImage::new(&file.configuration, application.directory()) else { return false };
+    let _ = application.set_copies(image.copies());
+    for _ in 0..30 {
+        application.cycle(|data| {
+            image.take_inputs(data);
+            image.give_outputs(data);
+        });
+    }
+    true
 }
 
 /// Ranges of numbers in the text of elements.

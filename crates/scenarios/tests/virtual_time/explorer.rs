@@ -14,6 +14,7 @@ use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use scenarios::check::{Delivery, troubles};
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::{CYCLE, World};
 
@@ -190,11 +191,9 @@ fn seeds_from_the_environment() {
 
 /// One seed or a range of them from the environment variable SEED.
 pub(crate) fn from_environment(run: impl FnOnce(u64), runs: impl FnOnce(Range<u64>)) {
-    let Ok(text) = std::env::var("SEED") else { return println!("skipped: no SEED given") };
-    let (first, last) = text.split_once("..").unwrap_or((&text, ""));
-    let first = first.parse().expect("SEED=17 or SEED=1000..2000");
-    match last.parse() {
-        Ok(last) => runs(first..last),
-        Err(_) => run(first),
+    match seeds::from_environment() {
+        None => println!("skipped: no SEED given"),
+        Some(seeds) if seeds.end - seeds.start == 1 => run(seeds.start),
+        Some(seeds) => runs(seeds),
     }
 }

@@ -19,6 +19,7 @@ use ringcat_wire::sii::{Identity, SiiHeader};
 use scenarios::check::Delivery;
 use scenarios::dice::Dice;
 use scenarios::odd_images::{Change, Variant, variant};
+use scenarios::seeds;
 use scenarios::segments::{describe, line};
 use scenarios::world::{CYCLE, World};
 
@@ -62,8 +63,9 @@ struct Tally {
     failures: Vec<String>,
 }
 
-fn number(name: &str, usual: u64) -> u64 {
-    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
+/// Variants of each image and seed: as many as VARIANTS in the environment says, otherwise `usual`.
+fn variants(usual: u64) -> u64 {
+    std::env::var("VARIANTS").ok().map_or(usual, |text| text.parse().expect("VARIANTS=50"))
 }
 
 /// A segment around this SubDevice.
@@ -167,8 +169,14 @@ fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks all variants of an image.
-fn judge_all(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
+/// Checks all variants of an image, of seed 1 or of those in the environment.
+fn judge_all(sound: &DeviceDescription, count: u64, tally: &mut Tally) {
+    for seed in seeds::from_environment().unwrap_or(1..2) {
+        judge_seed(sound, seed, count, tally);
+    }
+}
+
+fn judge_seed(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
     let image = sii_image::build(sound);
     let mut dice = Dice::new(seed);
     for number in 0..count {
@@ -231,7 +239,7 @@ fn finish(tally: &Tally, what: &str) {
 fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
     let mut tally = Tally::default();
     for name in catalogue::names() {
-        judge_all(&describe(name, name), number("SEED", 1), number("VARIANTS", SOME), &mut tally);
+        judge_all(&describe(name, name), variants(SOME), &mut tally);
     }
     finish(&tally, "images of the catalogue");
 }
@@ -254,12 +262,12 @@ fn odd_images_of_real_devices_hold_up_nobody_and_are_explained() {
         match DeviceDescription::from_sii(image.clone(), &name) {
             Ok(mut sound) => {
                 sound.behaviour = Behaviour::Terminal(InputSource::Outputs);
-                judge_all(&sound, number("SEED", 1), number("VARIANTS", MANY), &mut tally);
+                judge_all(&sound, variants(MANY), &mut tally);
             }
             Err(error) => {
                 println!("{name}: {error}");
                 let plain = DeviceDescription::plain(&name, Identity::default());
-                judge_all(&with_image(plain, &image), number("SEED", 1), number("VARIANTS", MANY), &mut tally);
+                judge_all(&with_image(plain, &image), variants(MANY), &mut tally);
             }
         }
     }

@@ -6,7 +6,6 @@
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -26,6 +25,7 @@ use scenarios::ethernet_host::{Addresses, download};
 use scenarios::loss::Loss;
 use scenarios::mail_beside::Beside;
 use scenarios::mail_questions::{Asker, KINDS, Kind};
+use scenarios::seeds;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
@@ -154,13 +154,6 @@ fn quiet_moment(world: &mut World) -> UnderWay {
     loads.min_by_key(|load| (load.procedures, load.datagrams)).expect("some cycles")
 }
 
-/// 30 seeds, or RINGCAT_SEEDS: a number or a range (`3217..3218`).
-fn seeds() -> Range<u64> {
-    let asked = std::env::var("RINGCAT_SEEDS").unwrap_or_default();
-    let (from, to) = asked.split_once("..").unwrap_or(("0", &asked));
-    from.parse().unwrap_or(0)..to.parse().unwrap_or(30)
-}
-
 fn run(seed: u64, tally: &Rc<Tally>) {
     let mut dice = Dice::new(seed);
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10 + dice.below(2000)));
@@ -270,7 +263,7 @@ fn mailboxes_are_idle(world: &mut World, seed: u64) {
 #[test]
 fn each_answer_finds_its_request_and_no_mail_stays_whatever_happens() {
     let tally = Rc::new(Tally::default());
-    let seeds = seeds();
+    let seeds = seeds::from_environment().unwrap_or(0..30);
     let runs = (seeds.end - seeds.start) as u32;
     seeds.for_each(|seed| run(seed, &tally));
     let (answered, failed, downloads) = (tally.answered.get(), tally.failed.get(), tally.downloads.get());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use scenarios::dice::Dice;
 use scenarios::fuzz_targets::{TARGETS, Target, eni, mutate, seeds};
+use scenarios::seeds::from_environment;
 
 /// Mutants of each file of a corpus.
 const MUTANTS: usize = 400;
@@ -62,36 +63,37 @@ fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
 // covers: mail-judge
 #[test]
 fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() {
-    let mut dice = Dice::new(4);
-    for (name, target) in TARGETS {
-        let files = read(name);
-        for (_, bytes) in &files {
-            for _ in 0..MUTANTS {
+    let corpora = TARGETS.map(|(name, target)| (name, target, read(name)));
+    for seed in from_environment().unwrap_or(4..5) {
+        let mut dice = Dice::new(seed);
+        for (name, target, files) in &corpora {
+            for (_, bytes) in files.iter().flat_map(|file| std::iter::repeat_n(file, MUTANTS)) {
                 let mut mutant = bytes.clone();
-                mutate(&mut mutant, &dice.pick(&files).1.clone(), &mut dice);
-                run(name, target, &mutant);
+                mutate(&mut mutant, &dice.pick(files).1.clone(), &mut dice);
+                run(name, *target, &mutant);
             }
         }
     }
 }
 
-/// Mutants of each own ENI.
+/// Mutants of each own ENI and seed.
 const ENI_MUTANTS: usize = 150;
 
 // covers: 8, eni-read
 #[test]
 fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors() {
-    let runs = std::env::var("RINGCAT_ENI_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(ENI_MUTANTS);
-    let mut dice = Dice::new(8);
-    for text in [eni::WHOLE, eni::GROUP] {
-        let mut followed = 0;
-        for number in 0..=runs {
-            let mutant = if number == 0 { text.to_owned() } else { eni::mutate(text, &mut dice) };
-            let _running = Running("eni", mutant.as_bytes());
-            followed += usize::from(eni::is_followed(mutant.as_bytes()));
+    for seed in from_environment().unwrap_or(8..9) {
+        let mut dice = Dice::new(seed);
+        for text in [eni::WHOLE, eni::GROUP] {
+            let mut followed = 0;
+            for number in 0..=ENI_MUTANTS {
+                let mutant = if number == 0 { text.to_owned() } else { eni::mutate(text, &mut dice) };
+                let _running = Running("eni", mutant.as_bytes());
+                followed += usize::from(eni::is_followed(mutant.as_bytes()));
+            }
+            let share = followed * 100 / (ENI_MUTANTS + 1);
+            assert!((10..90).contains(&share), "{share} % are followed: the changes are too small or too large");
         }
-        let share = followed * 100 / (runs + 1);
-        assert!((10..90).contains(&share), "{share} % are followed: the changes are too small or too large");
     }
 }
 

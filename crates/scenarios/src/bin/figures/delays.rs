@@ -1,6 +1,7 @@
 //! Delays that are written during process data exchange (issue 14): rings of 2 to 64, local rings, random trees with
 //! rings, compared with the true delays of the simulator ([`scenarios::delays`]). The environment variable `DELAYS` is
-//! the number of changes of each kind; the default is a share of the full number.
+//! the number of changes of each kind and seed; the default is a share of the full number. `SEED` selects other segments
+//! (`17` or `17..20`).
 
 use std::process::ExitCode;
 use std::thread;
@@ -8,6 +9,7 @@ use std::thread;
 use scenarios::delays::{Outcome, Shape, run};
 use scenarios::dice::Dice;
 use scenarios::figures::{Figures, verdict};
+use scenarios::seeds;
 
 /// Default number of changes of each kind.
 const CHANGES: u64 = 60;
@@ -17,7 +19,6 @@ const OF_ONE: u64 = 20;
 pub fn main() -> ExitCode {
     let wanted = std::env::var("DELAYS").ok().and_then(|text| text.parse().ok()).unwrap_or(CHANGES);
     let mut figures = Figures::new("delays written while cycles of 1 ms go on, cables cut and healed, in virtual time");
-    let mut dice = Dice::new(14);
     type Draw = fn(&mut Dice) -> Shape;
     let kinds: [(&str, Draw); 6] = [
         ("rings of 2 to 16", |dice| Shape::Ring(2 + dice.below(15) as usize)),
@@ -27,9 +28,12 @@ pub fn main() -> ExitCode {
         ("random trees with rings", |_| Shape::Tree),
         ("the same, a third without a clock", |_| Shape::Gaps),
     ];
-    for (name, draw) in kinds {
-        let runs: Vec<(Shape, u64)> = (0..wanted.div_ceil(OF_ONE)).map(|_| (draw(&mut dice), dice.roll())).collect();
-        print(&mut figures, name, &both(&runs));
+    for seed in seeds::from_environment().unwrap_or(14..15) {
+        let mut dice = Dice::new(seed);
+        for (name, draw) in kinds {
+            let runs: Vec<_> = (0..wanted.div_ceil(OF_ONE)).map(|_| (draw(&mut dice), dice.roll())).collect();
+            print(&mut figures, name, &both(&runs));
+        }
     }
     verdict(figures.print())
 }

@@ -1,0 +1,137 @@
+# The steps of `.ci/run`, which sources this file: a function each, called at the root of the repository with `set -e`.
+# `$logs` is a directory for files of this run.
+
+# What tests and benches use beyond the compiler: valgrind counts instructions, iproute2 makes the network namespaces
+# that tests on real interfaces run in, tshark reads captures, strace counts system calls. Packages are installed on the
+# machine of CI only.
+root_layer() {
+    local missing=()
+    command -v valgrind >/dev/null || missing+=(valgrind)
+    command -v ip >/dev/null || missing+=(iproute2)
+    command -v tshark >/dev/null || missing+=(tshark)
+    command -v strace >/dev/null || missing+=(strace)
+    if [[ ${#missing[@]} == 0 ]]; then
+        echo "all here: $(valgrind --version), $(ip -V), $(tshark --version 2>/dev/null | head -n 1)"
+    elif [[ ${CI:-} == true && $(id -u) == 0 ]]; then
+        apt-get update -q
+        DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
+    else
+        echo "skipped: not installed: ${missing[*]}; without valgrind instruction counts are missing, without iproute2"
+        echo "the tests on real interfaces, without tshark its view of captures (apt-get install brings them; this"
+        echo "script does so only as root with CI=true)"
+    fi
+}
+
+# What `root_layer` said, which ran beside the steps before.
+root_layer_came() {
+    cat "$logs/root-layer"
+    return "$layer_status"
+}
+
+# Tests on veth pairs in network namespaces, in real time, and the MainDevices of others (pysoem, ethercrab) on our
+# simulator. A machine that stalls for longer than a watchdog takes a test with it, so tests that fail are run again.
+on_the_wire() {
+    local begin=$SECONDS
+    export RINGCAT_ON_THE_WIRE=1 RINGCAT_FOREIGN=1
+    # The whole workspace each time: another selection of packages has other features, and is built again.
+    tried --workspace --test wire
+    tried --workspace --test on_the_wire
+    echo "the tests on real interfaces took $((SECONDS - begin)) s, of 360 that they may take"
+}
+
+# tried ARGUMENTS...: `cargo test ARGUMENTS` one test at a time; those that fail have three tries, and each is shown.
+tried() {
+    local try names=()
+    for try in 1 2 3; do
+        if cargo test "$@" -- --nocapture --test-threads 1 "${names[@]}" 2>&1 | tee "$logs/try"; then
+            return 0
+        fi
+        # The runner names at its end what failed; without names it was not built.
+        mapfile -t names < <(sed -n '/^failures:$/,/^test result/s/^    \([a-z0-9_:]*\)$/\1/p' "$logs/try" | sort -u)
+        echo "try $try of 3 failed: ${names[*]:-nothing was run}"
+        [[ ${#names[@]} != 0 ]] || return 1
+        names=(--exact "${names[@]}")
+    done
+    return 1
+}
+
+# The README's test command. The runner's closing lines are shown as they come and once more, added up, at the end.
+tests() {
+    cargo test --workspace 2>&1 | tee "$logs/tests"
+    echo
+    echo "closing lines of all test programs:"
+    grep '^test result:' "$logs/tests" | sort | uniq -c
+    awk '/^test result:/ { passed += $4; failed += $6; ignored += $8 }
+         END { printf "all together: %d passed, %d failed, %d ignored\n", passed, failed, ignored }' "$logs/tests"
+}
+
+# The minimum version that Cargo.toml and the README name is the one that everything here is built with.
+toolchain() {
+    local wanted built
+    wanted=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' Cargo.toml)
+    built=$(rustc --version | cut -d ' ' -f 2)
+    echo "rustc $built, rust-version $wanted"
+    if [[ $built != "$wanted" && $built != "$wanted".* ]]; then
+        echo "CI builds with rust-version: RUSTUP_TOOLCHAIN=$wanted .ci/run, or raise it in Cargo.toml and README.md"
+        return 1
+    fi
+}
+
+formatting() {
+    cargo fmt --all --check
+    cargo fmt --check --manifest-path ci/no-std-proof/Cargo.toml
+}
+
+lints() {
+    cargo clippy --workspace --all-targets -- -D warnings
+    cargo clippy --release --locked --manifest-path ci/no-std-proof/Cargo.toml -- -D warnings
+}
+
+# The library with each of its features alone: what `--workspace` builds has them all.
+features() {
+    local feature
+    for feature in "" packet sim eni gateway eoe tracing; do
+        echo "ringcat with \"$feature\""
+        cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
+    done
+}
+
+documentation() {
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+}
+
+# Licences, duplicates and sources of crates after deny.toml. Known vulnerabilities need cargo-deny and its database,
+# which comes from GitHub; registries of crates do not have it. Withdrawn (yanked) versions are found by ci/package.
+dependencies() {
+    local database=https://github.com/rustsec/advisory-db
+    cargo test --quiet --workspace --test tree -- crates_from_elsewhere
+    if ! command -v cargo-deny >/dev/null; then
+        echo "skipped: advisories: cargo-deny is not installed (cargo install cargo-deny --locked, about three minutes)"
+        return
+    fi
+    cargo deny --workspace check bans licenses sources
+    if timeout 30 git ls-remote --quiet "$database" HEAD >/dev/null 2>&1; then
+        cargo deny --workspace check advisories
+    else
+        echo "skipped: advisories: $database cannot be reached"
+    fi
+}
+
+figures() {
+    cargo run --quiet --package tidy
+    cargo run --quiet --package tidy -- figures
+}
+
+# The README's first command, and the size of the program that a release has.
+demo() {
+    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=8000000
+    cargo run --release
+    bytes=$(stat --format %s "$program")
+    echo "$program has $bytes bytes, at most $most may be; without symbols $(without_symbols "$program")"
+    ((bytes <= most))
+}
+
+without_symbols() {
+    strip --strip-all -o "$logs/stripped" "$1"
+    stat --format %s "$logs/stripped"
+}

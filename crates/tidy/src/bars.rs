@@ -1,0 +1,190 @@
+//! Figures of the source tree against the bars of issue 15, with what they were before it.
+//!
+//! In goes a tree, out come [`Row`]s. What has to be run is named with its command.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use crate::known::Counts;
+use crate::tree::{File, Tree};
+use crate::{Finding, circles, dependencies, interface, limits, words};
+
+/// A line of the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What is measured.
+    pub what: &'static str,
+    /// Before issue 15, where it was measured.
+    pub before: &'static str,
+    /// Now.
+    pub now: String,
+    /// What it has to be.
+    pub bar: &'static str,
+    /// Whether it is; nothing where a figure is only printed.
+    pub holds: Option<bool>,
+}
+
+/// Above the table of tasks that poll: a comment in a page, so that its rows can be counted.
+pub const POLLING: &str = "<!-- polling tasks of the engine -->";
+
+/// Crates that are published, by directory; their documentation counts.
+const PUBLISHED: [&str; 8] = ["cli", "config", "engine", "gateway", "link", "ringcat", "sim", "wire"];
+/// The pages that are documentation of `ringcat`.
+const GUIDE: &str = "docs/guide/";
+const EXAMPLES: usize = 20;
+
+/// All rows; `packet` is what `cargo tree` prints for an application with the feature of this name.
+pub fn rows(tree: &Tree, packet: &str) -> Result<Vec<Row>, Finding> {
+    let none = |what, before, counts: Counts| {
+        let sum: usize = counts.values().sum();
+        let now = if counts.is_empty() { "0".to_owned() } else { format!("{sum} in {}", places(&counts)) };
+        Row { what, before, now, bar: "0", holds: Some(counts.is_empty()) }
+    };
+    let at_most = |what, before, now: usize, most: usize, bar| Row {
+        what,
+        before,
+        now: now.to_string(),
+        bar,
+        holds: Some(now <= most),
+    };
+    let printed = |what, before, now: String| Row { what, before, now, bar: "printed", holds: None };
+    let long = limits::long_functions(tree)?.into_keys().map(|name| (name, 1)).collect();
+    let files = limits::long_files(tree).into_keys().map(|name| (name, 1)).collect();
+    let (registry, _) = dependencies::crates_in(packet);
+    let examples = examples(tree);
+    let (without, all) = (lines(tree, "engine", false), lines(tree, "engine", true));
+    Ok(vec![
+        none("files in circles of a crate", "28 of 184 files", circles::sizes(tree)?),
+        at_most(
+            "crates of an application with `packet`",
+            "not possible",
+            registry.len(),
+            dependencies::MAX_CRATES,
+            "12",
+        ),
+        none("functions over 60 lines", "25 over 50", long),
+        none("files over 500 lines, tests apart", "not counted", files),
+        none("lines over 120 columns", "not counted", limits::wide_lines(tree)),
+        polling(tree),
+        none("words for people outside of the allow-list", "1,361", words::for_people(tree)),
+        printed("lines of the engine", "42,982", format!("{all}, without files of tests {without}")),
+        printed("public items of `ringcat`", "not counted", interface::items(tree).len().to_string()),
+        Row {
+            what: "documentation examples",
+            before: "1",
+            now: examples.to_string(),
+            bar: "20",
+            holds: Some(examples >= EXAMPLES),
+        },
+    ])
+}
+
+fn places(counts: &Counts) -> String {
+    let most = 3;
+    let mut named: Vec<&str> = counts.keys().take(most).map(String::as_str).collect();
+    if counts.len() > most {
+        named.push("...");
+    }
+    format!("{} places ({})", counts.len(), named.join(", "))
+}
+
+/// Lines of a crate's sources, with or without files of tests.
+fn lines(tree: &Tree, directory: &str, with_tests: bool) -> usize {
+    let below = format!("crates/{directory}/src/");
+    let counts = |file: &&File| file.path.starts_with(&below) && (with_tests || !limits::is_test(&file.path));
+    tree.rust().filter(counts).map(|file| file.text.lines().count()).sum()
+}
+
+/// Tasks that poll, in the table behind [`POLLING`].
+fn polling(tree: &Tree) -> Row {
+    let what = "polling tasks of the engine without an event";
+    let before = "not listed";
+    let page = tree.files.iter().find(|file| file.path.ends_with(".md") && file.text.contains(POLLING));
+    let bar = "0 or listed with the reason";
+    let Some(page) = page else {
+        return Row { what, before, now: "no list".to_owned(), bar, holds: Some(false) };
+    };
+    let table = page.text.split_once(POLLING).map_or("", |(_, after)| after).trim_start();
+    let rows: Vec<&str> = table.lines().take_while(|line| line.starts_with('|')).skip(2).collect();
+    let reasons =
+        rows.iter().all(|row| row.trim_matches('|').rsplit('|').next().is_some_and(|it| !it.trim().is_empty()));
+    Row { what, before, now: format!("{} in {}", rows.len(), page.path), bar, holds: Some(reasons) }
+}
+
+/// Programs in documentation that `cargo test` compiles.
+fn examples(tree: &Tree) -> usize {
+    let sources: BTreeSet<String> = PUBLISHED.iter().map(|name| format!("crates/{name}/src/")).collect();
+    let is_source = |file: &&File| sources.iter().any(|below| file.path.starts_with(below.as_str()));
+    let in_comments = tree.rust().filter(is_source).map(|file| {
+        let comment = |line: &str| {
+            let line = line.trim_start();
+            line.strip_prefix("///").or(line.strip_prefix("//!")).map(str::to_owned)
+        };
+        programs(file.text.lines().filter_map(comment))
+    });
+    let pages = tree.files.iter().filter(|file| file.path.starts_with(GUIDE) && !file.path.ends_with("README.md"));
+    let in_pages = pages.map(|file| programs(file.text.lines().map(str::to_owned)));
+    in_comments.chain(in_pages).sum()
+}
+
+/// Fenced blocks that rustdoc takes for Rust to compile.
+fn programs(lines: impl Iterator<Item = String>) -> usize {
+    let (mut inside, mut count) = (false, 0);
+    for line in lines {
+        let Some(words) = line.trim_start().strip_prefix("```") else { continue };
+        let compiled = ["should_panic", "no_run", "rust", "edition2024"];
+        let is_program = words.split(',').all(|word| word.trim().is_empty() || compiled.contains(&word.trim()));
+        count += usize::from(!inside && is_program);
+        inside = !inside;
+    }
+    count
+}
+
+/// The table as text, and whether all bars hold.
+pub fn text(rows: &[Row]) -> (String, bool) {
+    let mut text = String::new();
+    for Row { what, before, now, bar, holds } in rows {
+        let verdict = match holds {
+            None => "",
+            Some(true) => "holds",
+            Some(false) => "MISSED",
+        };
+        let _ = writeln!(text, "{verdict:<7} {what}: {now} (bar: {bar}; before: {before})");
+    }
+    (text, rows.iter().all(|row| row.holds != Some(false)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tree(files: &[(&str, &str)]) -> Tree {
+        Tree { files: files.iter().map(|(path, text)| File::new(path, text)).collect() }
+    }
+
+    #[test]
+    fn programs_in_comments_and_in_the_guide_are_counted() {
+        let source = "//! ```\n//! a();\n//! ```\n//! ```text\n//! no\n//! ```\n/// ```no_run\n/// b();\n/// ```\n";
+        let guide = "```rust\nc();\n```\n```toml\nd = 1\n```\n";
+        let tree =
+            tree(&[("crates/wire/src/a.rs", source), ("crates/tidy/src/a.rs", source), ("docs/guide/a.md", guide)]);
+        assert_eq!(examples(&tree), 3);
+    }
+
+    #[test]
+    fn tasks_that_poll_have_a_reason_each() {
+        let page =
+            |reason: &str| format!("{POLLING}\n\n| task | period | reason |\n|---|---|---|\n| a | 1 ms | {reason} |\n");
+        assert_eq!(polling(&tree(&[])).holds, Some(false));
+        let good = polling(&tree(&[("docs/a.md", &page("silence posts nothing"))]));
+        assert_eq!((good.now.as_str(), good.holds), ("1 in docs/a.md", Some(true)));
+        assert_eq!(polling(&tree(&[("docs/a.md", &page(""))])).holds, Some(false));
+    }
+
+    #[test]
+    fn a_bar_that_is_missed_is_said_to_be() {
+        let row = |holds| Row { what: "a", before: "2", now: "1".to_owned(), bar: "0", holds };
+        assert!(text(&[row(None), row(Some(true))]).1);
+        assert_eq!(text(&[row(Some(false))]), ("MISSED  a: 1 (bar: 0; before: 2)\n".to_owned(), false));
+    }
+}
