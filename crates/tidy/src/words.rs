@@ -1,7 +1,7 @@
 //! Words for people, which the field does not use for devices and frames.
 //!
-//! In goes a tree, out come [`Counts`] of such words per file. Data sheets name the thing that acts: "the SubDevice
-//! that processes the frame".
+//! Input: a tree. Output: [`Counts`] of such words per file. Data sheets name the acting device: "the SubDevice that
+//! processes the frame".
 
 use crate::known::{self, Counts};
 use crate::tree::Tree;
@@ -9,7 +9,7 @@ use crate::tree::Tree;
 /// Words that no data sheet has.
 pub const WORDS: [&str; 6] = ["who", "whoever", "whom", "somebody", "nobody", "everybody"];
 
-/// Files that speak of people, or of these words.
+/// Files that may contain these words.
 const ALLOWED: [&str; 2] = [known::PATH, "crates/tidy/src/words.rs"];
 
 /// How often each file uses one of [`WORDS`].
