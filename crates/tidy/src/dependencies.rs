@@ -1,7 +1,7 @@
-//! What an application takes in with the library, feature by feature, and what its examples name.
+//! Crates that an application gets with the library, per feature, and crates that examples name.
 //!
-//! In goes what `cargo tree` says of a set of features, out comes a finding for every crate that does not belong there
-//! and for more crates than the bar.
+//! Input: the output of `cargo tree` for a set of features. Output: a finding for every crate that is not allowed, and
+//! for exceeding the limit.
 
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -10,27 +10,27 @@ use crate::Finding;
 use crate::tokens::tokens;
 use crate::tree::Tree;
 
-/// Features of `ringcat`, each by itself.
+/// Features of `ringcat`, each one alone.
 pub const FEATURE_SETS: [&str; 7] = ["", "packet", "sim", "eni", "gateway", "eoe", "tracing"];
 
-/// Sets that an application on network interfaces needs; they bring as little as possible.
+/// Sets for an application on network interfaces, with few dependencies.
 const SMALL: [&str; 2] = ["", "packet"];
-/// Crates from the registry in one of the small sets.
+/// Maximum number of crates from the registry in one of the small sets.
 pub const MAX_CRATES: usize = 12;
-/// Crates of the program, of the simulator, of files and of the gateway.
+/// Crates of the program, the simulator, files and the gateway.
 const NOT_IN_SMALL: [&str; 9] =
     ["clap", "mio", "roxmltree", "serde_json", "signal-hook", "smoltcp", "strsim", "toml", "tracing"];
 
-/// Sources that name the library alone of this repository, and what else of it single ones may.
+/// Sources that may name only the library of this repository, and exceptions.
 const USERS: [(&str, &[&str]); 3] = [
     ("crates/ringcat/examples/", &[]),
-    // It measures the cyclic half by itself.
+    // It measures the cyclic half of the engine.
     ("crates/cli/src/bench/", &["ringcat_engine", "ringcat_link"]),
-    // What the kernel says of interfaces is not EtherCAT.
+    // Information of the kernel about interfaces is not EtherCAT.
     ("crates/cli/", &["ringcat_link"]),
 ];
 
-/// What `cargo tree` prints for an application with these features of the library.
+/// Output of `cargo tree` for an application with these features of the library.
 pub fn cargo_tree(features: &str) -> Result<String, String> {
     let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
     cargo.args(["tree", "--offline", "--package", "ringcat", "--edges", "normal", "--prefix", "none"]);
@@ -40,7 +40,7 @@ pub fn cargo_tree(features: &str) -> Result<String, String> {
     if output.status.success() { Ok(text(&output.stdout)) } else { Err(text(&output.stderr)) }
 }
 
-/// Names of crates from the registry in what `cargo tree --prefix none` prints, and of ours.
+/// Names of crates from the registry in the output of `cargo tree --prefix none`, and of crates of this repository.
 pub fn crates_in(tree: &str) -> (BTreeSet<&str>, BTreeSet<&str>) {
     let lines = tree.lines().filter(|line| !line.trim().is_empty());
     let (ours, others): (Vec<&str>, Vec<&str>) = lines.partition(|line| line.contains("(/"));
@@ -51,7 +51,7 @@ fn first_word(line: &str) -> Option<&str> {
     line.split(' ').next()
 }
 
-/// What is wrong with the crates of a set of features.
+/// Findings about the crates of a set of features.
 pub fn not_in(features: &str, tree: &str) -> Vec<Finding> {
     if !SMALL.contains(&features) {
         return Vec::new();
@@ -70,8 +70,8 @@ pub fn not_in(features: &str, tree: &str) -> Vec<Finding> {
     findings
 }
 
-/// Examples and sources of the program that name another crate of this repository than they may: an application has
-/// `ringcat` alone.
+/// Examples and sources of the program that name another crate of this repository than allowed: an application depends
+/// only on `ringcat`.
 pub fn beside_the_library(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for file in tree.rust() {
@@ -95,7 +95,7 @@ mod tests {
                           ringcat-link v0.1.0 (/r/crates/link) (*)\n";
 
     #[test]
-    fn crates_of_the_registry_are_told_from_ours() {
+    fn crates_of_the_registry_and_of_the_repository_are_distinguished() {
         let (others, ours) = crates_in(PACKET);
         assert_eq!(others.into_iter().collect::<Vec<_>>(), ["libc"]);
         assert_eq!(ours.into_iter().collect::<Vec<_>>(), ["ringcat", "ringcat-link"]);

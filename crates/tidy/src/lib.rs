@@ -1,33 +1,33 @@
-//! Checks of the source tree that the compiler does not make; `tests/tree.rs` runs them over this repository.
+//! Checks of the source tree that the compiler does not perform; `tests/tree.rs` applies them to this repository.
 //!
-//! In goes the text of the tree ([`tree::Tree`]), out come [`Finding`]s, each with the place and what to do about it.
-//! One module per rule:
+//! Input: the text of the tree ([`tree::Tree`]). Output: [`Finding`]s, each with its position and advice. One module
+//! per rule:
 //!
 //! * [`files`]: length of files, forbidden names, the opening comment, marks of unfinished work;
 //! * [`crates`]: allowed arrows between crates;
-//! * [`dependencies`]: what an application takes in with the library; examples and the program use it alone;
+//! * [`dependencies`]: crates that an application gets with the library; examples and the program use only the library;
 //! * [`interface`]: the list of public items of the library is kept in the repository;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`publishing`]: manifests of crates that are published;
-//! * [`safety`]: where `unsafe` may be written;
-//! * [`protocol`]: sections and statements of `docs/protocol` that are cited exist;
-//! * [`covers`]: names of tests, and what their `// covers:` lines name;
-//! * [`features`]: every row of `docs/FEATURES.md` is covered by tests;
-//! * [`deny`]: licences, versions and sources of crates are as `deny.toml` wants them;
+//! * [`safety`]: files that may contain `unsafe`;
+//! * [`protocol`]: cited sections and statements of `docs/protocol` exist;
+//! * [`covers`]: names of tests, and ids in their `// covers:` lines;
+//! * [`features`]: tests cover every row of `docs/FEATURES.md`;
+//! * [`deny`]: licences, versions and sources of crates match `deny.toml`;
 //! * [`evidence`]: the lists of tests in `docs/` are current;
 //! * [`explorers`]: the list of random scenarios in `ci/explorers.toml` is complete;
-//! * [`paths`]: the places that `docs/ARCHITECTURE.md` names exist;
-//! * [`toolchain`]: one minimum Rust version in all places that name it;
+//! * [`paths`]: the paths in `docs/ARCHITECTURE.md` exist;
+//! * [`toolchain`]: the same minimum Rust version everywhere;
 //! * [`circles`]: the files of a crate name each other without circles, over [`names`] and [`arrows`];
 //! * [`limits`]: lines of functions and files, columns of lines, names of tests;
-//! * [`words`]: words for people, used for devices.
+//! * [`words`]: words for people in place of devices.
 //!
-//! The last three count ([`rules`]); what is not mended yet is in `known.toml`, which only shrinks ([`known`]).
-//! `cargo run -p tidy` prints it, with the longest chain of files of each crate, `-- figures` the bars of issue 15
-//! ([`bars`]). [`coverage`] lists what of the protocol no test covers.
+//! The last three count ([`rules`]); `known.toml` lists known violations and only shrinks ([`known`]). `cargo run -p
+//! tidy` prints them, with the longest chain of files of each crate, `-- figures` the bars of issue 15 ([`bars`]).
+//! [`coverage`] lists the parts of the protocol without a test.
 //!
-//! [`tokens`] is the little Rust lexer under some of them, so that words in comments and strings are not taken for
-//! code; the younger ones read with `syn`.
+//! [`tokens`] is a small Rust lexer for some of the modules, so that words in comments and strings are not read as
+//! code; the newer modules use `syn`.
 #![forbid(unsafe_code)]
 
 pub mod arrows;
@@ -59,14 +59,14 @@ pub mod words;
 
 use std::fmt;
 
-/// Something that breaks a rule, or is about to.
+/// A violation of a rule, or a warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// File, relative to the root of the repository, with `/` between its parts.
     pub file: String,
     /// Line, counted from 1; 0 is the whole file.
     pub line: usize,
-    /// What is wrong and what to do.
+    /// The violation and advice.
     pub text: String,
 }
 

@@ -1,8 +1,8 @@
-//! `cargo run -p tidy`: what the rules find in this repository, with the longest chain of files of each crate.
+//! `cargo run -p tidy`: findings of the rules in this repository, with the longest chain of files of each crate.
 //!
-//! `cargo run -p tidy -- coverage` lists what of `docs/protocol` no test covers, `-- tests` writes the lists of tests
-//! of each feature and each part of the protocol, `-- figures` prints the bars of issue 15 with what is measured.
-//! `cargo run -p tidy -- shrink` lowers `known.toml` to what is there; it refuses where a rule found more than before.
+//! `cargo run -p tidy -- coverage` lists the parts of `docs/protocol` without a test, `-- tests` writes the lists of
+//! tests of each feature and each part of the protocol, `-- figures` prints the bars of issue 15 with measured figures.
+//! `cargo run -p tidy -- shrink` lowers `known.toml` to the current counts; it refuses if a count has grown.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,18 +1,18 @@
-//! The minimum Rust version is one: that of the workspace, of the README, of every crate, and the one CI builds with.
+//! The minimum Rust version is the same in the workspace, the README, every crate and CI.
 //!
-//! In goes a tree, out come findings. A version that no build ever used is a guess, so `.ci/run` compares the compiler
-//! with `rust-version`, and clippy's `incompatible_msrv` judges what the library had at that version.
+//! Input: a tree. Output: findings. A version that no build has used is a guess, so `.ci/run` compares the compiler
+//! with `rust-version`, and clippy's `incompatible_msrv` checks the use of the standard library.
 
 use crate::Finding;
 use crate::tree::Tree;
 
-/// Where the version is written.
+/// Files that contain the version.
 const WORKSPACE: &str = "Cargo.toml";
 const README: &str = "README.md";
-/// What builds, and has to look at it.
+/// The script that builds, which has to check it.
 const CI: &str = ".ci/steps.sh";
 
-/// Places that name another version, or none.
+/// Files that name another version, or none.
 pub fn disagreements(tree: &Tree) -> Vec<Finding> {
     let Some(version) = tree.file(WORKSPACE).and_then(|file| version_of(&file.text)) else {
         return vec![Finding::new(WORKSPACE, 0, "[workspace.package] has no rust-version")];

@@ -1,7 +1,7 @@
 //! Words for people, which the field does not use for devices and frames.
 //!
-//! In goes a tree, out come [`Counts`] of such words per file outside of the allow-list ([`ALLOWED`]). Data sheets name
-//! the thing that acts: "the SubDevice that processes the frame".
+//! Input: a tree. Output: [`Counts`] of such words per file outside of the allow-list ([`ALLOWED`]). Data sheets name
+//! the acting device: "the SubDevice that processes the frame".
 
 use crate::Finding;
 use crate::known::{self, Counts};
