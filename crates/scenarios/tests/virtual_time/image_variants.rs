@@ -228,7 +228,7 @@ fn finish(tally: &Tally, what: &str) {
 
 // covers: odd-sii
 #[test]
-fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
+fn damaged_catalogue_images_are_explained_and_stop_no_other_subdevice() {
     let mut tally = Tally::default();
     for name in catalogue::names() {
         judge_all(&describe(name, name), number("SEED", 1), number("VARIANTS", SOME), &mut tally);
@@ -238,7 +238,7 @@ fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
 
 // covers: odd-sii
 #[test]
-fn odd_images_of_real_devices_hold_up_nobody_and_are_explained() {
+fn damaged_images_of_real_devices_stop_no_other_subdevice() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");
     let Ok(entries) = std::fs::read_dir(&directory) else {
         println!("skipped: {} is not there", directory.display());
