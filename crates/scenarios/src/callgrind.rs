@@ -16,12 +16,11 @@ use std::process::{Command, Stdio};
 pub struct Profile {
     /// Instructions in user mode.
     pub instructions: u64,
-    /// Calls by name of the called function, also those outside of the function within which was counted.
+    /// Calls by name of the called function, also those outside of the counted function.
     pub calls: BTreeMap<String, u64>,
-    /// How often the first instruction of a function was executed, where that was counted.
+    /// Executions of the first instruction of each counted function.
     pub entries: BTreeMap<String, u64>,
-    /// Instructions by source file and function: those of the function itself, without what it calls. Code that was
-    /// inlined counts for the file it was written in.
+    /// Instructions by source file and function, without called functions. Inlined code counts for its own file.
     pub own: BTreeMap<(String, String), u64>,
 }
 
@@ -32,7 +31,7 @@ impl Profile {
         let (mut called, mut file, mut function) = ("", "", "");
         let mut totals = None;
         let mut is_of_call = false;
-        // Lowest address of each function, and how often it was executed.
+        // Lowest address of each function, and its executions.
         let mut firsts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
         for line in text.lines() {
             if let Some(name) = line.strip_prefix("cfn=") {
@@ -44,7 +43,7 @@ impl Profile {
             } else if let Some(rest) = line.strip_prefix("calls=") {
                 let count: u64 = rest.split_whitespace().next()?.parse().ok()?;
                 *profile.calls.entry(called.to_owned()).or_default() += count;
-                // The next line is what the call cost, with all that it called.
+                // The next line is the inclusive cost of the call.
                 is_of_call = true;
             } else if let Some(rest) = line.strip_prefix("0x") {
                 // Address, line of the source, cost.
@@ -148,7 +147,8 @@ mod tests {
     #[test]
     fn totals_and_calls_are_found_in_an_output_file() {
         let text = "version: 1\nfn=main\n0x10 16 4\ncfn=memcpy\ncalls=12 0x80 0\n0x14 16 120\n0x18 17 2\nfi=other.rs\n\
-                    0x10 3 1\ncfn=free\ncalls=1 0x90 0\n0x20 2 3\ncfn=memcpy\ncalls=3 0x80 0\n0x24 1 1\n\ntotals: 4711\n";
+                    0x10 3 1\ncfn=free\ncalls=1 0x90 0\n0x20 2 3\ncfn=memcpy\ncalls=3 0x80 0\n0x24 1 1\n\n\
+                    totals: 4711\n";
         let profile = Profile::parse(text).unwrap();
         assert_eq!(profile.instructions, 4711);
         assert_eq!(profile.calls_of(|name| name == "memcpy"), 15);

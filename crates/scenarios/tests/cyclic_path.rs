@@ -57,7 +57,7 @@ fn the_counter_sees_an_allocation() {
 
 // covers: no-allocation
 #[test]
-fn undisturbed_cycles_take_no_memory() {
+fn undisturbed_cycles_do_not_allocate() {
     for cabling in CABLINGS {
         let mut load = load(cabling);
         let used = counted(|| {
@@ -75,7 +75,7 @@ fn undisturbed_cycles_take_no_memory() {
 
 // covers: under-way
 #[test]
-fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
+fn several_cycles_under_way_do_not_allocate_and_lose_nothing() {
     for (cabling, under_way) in CABLINGS.into_iter().zip(2..=4) {
         let mut load = load_under_way(cabling, under_way);
         let used = counted(|| {
@@ -95,7 +95,7 @@ fn several_cycles_under_way_take_no_memory_and_lose_nothing() {
 
 // covers: no-allocation
 #[test]
-fn disturbed_cycles_take_no_memory() {
+fn disturbed_cycles_do_not_allocate() {
     for cabling in CABLINGS {
         let mut load = load(cabling);
         let used = counted(|| {
@@ -117,7 +117,7 @@ fn disturbed_cycles_take_no_memory() {
 
 // covers: capture
 #[test]
-fn recorded_cycles_take_no_memory() {
+fn recorded_cycles_do_not_allocate() {
     let path = std::env::temp_dir().join(format!("ringcat-no-memory-{}.pcapng", std::process::id()));
     let recorder = Recorder::start(&path, &[("main", ""), ("redundant", "")]).expect("a file");
     let mut load = load(Cabling::ClosedRing);
@@ -151,7 +151,7 @@ fn recorded_cycles_take_no_memory() {
 
 // covers: copy
 #[test]
-fn copying_takes_no_memory() {
+fn copying_does_not_allocate() {
     let mut load = load(Cabling::ClosedRing);
     let image = load.exchange.image(DomainId(0)).len() as u32;
     // The first SubDevice's inputs, and the last one's.
@@ -176,7 +176,7 @@ fn copying_takes_no_memory() {
 
 // covers: byte-budget, jobs
 #[test]
-fn requests_take_no_memory_on_the_side_of_the_cyclic_thread() {
+fn requests_do_not_allocate_in_the_cyclic_thread() {
     let options = Options::new(MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]), None);
     let mut engine = MainDevice::new(options, Instant(0));
     let (mut object, mut register) = (engine.create_sdo_request(0, 100), engine.create_register_request(0, 100));
@@ -270,7 +270,7 @@ fn copy_first(links: &mut MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) 
 /// The image of an ENI is copied bit by bit where its SubDevices share bytes.
 // covers: eni-run
 #[test]
-fn the_image_of_an_eni_takes_no_memory() {
+fn the_image_of_an_eni_does_not_allocate_in_a_cycle() {
     let file = EniFile::from_bytes(include_bytes!("../../ringcat/examples/machine.eni.xml")).expect("it is ours");
     let segment = SimulatedSegment::new(file.simulated(false).expect("cables fit"));
     let mut main_device = ringcat::MainDevice::request(segment, &ringcat::Options::default());
@@ -295,7 +295,7 @@ fn the_image_of_an_eni_takes_no_memory() {
 }
 
 #[test]
-fn typed_process_data_takes_no_memory_in_a_cycle() {
+fn typed_process_data_does_not_allocate_in_a_cycle() {
     let segment = "[segment]\nring = true\n[[device]]\ntype = \"servo\"\n[[device]]\ntype = \"digital-output-8\"\n";
     let links = SimulatedSegment::from_toml(segment).expect("a good segment");
     let mut main_device = ringcat::MainDevice::request(links, &ringcat::Options::default());

@@ -217,7 +217,7 @@ fn eeproms_of_any_content_are_read_or_refused_seeds_0_to_149() {
 
 // covers: robust
 #[test]
-fn answers_that_lie_do_no_harm_beyond_their_time_seeds_0_to_149() {
+fn wrong_responses_have_no_lasting_effect_seeds_0_to_149() {
     runs(0..150, lies);
 }
 

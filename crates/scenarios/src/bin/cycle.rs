@@ -210,7 +210,7 @@ fn print(measured: &[Measured]) -> bool {
          ring"
     );
     println!(
-        "  closed, or cut so that it processes the main or the redundant copy. n-of-b: n SubDevices with b + b bytes each."
+        "  closed, or cut so that it processes the main or the redundant copy. n-of-b: n SubDevices, b + b bytes each."
     );
     // One link uses LRW if possible: the smaller figure of the two, so the stricter reference.
     let one_link = find("lrw").net();

@@ -1,13 +1,13 @@
-//! What a process-data cycle costs on a packet socket (issue 16): instructions, clock reads and system calls of the
-//! thread with the cycles, CPU time of the whole process, resident memory.
+//! Cost of a process-data cycle on a packet socket (issue 16): instructions, clock reads and system calls of the thread
+//! with the cycles, CPU time of the whole process, resident memory.
 //!
 //! The MainDevice is a process in a network namespace, `ringcat sim` is at the other end of a veth pair. A cycle is all
-//! that an application's thread does for it: wait for the frames, receive, evaluate, copy, work, pack, send, publish,
-//! sleep. Callgrind counts within the function of a measured cycle alone, after a warm-up, so start-up and the thread
-//! of the supervisor are left out. Valgrind does not see the vDSO: clock reads are counted beside, as calls. Frames
-//! take long in the simulated segment, so that each cycle waits asleep, however slow valgrind is.
+//! work of the application's thread: wait for the frames, receive, evaluate, copy, work, pack, send, publish, sleep.
+//! Callgrind counts only within the function of a measured cycle, after a warm-up, so start-up and the supervisor
+//! thread are excluded. Valgrind does not instrument the vDSO: clock reads are counted separately, as calls. The
+//! simulated segment delays frames, so that each cycle sleeps in spite of the slow valgrind.
 //!
-//! CPU time and memory are those of the process without valgrind, both threads and the watch of the carrier included.
+//! CPU time and memory are measured without valgrind, for the whole process with both threads and the carrier watch.
 //!
 //! Run without arguments it prints the tables; `run ...` is the process that is measured.
 
@@ -35,27 +35,27 @@ const COUNTED: u64 = 500;
 const WARM_UP: u64 = 50;
 /// Their period.
 const PERIOD_US: u64 = 1_000;
-/// How long a frame takes through the simulated segment under valgrind: longer than the rest of the cycle that sent it.
+/// Delay of a frame in the simulated segment under valgrind: longer than the rest of its cycle.
 const RESIDENCE_NS: u64 = 300_000;
-/// Cycles whose CPU time counts.
+/// Cycles of the CPU time measurement.
 const CPU_CYCLES: u64 = 5_000;
-/// From activation to OP at the most, under valgrind.
+/// Time limit from activation to OP, under valgrind.
 const OP_LIMIT: Duration = Duration::from_secs(60);
 const STOP_LIMIT: Duration = Duration::from_secs(10);
 /// The spinning part of a hybrid wait, as in `ringcat run`.
 const SPIN: Duration = Duration::from_micros(200);
-/// Functions and files that a profile shows.
+/// Number of functions and files in a printed profile.
 const SHOWN: usize = 14;
 /// The function within which callgrind counts.
 const WITHIN: &str = "*measured_cycle*";
 
-/// Most instructions of a cycle with two threads, by the number of servos; SOEM in C takes 890 and 1,333 (issue 16).
+/// Maximum instructions of a cycle with two threads, by the number of servos; SOEM in C takes 890 and 1,333 (issue 16).
 const BARS: [(usize, f64); 2] = [(1, 890.0), (50, 1000.0)];
-/// What is aimed at with one servo.
+/// Goal with one servo.
 const AIM: f64 = 800.0;
-/// Most CPU time with 50 servos at 1 kHz, in hundredths of a processor.
+/// Maximum CPU time with 50 servos at 1 kHz, in percent of a processor.
 const CPU_BARS: [(&str, f64); 2] = [("block", 8.0), ("hybrid", 15.0)];
-/// Most resident memory with 50 servos.
+/// Maximum resident memory with 50 servos.
 const MEMORY_BAR_MB: f64 = 5.0;
 
 fn main() -> ExitCode {
@@ -87,7 +87,7 @@ fn receive_mode(name: &str) -> Tried<ReceiveMode> {
     }
 }
 
-/// A MainDevice on `near0` that runs so many cycles; it prints what it has used.
+/// A MainDevice on `near0` that runs this many cycles and prints its resources.
 fn run(threads: &str, mode: &str, period_us: &str, cycles: &str) -> Tried<()> {
     let (period_us, cycles): (u64, u64) = (number(period_us)?, number(cycles)?);
     let (mode, period) = (receive_mode(mode)?, Duration::from_micros(period_us));
@@ -123,7 +123,7 @@ fn exchange<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, cycle
     while !application.all_settled() {
         application.cycle(work);
         if application.now() >= until {
-            return Err("not all SubDevices get to OP".to_owned());
+            return Err("not all SubDevices reached OP".to_owned());
         }
     }
     for _ in 0..WARM_UP {
@@ -152,7 +152,7 @@ fn measured_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>)
     application.cycle(work);
 }
 
-/// What an application does at the least: it looks at an input and changes an output.
+/// Minimal work of an application: it reads an input and changes an output.
 fn work(data: &mut ProcessData<'_>) {
     if let [first, .., last] = data.image_mut(DomainId(0)) {
         *first = first.wrapping_add(1);
@@ -160,7 +160,7 @@ fn work(data: &mut ProcessData<'_>) {
     }
 }
 
-/// Resident memory in kB: all of it, and by what is mapped.
+/// Resident memory in kB: in total, and by mapping.
 fn memory() -> Tried<Vec<(String, u64)>> {
     let maps = fs::read_to_string("/proc/self/smaps").map_err(said)?;
     let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
@@ -177,7 +177,7 @@ fn memory() -> Tried<Vec<(String, u64)>> {
     Ok(std::iter::once(all).chain(parts.into_iter().map(|(name, size)| (format!("of it {name}"), size))).collect())
 }
 
-/// What a mapping is for.
+/// Kind of a mapping.
 fn kind(name: &[&str]) -> &'static str {
     match name.first() {
         None => "stacks and heaps of threads",
@@ -214,11 +214,12 @@ fn measure(parts: &[&str]) -> Tried<bool> {
     Ok(met)
 }
 
-/// So many servos at the far end. A frame takes `hop_ns` from one to the next.
+/// This many servos at the far end. A frame takes `hop_ns` from one to the next.
 fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Server> {
     let file = std::env::temp_dir().join(format!("ringcat-socket-cycle-{}.toml", std::process::id()));
     let segment = format!(
-        "[segment]\nname = \"servos\"\nring = false\nhop_ns = {hop_ns}\n[[device]]\ntype = \"servo\"\ncount = {servos}\n"
+        "[segment]\nname = \"servos\"\nring = false\nhop_ns = {hop_ns}\n\
+         [[device]]\ntype = \"servo\"\ncount = {servos}\n"
     );
     fs::write(&file, segment).map_err(said)?;
     let here = std::env::current_exe().map_err(said)?;
@@ -278,7 +279,7 @@ fn profile(namespaces: &Namespaces, threads: &str) -> Tried<Profile> {
     profile_elsewhere_within(namespaces.near("valgrind"), WITHIN, &arguments).map_err(said)
 }
 
-/// Instructions per cycle by function, and by source file with inlined code where it was written.
+/// Instructions per cycle by function, and by source file; inlined code counts for its own file.
 fn print_profile(name: &str, profile: &Profile) {
     let by = |key: &dyn Fn(&(String, String)) -> String| {
         let mut sums: BTreeMap<String, u64> = BTreeMap::new();

@@ -137,7 +137,7 @@ pub fn left_out(lines: &[String]) -> usize {
 
 // covers: ring-interfaces, run
 #[test]
-fn cutting_each_cable_of_16_on_interfaces_costs_what_detection_and_stalls_explain() {
+fn cuts_of_16_on_interfaces_cost_only_detection_time_and_stalls() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--tell-all"]);

@@ -123,7 +123,7 @@ pub fn interrupt(child: Child) -> Output {
 
 // covers: capture
 #[test]
-fn a_capture_of_one_subdevice_is_understood_by_tshark_and_shows_every_promise_kept() {
+fn a_capture_of_one_subdevice_has_no_findings_and_tshark_decodes_it() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANTS[0].segment(), false);
     let (scan, run) = (CaptureFile::new("scan"), CaptureFile::new("run"));
@@ -141,7 +141,7 @@ fn a_capture_of_one_subdevice_is_understood_by_tshark_and_shows_every_promise_ke
 
 // covers: capture
 #[test]
-fn captures_of_a_ring_of_16_that_is_cut_keep_every_promise() {
+fn captures_of_a_ring_of_16_with_a_cut_have_no_findings() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     let (own, seen) = (CaptureFile::new("own"), CaptureFile::new("seen"));
@@ -168,7 +168,7 @@ fn captures_of_a_ring_of_16_that_is_cut_keep_every_promise() {
 
 // covers: capture
 #[test]
-fn a_capture_of_a_ring_whose_host_cable_is_cut_shows_every_promise_kept() {
+fn a_capture_of_a_ring_with_cut_host_cables_has_no_findings() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     let own = CaptureFile::new("host");
@@ -197,7 +197,7 @@ fn a_capture_of_a_ring_whose_host_cable_is_cut_shows_every_promise_kept() {
 
 // covers: capture
 #[test]
-fn a_capture_of_forty_subdevices_that_return_shows_every_cycle_had_its_time() {
+fn the_return_of_forty_subdevices_delays_no_cycle_in_a_capture() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANTS[2].segment(), false);
     let own = CaptureFile::new("return");
@@ -218,7 +218,7 @@ fn a_capture_of_forty_subdevices_that_return_shows_every_cycle_had_its_time() {
 
 // covers: capture
 #[test]
-fn an_onlooker_records_ethercat_or_everything_and_says_what_is_wrong() {
+fn ringcat_capture_records_ethercat_or_all_frames_and_names_errors() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANTS[0].segment(), false);
     let (some, all) = (CaptureFile::new("some"), CaptureFile::new("all"));

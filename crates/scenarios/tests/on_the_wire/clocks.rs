@@ -144,7 +144,7 @@ fn judge(name: &str, delays: &[i64], truth: &[Option<i64>]) {
 
 // covers: 7.1, dc-delays
 #[test]
-fn ethercrab_measures_the_delays_that_we_measure_and_both_are_true() {
+fn delays_of_ethercrab_and_ringcat_are_equal_and_right() {
     if !is_asked_for(FOREIGN) {
         return;
     }
@@ -204,7 +204,7 @@ fn check_capture(path: &Path, clocks: usize) {
 
 // covers: 7.3, 7.4, dc-tools
 #[test]
-fn clocks_on_interfaces_lock_start_their_signals_and_cycles_follow_them() {
+fn clocks_on_interfaces_lock_and_cycles_follow_sync0() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(LINE, false);
     let plot = file("plot.svg");

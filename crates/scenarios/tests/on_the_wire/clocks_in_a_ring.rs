@@ -61,7 +61,7 @@ fn watch(bench: &Bench, groups: [&[usize]; 3]) -> [i64; 3] {
 
 // covers: 7.5, dc-ring
 #[test]
-fn clocks_of_a_ring_on_two_interfaces_stay_together_when_cables_go_and_come() {
+fn clocks_of_a_ring_on_two_interfaces_stay_synchronous_through_cuts() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(RING, true);
     let run = bench.run_ringcat(&["clocks", "--main", "main0", "--redundant", "main1", "--for", "60s"]);

@@ -29,7 +29,7 @@ fn schedule(bench: &Bench) {
 
 // covers: ring-interfaces, run
 #[test]
-fn pysoem_and_ours_meet_the_same_cuts_of_a_ring() {
+fn pysoem_and_ours_run_with_the_same_cuts_of_a_ring() {
     if !is_asked_for(FOREIGN) {
         return;
     }

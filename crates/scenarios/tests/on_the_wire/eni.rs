@@ -7,7 +7,7 @@ use crate::said;
 
 // covers: CR-16, 8, eni-lrw, eni-run
 #[test]
-fn a_network_from_an_eni_runs_on_a_ring_of_interfaces_only_with_lrw_split() {
+fn an_eni_with_lrw_runs_on_a_ring_of_interfaces_only_if_split() {
     let Some(mut bench) = Bench::new(2) else { return };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../ringcat/examples/machine.eni.xml");
     let path = file.to_str().expect("its name is text");

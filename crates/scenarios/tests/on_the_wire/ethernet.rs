@@ -132,7 +132,7 @@ fn ask(tasks: &[&str], start: impl FnOnce(&[&str]) -> Child) {
 
 // covers: eoe-interfaces
 #[test]
-fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
+fn two_eoe_devices_serve_ping_and_downloads_bridged_and_routed() {
     let Some(mut bench) = Bench::new(1).filter(|_| has_taps()) else { return };
     bench.simulate(SEGMENT, false);
     let capture = CaptureFile::new("eoe");
@@ -195,7 +195,7 @@ fn two_eoe_devices_answer_ping_and_downloads_bridged_and_routed() {
 
 // covers: eoe-interfaces
 #[test]
-fn without_permission_interfaces_are_missing_with_a_warning_and_cycles_go_on() {
+fn without_permission_eoe_prints_a_warning_and_cycles_continue() {
     let Some(mut bench) = Bench::new(1).filter(|_| has_taps()) else { return };
     bench.simulate(SEGMENT, false);
     let program = program("ringcat").display().to_string();

@@ -149,7 +149,7 @@ fn judge_all(bench: &Bench, situations: &[(String, Happens, &str)], findings: &m
 
 // covers: signals, verdict
 #[test]
-fn what_does_not_hold_in_a_ring_is_said_last_and_does_not_exit_with_0() {
+fn failures_in_a_ring_are_in_the_last_line_and_the_exit_status() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&PLANT.segment(), true);
     let disk = SmallDisk::new();
@@ -184,7 +184,7 @@ fn what_does_not_hold_in_a_ring_is_said_last_and_does_not_exit_with_0() {
 
 // covers: verdict
 #[test]
-fn what_does_not_hold_on_one_interface_is_said_last_and_does_not_exit_with_0() {
+fn failures_on_one_interface_are_in_the_last_line_and_the_exit_status() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANT.segment(), false);
     let run = format!("run --main main0 --for {LASTS}");
@@ -216,7 +216,7 @@ fn what_does_not_hold_on_one_interface_is_said_last_and_does_not_exit_with_0() {
 
 // covers: other-main-device
 #[test]
-fn no_command_but_capture_begins_beside_a_main_device_which_stays_in_op() {
+fn only_capture_starts_beside_a_main_device_which_stays_in_op() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&PLANT.segment(), true);
     let mut findings = Findings::default();
@@ -259,7 +259,7 @@ fn no_command_but_capture_begins_beside_a_main_device_which_stays_in_op() {
 
 // covers: other-main-device
 #[test]
-fn a_main_device_is_found_by_its_frames_where_its_socket_is_elsewhere() {
+fn a_main_device_in_another_namespace_is_found_by_its_frames() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.give_away_main1();
     bench.set_link("sim1", "down");
@@ -279,7 +279,7 @@ fn a_main_device_is_found_by_its_frames_where_its_socket_is_elsewhere() {
 
 // covers: verdict
 #[test]
-fn a_cable_without_subdevices_and_a_ring_that_is_open_are_said_last() {
+fn an_empty_cable_and_an_open_ring_are_in_the_last_line() {
     let Some(mut bench) = Bench::new(2) else { return };
     let mut findings = Findings::default();
     let mut nothing = |bench: &Bench, line: &str, status, expected: &str| {
@@ -308,7 +308,7 @@ const COUPLER_ALONE: &str = "<EtherCATConfig Version=\"1.3\"><Config><Master><In
 
 // covers: verdict
 #[test]
-fn a_bus_with_more_than_the_eni_says_runs_and_fails_with_what_the_file_lacks() {
+fn a_bus_with_more_subdevices_than_the_eni_runs_and_exits_with_1() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANT.segment(), false);
     let file = std::env::temp_dir().join(format!("ringcat-coupler-{}.xml", std::process::id()));
@@ -322,7 +322,7 @@ fn a_bus_with_more_than_the_eni_says_runs_and_fails_with_what_the_file_lacks() {
 
 // covers: signals
 #[test]
-fn on_one_processor_no_thread_spins_limits_hold_and_signals_are_obeyed() {
+fn on_one_processor_no_thread_spins_and_limits_and_signals_work() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANT.segment(), false);
     let program = crate::bench::program("ringcat").display().to_string();

@@ -39,7 +39,7 @@ fn packets(path: &str, filter: &str) -> Vec<String> {
 
 // covers: 10.1, 10.2, gateway
 #[test]
-fn clients_of_others_read_dictionaries_objects_and_files_through_the_gateway() {
+fn independent_clients_read_dictionaries_and_files_through_the_gateway() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(SEGMENT, false);
     bench.ip_main("link set lo up");

@@ -54,7 +54,7 @@ const PAUSE: Duration = Duration::from_millis(250);
 
 // covers: JR-03, JR-07, junctions
 #[test]
-fn a_local_ring_breaks_and_heals_on_an_interface_in_both_junction_modes() {
+fn a_local_ring_break_and_repair_are_reported_in_both_junction_modes() {
     let Some(mut bench) = Bench::new(1) else { return };
     for mode in ["automatic", "strict=1:1-4:1"] {
         bench.simulate(JUNCTION, false);

@@ -166,7 +166,7 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
 
 // covers: 6.1, mail-judge
 #[test]
-fn mail_of_a_hundred_power_cycles_counts_on_and_brings_the_same_list_each_time() {
+fn a_hundred_power_cycles_give_the_same_list_and_right_counters() {
     if !has_tshark() {
         return;
     }
@@ -193,7 +193,7 @@ fn a_subdevice_that_sends_its_mail_twice_is_found() {
 
 // covers: mail-judge
 #[test]
-fn mail_that_was_tampered_with_is_found() {
+fn modified_mail_is_found() {
     if !has_tshark() {
         return;
     }

@@ -93,7 +93,7 @@ fn show_summary(title: &str, output: &str) {
 
 // covers: run
 #[test]
-fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() {
+fn ringcat_brings_1_10_50_and_200_subdevices_to_op_and_stops() {
     let Some(mut bench) = Bench::new(1) else { return };
     for plant in PLANTS.into_iter().chain([TWO_HUNDRED]) {
         bench.simulate(&plant.segment(), false);
@@ -111,7 +111,7 @@ fn our_main_device_brings_1_10_50_and_200_subdevices_to_op_and_stops_in_order() 
 
 // covers: sim-interfaces
 #[test]
-fn the_next_main_device_takes_over_from_one_that_was_killed_in_operation() {
+fn a_main_device_starts_after_another_was_killed_in_operation() {
     let Some(mut bench) = Bench::new(1) else { return };
     bench.simulate(&PLANTS[1].segment(), false);
     for _ in 0..3 {

@@ -29,7 +29,7 @@ fn error_of(bench: &Bench, arguments: &[&str]) -> String {
 
 // covers: links
 #[test]
-fn whoever_cannot_start_is_told_what_to_do() {
+fn a_command_that_cannot_start_prints_the_remedy() {
     let Some(bench) = Bench::new(1) else { return };
     for command in ["scan", "run"] {
         let missing = error_of(&bench, &[command, "--main", "nowhere"]);
@@ -49,7 +49,7 @@ fn whoever_cannot_start_is_told_what_to_do() {
 
 // covers: links
 #[test]
-fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
+fn a_cable_without_subdevices_is_distinguished_from_a_dead_cable() {
     let Some(bench) = Bench::new(1) else { return };
     // It prints that it is ready.
     let mirror = Client::new(bench.start_at_sim(Path::new("python3"), &["-c", MIRROR]));
@@ -61,7 +61,7 @@ fn a_cable_without_subdevices_is_told_apart_from_a_dead_one() {
 
 // covers: links
 #[test]
-fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
+fn a_missing_permission_is_reported_with_its_setcap_line() {
     let Some(bench) = Bench::new(1) else { return };
     let unprivileged = ["--reuid", "65534", "--regid", "65534", "--clear-groups", "--inh-caps", "-all"];
     let program = program("ringcat").display().to_string();
@@ -90,7 +90,7 @@ fn a_user_without_the_permission_is_told_the_line_that_grants_it() {
 
 // covers: stray-ring-cable
 #[test]
-fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
+fn a_ring_cable_at_another_interface_is_reported_with_its_name() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     for command in ["scan", "run"] {
@@ -114,7 +114,7 @@ fn a_ring_that_ends_at_an_interface_nobody_named_is_told_with_its_name() {
 
 // covers: stray-ring-cable
 #[test]
-fn a_cable_that_is_plugged_into_another_interface_in_operation_is_told() {
+fn a_cable_plugged_into_another_interface_in_operation_is_reported() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.set_link("main1", "down");
     bench.simulate(&TERMINAL.segment(), true);
@@ -129,7 +129,7 @@ fn a_cable_that_is_plugged_into_another_interface_in_operation_is_told() {
 
 // covers: other-main-device
 #[test]
-fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
+fn a_main_device_at_the_other_end_of_the_segment_is_reported_once() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.give_away_main1();
     bench.set_link("sim1", "down");
@@ -151,7 +151,7 @@ fn a_main_device_at_the_other_end_of_the_segment_is_told_once_and_counted() {
 }
 
 #[test]
-fn both_ends_of_a_veth_pair_in_one_namespace_are_no_cable_that_was_plugged_in_wrong() {
+fn both_ends_of_a_veth_pair_in_one_namespace_are_not_a_wrong_cable() {
     let Some(bench) = Bench::new(1) else { return };
     bench.ip_main("link add near type veth peer name far");
     for interface in ["near", "far"] {

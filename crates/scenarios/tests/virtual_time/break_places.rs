@@ -29,7 +29,7 @@ fn places(world: &World, mark: Mark) -> Vec<Cable> {
 
 // covers: CR-12, ring-places
 #[test]
-fn a_branch_that_is_not_there_is_never_taken_for_the_break_of_the_ring() {
+fn an_absent_branch_is_never_reported_as_the_break_of_the_ring() {
     for number in 0..=5 {
         let mut world = World::in_op(number as u64, ring_with_branch(Port::D));
         world.cut(CableId(6));
@@ -73,7 +73,7 @@ fn ring_of_couplers(couplers: usize) -> (Vec<&'static str>, Vec<(Endpoint, Endpo
 
 // covers: CR-12, ring-branches
 #[test]
-fn a_ring_of_couplers_with_terminals_that_is_broken_from_the_start_has_its_place() {
+fn a_broken_ring_of_couplers_with_terminals_is_located_at_the_scan() {
     for (couplers, number) in (1..4).flat_map(|couplers| (0..=couplers).map(move |number| (couplers, number))) {
         let (kinds, cables) = ring_of_couplers(couplers);
         let mut network = wired(&kinds, &cables);
@@ -95,7 +95,7 @@ fn a_ring_of_couplers_with_terminals_that_is_broken_from_the_start_has_its_place
 
 // covers: CR-12, CR-18, ring-places
 #[test]
-fn each_of_two_breaks_is_told_once_with_its_place_whichever_comes_first() {
+fn each_of_two_breaks_is_reported_once_with_its_place() {
     for [first, second] in [[4, 11], [11, 4], [0, 9], [9, 0], [16, 5], [5, 16], [7, 8], [8, 7]] {
         let mut world = World::in_op(3, ring_of_16(Duration::from_micros(10)));
         let [one, other] = [first, second].map(|number| cable_of_ring(number, 16));

@@ -146,7 +146,7 @@ fn a_break_and_its_repair_during_downloads_lose_no_object() {
 
 // covers: CR-18, ring-phases
 #[test]
-fn two_breaks_isolate_a_piece_which_returns_without_losing_others() {
+fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
     for (first, second, isolated) in [(4, 7, 4..7), (10, 3, 3..10), (1, 2, 1..2), (0, 3, 0..3), (13, 16, 13..16)] {
         for gap in [30, 500] {
             let mut world = World::in_op(7, ring_of_16(FAST));

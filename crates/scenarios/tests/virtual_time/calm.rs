@@ -14,7 +14,7 @@ const LONGEST: usize = 400;
 
 // covers: byte-budget
 #[test]
-fn without_news_acyclic_frames_are_short_with_50_subdevices() {
+fn in_an_undisturbed_segment_of_50_acyclic_frames_are_short() {
     let (longest, frames) = (Rc::new(Cell::new(0)), Rc::new(Cell::new(0_u32)));
     let (seen, count) = (longest.clone(), frames.clone());
     let links = Meddled::new(plant(50), Instant(10_000_000_000), move |frame| {

@@ -92,7 +92,7 @@ fn read(bytes: &[u8]) -> Capture {
 
 // covers: capture
 #[test]
-fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
+fn a_capture_on_one_link_has_no_findings() {
     let verdict = judge(&short(), Some(CYCLE)).expect("a capture");
     assert_eq!(verdict.broken, 0, "{verdict}");
     assert!(verdict.reads > 50 && verdict.missing == 0 && verdict.pairs == 0, "{verdict}");
@@ -101,7 +101,7 @@ fn what_a_main_device_sends_keeps_every_promise_on_one_link() {
 
 // covers: CR-01, CR-04, CR-24, CR-25, SM-01, SM-02, capture
 #[test]
-fn what_is_sent_keeps_every_promise_on_a_ring_that_breaks_and_closes() {
+fn a_capture_of_a_ring_that_breaks_and_closes_has_no_findings() {
     let verdict = judge(&eventful(), None).expect("a capture");
     println!("{verdict}");
     assert_eq!(verdict.broken, 0, "{verdict}");
@@ -119,7 +119,7 @@ fn what_is_sent_keeps_every_promise_on_a_ring_that_breaks_and_closes() {
 
 // covers: capture
 #[test]
-fn a_segment_that_returns_as_a_whole_leaves_every_cycle_its_time() {
+fn the_return_of_a_whole_segment_delays_no_cycle() {
     let kinds: Vec<&str> = ["digital-output-8", "digital-input-8", "servo"].into_iter().cycle().take(40).collect();
     let file = recorded(line(descriptions(&kinds), NetworkOptions::default()), false, |run| {
         for device in (0..kinds.len()).map(DeviceIndex) {
@@ -182,7 +182,7 @@ fn assert_found(verdict: &Verdict, text: &str) {
 
 // covers: capture
 #[test]
-fn the_judge_sees_each_single_bit_that_must_not_be_set() {
+fn the_check_finds_each_wrong_bit() {
     let capture = read(&eventful());
     let in_datagram = [
         (1, 0x01, "has Idx"),
@@ -212,7 +212,7 @@ fn the_judge_sees_each_single_bit_that_must_not_be_set() {
 
 // covers: capture
 #[test]
-fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
+fn the_check_finds_missing_duplicated_and_late_copies() {
     let capture = read(&eventful());
     let pair = tampered(&capture, |packets| {
         let (place, _) = sent_with(packets, LRD);
@@ -250,7 +250,7 @@ fn the_judge_sees_frames_that_leave_once_or_come_back_twice_or_too_late() {
 
 // covers: capture
 #[test]
-fn the_judge_sees_acyclic_frames_that_delay_a_cycle_apart_from_stalls() {
+fn the_check_separates_delayed_cycles_from_stalls() {
     let capture = read(&eventful());
     let acyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 != 0;
     let cyclic = |p: &Packet| p.sent && p.interface == 0 && p.bytes[17] & 0x80 == 0;
@@ -280,7 +280,7 @@ fn the_judge_sees_acyclic_frames_that_delay_a_cycle_apart_from_stalls() {
 
 // covers: capture
 #[test]
-fn any_damage_to_a_file_is_survived() {
+fn damaged_capture_files_never_cause_a_panic() {
     let file = short();
     let mut dice = Dice::new(7);
     for _ in 0..2_000 {

@@ -168,7 +168,7 @@ fn with_gaps(count: usize) -> Vec<DeviceDescription> {
 
 // covers: 7.1, 7.2, dc-tools
 #[test]
-fn written_delays_and_offsets_are_those_that_a_capture_gives() {
+fn written_delays_and_offsets_match_the_capture() {
     let mut cases = Cases::default();
     let options = NetworkOptions::default;
     cases.fine("line", line(clocked(12, 100), options()), "checked: 12 delays", |_| ());
@@ -240,7 +240,7 @@ fn fork() -> Network {
 
 // covers: 7.1, dc-tools
 #[test]
-fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged() {
+fn captures_with_crossed_subdevices_and_clockless_forks_are_checked() {
     let mut cases = Cases::default();
     cases.fine("crossed", crossed(), "checked: 6 delays", |_| ());
     cases.fine("fork without a clock", fork(), "checked: 6 delays", |_| ());
@@ -249,7 +249,7 @@ fn crossed_subdevices_and_branches_of_a_fork_without_a_clock_are_judged() {
 
 // covers: 7.5, 9.4, dc-tools
 #[test]
-fn rings_behind_junctions_are_judged_whole_and_broken() {
+fn captures_of_rings_behind_junctions_are_checked() {
     let mut cases = Cases::default();
     let network = || wired(clocked(7, 100), &RING_BEHIND_JUNCTION);
     cases.fine("ring behind a junction", network(), "checked: 63 delays", |run| {
@@ -344,7 +344,7 @@ impl Tampering {
 
 // covers: dc-tools
 #[test]
-fn tampered_delays_are_found_crossed_behind_clockless_forks_and_in_rings() {
+fn modified_delays_are_found_crossed_behind_forks_and_in_rings() {
     let mut cases = Cases::default();
     // Stations are numbered in the order in which the frame is processed: device 1 is the last.
     let tampering = Tampering::with(crossed(), |_| ());
@@ -369,7 +369,7 @@ fn tampered_delays_are_found_crossed_behind_clockless_forks_and_in_rings() {
 
 // covers: dc-tools
 #[test]
-fn clocks_that_were_tampered_with_are_found() {
+fn modified_clock_set_ups_are_found() {
     let tampering = Tampering::with(line(clocked(6, 100), NetworkOptions::default()), |run| cycles(run, 20));
     let mut cases = Cases::default();
     tampering.add(&mut cases, Case::Fine("written anew", "checked: 6 delays"), &mut |_, _, _, _| ());

@@ -52,7 +52,7 @@ fn change(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> usize 
 
 // covers: 7.5, 9.4, dc-delays
 #[test]
-fn clocks_of_a_ring_behind_a_junction_stay_together_whole_and_broken_anywhere() {
+fn clocks_of_a_local_ring_stay_synchronous_with_any_break() {
     let mut world = world(1, junction_ring());
     let clocks = all(world.network());
     assert!(largest_spread(&mut world, &clocks, 300) <= 100, "{:?}", differences(world.network(), &clocks));
@@ -124,7 +124,7 @@ fn a_local_ring_in_a_ring_of_two_links_keeps_its_clocks_through_breaks_of_either
 /// No frame comes back meanwhile, and rings are examined one after the other.
 // covers: JR-02, 7.5, dc-delays
 #[test]
-fn clocks_come_back_together_when_two_rings_behind_junctions_broke_at_once() {
+fn clocks_resynchronise_after_two_local_rings_broke_at_once() {
     let mut world = world(10, wired(clocked(7, 50), &TWO_RINGS));
     let clocks = all(world.network());
     for (first, second, gap) in [(2, 6, 100), (5, 1, 800)] {
@@ -174,7 +174,7 @@ fn a_ring_broken_from_the_start_has_the_delay_of_its_cable_after_the_repair() {
 /// segment has changed; with the ring broken the delays are right.
 // covers: 7.1, 9.4, dc-lock
 #[test]
-fn a_ring_not_looked_for_is_reported_per_change_and_clocks_begin_when_open() {
+fn an_undetected_local_ring_is_reported_per_change_until_it_opens() {
     let mut world = World::with(9, junction_ring(), &Options::default(), |scan| with_clocks(scan, config()))
         .expect("it can be activated");
     let mark = world.beginning();
@@ -221,7 +221,7 @@ fn tree() -> Network {
 }
 
 #[test]
-fn clocks_lock_though_frames_get_lost_at_random_from_the_start() {
+fn clocks_lock_with_random_frame_loss_from_the_start() {
     let mut world = begun(8, tree(), ClockConfig { drift_distributions: 20_000, ..config() });
     let mut dice = Dice::new(8);
     for _ in 0..150 {
@@ -235,7 +235,7 @@ fn clocks_lock_though_frames_get_lost_at_random_from_the_start() {
 
 // covers: dc-remeasure
 #[test]
-fn delays_stay_right_when_any_cable_of_a_tree_goes_and_frames_get_lost() {
+fn delays_stay_right_when_any_cable_of_a_tree_is_cut_under_loss() {
     let mut world = begun(5, tree(), config());
     lock(&mut world, Duration::from_secs(5));
     let mut dice = Dice::new(5);
@@ -378,7 +378,7 @@ fn a_group_that_joins_late_or_elsewhere_has_the_clocks_of_its_place() {
 /// one SubDevice without a clock between them.
 // covers: 7.2, dc-remeasure
 #[test]
-fn the_first_clocks_of_a_segment_may_come_with_a_group_and_come_again() {
+fn the_first_clocks_of_a_segment_may_join_with_a_group() {
     let cables = [
         (MAIN, at(0, A)),
         (at(0, B), at(1, A)),

@@ -59,7 +59,7 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
 /// A coupler, terminals and drives, each with its own passage times: delays are exact if each is configured.
 // covers: 7.1, dc-delays
 #[test]
-fn types_whose_passages_differ_have_exact_delays_where_each_is_told() {
+fn types_with_configured_passage_times_have_exact_delays() {
     const PASSAGES: [(u64, u64); 7] =
         [(550, 540), (150, 150), (150, 150), (750, 700), (750, 700), (150, 150), (300, 300)];
     let descriptions = || {

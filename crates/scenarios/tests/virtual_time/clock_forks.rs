@@ -80,7 +80,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
 /// The time between branches of a splitter without a clock in front of it cannot be measured.
 // covers: dc-delays
 #[test]
-fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
+fn an_unknown_delay_behind_a_splitter_at_the_head_is_reported() {
     let cables =
         [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(0, B), at(3, A)), (at(3, B), at(4, A))];
     for estimated_delays in [false, true] {
@@ -105,7 +105,7 @@ fn behind_a_splitter_without_a_clock_at_the_head_the_second_branch_is_told() {
 /// each. This is reported with the minimum and maximum; the middle is written only on request.
 // covers: dc-delays
 #[test]
-fn a_delay_of_which_only_a_range_is_known_is_estimated_where_that_is_asked_for() {
+fn a_delay_with_known_limits_is_estimated_on_request() {
     for estimated_delays in [false, true] {
         let mut descriptions = clocked(SPLITTERS.len(), 50);
         [1, 5].into_iter().for_each(|device| descriptions[device].dc = None);
@@ -145,7 +145,7 @@ fn a_delay_of_which_only_a_range_is_known_is_estimated_where_that_is_asked_for()
 
 // covers: dc-delays
 #[test]
-fn a_subdevice_with_sync0_whose_delay_is_hidden_stays_in_safeop_and_says_why() {
+fn a_subdevice_with_sync0_and_unknown_delay_stays_in_safeop() {
     let cables = [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(0, B), at(2, A))];
     let mut descriptions = clocked(3, 50);
     descriptions[0].dc = None;

@@ -59,7 +59,7 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
 
 // covers: 7.5, dc-late-host
 #[test]
-fn sync0_stays_together_while_cables_go_and_come_though_the_host_sends_50_us_late() {
+fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
     const COUNT: usize = 8;
     let network = || ring(clocked(COUNT, 50), NetworkOptions::default());
     let clocks: Vec<usize> = (0..COUNT).collect();

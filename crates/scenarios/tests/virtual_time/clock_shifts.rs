@@ -32,7 +32,7 @@ fn with_bus_shift_the_reference_follows_the_host() {
 
 // covers: 7.4, dc-reference
 #[test]
-fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time() {
+fn the_reference_follows_the_application_time_and_a_single_given_time() {
     // The application's time runs 30 ppm faster than the host's.
     let time = |world: &World| {
         let host = world.application().now().0;
@@ -65,7 +65,7 @@ fn the_reference_follows_the_time_of_the_application_and_is_led_to_a_given_time(
 /// also if frames reach it from the other side.
 // covers: CR-26, 7.5, dc-reference
 #[test]
-fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair() {
+fn bus_shift_and_master_shift_continue_through_a_cut_and_a_repair() {
     for cable in [0, 2] {
         let shift = ClockConfig { bus_shift: true, ..config() };
         let mut world = world(11, ring(clocked(4, 50), NetworkOptions::default()), shift);
@@ -117,7 +117,7 @@ fn bus_shift_and_master_shift_go_on_through_a_cut_and_a_repair() {
 
 // covers: 7.4, dc-master-shift
 #[test]
-fn cycles_follow_the_reference_clock_though_the_host_wakes_late() {
+fn cycles_follow_the_reference_clock_with_a_late_host() {
     let mut world = world(10, line(clocked(4, 80), NetworkOptions::default()), config());
     world.application_mut().set_trigger(Trigger::ReferenceClock { phase_ns: -250_000 });
     world.application_mut().links_mut().oversleep(Duration::from_micros(50));
@@ -174,7 +174,7 @@ fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
 /// is read, without it the broadcast read is used.
 // covers: 7.2, dc-lock
 #[test]
-fn clocks_that_leave_their_window_and_come_back_are_told() {
+fn clocks_that_leave_their_window_and_return_are_reported() {
     for bus_shift in [false, true] {
         let shift = ClockConfig { bus_shift, ..config() };
         let mut world = world(20, line(clocked(3, 30), NetworkOptions::default()), shift);

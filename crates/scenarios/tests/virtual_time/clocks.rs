@@ -68,7 +68,7 @@ fn clocks_anywhere_within_100_ppm_lock_and_stay_together() {
 
 // covers: 7.3, dc-sync
 #[test]
-fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted() {
+fn sync0_comes_at_the_same_time_everywhere_with_its_shift() {
     const COUNT: usize = 9;
     let network = line(clocked(COUNT, 50), NetworkOptions::default());
     let mut world = World::with(3, network, &Options::default(), |scan| {
@@ -101,7 +101,7 @@ fn sync0_comes_at_one_time_everywhere_and_where_it_was_wanted() {
 
 // covers: dc-sync
 #[test]
-fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_a_clear_error() {
+fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
     let mut descriptions = clocked(3, 0);
     // Beyond the range of the control loop (protocol 7.2.1).
     descriptions[2].clock_drift_ppb = 900_000;
@@ -141,7 +141,7 @@ fn a_reference_that_the_application_chooses_is_followed() {
 
 // covers: dc-reference
 #[test]
-fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
+fn the_first_subdevice_with_sync_is_the_reference_on_request() {
     let network = line(clocked(4, 30), NetworkOptions::default());
     let mut world = World::with(13, network, &Options::default(), |scan| {
         let wanted = ClockConfig { reference: ReferenceClock::FirstConfigured, ..config() };
@@ -159,7 +159,7 @@ fn the_first_that_is_configured_is_the_reference_where_that_is_wanted() {
 /// The first clock is the reference although its SubDevice is undeclared; the SubDevice stays in its state.
 // covers: 7.2, dc-reference
 #[test]
-fn a_reference_that_nobody_declares_is_followed_and_left_alone() {
+fn an_undeclared_reference_is_followed_and_not_configured() {
     let network = line(clocked(3, 30), NetworkOptions::default());
     let mut world = World::with(19, network, &Options::default(), |scan| {
         let clocks = Some(config());
@@ -196,7 +196,7 @@ fn a_subdevice_that_lost_its_power_has_its_clock_back_in_op() {
 
 // covers: 7.5, dc-ring
 #[test]
-fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too() {
+fn closed_and_broken_rings_have_the_delays_of_a_line() {
     const COUNT: usize = 8;
     for cut in [None, Some(3), Some(1)] {
         let mut network = ring(clocked(COUNT, 50), NetworkOptions::default());
@@ -225,7 +225,7 @@ fn a_closed_ring_has_the_delays_of_a_line_and_a_broken_one_too() {
 
 // covers: CR-26, 7.5, dc-ring
 #[test]
-fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind() {
+fn a_cut_and_a_repair_of_any_cable_keep_all_clocks_synchronous() {
     const COUNT: usize = 6;
     for cable in 0..=COUNT {
         let mut world = world(9, ring(clocked(COUNT, 50), NetworkOptions::default()), config());
@@ -257,7 +257,7 @@ fn a_cut_and_a_heal_at_any_cable_leave_no_clock_behind() {
 /// the mean of its jitter has.
 // covers: 7.5, dc-ring
 #[test]
-fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
+fn clocks_of_an_open_ring_stay_synchronous_with_copies_5_us_apart() {
     const COUNT: usize = 6;
     for (ppm, open_for) in [(20, 3_000), (100, 1_200)] {
         let mut world = world(16, ring(clocked(COUNT, ppm), NetworkOptions::default()), config());
@@ -285,7 +285,7 @@ fn clocks_of_an_open_ring_stay_together_though_copies_leave_up_to_5_us_apart() {
 /// The second part has never followed the first, and their rates differ by the maximum.
 // covers: 7.5, dc-ring
 #[test]
-fn a_ring_that_is_open_from_the_start_locks_though_copies_leave_up_to_5_us_apart() {
+fn a_ring_open_from_the_start_locks_with_copies_5_us_apart() {
     let mut descriptions = clocked(6, 100);
     (descriptions[0].clock_drift_ppb, descriptions[3].clock_drift_ppb) = (-100_000, 100_000);
     let mut network = ring(descriptions, NetworkOptions::default());

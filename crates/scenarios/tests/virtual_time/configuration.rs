@@ -56,7 +56,7 @@ fn the_expected_product_is_compared_and_a_mismatch_names_both() {
 }
 
 #[test]
-fn two_swapped_subdevices_are_told_by_the_first_that_is_not_in_its_place() {
+fn two_swapped_subdevices_are_reported_by_the_first_wrong_place() {
     let mut kinds = SIXTEEN;
     kinds.swap(2, 6);
     let swapped = ring(descriptions(&kinds), NetworkOptions::default());
@@ -70,14 +70,14 @@ fn two_swapped_subdevices_are_told_by_the_first_that_is_not_in_its_place() {
 }
 
 #[test]
-fn a_wildcard_takes_anybody() {
+fn a_wildcard_accepts_any_identity() {
     let mut world = declared(ring_of_16(FAST), |number, _| SubDeviceConfig::at_position(number as u16));
     world.settle();
 }
 
 // covers: declaration
 #[test]
-fn subdevices_are_found_by_alias_wherever_they_are() {
+fn subdevices_are_found_by_alias_at_any_position() {
     let mut devices = descriptions(&SIXTEEN);
     devices[6].alias = 77;
     let declare = |scan: &Scan| {
@@ -107,7 +107,7 @@ fn subdevices_are_found_by_alias_wherever_they_are() {
 
 // covers: topology
 #[test]
-fn an_alias_that_two_have_is_an_event_and_an_error_where_it_matters() {
+fn a_duplicate_alias_is_an_event_and_an_error_if_it_is_declared() {
     let mut devices = descriptions(&SIXTEEN);
     devices[3].alias = 99;
     devices[9].alias = 99;
@@ -128,7 +128,7 @@ fn an_alias_that_two_have_is_an_event_and_an_error_where_it_matters() {
 
 // covers: declaration
 #[test]
-fn pdos_are_assigned_anew_where_the_subdevice_allows_it() {
+fn pdos_are_reassigned_if_the_subdevice_allows_it() {
     // The compact PDOs, without status.
     let compact = || (0..4).map(|channel| PdoMapping::from_sii(0x1A01 + 2 * channel)).collect();
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
@@ -154,7 +154,7 @@ fn pdos_are_assigned_anew_where_the_subdevice_allows_it() {
 
 // covers: declaration
 #[test]
-fn pdos_are_mapped_anew_where_the_subdevice_allows_it() {
+fn pdos_are_remapped_if_the_subdevice_allows_it() {
     let outputs = || vec![PdoMapping::of(0x1600, [PdoEntry::new(0x60FF, 0, 32), PdoEntry::new(0x6040, 0, 16)])];
     let inputs = || vec![PdoMapping::of(0x1A00, [PdoEntry::new(0x6064, 0, 32)]), PdoMapping::from_sii(0x1A01)];
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
@@ -182,7 +182,7 @@ fn a_terminal_that_copies_al_control_takes_outputs_without_a_watchdog_too() {
 
 // covers: declaration
 #[test]
-fn objects_are_downloaded_expedited_and_normal_and_an_abort_is_told_with_its_text() {
+fn objects_are_downloaded_and_an_abort_is_reported_with_its_text() {
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
         3 => config.sdo(0x8000, 2, 123_456u32.to_le_bytes()).sdo(0x8010, 3, *b"another 16 bytes"),
         14 => config.sdo(0x9999, 0, [1]),
@@ -202,7 +202,7 @@ fn objects_are_downloaded_expedited_and_normal_and_an_abort_is_told_with_its_tex
 }
 
 #[test]
-fn a_download_that_is_too_long_for_the_object_is_told_and_tried_again() {
+fn a_download_too_long_for_the_object_is_reported_and_retried() {
     let mut world = declared(ring_of_16(FAST), |number, config| match number {
         3 => config.sdo(0x8000, 3, vec![0x55; 500]),
         _ => config,
@@ -219,7 +219,7 @@ type Outcome = Rc<RefCell<Vec<Result<Vec<u8>, SdoError>>>>;
 
 // covers: declaration, sdo
 #[test]
-fn objects_are_uploaded_and_downloaded_in_op_while_process_data_goes_on() {
+fn objects_are_uploaded_and_downloaded_in_op_beside_process_data() {
     let mut world = World::in_op(3, ring_of_16(FAST));
     let mark = world.mark();
     let outcome = Outcome::default();
@@ -253,7 +253,7 @@ fn objects_are_uploaded_and_downloaded_in_op_while_process_data_goes_on() {
 }
 
 #[test]
-fn controllers_of_all_kinds_are_read_alike() {
+fn all_types_of_controllers_are_read_with_the_same_result() {
     let scans: Vec<_> = [(true, true, true), (false, true, false), (true, false, true), (false, false, false)]
         .into_iter()
         .map(|(eight_byte_sii, wide, sii_cache)| {

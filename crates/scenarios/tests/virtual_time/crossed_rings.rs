@@ -106,7 +106,7 @@ fn breaks_with_any_crossed_subdevices_have_their_place_and_are_reported_once() {
 
 // covers: CR-19, LC-05, ring-places
 #[test]
-fn a_ring_with_crossed_subdevices_that_is_broken_from_the_start_is_told_as_it_is() {
+fn a_ring_with_crossed_subdevices_broken_from_the_start_is_located() {
     for crossed in 0..=ALL {
         let cables = cables(crossed);
         for (number, cable) in cables.iter().enumerate() {

@@ -149,7 +149,7 @@ fn a_mapping_that_differs_from_the_sii_is_taken_from_the_file_alone() {
 
 // covers: 8.1, sync-managers-declared
 #[test]
-fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty() {
+fn mailboxes_and_areas_of_the_file_override_a_wrong_or_empty_sii() {
     // An SII with the mailboxes of another product, and an SII without mailbox, PDOs and SyncManagers.
     let moved = |described: &mut DeviceDescription| {
         let mailbox = described.mailbox.as_mut().expect("a servo has one");
@@ -176,7 +176,7 @@ fn mailboxes_and_areas_of_the_file_count_where_the_sii_is_wrong_or_empty() {
 
 // covers: sync-managers-declared
 #[test]
-fn an_absent_subdevice_has_its_place_from_the_file_and_takes_it_when_it_comes() {
+fn an_absent_subdevice_has_its_place_from_the_file_and_joins_there() {
     // The file describes all of them.
     let mut main_device = MainDevice::request(Tap::new(segment(|_| ())), &Options::default());
     let all: Vec<SubDeviceInfo> = main_device.scan().expect("a scan").subdevices;
@@ -206,7 +206,7 @@ fn an_absent_subdevice_has_its_place_from_the_file_and_takes_it_when_it_comes() 
 
 // covers: 3.1, sync-managers-declared
 #[test]
-fn what_does_not_fit_the_controller_is_refused_with_the_sync_manager() {
+fn a_file_that_exceeds_the_controller_is_refused_with_its_sync_manager() {
     let refused = |change: fn(&mut Vec<DeclaredSyncManager>)| {
         let declare = |scan: &Scan| {
             let mut declaration = automatic(&scan.subdevices, CYCLE);

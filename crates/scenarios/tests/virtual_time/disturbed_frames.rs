@@ -56,7 +56,7 @@ fn in_a_closed_ring_the_unprocessed_copy_is_not_missed() {
 
 // covers: CR-04, CR-07, lost-frames
 #[test]
-fn a_frame_that_comes_back_late_or_twice_is_counted_and_never_taken_for_a_new_one() {
+fn a_late_or_duplicated_frame_is_counted_and_never_treated_as_new() {
     // Up to 600 ms: more than 256 frames, after which frame ids are reused.
     let delays_us = [100, 500, 740, 760, 990, 1_000, 1_010, 1_500, 2_000, 5_000, 127_000, 255_950, 256_000, 512_000];
     for (seed, delay_us) in (0..).zip(delays_us) {
@@ -94,7 +94,7 @@ fn patient(world: &mut World) {
 
 // covers: lost-frames
 #[test]
-fn a_domain_whose_frames_are_still_out_is_skipped_and_counted() {
+fn a_domain_with_frames_under_way_is_skipped_and_counted() {
     let mut world = World::in_op(3, line(descriptions(&SIXTEEN), NetworkOptions::default()));
     patient(&mut world);
     world.run_cycles(5);
@@ -151,7 +151,7 @@ fn frames_of_another_main_device_are_counted_and_handed_over() {
 }
 
 #[test]
-fn a_frame_of_ours_with_other_datagrams_than_were_sent_is_counted_as_corrupt() {
+fn an_own_frame_with_changed_datagrams_is_counted_as_corrupt() {
     let mut world = World::in_op(5, line(descriptions(&SIXTEEN), NetworkOptions::default()));
     world.run_cycles(3);
     // Like a frame of the engine, but with one datagram only: same id, same Idx.

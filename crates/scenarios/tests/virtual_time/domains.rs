@@ -60,7 +60,7 @@ fn in_turn(scan: &Scan, periods: &[u32]) -> Declaration {
 
 // covers: domains
 #[test]
-fn domains_at_different_rates_are_exchanged_each_at_its_own() {
+fn domains_with_different_periods_are_exchanged_at_their_own_rate() {
     let declare = |scan: &Scan| in_turn(scan, &[1, 4, 10]);
     let mut world = World::with(3, ring_of_16(FAST), &Options::default(), declare).expect("activation");
     world.settle();
@@ -155,7 +155,7 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
 }
 
 #[test]
-fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
+fn an_undeclared_subdevice_is_reported_and_not_configured() {
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices.truncate(15);
@@ -185,7 +185,7 @@ fn a_subdevice_that_nobody_declared_is_named_and_left_alone() {
 /// is always Zero.
 // covers: lost-frames
 #[test]
-fn a_domain_that_is_silent_from_the_beginning_is_told_once() {
+fn a_domain_without_a_response_from_the_start_is_reported_once() {
     let network = line(descriptions(&["digital-input-8"]), NetworkOptions::default());
     let mut world = World::new(1, network);
     let mark = world.beginning();

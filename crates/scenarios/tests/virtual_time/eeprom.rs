@@ -64,7 +64,7 @@ fn a_subdevice_lost_on_the_way_to_preop_gives_the_eeprom_back_on_return() {
 }
 
 #[test]
-fn a_read_command_whose_answer_comes_too_late_does_not_end_the_scan() {
+fn a_late_response_to_a_read_command_does_not_end_the_scan() {
     // Delayed beyond the frame timeout, while the EEPROM is busy even longer.
     let moments = (15_000..45_000).step_by(1_000).flat_map(|at| [(at, Direction::AToB), (at, Direction::BToA)]);
     for (at_us, direction) in moments {

@@ -38,7 +38,7 @@ fn sii(error: ServiceError) -> SiiProgramError {
 
 // covers: eeprom
 #[test]
-fn an_image_is_written_while_process_data_goes_on_and_reads_back() {
+fn an_eeprom_image_is_written_beside_process_data_and_verified() {
     let mut world = world(1);
     let mark = world.mark();
     let mut new = image(&world);
@@ -57,7 +57,7 @@ fn an_image_is_written_while_process_data_goes_on_and_reads_back() {
 
 // covers: eeprom
 #[test]
-fn what_is_no_image_is_refused_and_written_with_force() {
+fn an_invalid_eeprom_image_is_refused_unless_forced() {
     let mut world = world(2);
     let before = image(&world);
     let mut wrong = before.clone();
@@ -85,7 +85,7 @@ fn what_is_no_image_is_refused_and_written_with_force() {
 
 // covers: eeprom
 #[test]
-fn an_eeprom_that_is_slow_busy_or_protected_is_waited_for_or_named() {
+fn a_slow_busy_or_protected_eeprom_is_waited_for_or_reported() {
     let mut world = world(3);
     let mut new = image(&world);
     let word = new.len() / 2 - 1;
@@ -118,7 +118,7 @@ fn an_eeprom_that_is_slow_busy_or_protected_is_waited_for_or_named() {
 
 // covers: 4.7, eeprom
 #[test]
-fn an_alias_has_its_checksum_and_counts_from_the_next_start() {
+fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     let mut world = world(4);
     let alias = |world: &mut World, force| {
         let work = world.application_mut().engine_mut().start_alias_write(DEVICE.0, 0x0ABC, force);

@@ -204,7 +204,7 @@ fn files_of_tools_come_to_op_and_exchange_data_through_their_variables() {
 /// All present files, besides those above: `sim --eni` and `run --eni` of each, as one program.
 // covers: eni-run
 #[test]
-fn every_file_there_is_comes_to_op_with_complete_working_counters_or_says_why_not() {
+fn every_present_eni_reaches_op_or_reports_a_reason() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni");
     let Ok(entries) = std::fs::read_dir(&directory) else {
         println!("skipped: {} is not there", directory.display());
@@ -302,7 +302,7 @@ fn packed_bits_copies_and_a_mapping_of_a_file_work_on_line_and_ring() {
 /// A drive with another default mapping than the file's (SOEM#958).
 // covers: 8, eni-run
 #[test]
-fn a_mapping_that_is_not_that_of_the_sii_is_set_by_the_file_alone() {
+fn a_mapping_that_differs_from_the_sii_is_set_by_the_file() {
     let file = machine();
     let mut segment = segment(&file.eni, &file.configuration, false);
     let drive = &mut segment.devices[DRIVE];
@@ -355,7 +355,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_by_name_unless_it_may_be_split() {
 
 // covers: eni-run
 #[test]
-fn a_network_that_is_not_the_one_of_the_file_is_told_for_each_subdevice() {
+fn a_network_that_differs_from_the_file_is_reported_per_subdevice() {
     let file = machine();
     let mut other = segment(&file.eni, &file.configuration, false);
     other.devices[LAMPS].identity.product_code = 0x4711;
@@ -378,7 +378,7 @@ fn a_network_that_is_not_the_one_of_the_file_is_told_for_each_subdevice() {
 
 // covers: eni-run
 #[test]
-fn variables_tell_how_old_they_are_by_the_subdevice_that_they_come_from() {
+fn variables_have_the_freshness_of_their_subdevice() {
     let mut plant = activate(machine(), false, false).expect("it fits");
     plant.settle();
     let variable = |plant: &Plant, name: &str| plant.image.variable(name).cloned().expect("it is there");

@@ -149,7 +149,7 @@ fn cuts_and_lost_mail_lose_no_frame() {
 
 // covers: eoe
 #[test]
-fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
+fn an_ethernet_port_goes_down_and_up_with_its_subdevice() {
     let mut world = world(4, 256, EoeEnd::Loop);
     let mailbox = world.mailbox(TERMINAL);
     let port = EthernetPort::open(&mailbox).expect("the port is free");
@@ -185,7 +185,7 @@ fn a_subdevice_that_leaves_takes_its_ethernet_down_and_brings_it_back() {
 
 // covers: eoe
 #[test]
-fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
+fn a_subdevice_that_accepts_no_frames_blocks_its_queue_only() {
     let mut world = world(5, 256, EoeEnd::Loop);
     let port = EthernetPort::open(&world.mailbox(TERMINAL)).expect("the port is free");
     world.hang(DeviceIndex(TERMINAL), true);
@@ -207,7 +207,7 @@ fn a_subdevice_that_takes_no_frames_stops_the_queue_and_nothing_grows() {
 
 // covers: 6.5, eoe
 #[test]
-fn addresses_and_filter_are_set_and_told_beside_frames() {
+fn addresses_and_filter_are_set_and_read_beside_frames() {
     let mut world = world(6, 256, EoeEnd::Stack);
     let work = start_download(&mut world, TERMINAL, 20_000);
     let mailbox = world.mailbox(TERMINAL);
@@ -264,7 +264,7 @@ fn a_time_stamp_comes_with_the_number_of_its_frame() {
 
 // covers: 6.5, eoe
 #[test]
-fn declared_addresses_are_set_at_each_start_and_refused_ones_are_told() {
+fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
     let address = Some(Ipv4Addr::new(10, 0, 0, 7));
     let settings = IpSettings { address, name: Some(b"axis".to_vec()), ..IpSettings::default() };
     let start = |settings: &IpSettings, subdevice: usize| {

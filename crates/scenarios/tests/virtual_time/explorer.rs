@@ -168,19 +168,19 @@ fn runs(seeds: Range<u64>) {
 
 // covers: robust
 #[test]
-fn whatever_happens_all_come_back_seeds_0_to_99() {
+fn all_subdevices_return_after_random_faults_seeds_0_to_99() {
     runs(0..100);
 }
 
 // covers: robust
 #[test]
-fn whatever_happens_all_come_back_seeds_100_to_199() {
+fn all_subdevices_return_after_random_faults_seeds_100_to_199() {
     runs(100..200);
 }
 
 // covers: robust
 #[test]
-fn whatever_happens_all_come_back_seeds_200_to_299() {
+fn all_subdevices_return_after_random_faults_seeds_200_to_299() {
     runs(200..300);
 }
 

@@ -27,7 +27,7 @@ fn all_well(world: &World) -> bool {
 
 // covers: refused-states
 #[test]
-fn an_application_that_stalls_beyond_the_watchdog_finds_all_back_in_op() {
+fn after_an_application_stall_all_subdevices_return_to_op() {
     for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
         let mut world = World::in_op(1, network);
         world.run_cycles(50);
@@ -59,7 +59,7 @@ fn an_application_that_stalls_beyond_the_watchdog_finds_all_back_in_op() {
 
 // covers: refused-states
 #[test]
-fn every_fall_of_a_watchdog_is_told_once() {
+fn every_watchdog_expiry_is_reported_once() {
     for network in [ring_of_16(FAST), line(descriptions(&SIXTEEN), NetworkOptions::default())] {
         let mut world = World::in_op(10, network);
         world.run_cycles(50);
@@ -85,7 +85,7 @@ fn every_fall_of_a_watchdog_is_told_once() {
 }
 
 #[test]
-fn an_application_of_a_subdevice_that_hangs_in_op_costs_nobody_else_anything() {
+fn a_hanging_subdevice_application_in_op_does_not_affect_others() {
     let mut world = World::in_op(2, ring_of_16(FAST));
     let mark = world.mark();
     world.hang(DeviceIndex(4), true);
@@ -110,7 +110,7 @@ fn impatient(scan: &Scan) -> Declaration {
 }
 
 #[test]
-fn an_application_that_hangs_while_it_is_configured_is_named_and_configured_later() {
+fn a_subdevice_hanging_during_configuration_is_reported_and_retried() {
     for after in [0, 1, 2, 3] {
         let mut world = World::with(after, ring_of_16(FAST), &Options::default(), impatient).expect("activation");
         world.run_cycles(after);
@@ -130,7 +130,7 @@ fn an_application_that_hangs_while_it_is_configured_is_named_and_configured_late
 
 // covers: refused-states
 #[test]
-fn a_refused_transition_is_named_with_its_code_and_tried_again() {
+fn a_refused_transition_is_reported_with_its_code_and_retried() {
     for to in [AlState::PreOp, AlState::SafeOp, AlState::Op] {
         for (device, times) in [(2, 1), (4, 2), (13, 3)] {
             let mut network = ring_of_16(FAST);
@@ -151,7 +151,7 @@ fn a_refused_transition_is_named_with_its_code_and_tried_again() {
 
 // covers: refused-states
 #[test]
-fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
+fn a_subdevice_that_refuses_for_long_does_not_delay_others() {
     let mut network = ring_of_16(FAST);
     let code = AlStatusCode::INVALID_INPUT_MAPPING;
     network.apply(Fault::RefuseTransition { device: DeviceIndex(3), to: AlState::SafeOp, code, times: 1_000 });
@@ -168,7 +168,7 @@ fn a_subdevice_that_refuses_for_long_holds_up_nobody() {
 
 // covers: refused-states
 #[test]
-fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
+fn a_corrupt_sii_is_reported_with_expected_and_read_value() {
     // Byte 16 is the first of the vendor id in word 8, byte 14 the checksum (protocol 4.1).
     let mut network = ring_of_16(FAST);
     network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
@@ -184,7 +184,7 @@ fn a_corrupt_sii_is_told_with_what_was_expected_and_what_came() {
 }
 
 #[test]
-fn a_subdevice_with_a_wrong_checksum_in_its_sii_is_told_and_holds_up_nobody() {
+fn a_wrong_sii_checksum_is_reported_and_does_not_affect_others() {
     let mut network = ring_of_16(FAST);
     network.apply(Fault::CorruptSii { device: DeviceIndex(2), offset: 14, mask: 0x40 });
     let mut world = World::with(6, network, &Options::default(), impatient).expect("activation");
@@ -218,7 +218,7 @@ fn scan_error(network: Network) -> ScanError {
 }
 
 #[test]
-fn links_joined_without_any_subdevice_differ_from_links_that_lead_nowhere() {
+fn connected_links_without_subdevices_differ_from_dead_links() {
     let (main, redundant) = (Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant));
     let joined = SegmentBuilder::new().cable(main, redundant).build().expect("two links");
     let error = scan_error(joined);
@@ -251,7 +251,7 @@ fn a_count_that_does_not_settle_is_an_error_with_the_counts() {
 
 // covers: recovery
 #[test]
-fn a_whole_segment_that_loses_power_comes_back_by_itself() {
+fn a_whole_segment_that_loses_power_recovers_automatically() {
     for ring in [true, false] {
         let network = if ring { ring_of_16(FAST) } else { line(descriptions(&SIXTEEN), NetworkOptions::default()) };
         let mut world = World::in_op(8, network);
@@ -286,7 +286,7 @@ fn fmmu_thief(station: u16) -> Vec<u8> {
 
 // covers: refused-states
 #[test]
-fn a_subdevice_in_op_that_lost_its_fmmus_is_noticed_and_configured_anew() {
+fn a_subdevice_in_op_without_fmmus_is_detected_and_reconfigured() {
     let mut world = World::in_op(9, ring_of_16(FAST));
     let mark = world.mark();
     let frame = fmmu_thief(0x1001 + 1);

@@ -64,7 +64,7 @@ fn answered(world: &mut World) -> (Vec<u32>, u64) {
 
 // covers: byte-budget
 #[test]
-fn a_long_file_and_a_flood_leave_fifty_others_their_share_of_the_budget() {
+fn a_file_and_a_datagram_flood_leave_others_their_share_of_the_budget() {
     let mut world = world(1);
     let (alone, most) = answered(&mut world);
     assert!(most <= BUDGET as u64, "{most} bytes in a cycle");

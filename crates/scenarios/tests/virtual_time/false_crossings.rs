@@ -121,14 +121,14 @@ const COURSES: [Course; 4] = [Course::InOp, Course::Enhanced, Course::Scan, Cour
 
 // covers: LC-01, crossed-lines
 #[test]
-fn cuts_healed_within_milliseconds_under_loss_cross_no_line() {
+fn short_cuts_under_frame_loss_report_no_crossed_line() {
     let told: Vec<String> = (0..150).flat_map(|seed| run(seed, Course::InOp)).collect();
     assert_eq!(told, Vec::<String>::new());
 }
 
 // covers: LC-03, crossed-lines
 #[test]
-fn the_same_with_enhanced_detection_and_at_the_scan_crosses_no_line() {
+fn short_cuts_with_enhanced_detection_and_at_the_scan_cross_no_line() {
     let both = |seed| [Course::Enhanced, Course::Scan].into_iter().flat_map(move |course| run(seed, course));
     let told: Vec<String> = (0..75).flat_map(both).collect();
     assert_eq!(told, Vec::<String>::new());
@@ -136,7 +136,7 @@ fn the_same_with_enhanced_detection_and_at_the_scan_crosses_no_line() {
 
 // covers: LC-01, crossed-lines
 #[test]
-fn a_line_that_is_crossed_is_told_in_spite_of_cuts_and_loss() {
+fn a_crossed_line_is_reported_in_spite_of_cuts_and_loss() {
     let told: Vec<String> = (0..75).flat_map(|seed| run(seed, Course::Crossed)).collect();
     assert_eq!(told, Vec::<String>::new());
 }

@@ -53,7 +53,7 @@ fn too_many(world: &World) -> u64 {
 
 // covers: frame-limit, sim-faults
 #[test]
-fn a_scan_that_fails_for_too_many_datagrams_says_how_many_to_set() {
+fn a_scan_that_exceeds_the_datagram_limit_reports_the_limit() {
     for beyond in BOTH {
         for is_ring in [false, true] {
             for (datagrams, count) in [(3, 5), (7, 5), (14, 40), (15, 40), (16, 300), (40, 100), (100, 300)] {
@@ -74,7 +74,7 @@ fn a_scan_that_fails_for_too_many_datagrams_says_how_many_to_set() {
 
 // covers: frame-limit
 #[test]
-fn a_look_at_the_ring_that_fails_for_too_many_datagrams_says_so() {
+fn a_ring_check_that_exceeds_the_datagram_limit_reports_it() {
     for beyond in BOTH {
         let look = |options: &Options| {
             let mut tap = Tap::new(limited(12, true, 15, beyond));
@@ -89,7 +89,7 @@ fn a_look_at_the_ring_that_fails_for_too_many_datagrams_says_so() {
 
 // covers: frame-limit
 #[test]
-fn a_limit_that_was_set_too_high_is_said_too() {
+fn a_limit_that_was_set_too_high_is_reported() {
     for beyond in BOTH {
         let error = scan(limited(40, false, 15, beyond), &told(16)).expect_err("one too many");
         assert!(error.to_string().contains("set max_datagrams_per_frame to 15"), "{error}");
@@ -100,7 +100,7 @@ fn a_limit_that_was_set_too_high_is_said_too() {
 
 // covers: frame-limit
 #[test]
-fn with_the_limit_set_no_frame_holds_more_and_all_else_is_as_without() {
+fn with_the_limit_set_no_frame_exceeds_it_and_all_else_is_unchanged() {
     for beyond in BOTH {
         for is_ring in [false, true] {
             for (datagrams, count) in [(3, 12), (15, 40), (15, 300)] {
@@ -142,7 +142,7 @@ fn busy(scan: &Scan) -> Declaration {
 
 // covers: frame-limit
 #[test]
-fn cyclic_frames_with_datagrams_of_their_own_for_each_subdevice_keep_the_limit() {
+fn cyclic_frames_with_a_datagram_per_subdevice_keep_the_limit() {
     for datagrams in [3, 4, 15] {
         for is_ring in [false, true] {
             let network = limited(24, is_ring, datagrams, Beyond::Dropped);
@@ -157,7 +157,7 @@ fn cyclic_frames_with_datagrams_of_their_own_for_each_subdevice_keep_the_limit()
 
 // covers: frame-limit
 #[test]
-fn subdevices_that_join_and_are_too_many_for_a_frame_are_explained_once() {
+fn joining_subdevices_that_exceed_the_limit_are_explained_once() {
     const PRESENT: usize = 3;
     let all = scan(segment(40, false, None), &Options::default()).expect("a scan").subdevices;
     for beyond in BOTH {
@@ -220,7 +220,7 @@ fn disturbed(seed: u64) -> Option<String> {
 
 // covers: frame-limit
 #[test]
-fn frames_that_are_lost_by_chance_make_no_limit() {
+fn random_frame_losses_are_not_mistaken_for_a_limit() {
     let mistaken: Vec<String> = (0..300).filter_map(disturbed).collect();
     assert_eq!(mistaken, Vec::<String>::new());
 }

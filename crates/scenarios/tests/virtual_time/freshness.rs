@@ -88,7 +88,7 @@ fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
 /// Protocol 5.2: FMMUs are set before SAFEOP is requested. Some controllers read them only during this transition.
 // covers: freshness
 #[test]
-fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data() {
+fn subdevices_that_latch_fmmus_before_safeop_exchange_process_data() {
     let mut described = descriptions(&["coupler", "digital-input-8", "servo", "digital-output-8", "analog-input-4"]);
     described.iter_mut().for_each(|it| it.latches_fmmus = true);
     let mut world = World::in_op(1, line(described, NetworkOptions::default()));
@@ -107,7 +107,7 @@ fn subdevices_that_latch_their_fmmus_on_the_way_to_safeop_exchange_process_data(
 /// cycle.
 // covers: freshness
 #[test]
-fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh() {
+fn a_slow_transition_to_safeop_leaves_inputs_of_others_fresh() {
     let kinds = ["digital-input-8", "emulated-input-8", "servo", "emulated-output-8", "analog-input-4", "block"];
     for closed in [false, true] {
         let mut described = descriptions(&kinds);
@@ -132,7 +132,7 @@ fn a_subdevice_on_its_slow_way_to_safeop_leaves_the_inputs_of_all_others_fresh()
 /// session another SubDevice has this address; it loses its power when the old one becomes reachable again.
 // covers: freshness
 #[test]
-fn a_subdevice_of_an_earlier_session_is_not_taken_for_another_one() {
+fn a_subdevice_of_an_earlier_session_is_not_mistaken_for_another() {
     let mut described = with_four_ports(&["digital-input-16"; 3]);
     for (number, it) in described.iter_mut().enumerate() {
         it.identity.product_code += 0x1000 * number as u32;
@@ -201,7 +201,7 @@ fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
 /// One link, LRW: inputs are delivered, outputs are not accepted.
 // covers: freshness
 #[test]
-fn a_domain_is_not_complete_while_outputs_are_not_taken() {
+fn a_domain_is_incomplete_while_outputs_are_not_accepted() {
     for kinds in [&["servo"][..], &["servo", "analog-input-4"]] {
         for fmmus in [None, Some(3), Some(2)] {
             let mut described = descriptions(kinds);
@@ -226,7 +226,7 @@ fn a_domain_is_not_complete_while_outputs_are_not_taken() {
 /// A SubDevice with outputs leaves INIT on request while another one loses its power: the sum is unchanged.
 // covers: freshness
 #[test]
-fn outputs_that_one_takes_on_its_way_do_not_stand_for_those_of_one_without_power() {
+fn outputs_of_a_starting_subdevice_do_not_replace_those_of_a_lost_one() {
     let mut described = descriptions(&["digital-output-8"; 2]);
     for it in &mut described {
         it.controller_fmmus = Some(1);
@@ -411,13 +411,13 @@ fn runs(seeds: Range<u64>) {
 
 // covers: freshness
 #[test]
-fn what_is_called_fresh_was_put_into_this_frame_seeds_0_to_99() {
+fn fresh_inputs_were_written_into_this_frame_seeds_0_to_99() {
     runs(0..100);
 }
 
 // covers: freshness
 #[test]
-fn what_is_called_fresh_was_put_into_this_frame_seeds_100_to_199() {
+fn fresh_inputs_were_written_into_this_frame_seeds_100_to_199() {
     runs(100..200);
 }
 

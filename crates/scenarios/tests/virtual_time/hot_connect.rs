@@ -140,7 +140,7 @@ fn a_group_joins_and_leaves_a_line_without_working_counter_errors_elsewhere() {
 
 // covers: hot-connect
 #[test]
-fn a_torn_off_group_with_a_domain_of_its_own_costs_the_others_nothing() {
+fn an_unplugged_group_with_its_own_domain_does_not_affect_others() {
     let (network, cable) = at_the_end();
     let declare = |scan: &Scan| {
         let mut declaration = declare(scan);
@@ -228,7 +228,7 @@ fn a_group_in_the_middle_of_a_ring_joins_while_the_others_stay_in_op() {
 
 // covers: 5.3, hot-connect
 #[test]
-fn a_group_is_there_from_the_beginning_and_found_by_its_identification() {
+fn a_group_present_at_the_start_is_found_by_its_identification() {
     let mut head = tool();
     head[0].alias = 0;
     head[0].identification = Some(4711);
@@ -259,7 +259,7 @@ fn a_group_is_there_from_the_beginning_and_found_by_its_identification() {
 
 // covers: hot-connect
 #[test]
-fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
+fn a_broken_group_is_reported_and_its_remaining_part_is_used() {
     let mut all: Vec<_> = descriptions(&BASE).into_iter().chain(tool()).collect();
     all.pop();
     all.extend(descriptions(&["digital-input-4"]));
@@ -276,7 +276,7 @@ fn a_group_that_breaks_off_is_told_and_its_rest_is_taken() {
 /// side.
 // covers: CR-21, hot-connect
 #[test]
-fn groups_side_by_side_that_a_break_separates_go_on_and_join_from_their_own_side() {
+fn adjacent_groups_separated_by_a_break_continue_and_join_again() {
     let mut second = tool();
     second[0].alias = TOOL + 1;
     let mut all = descriptions(&BASE);
@@ -409,7 +409,7 @@ fn runs(seeds: Range<u64>) {
 
 // covers: hot-connect, freshness
 #[test]
-fn groups_of_any_devices_come_and_go_and_what_is_fresh_was_put_in_seeds_0_to_39() {
+fn inputs_stay_proven_while_random_groups_join_and_leave_seeds_0_to_39() {
     runs(0..40);
 }
 

@@ -67,7 +67,7 @@ fn second_session(
 /// earlier session comes before or behind it in processing order, and whether or not they are identical.
 // covers: identity
 #[test]
-fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_it() {
+fn of_two_subdevices_at_one_address_that_of_this_session_keeps_it() {
     let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
     let closed = [tree[0], tree[1], tree[2], (at(1, Port::B), REDUNDANT)];
     for (cables, alike, kind) in [
@@ -123,7 +123,7 @@ fn of_two_at_one_address_the_one_of_this_session_stays_and_the_other_one_loses_i
 /// intervals, and this is reported once. The right SubDevice comes back when the other one is gone.
 // covers: identity
 #[test]
-fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_often() {
+fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     let tree = [(MAIN, at(0, Port::A)), (at(0, Port::B), at(1, Port::A)), (at(0, Port::D), at(2, Port::A))];
     let described = described(&["digital-input-16"; 3], false);
     let mut application =
@@ -175,7 +175,7 @@ fn one_that_cannot_give_up_a_wrong_address_is_told_once_and_asked_ever_less_ofte
 /// while the first has no power.
 // covers: identity
 #[test]
-fn of_several_alike_each_comes_back_to_its_own_place_whichever_is_there_first() {
+fn identical_subdevices_return_to_their_places_in_any_order() {
     let branches = [
         (MAIN, at(0, Port::A)),
         (at(0, Port::D), at(1, Port::A)),

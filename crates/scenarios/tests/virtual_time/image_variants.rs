@@ -236,7 +236,7 @@ fn finish(tally: &Tally, what: &str) {
 
 // covers: odd-sii
 #[test]
-fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
+fn damaged_catalogue_images_are_explained_and_stop_no_other_subdevice() {
     let mut tally = Tally::default();
     for name in catalogue::names() {
         judge_all(&describe(name, name), variants(SOME), &mut tally);
@@ -246,7 +246,7 @@ fn odd_images_of_the_catalogue_hold_up_nobody_and_are_explained() {
 
 // covers: odd-sii
 #[test]
-fn odd_images_of_real_devices_hold_up_nobody_and_are_explained() {
+fn damaged_images_of_real_devices_stop_no_other_subdevice() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sii");
     let Ok(entries) = std::fs::read_dir(&directory) else {
         println!("skipped: {} is not there", directory.display());

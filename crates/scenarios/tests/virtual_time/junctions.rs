@@ -100,7 +100,7 @@ fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
 
 // covers: JR-01, JR-07, junctions
 #[test]
-fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op() {
+fn each_cable_of_a_ring_behind_a_junction_is_cut_and_repaired_in_op() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
         let mut world = in_op(1, one_ring(), setting);
         assert_eq!(told(&world, world.beginning()), [], "it is whole");
@@ -126,7 +126,7 @@ fn every_cable_of_a_ring_behind_a_junction_is_cut_and_healed_in_op() {
 
 // covers: JR-03, junctions
 #[test]
-fn a_ring_behind_a_junction_that_is_broken_from_the_start_is_told() {
+fn a_ring_behind_a_junction_broken_from_the_start_is_reported() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
         for cable in RING {
             let mut network = one_ring();
@@ -168,7 +168,7 @@ fn unknown(world: &World, mark: Mark) -> Vec<usize> {
 
 // covers: JR-03, JR-09, junctions
 #[test]
-fn a_ring_that_closes_after_the_scan_is_told_as_unknown_unless_it_was_declared() {
+fn a_ring_closed_after_the_scan_is_reported_unknown_unless_declared() {
     for (setting, expected) in [
         ((JunctionMode::Automatic, &[][..]), vec![1]),
         ((JunctionMode::Strict, &[STRICT]), vec![]),
@@ -222,7 +222,7 @@ fn a_ring_behind_a_junction_that_breaks_during_start_up_comes_to_op() {
 }
 
 #[test]
-fn a_cut_in_the_line_loses_what_is_behind_it_and_is_no_matter_of_the_ring() {
+fn a_cut_of_the_line_loses_subdevices_without_a_ring_event() {
     let mut world = in_op(6, one_ring(), (JunctionMode::Automatic, &[]));
     let mark = world.mark();
     world.cut(CableId(6));
@@ -238,7 +238,7 @@ fn a_cut_in_the_line_loses_what_is_behind_it_and_is_no_matter_of_the_ring() {
 
 // covers: JR-04, crossed-lines
 #[test]
-fn without_junction_redundancy_a_ring_that_breaks_reads_as_a_crossed_line() {
+fn without_junction_redundancy_a_broken_local_ring_is_a_crossed_line() {
     for cable in [2, 3, 4] {
         let mut world = in_op(7, one_ring(), (JunctionMode::Disabled, &[]));
         assert_eq!(crossed(&world, world.beginning()), 0);
@@ -308,7 +308,7 @@ fn random_segment(dice: &mut Dice) -> (Network, Vec<usize>, bool) {
 
 // covers: junctions-in-ring
 #[test]
-fn random_segments_with_a_local_ring_deliver_the_same_with_and_without_one_break() {
+fn random_segments_with_a_local_ring_work_alike_with_one_break() {
     for seed in 0..12 {
         let dice = &mut Dice::new(seed);
         let (network, ring, two_links) = random_segment(dice);
@@ -330,7 +330,7 @@ fn random_segments_with_a_local_ring_deliver_the_same_with_and_without_one_break
 
 // covers: junctions-in-ring
 #[test]
-fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
+fn transfers_continue_through_cuts_and_repairs_of_a_local_ring() {
     let mut world = in_op(9, one_ring(), (JunctionMode::Strict, &[STRICT]));
     let limits: Limits = (Duration::from_millis(100), Duration::from_secs(1));
     let object = SdoAddress::new(0x8000, 3);
@@ -359,7 +359,7 @@ fn transfers_go_on_through_cuts_and_repairs_of_a_local_ring() {
 /// Their reads clear the event of the change.
 // covers: JR-07, junctions
 #[test]
-fn a_repair_right_behind_a_break_is_told_in_time_whoever_else_looks_at_ports() {
+fn a_repair_right_after_a_break_is_reported_despite_other_port_reads() {
     for with_clocks in [false, true] {
         let declare = |scan: &ringcat::Scan| {
             let mut declaration = automatic(&scan.subdevices, CYCLE);

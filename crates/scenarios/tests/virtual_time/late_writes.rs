@@ -34,7 +34,7 @@ fn is_well(world: &World) -> bool {
 /// Each group of configuration registers is cleared without the engine's knowledge in OP, SAFEOP and PREOP.
 // covers: recovery
 #[test]
-fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
+fn a_configuration_overwritten_by_a_late_write_is_restored() {
     let registers: [(usize, AlState, RegisterAddress, usize); 8] = [
         (0, AlState::Op, map::sync_manager(0), SyncManager::LEN),
         (0, AlState::Op, map::fmmu(0), Fmmu::LEN),
@@ -83,7 +83,7 @@ fn a_configuration_that_a_late_write_has_undone_is_told_and_written_again() {
 /// A SubDevice with outputs in OP only is right in a requested SAFEOP.
 // covers: recovery
 #[test]
-fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
+fn outputs_for_op_only_are_not_reconfigured_in_safeop() {
     let mut world = world();
     let request = world.application_mut().request_state(0, AlState::SafeOp);
     world.finish(Duration::from_secs(1), request).expect("it goes there");
@@ -97,7 +97,7 @@ fn one_for_op_only_that_was_led_to_safeop_is_left_in_peace() {
 /// moments.
 // covers: recovery
 #[test]
-fn frames_that_are_late_while_a_subdevice_comes_back_undo_nothing_for_good() {
+fn late_frames_during_a_return_have_no_lasting_effect() {
     for (seed, by) in (0..).zip([1_900, 2_900, 3_900, 5_900].map(Duration::from_micros)) {
         let mut world = world();
         for moment in 0..60 {

@@ -43,7 +43,7 @@ async fn write_and_read(mailbox: Mailbox, rounds: u16) -> Result<(), SdoError> {
 
 // covers: 6.1, mailbox
 #[test]
-fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once() {
+fn a_lost_write_is_repeated_with_its_counter_and_executed_once() {
     for lost in [Loss::of_write(0x1004, RECEIVE), Loss::of_write(0x1004, RECEIVE).on_the_way_back()] {
         for skip in 0..6 {
             let mut world = world(1);
@@ -61,7 +61,7 @@ fn a_lost_write_is_sent_again_with_its_counter_and_acted_upon_once() {
 
 // covers: 6.2, mailbox
 #[test]
-fn a_lost_read_is_asked_for_again_with_the_repeat_bit() {
+fn a_lost_read_is_repeated_with_the_repeat_bit() {
     for lost in [Loss::of_read(0x1004, SEND), Loss::of_read(0x1004, SEND).on_the_way_back()] {
         for skip in 0..12 {
             let mut world = world(2);
@@ -78,7 +78,7 @@ fn a_lost_read_is_asked_for_again_with_the_repeat_bit() {
 
 // covers: mailbox
 #[test]
-fn many_losses_in_a_row_are_survived() {
+fn many_consecutive_losses_are_recovered() {
     let mut world = world(3);
     let mailbox = world.mailbox(TERMINAL);
     for skip in [0, 7, 9, 20, 31] {
@@ -114,7 +114,7 @@ fn cutting_and_healing_cables_during_transfers_loses_no_request_and_no_answer() 
 
 // covers: mailbox
 #[test]
-fn a_late_answer_to_a_request_that_was_given_up_is_not_taken_for_that_to_the_next() {
+fn a_late_response_is_not_assigned_to_the_next_request() {
     let mut world = world(5);
     let mailbox = world.mailbox(TERMINAL);
     assert_eq!(world.run(write_and_read(mailbox.clone(), 2)), Ok(()));
@@ -141,7 +141,7 @@ fn a_late_answer_to_a_request_that_was_given_up_is_not_taken_for_that_to_the_nex
 
 // covers: mailbox
 #[test]
-fn while_a_subdevice_is_away_its_mailbox_is_closed_and_afterwards_it_works() {
+fn the_mailbox_of_an_absent_subdevice_is_closed_until_its_return() {
     let mut world = world(6);
     let mailbox = world.mailbox(TERMINAL);
     let work = world.start(write_and_read(mailbox.clone(), 1000));
@@ -159,7 +159,7 @@ fn while_a_subdevice_is_away_its_mailbox_is_closed_and_afterwards_it_works() {
 
 // covers: mailbox
 #[test]
-fn several_tasks_share_a_mailbox_and_each_gets_its_own_answers() {
+fn several_tasks_share_a_mailbox_and_each_gets_its_responses() {
     let mut world = world(7);
     let mailbox = world.mailbox(TERMINAL);
     let channel = |mailbox: Mailbox, channel: u16| async move {
@@ -184,7 +184,7 @@ fn several_tasks_share_a_mailbox_and_each_gets_its_own_answers() {
 
 // covers: mailbox
 #[test]
-fn an_idle_mailbox_costs_one_byte_per_poll_and_answers_are_read_when_there() {
+fn an_idle_mailbox_costs_one_byte_per_poll() {
     let mut world = world(8);
     let mailbox = world.mailbox(TERMINAL);
     let before = mailbox.counters();

@@ -24,7 +24,7 @@ fn world(seed: u64) -> World {
 
 // covers: 6.3, pdo-mail
 #[test]
-fn pdos_are_sent_and_asked_for_by_mailbox() {
+fn pdos_are_sent_and_requested_by_mailbox() {
     let mut world = world(1);
     let mailbox = world.mailbox(SERVO);
     let directory = world.application().directory().clone();
@@ -57,7 +57,7 @@ fn pdos_are_sent_and_asked_for_by_mailbox() {
 
 // covers: pdo-mail
 #[test]
-fn messages_of_the_applications_own_making_get_the_next_answer_or_none() {
+fn raw_messages_get_the_next_response_or_none() {
     let mut world = world(2);
     let mailbox = world.mailbox(ALL);
     let own = mailbox.clone();

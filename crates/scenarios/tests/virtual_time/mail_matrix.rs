@@ -85,7 +85,7 @@ fn question(world: &mut World, mut asker: Asker, number: u32) -> (Result<(), Str
 
 // covers: 6.1, mailbox-faults
 #[test]
-fn every_protocol_bears_every_fault_of_mail_and_frames() {
+fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
     let mut seen = 0;
     for kind in KINDS {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));

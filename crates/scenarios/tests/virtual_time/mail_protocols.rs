@@ -106,7 +106,7 @@ fn start_all(world: &mut World) -> Vec<ringcat_engine::main_device::Pending<()>>
 
 // covers: mailbox-faults
 #[test]
-fn all_protocols_of_one_device_work_at_once_while_process_data_goes_on() {
+fn all_protocols_of_one_device_work_at_once_beside_process_data() {
     let mut world = world(1);
     let mark = world.mark();
     let works = start_all(&mut world);
@@ -120,7 +120,7 @@ fn all_protocols_of_one_device_work_at_once_while_process_data_goes_on() {
 
 // covers: mailbox-faults
 #[test]
-fn all_protocols_survive_cuts_lost_reads_and_lost_writes_at_once() {
+fn all_protocols_recover_from_cuts_lost_reads_and_lost_writes() {
     let mut world = world(2);
     let station = world.station_of(ALL);
     let works = start_all(&mut world);
@@ -146,7 +146,7 @@ fn all_protocols_survive_cuts_lost_reads_and_lost_writes_at_once() {
 
 // covers: 6.1, mailbox-faults
 #[test]
-fn answers_that_come_twice_late_or_with_a_wrong_counter_are_told_apart() {
+fn duplicated_late_and_miscounted_responses_are_distinguished() {
     let mut world = world(3);
     let faults = [
         MailFault::RepeatAnswers { count: 20 },
@@ -171,7 +171,7 @@ fn answers_that_come_twice_late_or_with_a_wrong_counter_are_told_apart() {
 
 // covers: mailbox-faults
 #[test]
-fn a_device_that_answers_no_more_is_given_up_in_time_and_serves_again_when_it_does() {
+fn a_silent_device_is_given_up_in_time_and_works_again_later() {
     let mut world = world(4);
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::LoseAnswers { count: 1 }));
     let limits = (LIMITS.0, Duration::from_millis(50));
@@ -226,7 +226,7 @@ fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<
 // The error reply is assigned to the waiting request, whose response is still under way.
 // covers: 6.1, mailbox
 #[test]
-fn an_error_reply_that_may_be_anothers_confuses_no_later_answer() {
+fn an_ambiguous_error_reply_does_not_shift_later_responses() {
     for first_is_dropped in [false, true] {
         let mut world = world(5);
         // The drive has responded before in SoE, but not yet in VoE.
@@ -348,7 +348,7 @@ fn one_mebibyte_by_foe_takes_few_round_trips_per_packet_at_any_cycle() {
 
 // covers: mailbox-faults
 #[test]
-fn mail_that_nobody_asked_for_is_kept_for_whoever_wants_it() {
+fn unsolicited_mail_is_kept_for_the_application() {
     let mut world = world(10);
     let post = |world: &mut World, payload: &[u8]| {
         let device = world.network_mut().device_mut(DeviceIndex(ALL));
@@ -400,7 +400,7 @@ fn the_diagnosis_history_is_read_and_acknowledged() {
 
 // covers: 6.1, mailbox
 #[test]
-fn mail_of_all_who_can_show_it_is_found_with_one_read() {
+fn mail_of_all_mapped_mailboxes_is_found_with_one_read() {
     let mut world = world(12);
     // The two devices with mailboxes map a bit each: 0x080D.3 through their third FMMU.
     for device in [ALL, 3] {

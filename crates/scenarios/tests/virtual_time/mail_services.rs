@@ -22,7 +22,7 @@ const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
 
 // covers: jobs, sdo
 #[test]
-fn objects_are_read_and_written_before_activation_which_configures_everything_anew() {
+fn objects_are_accessible_before_activation_which_reconfigures_all() {
     let mut main_device =
         MainDevice::request(Tap::new(line(descriptions(&KINDS), NetworkOptions::default())), &Options::default());
     let scan = main_device.scan().expect("a scan");
@@ -45,7 +45,7 @@ fn objects_are_read_and_written_before_activation_which_configures_everything_an
 
 // covers: jobs, sdo
 #[test]
-fn requests_are_made_and_made_again_from_the_cyclic_thread() {
+fn requests_are_reused_from_the_cyclic_thread() {
     let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
     let mut request = world.application_mut().engine_mut().create_sdo_request(3, 16);
     let busy = |world: &mut World, request: &ringcat::SdoRequest| {
@@ -90,7 +90,7 @@ fn requests_are_made_and_made_again_from_the_cyclic_thread() {
 
 // covers: 6.4, foe
 #[test]
-fn firmware_is_written_through_boot_and_the_new_version_is_reported() {
+fn firmware_is_written_in_boot_and_the_new_version_is_reported() {
     let network = line(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     main_device.scan().expect("a scan");

@@ -6,7 +6,7 @@ use scenarios::start_lists::Lists;
 
 // covers: layout, start-lists
 #[test]
-fn a_hundred_drives_with_fifty_objects_each_start_in_little_more_than_one_of_them() {
+fn a_hundred_drives_start_in_little_more_time_than_one() {
     let all = Lists { drives: 100, objects: 50, mailbox: 128, period: Duration::from_millis(1) };
     let (one, cost) = (Lists { drives: 1, ..all }.start(), all.start());
     let floor = one.time.max(all.mail_alone());

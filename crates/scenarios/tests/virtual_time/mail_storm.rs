@@ -261,7 +261,7 @@ fn mailboxes_are_idle(world: &mut World, seed: u64) {
 
 // covers: mailbox-faults
 #[test]
-fn each_answer_finds_its_request_and_no_mail_stays_whatever_happens() {
+fn each_response_finds_its_request_and_no_mail_remains() {
     let tally = Rc::new(Tally::default());
     let seeds = seeds::from_environment().unwrap_or(0..30);
     let runs = (seeds.end - seeds.start) as u32;

@@ -43,7 +43,7 @@ fn run(name: &str, target: Target, bytes: &[u8]) {
 
 // covers: mail-judge
 #[test]
-fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
+fn corpora_contain_encoder_output_and_each_target_accepts_it() {
     for (name, target) in TARGETS {
         let seeds = seeds::of(name);
         if std::env::var_os("RINGCAT_WRITE_CORPUS").is_some() {
@@ -62,7 +62,7 @@ fn corpora_hold_what_our_encoders_write_and_each_target_takes_it() {
 
 // covers: mail-judge
 #[test]
-fn mutants_of_the_corpora_never_panic_and_what_decodes_survives_being_encoded() {
+fn mutants_of_the_corpora_never_panic_and_re_encode_to_the_same_value() {
     let corpora = TARGETS.map(|(name, target)| (name, target, read(name)));
     for seed in from_environment().unwrap_or(4..5) {
         let mut dice = Dice::new(seed);
@@ -81,7 +81,7 @@ const ENI_MUTANTS: usize = 150;
 
 // covers: 8, eni-read
 #[test]
-fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors() {
+fn mutants_of_an_eni_are_consistent_configurations_or_errors() {
     for seed in from_environment().unwrap_or(8..9) {
         let mut dice = Dice::new(seed);
         for text in [eni::WHOLE, eni::GROUP] {
@@ -99,7 +99,7 @@ fn mutants_of_an_eni_are_configurations_that_hold_together_or_errors() {
 
 // covers: mail-judge
 #[test]
-fn a_target_whose_decoder_breaks_is_found() {
+fn a_target_with_a_faulty_decoder_is_found() {
     let broken: Target = |bytes| assert!(bytes.get(5) != Some(&0xFF), "a decoder that cannot bear this");
     let found = std::panic::catch_unwind(|| {
         let mut dice = Dice::new(4);

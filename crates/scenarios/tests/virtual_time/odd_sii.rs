@@ -71,7 +71,7 @@ fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary() {
 
 // covers: odd-sii
 #[test]
-fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
+fn the_dictionary_has_priority_over_the_sii_which_is_reported() {
     // The SII has a PDO of half the size.
     let devices = || {
         with_sii("all-protocols", |described| {
@@ -98,7 +98,7 @@ fn where_sii_and_dictionary_disagree_the_dictionary_counts_and_that_is_told() {
 
 // covers: odd-sii
 #[test]
-fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
+fn a_former_pdo_assignment_is_restored_after_a_loss_of_power() {
     let mut devices = descriptions(&KINDS);
     devices[ODD] = descriptions(&["analog-input-4"]).remove(0);
     let links = Tap::new(line(devices, NetworkOptions::default()));
@@ -131,7 +131,7 @@ fn what_somebody_assigned_before_is_assigned_again_after_a_loss_of_power() {
 
 // covers: 4.4, odd-sii
 #[test]
-fn sync_managers_in_another_order_are_taken_as_the_sii_says() {
+fn sync_managers_in_another_order_are_used_as_in_the_sii() {
     let mut devices = descriptions(&KINDS);
     let device = &mut devices[ODD];
     device.sync_managers.swap(2, 3);
@@ -149,7 +149,7 @@ fn sync_managers_in_another_order_are_taken_as_the_sii_says() {
 
 // covers: 3.11, odd-sii
 #[test]
-fn mailboxes_on_other_sync_managers_work_as_the_sii_says() {
+fn mailboxes_on_other_sync_managers_work_as_in_the_sii() {
     for shows_mail in [true, false] {
         let mut devices = descriptions(&KINDS);
         let device = &mut devices[ODD];
@@ -192,7 +192,7 @@ fn mailboxes_on_other_sync_managers_work_as_the_sii_says() {
 
 // covers: odd-sii
 #[test]
-fn an_sii_without_an_end_marker_is_told_and_used() {
+fn an_sii_without_an_end_marker_is_reported_and_used() {
     let mut devices = descriptions(&KINDS);
     let used = sii_image::used_bytes(&devices[ODD]);
     let mut image = sii_image::build(&devices[ODD]);
@@ -208,7 +208,7 @@ fn an_sii_without_an_end_marker_is_told_and_used() {
 
 // covers: odd-sii
 #[test]
-fn one_with_a_blank_eeprom_is_told_and_keeps_nobody_from_op() {
+fn a_blank_eeprom_is_reported_and_the_others_reach_op() {
     for blank in [0x00, 0xFF] {
         let mut devices = descriptions(&KINDS);
         devices[ODD].sii_image = Some(vec![blank; 512]);
@@ -243,7 +243,7 @@ fn others_run_and_it_says(mut world: World, reason: &str) {
 
 // covers: odd-sii
 #[test]
-fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
+fn an_invalid_sii_stops_only_its_own_subdevice() {
     // Random mailbox words with a wrong checksum.
     let mut devices = descriptions(&KINDS);
     let mut image = sii_image::build(&devices[ODD]);
@@ -271,7 +271,7 @@ fn an_sii_that_cannot_be_followed_is_a_matter_of_its_subdevice_alone() {
 /// An event reports once that it has no place before the next activation and stays in SAFEOP; the others continue.
 // covers: odd-sii
 #[test]
-fn one_whose_sii_is_mended_in_operation_says_that_it_has_no_place_yet() {
+fn an_sii_repaired_in_operation_is_reported_without_a_place() {
     let mut devices = descriptions(&KINDS);
     let sound = sii_image::build(&devices[ODD]);
     let mut beyond = devices[ODD].clone();
@@ -334,7 +334,7 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
 
 /// Three identical SubDevices that share the contents of their SIIs; any one of them has damage inside a category.
 #[test]
-fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
+fn damage_inside_a_category_does_not_affect_identical_subdevices() {
     for damaged in 1..4 {
         let mut devices = descriptions(&["coupler", "digital-input-16", "digital-input-16", "digital-input-16"]);
         let mut other = devices[damaged].clone();
@@ -358,7 +358,7 @@ fn damage_inside_a_category_does_not_spread_to_subdevices_alike() {
 
 // covers: odd-sii
 #[test]
-fn pdos_one_way_or_of_size_0_and_default_lengths_mean_the_same_on_both_sides() {
+fn unusual_pdos_and_default_lengths_are_read_alike_on_both_sides() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
         for change in 0..6 {
             let mut described = descriptions(&[kind]).remove(0);
@@ -380,7 +380,7 @@ fn pdos_one_way_or_of_size_0_and_default_lengths_mean_the_same_on_both_sides() {
 
 // covers: odd-sii
 #[test]
-fn sync_managers_without_a_type_mean_one_thing_to_scan_run_and_simulator() {
+fn sync_managers_without_a_type_are_read_alike_everywhere() {
     for kind in ["digital-input-8", "digital-output-8", "analog-input-4", "servo", "all-protocols"] {
         for without_pdos in [false, true] {
             let mut described = descriptions(&[kind]).remove(0);
@@ -429,7 +429,7 @@ fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
 
 // covers: odd-sii
 #[test]
-fn process_ram_beyond_eight_kibibytes_is_there_where_the_sii_uses_it() {
+fn process_ram_beyond_eight_kibibytes_exists_if_the_sii_uses_it() {
     let mut described = descriptions(&["all-protocols"]).remove(0);
     described.sync_managers[2].start = 0x4000;
     described.sync_managers[3].start = 0x7000;
@@ -442,7 +442,7 @@ fn process_ram_beyond_eight_kibibytes_is_there_where_the_sii_uses_it() {
 
 // covers: odd-sii
 #[test]
-fn a_dictionary_that_does_not_answer_costs_its_own_time_only() {
+fn a_dictionary_that_does_not_respond_delays_only_its_subdevice() {
     let devices = with_sii("servo", |described| described.pdos.clear());
     let mut network = line(devices, NetworkOptions::default());
     network.apply(ringcat_sim::fault::Fault::Hang(DeviceIndex(ODD), true));

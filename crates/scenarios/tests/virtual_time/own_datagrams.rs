@@ -43,7 +43,7 @@ fn station_at(world: &mut World, position: u16) -> Option<u16> {
 
 // covers: CR-09, CR-10, ring-equals-line, sim-frames
 #[test]
-fn positions_of_an_application_are_those_of_the_scan_whoever_is_missing() {
+fn application_positions_are_those_of_the_scan_in_any_ring_state() {
     let mut world = World::in_op(1, segment());
     let stations: Vec<u16> = (0..KINDS.len()).map(|device| world.station_of(device)).collect();
     let all = |world: &mut World, missing: Option<usize>, what: &str| {
@@ -98,7 +98,7 @@ fn movable() -> Network {
 /// position.
 // covers: CR-09, CR-10, CR-17, ring-equals-line, sim-frames
 #[test]
-fn positions_of_an_application_are_those_of_a_rescan_that_took_over_the_cabling() {
+fn application_positions_are_those_of_a_rescan_that_updated_the_cabling() {
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices[1].optional = true;
@@ -183,7 +183,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
 
 // covers: CR-16, 9.2.2, ring-lrw
 #[test]
-fn an_lrw_of_the_applications_own_addresses_one_subdevice_on_two_links() {
+fn an_application_lrw_addresses_one_subdevice_on_two_links() {
     let mut world = World::in_op(5, segment());
     let lrw = |logical: u32, length: usize| RawDatagram {
         command: Command::Lrw,

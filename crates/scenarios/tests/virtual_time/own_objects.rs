@@ -96,7 +96,7 @@ fn write(world: &mut World, index: u16, sub_index: u8, data: &[u8]) -> Result<()
 
 // covers: 10.2, own-objects
 #[test]
-fn the_main_device_tells_what_was_declared_found_and_how_each_is() {
+fn objects_show_declared_and_found_subdevices_and_their_states() {
     let mut world = world();
     let mark = world.mark();
     assert_eq!(read(&mut world, 0x1008, 0, false), Ok(b"RingCAT".to_vec()));
@@ -157,7 +157,7 @@ fn the_main_device_tells_what_was_declared_found_and_how_each_is() {
 
 // covers: 10.2, own-objects
 #[test]
-fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_reset() {
+fn objects_follow_a_break_damaged_frames_and_a_loss_until_reset() {
     let mut world = world();
     world.judge_latched(false);
     world.corrupt(CableId(2), 20);
@@ -191,7 +191,7 @@ fn what_the_objects_say_follows_a_break_damaged_frames_and_a_loss_until_it_is_re
 
 // covers: 10.2, own-objects
 #[test]
-fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history() {
+fn faults_of_a_subdevice_are_counted_and_kept_in_the_history() {
     let mut world = world();
     world.judge_latched(false);
     let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
@@ -243,7 +243,7 @@ fn what_goes_wrong_with_a_subdevice_is_counted_and_kept_in_the_history() {
 
 // covers: 6.3, own-objects
 #[test]
-fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments() {
+fn detection_scans_the_segment_and_long_lists_are_segmented() {
     // So many that their addresses need two lists.
     let inputs = descriptions(&["digital-input-8"; COUNT]);
     let mut world = World::in_op(2, ring(inputs, NetworkOptions::default()));
@@ -273,7 +273,7 @@ fn detection_looks_at_the_whole_segment_and_lists_go_in_segments_and_fragments()
 
 // covers: 6.3, own-objects
 #[test]
-fn what_makes_no_sense_at_address_0_is_aborted_with_its_code() {
+fn invalid_requests_at_address_0_are_aborted_with_their_code() {
     let mut world = world();
     for (index, sub_index, complete, code) in [
         (0x2000, 0, false, AbortCode::OBJECT_DOES_NOT_EXIST),
@@ -330,7 +330,7 @@ fn anything(dice: &mut Dice) -> Vec<u8> {
 
 // covers: own-objects
 #[test]
-fn any_bytes_at_address_0_are_borne_and_the_next_question_is_answered_seeds_0_to_9() {
+fn random_bytes_at_address_0_leave_the_next_request_working_seeds_0_to_9() {
     let mut world = world();
     let mark = world.mark();
     for seed in 0..10 {

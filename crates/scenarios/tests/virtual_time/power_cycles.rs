@@ -81,7 +81,7 @@ fn assert_trouble(world: &World, since: Mark, subdevice: usize) {
 
 // covers: recovery
 #[test]
-fn a_power_cycle_of_each_subdevice_of_a_ring_costs_the_others_four_edges_at_most() {
+fn a_power_cycle_in_a_ring_costs_the_others_at_most_four_edges() {
     let mut world = world(1, ring_of_16(Duration::from_micros(10)));
     let mut worst = 0;
     for (device, kind) in SIXTEEN.iter().enumerate() {
@@ -108,7 +108,7 @@ fn a_power_cycle_in_a_ring_costs_no_more_than_its_edges_with_slow_detection_too(
 }
 
 #[test]
-fn a_short_interruption_of_power_is_enough_to_be_configured_anew() {
+fn a_short_power_interruption_is_followed_by_a_new_configuration() {
     let mut world = world(3, ring_of_16(Duration::from_micros(10)));
     for device in [2, 4, 9] {
         let incomplete = power_cycle(&mut world, DeviceIndex(device), 1, 200);

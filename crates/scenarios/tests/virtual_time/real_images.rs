@@ -109,7 +109,7 @@ fn segments_of_all_real_images_come_to_op_and_exchange_process_data() {
 
 // covers: sim-files
 #[test]
-fn real_images_are_read_alike_with_and_without_the_cache_and_with_4_and_8_bytes() {
+fn real_images_are_read_alike_with_and_without_cache_in_4_and_8_bytes() {
     let Some((taken, _)) = images() else { return };
     let scans: Vec<_> = [(true, true), (true, false), (false, true), (false, false)]
         .into_iter()

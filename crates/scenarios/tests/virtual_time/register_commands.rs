@@ -98,7 +98,7 @@ fn registers_are_written_and_checked_at_their_transitions() {
 
 // covers: 8.2, startup-commands
 #[test]
-fn a_register_with_another_value_is_told_with_comment_expected_and_got() {
+fn a_wrong_register_value_is_reported_with_comment_and_both_values() {
     let mut wrong = check(Transition::Ps, map::AL_STATUS, &[0x04, 0x00], &[0x0F, 0x00], 20);
     wrong.comment = Some("check device state for SAFEOP".to_owned());
     let text = failure(world(&[write(Transition::Ip, map::WATCHDOG_DIVIDER, &[0x34, 0x12]), wrong]));
@@ -109,7 +109,7 @@ fn a_register_with_another_value_is_told_with_comment_expected_and_got() {
 
 // covers: 8.2, startup-commands
 #[test]
-fn a_register_may_take_until_its_limit_to_hold_the_value() {
+fn a_register_may_reach_its_value_until_the_time_limit() {
     // Outputs arrive some cycles after SAFEOP: bit 0 of the watchdog status is set then.
     let watched = |limit| check(Transition::So, map::WATCHDOG_STATUS, &[1, 0], &[1, 0], limit);
     let mut patient = world(&[watched(200)]);
@@ -121,7 +121,7 @@ fn a_register_may_take_until_its_limit_to_hold_the_value() {
 
 // covers: 8.2, startup-commands
 #[test]
-fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken() {
+fn a_write_without_a_response_fails_only_if_required() {
     let text = failure(world(&[write(Transition::Ps, UNUSED, &[0; 4])]));
     assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP): register 0x0e80:"), "{text}");
     let mut may = write(Transition::Ps, UNUSED, &[0; 4]);
@@ -135,7 +135,7 @@ fn a_write_that_nobody_takes_fails_only_where_it_must_be_taken() {
 
 // covers: startup-commands
 #[test]
-fn commands_to_registers_that_cannot_be_sent_are_refused_before_anything_is() {
+fn impossible_register_commands_are_refused_before_anything_is_sent() {
     let refused = |wrong: &StartupCommand| {
         let declare = |scan: &Scan| {
             let mut declaration = automatic(&scan.subdevices, CYCLE);
@@ -161,7 +161,7 @@ fn upload(index: u16, sub_index: u8, expected: Option<&[u8]>) -> StartupCommand 
 
 // covers: 8.2, startup-commands
 #[test]
-fn objects_are_read_and_compared_or_told() {
+fn objects_are_read_and_compared_or_reported() {
     let mut world = world(&[upload(0x2001, 7, Some(&[7, 0])), upload(0x2003, 2, None)]);
     world.settle();
     let read = world.events(world.beginning()).iter().filter_map(|timed| match &timed.event {
@@ -178,7 +178,7 @@ fn objects_are_read_and_compared_or_told() {
 
 // covers: 8.2, startup-commands
 #[test]
-fn a_command_may_have_a_time_limit_of_its_own() {
+fn a_command_may_have_its_own_time_limit() {
     let slow = |device: &mut DeviceDescription| {
         device.mailbox.as_mut().expect("it has one").response_time = Duration::from_millis(60);
     };
@@ -196,7 +196,7 @@ fn a_command_may_have_a_time_limit_of_its_own() {
 
 // covers: 8.2, eni-commands
 #[test]
-fn a_look_that_may_take_an_hour_does_not_outlive_the_power_of_its_subdevice() {
+fn a_register_check_ends_when_its_subdevice_loses_power() {
     let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);
     world.run_cycles(400);
     let state = |world: &World| world.network().device(DeviceIndex(DRIVE)).al_status().al_state();

@@ -34,7 +34,7 @@ fn states(world: &World) -> Vec<AlStatus> {
 
 // covers: mandatory
 #[test]
-fn a_mismatch_is_told_with_both_sides_and_leaves_that_one_alone() {
+fn a_mismatch_is_reported_with_both_values_and_not_configured() {
     let op = AlStatus::new(AlState::Op);
     type Change = fn(SubDeviceConfig) -> SubDeviceConfig;
     let cases: [(Change, IdentityField, u32); 4] = [
@@ -68,7 +68,7 @@ fn a_mismatch_is_told_with_both_sides_and_leaves_that_one_alone() {
 
 // covers: 5.3, mandatory
 #[test]
-fn an_identification_that_is_right_is_no_mismatch() {
+fn a_right_identification_is_no_mismatch() {
     let declare = |declaration: &mut Declaration| {
         declaration.subdevices[2] = declaration.subdevices[2].clone().expect_identification(0x1234);
     };
@@ -101,7 +101,7 @@ fn an_identification_in_memory_is_read_there() {
 
 // covers: mandatory
 #[test]
-fn everybody_may_be_required_those_that_are_optional_too() {
+fn all_subdevices_may_be_required_including_optional_ones() {
     let with = |required| {
         activate(
             |devices| drop(devices.pop()),
@@ -120,7 +120,7 @@ fn everybody_may_be_required_those_that_are_optional_too() {
 
 // covers: mandatory
 #[test]
-fn a_mandatory_one_that_is_missing_is_told_and_may_come_later() {
+fn a_missing_mandatory_subdevice_is_reported_and_may_join_later() {
     let declare = |declaration: &mut Declaration| declaration.required = Required::Nobody;
     let mut devices = descriptions(&KINDS);
     for device in &mut devices {

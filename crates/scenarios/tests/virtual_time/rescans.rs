@@ -55,7 +55,7 @@ fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
 
 // covers: rescan
 #[test]
-fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter() {
+fn a_rescan_finds_new_moved_and_missing_subdevices() {
     let declare = |scan: &ringcat::Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         // Processing order: coupler, input, junction, movable, output, input, leaving.
@@ -108,7 +108,7 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
 
 // covers: rescan
 #[test]
-fn a_rescan_of_a_ring_gives_the_places_and_ends_in_time_while_it_changes() {
+fn a_rescan_of_a_changing_ring_ends_in_time_with_right_places() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-input-16", "digital-output-16"];
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
     let mut world = World::in_op(2, ring(descriptions(&kinds), options));
@@ -156,7 +156,7 @@ fn place(world: &World) -> Option<(Option<usize>, Option<usize>)> {
 
 // covers: rescan
 #[test]
-fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is() {
+fn after_a_rescan_breaks_and_errors_use_the_new_cabling() {
     const BRANCH: DeviceIndex = DeviceIndex(5);
     const BETWEEN: CableId = CableId(3);
     let kinds = ["coupler", "junction", "digital-input-8", "digital-output-8", "digital-input-16"];
@@ -220,7 +220,7 @@ fn after_a_rescan_breaks_and_errors_of_cables_are_told_by_the_cabling_as_it_is()
 /// In an open ring the processing order of a branch behind the port from which the ring continues is different (CR-09).
 // covers: CR-09, CR-17, rescan
 #[test]
-fn a_break_that_changes_the_order_of_a_ring_with_a_branch_has_moved_nobody() {
+fn a_break_that_changes_the_processing_order_moves_no_subdevice() {
     use ringcat_sim::frame::Port::{A, B, D};
     use scenarios::segments::{MAIN, REDUNDANT, at, wired};
     let cables =
@@ -306,7 +306,7 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
 /// the member at its own place.
 // covers: CR-09, CR-17, rescan
 #[test]
-fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
+fn an_unassigned_subdevice_becomes_a_member_at_its_rescan_place() {
     use ringcat_sim::frame::Port::{A, C, D};
     use scenarios::segments::{MAIN, at, wired};
     const FIRST: DeviceIndex = DeviceIndex(1);

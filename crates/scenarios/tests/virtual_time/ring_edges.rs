@@ -47,7 +47,7 @@ fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<us
 
 // covers: ring-merge
 #[test]
-fn outputs_doubled_at_a_cut_are_incomplete_when_the_second_copy_is_back() {
+fn outputs_doubled_at_a_cut_are_incomplete_if_the_second_copy_returns() {
     let mut world = World::in_op(0, segment());
     let mut twice = Vec::new();
     for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {
@@ -69,7 +69,7 @@ fn outputs_doubled_at_a_cut_are_incomplete_when_the_second_copy_is_back() {
 /// All SubDevices have processed the other copy, with all inputs. The effects of the lost copy cannot be detected.
 // covers: ring-merge
 #[test]
-fn outputs_doubled_at_a_cut_are_complete_when_the_second_copy_is_lost() {
+fn outputs_doubled_at_a_cut_are_complete_if_the_second_copy_is_lost() {
     let mut world = World::in_op(0, segment());
     let mut twice = 0;
     for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {

@@ -43,7 +43,7 @@ fn others(events: &[TimedEvent]) -> Vec<Event> {
 
 // covers: CR-11, CR-12, ring-events
 #[test]
-fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five() {
+fn each_edge_is_reported_in_its_cycle_and_located_within_five() {
     let mut world = World::in_op(1, ring_of_16(FAST));
     let (mut slowest, mut slowest_place) = (Duration::ZERO, Duration::ZERO);
     for cable in 0..=usize::from(COUNT) {
@@ -84,7 +84,7 @@ fn each_edge_is_told_in_the_cycle_that_shows_it_and_its_place_within_five() {
 
 // covers: CR-13, ring-status
 #[test]
-fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time() {
+fn counts_states_carriers_and_break_place_can_be_polled() {
     let mut world = World::in_op(2, ring_of_16(FAST));
     world.run_cycles(10);
     let op = 1 << 3;
@@ -134,7 +134,7 @@ fn counts_states_carriers_and_the_place_can_be_asked_for_at_any_time() {
 
 // covers: CR-12, ring-events
 #[test]
-fn redundancy_bus_faults_and_carriers_are_reported_each_by_itself() {
+fn redundancy_bus_faults_and_carriers_are_reported_separately() {
     let mut world = small(3);
     let mark = world.mark();
     world.cut(CableId(2));
@@ -164,7 +164,7 @@ fn redundancy_bus_faults_and_carriers_are_reported_each_by_itself() {
 
 // covers: CR-06, 9.2.1, ring-events
 #[test]
-fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_else() {
+fn a_ring_with_one_dead_direction_has_lost_only_its_redundancy() {
     let mut world = small(4);
     let mark = world.mark();
     // Frames of RED are lost on their way to MAIN; the copies of MAIN are complete.
@@ -183,7 +183,7 @@ fn a_ring_that_passes_frames_one_way_only_has_lost_its_redundancy_and_nothing_el
 
 // covers: CR-18, ring-events
 #[test]
-fn two_breaks_are_faults_of_the_bus_and_redundancy_comes_back_with_the_last_repair() {
+fn two_breaks_are_bus_faults_and_redundancy_returns_with_the_last_repair() {
     let mut world = small(5);
     let mark = world.mark();
     world.cut(CableId(1));
@@ -222,7 +222,7 @@ fn flap(world: &mut World, cable: usize, half_period: Duration, lasts: Duration)
 
 // covers: ring-flap
 #[test]
-fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
+fn a_cable_flapping_at_any_rate_changes_no_state_and_floods_no_log() {
     println!("half period us | cycles incomplete of all | events about ring and redundancy");
     for (number, micros) in [1u64, 7, 50, 333, 1_000, 3_700, 20_000, 70_000, 250_000, 1_000_000].into_iter().enumerate()
     {
@@ -252,7 +252,7 @@ fn a_cable_that_flaps_at_any_rate_floods_nobody_and_changes_no_state() {
 
 // covers: ring-flap
 #[test]
-fn a_cable_that_flaps_in_one_direction_changes_no_state_and_floods_no_log() {
+fn a_cable_flapping_in_one_direction_changes_no_state_and_floods_no_log() {
     println!("direction, half period us | cycles incomplete of all | events about ring and redundancy");
     for (number, direction) in [Direction::AToB, Direction::BToA].into_iter().enumerate() {
         // Away from MAIN no SubDevice behind the cable receives outputs: for less than the watchdog of 100 ms.
@@ -287,7 +287,7 @@ fn a_cable_that_flaps_in_one_direction_changes_no_state_and_floods_no_log() {
 
 // covers: ring-flap
 #[test]
-fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
+fn an_unsteady_ring_is_reported_once_and_again_when_stable() {
     let mut world = small(30);
     let mark = world.mark();
     flap(&mut world, 2, Duration::from_millis(25), Duration::from_secs(3));
@@ -309,7 +309,7 @@ fn an_unsteady_ring_is_told_once_and_then_when_it_holds() {
 
 // covers: cable-errors
 #[test]
-fn bursts_of_corrupt_frames_are_no_break_and_are_told_with_their_cable() {
+fn bursts_of_corrupt_frames_are_no_break_and_are_reported_by_cable() {
     let mut world = small(31);
     let mark = world.mark();
     let mut dice = Dice::new(31);

@@ -123,7 +123,7 @@ fn cutting_any_cable_of_a_ring_of_16_costs_no_more_cycles_than_detection() {
 /// cable are lost. This costs the difference, not more, and is reported as one repair.
 // covers: CR-14, CR-15, ring-cut
 #[test]
-fn ends_that_open_one_after_the_other_cost_no_more_cycles_than_the_difference() {
+fn cable_ends_that_open_at_different_times_cost_only_the_difference() {
     println!("later end, by us | cycles incomplete of allowed, worst of 5 cables");
     for direction in Direction::ALL {
         for by_us in [50, 700, 2_600, 9_300] {

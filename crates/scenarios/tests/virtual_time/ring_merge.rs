@@ -234,7 +234,7 @@ fn run(seed: u64) -> [usize; 3] {
 
 // covers: CR-05, CR-09, CR-10, 9.3, ring-equals-line, sim-frames
 #[test]
-fn a_split_ring_answers_like_the_whole_one_seeds_0_to_59() {
+fn a_broken_ring_responds_like_a_closed_one_seeds_0_to_59() {
     let mut counts = [0; 3];
     for seed in 0..60 {
         counts.iter_mut().zip(run(seed)).for_each(|(count, more)| *count += more);

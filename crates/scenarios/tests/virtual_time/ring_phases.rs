@@ -28,20 +28,20 @@ fn cables(count: usize, cables: impl Iterator<Item = usize> + Clone) -> usize {
 
 // covers: CR-02, CR-03, CR-14, CR-15, CR-19, CR-20, CR-23, ring-phases
 #[test]
-fn any_cable_of_rings_of_2_and_5_is_cut_and_healed_in_every_phase() {
+fn any_cable_of_rings_of_2_and_5_is_cut_and_repaired_in_every_phase() {
     assert_eq!(cables(2, 0..=2) + cables(5, 0..=5), 99);
 }
 
 // covers: CR-02, CR-03, CR-14, CR-15, CR-19, CR-20, ring-phases
 #[test]
-fn some_cables_of_rings_of_16_and_64_are_cut_and_healed_in_every_phase() {
+fn some_cables_of_rings_of_16_and_64_are_cut_and_repaired_in_every_phase() {
     assert_eq!(cables(16, [0, 8, 9, 16].into_iter()) + cables(64, [33].into_iter()), 55);
 }
 
 /// Slow link detection: the cut costs the detection time and no more.
 // covers: CR-14, CR-15, ring-cut
 #[test]
-fn ports_that_notice_late_cost_rings_of_2_5_and_64_no_more_than_their_delay() {
+fn slow_link_detection_costs_rings_no_more_than_its_delay() {
     for (count, detection_us, chosen) in
         [(2, 1_700, &[0, 1, 2][..]), (5, 1_700, &[0, 2, 5]), (5, 20_000, &[3]), (64, 1_700, &[33])]
     {

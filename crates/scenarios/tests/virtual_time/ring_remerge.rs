@@ -123,7 +123,7 @@ fn remerged(capture: &Path, images: &Path, seed: u64) -> Option<(usize, usize)> 
 
 // covers: CR-05, CR-06, CR-07, 9.3, ring-merge
 #[test]
-fn a_merge_written_apart_comes_to_the_same_inputs_and_the_same_incomplete_cycles() {
+fn an_independent_merge_gives_the_same_inputs_and_cycles() {
     let (mut compared, mut incomplete) = (0, 0);
     for seed in 0..12 {
         let capture: PathBuf =

@@ -65,7 +65,7 @@ async fn all_services(mailbox: Mailbox) {
 
 // covers: CR-08, CR-20, ring-goes-on
 #[test]
-fn every_mailbox_protocol_works_on_either_stub_while_process_data_goes_on() {
+fn every_mailbox_protocol_works_on_either_side_of_a_break() {
     for cable in 0..=KINDS.len() {
         let mut world = World::in_op(cable as u64, segment());
         world.cut(CableId(cable));
@@ -118,7 +118,7 @@ fn registers_are_reached_by_station_and_by_position_behind_any_break() {
 
 // covers: CR-17, ring-goes-on
 #[test]
-fn a_subdevice_power_cycled_on_either_stub_is_read_and_configured_again() {
+fn a_subdevice_power_cycled_on_either_side_is_configured_again() {
     // 7 and 8 are next to the break; the SubDevices behind 3 and 12 return with them.
     for (device, gone) in [(7, 7..8), (8, 8..9), (3, 3..8), (12, 8..13)] {
         let mut world = World::in_op(device as u64, ring_of_16(FAST));
@@ -153,7 +153,7 @@ fn optional_analog_input(position: u16) -> SubDeviceConfig {
 
 // covers: CR-17, CR-21, ring-goes-on
 #[test]
-fn an_optional_subdevice_on_either_side_of_a_break_joins_and_its_neighbours_go_on() {
+fn an_optional_subdevice_joins_on_either_side_of_a_break() {
     // It is the first SubDevice of the redundant side, or the last of the main side: its neighbour across the break is
     // configured at the same time.
     for cable in [2, 3] {

@@ -106,7 +106,7 @@ fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
 
 // covers: 2.2, registers
 #[test]
-fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back() {
+fn closing_a_port_cuts_off_subdevices_and_opening_restores_them() {
     let mut world = in_line(3);
     let set = |world: &mut World, control| {
         let set = world.application_mut().engine_mut().start_port_set(2, 1, control);
@@ -134,7 +134,7 @@ fn closing_a_port_of_a_line_takes_those_behind_it_and_opening_brings_them_back()
 
 // covers: 3.2, registers
 #[test]
-fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lost() {
+fn a_controller_reset_works_also_when_frames_are_lost() {
     for lost in [0, 1, 2, 3] {
         let mut world = in_ring(4);
         let starts = world.network().device(DeviceIndex(3)).controller.starts();
@@ -157,7 +157,7 @@ fn a_controller_that_is_reset_starts_anew_and_comes_back_also_when_frames_are_lo
 
 // covers: own-datagrams
 #[test]
-fn datagrams_of_the_applications_own_bring_data_and_working_counter() {
+fn datagrams_of_the_application_return_data_and_working_counter() {
     let mut world = in_ring(5);
     let station = StationAddress(world.station_of(1));
     let datagram = |command, target, data: &[u8]| RawDatagram { command, target, data: data.to_vec(), resend: true };

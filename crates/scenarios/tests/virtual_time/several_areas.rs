@@ -35,7 +35,7 @@ fn described(fmmus: Option<u8>) -> Vec<DeviceDescription> {
 
 // covers: freshness
 #[test]
-fn inputs_of_a_dead_sync_manager_are_not_fresh_beside_those_of_another_one() {
+fn inputs_of_a_disabled_sync_manager_are_not_fresh() {
     for fmmus in [None, Some(2)] {
         for closed in [false, true] {
             for dead in 0..2u8 {

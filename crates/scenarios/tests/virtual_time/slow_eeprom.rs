@@ -42,7 +42,7 @@ fn scan(network: Network) -> (Result<Scan, Error>, Duration, usize) {
 
 // covers: slow-eeproms
 #[test]
-fn an_eeprom_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word() {
+fn an_eeprom_that_is_always_slow_is_given_up_after_30_s_with_its_word() {
     let mut slow = terminal(Duration::from_millis(99));
     let mut image = ringcat_sim::device::Device::new(slow.clone()).controller.sii_image()[..128].to_vec();
     // Strings without end, within the EEPROM's size of 16 KByte.
@@ -72,7 +72,7 @@ fn an_eeprom_slow_at_every_word_is_given_up_after_30_s_and_named_with_the_word()
 
 // covers: slow-eeproms
 #[test]
-fn one_slow_command_costs_its_own_time_and_not_that_of_every_word() {
+fn one_slow_command_does_not_slow_down_the_following_words() {
     let (_, usual, _) = scan(network(vec![terminal(Duration::from_micros(500))]));
     for at_us in (1_000..30_000).step_by(2_900) {
         let mut network = network(vec![terminal(Duration::from_micros(500))]);
@@ -102,7 +102,7 @@ fn a_scan_after_one_of_a_slow_eeprom_reads_quick_ones_quickly() {
 
 // covers: slow-eeproms
 #[test]
-fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_0() {
+fn late_and_lost_frames_during_eeprom_reads_restart_no_scan_seeds_0() {
     for seed in 0..40 {
         let mut dice = Dice::new(seed);
         let busy = [500, 2_000, 8_000][dice.below(3) as usize];
@@ -130,7 +130,7 @@ fn late_and_lost_frames_while_eeproms_are_read_do_not_begin_the_scan_anew_seeds_
 
 // covers: slow-eeproms
 #[test]
-fn an_sii_command_sent_twice_after_a_lost_answer_does_no_harm() {
+fn an_sii_command_repeated_after_a_lost_response_has_no_effect() {
     for seed in 0..20 {
         let mut dice = Dice::new(seed);
         let busy = Duration::from_micros(*dice.pick(&[500, 3_000, 8_000]));

@@ -62,7 +62,7 @@ fn a_scan_that_has_read_everything_waits_until_the_count_has_settled() {
 
 // covers: scan
 #[test]
-fn a_count_that_never_settles_ends_the_scan_after_its_patience() {
+fn a_count_that_never_settles_ends_the_scan_after_its_limit() {
     let mut network = line(descriptions(&KINDS), NetworkOptions::default());
     for ms in (3..200).step_by(6) {
         network.schedule(SimTime(ms * 1_000_000), Fault::PowerOff(DeviceIndex(4)));

@@ -127,7 +127,7 @@ fn a_hundred_power_cycles_write_the_same_list_in_the_same_order_each_time() {
 
 // covers: startup-commands
 #[test]
-fn one_that_falls_out_of_op_gets_the_commands_of_the_way_back() {
+fn a_subdevice_that_loses_op_gets_the_commands_of_the_way_back() {
     let mut world = world(segment(|_| ()), many);
     world.settle();
     world.network_mut().device_mut(DeviceIndex(DRIVE)).application.record_mail();
@@ -157,7 +157,7 @@ fn a_refused_idn_is_told_with_its_number_and_code() {
 
 // covers: watchdogs
 #[test]
-fn one_that_needs_a_pause_before_safeop_gets_it() {
+fn a_declared_pause_before_safeop_is_kept() {
     let network = || segment(|device| device.preop_settling = Duration::from_millis(60));
     let mut hasty = world(network(), |config| config);
     hasty.run_cycles(1000);
@@ -173,7 +173,7 @@ fn one_that_needs_a_pause_before_safeop_gets_it() {
 
 // covers: 5.2, watchdogs
 #[test]
-fn the_eeprom_is_left_to_the_pdi_where_that_is_declared() {
+fn the_eeprom_is_left_to_the_pdi_if_declared() {
     let owner = |world: &World| {
         let controller = &world.network().device(DeviceIndex(DRIVE)).controller;
         controller.register(map::SII_CONFIGURATION, 1)[0] & 1
@@ -205,7 +205,7 @@ fn watchdogs_are_written_before_safeop() {
 
 // covers: 5.4, watchdogs
 #[test]
-fn a_state_change_may_have_a_limit_of_its_own() {
+fn a_state_change_may_have_its_own_time_limit() {
     let slow = |device: &mut DeviceDescription| device.transitions.to_safeop = Duration::from_millis(80);
     let limit = Duration::from_millis(30);
     let mut world = world(segment(slow), |config| config.state_timeout(AlState::PreOp, AlState::SafeOp, limit));

@@ -55,7 +55,7 @@ fn registers(world: &World, device: usize) -> Vec<u8> {
 
 // covers: states
 #[test]
-fn each_of_16_goes_to_preop_init_and_safeop_and_back_and_no_cycle_misses_another() {
+fn state_changes_of_each_of_16_leave_all_cycles_complete() {
     let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
     for device in 0..16 {
         let before = registers(&world, device);
@@ -99,7 +99,7 @@ fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
 
 // covers: 6.4, states
 #[test]
-fn firmware_is_updated_through_boot_while_the_others_stay_in_op() {
+fn firmware_is_updated_in_boot_while_the_others_stay_in_op() {
     let mut world = World::in_op(3, line(descriptions(&KINDS), NetworkOptions::default()));
     let mark = world.mark();
     assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
@@ -129,7 +129,7 @@ fn manager(world: &World, number: u8) -> (u16, u16, bool) {
 
 // covers: 3.11, odd-sii
 #[test]
-fn firmware_goes_through_boot_with_mailboxes_on_sync_managers_of_the_sii() {
+fn firmware_update_uses_the_boot_sync_managers_of_the_sii() {
     for own in [false, true] {
         let mut devices = descriptions(&KINDS);
         let device = &mut devices[DRIVE];
@@ -255,7 +255,7 @@ fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down() {
 
 // covers: states
 #[test]
-fn one_that_refuses_is_brought_back_and_the_refusal_is_told() {
+fn a_refused_state_is_reported_and_the_former_state_restored() {
     let mut world = World::in_op(5, line(descriptions(&KINDS), NetworkOptions::default()));
     assert_eq!(request(&mut world, 3, AlState::Boot), Err(ConfigureError::NoBoot), "nothing happens to it");
     assert_eq!(state(&world, 3), AlStatus::new(AlState::Op));
@@ -293,7 +293,7 @@ fn the_state_that_was_requested_is_kept_over_a_loss_of_power() {
 
 // covers: states
 #[test]
-fn one_that_is_lost_on_its_way_up_is_missed_as_before() {
+fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
     let mut world = World::in_op(8, line(descriptions(&KINDS), NetworkOptions::default()));
     let last = KINDS.len() - 1;
     let is_missed = |world: &World| {

@@ -97,7 +97,7 @@ fn a_stop_raises_no_subdevice_that_is_in_a_lower_state() {
 
 // covers: stop
 #[test]
-fn a_subdevice_with_an_error_follows_and_its_error_is_acknowledged() {
+fn a_stop_acknowledges_errors_of_subdevices() {
     for state in [AlState::Init, AlState::PreOp, AlState::SafeOp] {
         for network in networks() {
             let mut application = run(network, |scan| automatic(&scan.subdevices, CYCLE));
@@ -113,7 +113,7 @@ fn a_subdevice_with_an_error_follows_and_its_error_is_acknowledged() {
 
 // covers: stop
 #[test]
-fn a_subdevice_that_does_not_follow_is_named_with_its_status_and_holds_up_no_other() {
+fn a_subdevice_that_does_not_stop_is_named_and_delays_no_other() {
     for network in networks() {
         let mut application = run(network, |scan| without(scan, &[0]));
         application.links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), true));
@@ -143,7 +143,7 @@ fn a_subdevice_that_refuses_is_named_with_its_code() {
 
 // covers: stop
 #[test]
-fn subdevices_that_are_not_there_hold_up_no_stop() {
+fn absent_subdevices_do_not_delay_a_stop() {
     for state in [AlState::Init, AlState::PreOp] {
         let mut application = run(line(descriptions(&MIXED), NetworkOptions::default()), |scan| without(scan, &[1]));
         application.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(4)));
@@ -163,7 +163,7 @@ fn subdevices_that_are_not_there_hold_up_no_stop() {
 
 // covers: stop
 #[test]
-fn a_scan_clears_the_errors_of_all_though_one_stays_out_of_init() {
+fn a_scan_clears_all_errors_even_if_one_does_not_reach_init() {
     for network in networks() {
         let application = run(network, |scan| automatic(&scan.subdevices, CYCLE));
         let mut stopped = application.stop(LastOutputs::Held, AlState::PreOp, LIMIT).expect("all follow");

@@ -54,7 +54,7 @@ fn until_settled(world: &mut World) {
 }
 
 #[test]
-fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
+fn unassigned_subdevices_with_an_old_address_do_not_share_it() {
     let mut world = world(six(false), 4);
     let power_cycle = |world: &mut World, device: usize| {
         world.power_off(DeviceIndex(device));
@@ -82,7 +82,7 @@ fn strangers_that_keep_an_address_given_long_ago_do_not_share_it_with_others() {
 
 // covers: identity
 #[test]
-fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
+fn a_subdevice_with_the_address_of_a_member_gets_another_one() {
     for (stranger, member) in [(5, 1), (5, 4), (0, 1)] {
         let kinds = if stranger == 0 { 1..6 } else { 0..5 };
         let declare = |scan: &ringcat::Scan| {
@@ -110,7 +110,7 @@ fn one_with_the_address_of_a_member_gets_another_and_the_member_stays_in_op() {
 }
 
 #[test]
-fn a_subdevice_configured_by_another_main_device_is_put_to_init_and_left_out() {
+fn a_subdevice_of_another_main_device_is_set_to_init_and_left_out() {
     let mut world = world(six(true), 5);
     let temporary = StationAddress(stations(&world)[5]);
     let ours =
@@ -135,7 +135,7 @@ fn a_subdevice_configured_by_another_main_device_is_put_to_init_and_left_out() {
 
 // covers: identity
 #[test]
-fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
+fn a_subdevice_with_the_address_of_an_absent_member_is_not_mistaken() {
     let mut world = world(six(true), 5);
     world.power_off(DeviceIndex(2));
     world.run_cycles(200);
@@ -159,7 +159,7 @@ fn another_one_with_the_address_of_an_absent_member_is_not_taken_for_it() {
 
 // covers: identity
 #[test]
-fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
+fn identical_neighbours_keep_their_places_from_either_side() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
     for cut in [None, Some(0), Some(1), Some(3), Some(5)] {
         for order in [[2, 3], [3, 2]] {
@@ -188,7 +188,7 @@ fn neighbours_alike_keep_their_places_whichever_side_they_come_back_from() {
 /// redundant side before, is assigned: it must not take the place of the first, which has not been found yet.
 // covers: identity
 #[test]
-fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognised() {
+fn identical_neighbours_keep_their_places_when_the_ring_closes_meanwhile() {
     let kinds = ["coupler", "digital-input-8", "digital-output-8", "digital-output-8", "digital-input-8"];
     for step in 0..60 {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(1_500));
@@ -207,7 +207,7 @@ fn neighbours_alike_keep_their_places_when_the_ring_closes_while_one_is_recognis
 }
 
 #[test]
-fn a_segment_that_loses_its_power_as_a_whole_comes_back_with_everybody_in_his_place() {
+fn after_a_loss_of_power_all_subdevices_return_to_their_places() {
     let kinds = ["digital-output-8"; 100];
     let mut world = World::in_op(6, ring(descriptions(&kinds), NetworkOptions::default()));
     world.judge_latched(false);
@@ -220,7 +220,7 @@ fn a_segment_that_loses_its_power_as_a_whole_comes_back_with_everybody_in_his_pl
 }
 
 #[test]
-fn an_optional_subdevice_that_was_never_there_does_not_take_the_place_of_its_twin() {
+fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
     let kinds = ["coupler", "digital-output-8", "digital-input-8"];
     let network = ring(descriptions(&kinds), NetworkOptions::default());
     let mut world = World::with(5, network, &Options::default(), |scan| {
@@ -255,7 +255,7 @@ fn corrupt_sii(world: &mut World, device: DeviceIndex) {
 }
 
 #[test]
-fn others_are_noticed_when_they_come_and_go_while_a_new_subdevice_is_read() {
+fn other_changes_are_detected_while_a_new_subdevice_is_read() {
     let mut world = world(six(true), 6);
     world.power_off(DeviceIndex(2));
     world.run_cycles(100);
@@ -274,7 +274,7 @@ fn others_are_noticed_when_they_come_and_go_while_a_new_subdevice_is_read() {
 
 // covers: identity
 #[test]
-fn one_that_cannot_be_read_does_not_hide_those_behind_it() {
+fn an_unreadable_subdevice_does_not_hide_those_behind_it() {
     let mut world = world(six(true), 6);
     world.power_off(DeviceIndex(2));
     world.power_off(DeviceIndex(4));
@@ -336,7 +336,7 @@ fn torture(seed: u64) {
 
 // covers: identity
 #[test]
-fn after_any_cuts_and_power_cycles_everybody_is_back_and_who_it_was_seeds_0_to_149() {
+fn after_cuts_and_power_cycles_all_identities_are_right_seeds_0_to_149() {
     let failed: Vec<u64> = (0..150).filter(|seed| std::panic::catch_unwind(|| torture(*seed)).is_err()).collect();
     println!("seeds 0 to 149: {} fail", failed.len());
     assert_eq!(failed, [], "seeds that fail");

@@ -43,7 +43,7 @@ fn a_crossed_subdevice_in_a_line_is_located() {
 
 // covers: topology
 #[test]
-fn a_subdevice_without_a_cable_in_port_0_is_told_and_works() {
+fn a_subdevice_without_a_cable_in_port_0_is_reported_and_works() {
     use Port::{A, B};
     let kinds = ["coupler", "digital-output-8", "servo"];
     let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B))];
@@ -81,7 +81,7 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
 /// the redundant link, and a break there cuts off those behind the break.
 // covers: CR-22, topology
 #[test]
-fn a_subdevice_with_one_port_leaves_the_ring_open_and_that_is_told() {
+fn a_subdevice_with_one_port_leaves_the_ring_open_which_is_reported() {
     use Port::{A, B};
     let mut descriptions = descriptions(&["digital-output-8", "digital-input-8", "servo", "digital-input-16"]);
     descriptions[1].ports[1..].fill(PortKind::NotImplemented);
@@ -145,7 +145,7 @@ fn a_ring_with_a_branch_keeps_all_in_op_when_any_cable_of_the_ring_is_cut() {
 }
 
 #[test]
-fn a_branch_that_is_cut_off_comes_back_while_the_ring_goes_on() {
+fn a_branch_that_is_cut_off_returns_while_the_ring_continues() {
     for port in [Port::C, Port::D] {
         let mut world = in_op(ring_with_branch(port));
         for gap in [30, 400] {
@@ -256,7 +256,7 @@ fn lost_links(world: &World) -> u8 {
 
 // covers: LC-03, crossed-enhanced
 #[test]
-fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges() {
+fn enhanced_detection_repeats_when_ports_change_and_costs_two_edges() {
     let mut world = enhanced(ring_with_branch(Port::D));
     world.run_cycles(100);
     // The branch is unplugged: ports change, the ring stays closed.
@@ -275,7 +275,7 @@ fn enhanced_detection_looks_again_when_ports_change_and_costs_two_edges() {
 
 // covers: LC-02, crossed-enhanced
 #[test]
-fn links_that_cannot_be_taken_down_say_so_and_the_ring_is_looked_at_as_it_is() {
+fn links_that_cannot_be_taken_down_fall_back_to_simple_detection() {
     let options = Options::default().with_enhanced_line_crossed(true);
     let mut tap = scenarios::tap::Tap::new(ring_with_branch(Port::C));
     tap.forbid_disconnecting();

@@ -151,7 +151,7 @@ impl Stamped {
 
 // covers: under-way
 #[test]
-fn a_way_of_three_cycles_costs_two_of_three_with_one_under_way_and_none_with_four() {
+fn a_round_trip_of_three_cycles_costs_none_with_four_under_way() {
     for (under_way, most_skipped, least_skipped) in [(1, 140, 120), (4, 0, 0)] {
         let mut stamped = Stamped::new(1, false, under_way);
         stamped.world.application_mut().exchange_mut().set_timeout(DOMAIN, 4 * CYCLE);
@@ -172,7 +172,7 @@ fn a_way_of_three_cycles_costs_two_of_three_with_one_under_way_and_none_with_fou
 
 // covers: CR-04, CR-06, CR-07, under-way
 #[test]
-fn a_break_and_its_mending_cost_at_most_the_cycles_that_are_under_way() {
+fn a_break_and_its_repair_cost_at_most_the_cycles_under_way() {
     for (under_way, way) in [(2, Duration::ZERO), (2, CYCLE * 3 / 4), (3, CYCLE * 7 / 4)] {
         let mut stamped = Stamped::new(u64::from(under_way), true, under_way);
         stamped.lengthen(way);
@@ -196,7 +196,7 @@ fn a_break_and_its_mending_cost_at_most_the_cycles_that_are_under_way() {
 
 // covers: under-way
 #[test]
-fn inputs_never_become_older_whatever_breaks_and_all_is_complete_afterwards() {
+fn inputs_never_become_older_through_breaks_and_are_complete_after() {
     for seed in 0..8 {
         println!("seed {seed}");
         let mut dice = Dice::new(seed);
@@ -246,7 +246,7 @@ fn inputs_never_become_older_whatever_breaks_and_all_is_complete_afterwards() {
 /// under way are lost, and fresh inputs are no older than these.
 // covers: JR-02, under-way
 #[test]
-fn breaks_behind_junctions_cost_the_cycles_under_way_and_no_old_input_is_fresh() {
+fn breaks_behind_junctions_cost_the_cycles_under_way_and_no_more() {
     let kinds = ["digital-input-8", "junction", "digital-input-8", "digital-input-16", "digital-input-8"];
     let one = [
         "digital-input-8",

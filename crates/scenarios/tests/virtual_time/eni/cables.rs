@@ -23,7 +23,7 @@ fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan,
 
 // covers: 8.2, eni-cabling
 #[test]
-fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open() {
+fn cables_as_in_the_file_are_not_reported_even_in_an_open_ring() {
     let file = machine();
     assert_eq!(scanned(&file, file.simulated(false).expect("a segment"), None).1, [""; 0]);
     assert_eq!(scanned(&file, file.simulated(true).expect("a segment"), None).1, [""; 0]);
@@ -38,7 +38,7 @@ fn cables_as_the_file_says_are_not_told_also_in_a_ring_that_is_open() {
 
 // covers: 8.2, eni-cabling
 #[test]
-fn a_cable_that_is_plugged_in_elsewhere_is_told_with_both_places() {
+fn a_moved_cable_is_reported_with_both_places() {
     let file = machine();
     let mut moved = segment(&file.eni, &file.configuration, false);
     moved.cables[DRIVE].a = Endpoint::Device(DeviceIndex(BUTTONS), Port::B);

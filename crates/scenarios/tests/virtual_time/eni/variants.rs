@@ -69,7 +69,7 @@ fn activate_on_any(network: Network, file: EniFile) -> Plant {
 
 // covers: 8.1, eni-run
 #[test]
-fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own() {
+fn tasks_of_a_file_are_domains_with_their_own_cycle_times() {
     let slow = "    </Cyclic>
     <Cyclic>
       <CycleTime>4000</CycleTime>
@@ -99,7 +99,7 @@ fn tasks_of_a_file_are_domains_with_cycle_times_of_their_own() {
 
 // covers: 8.2, eni-run
 #[test]
-fn an_object_that_a_drive_refuses_is_told_with_the_comment_of_the_file() {
+fn a_refused_object_is_reported_with_the_comment_of_the_file() {
     let file = with(&[]);
     let mut segment = segment(&file.eni, &file.configuration, false);
     segment.devices[DRIVE].objects.clear();
@@ -152,7 +152,7 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
 /// As in TwinCAT files for terminals: outputs that act already in SAFEOP would be dangerous.
 // covers: 8.2, sync-managers-declared
 #[test]
-fn outputs_that_a_file_switches_on_at_so_are_off_in_safeop() {
+fn outputs_that_a_file_enables_at_so_are_off_in_safeop() {
     let set_sm = "<Data>000f010044000100</Data>";
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let lamps = text.find(set_sm).expect("the lamps have one");
@@ -205,7 +205,7 @@ fn with_commands_of_the_drive(commands: &str) -> EniFile {
 
 // covers: eni-run
 #[test]
-fn registers_that_a_file_checks_are_those_that_a_simulated_eeprom_sets() {
+fn registers_checked_by_a_file_are_set_by_the_simulated_eeprom() {
     let check = |ado: u16, data: &str, mask: &str| {
         format!(
             "<InitCmd><Transition>IP</Transition><Comment>check {ado}</Comment><Cmd>4</Cmd><Adp>1005</Adp>\
@@ -228,7 +228,7 @@ fn registers_that_a_file_checks_are_those_that_a_simulated_eeprom_sets() {
 
 // covers: eni-run
 #[test]
-fn pdos_that_a_file_only_assigns_are_as_long_as_their_simulated_sync_manager() {
+fn pdos_assigned_by_a_file_fill_their_simulated_sync_manager() {
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let text = without(&text, "<TxPdo", "</TxPdo>", "#x6064");
     let text = without(&text, "<InitCmd>", "</InitCmd>", "<Index>6656<");
@@ -242,7 +242,7 @@ fn pdos_that_a_file_only_assigns_are_as_long_as_their_simulated_sync_manager() {
 /// The SII of the drive has no inputs, or not even a mailbox for a dictionary.
 // covers: eni-run
 #[test]
-fn a_file_that_says_more_than_the_sii_of_its_subdevices_is_followed() {
+fn a_file_with_more_data_than_the_sii_is_followed() {
     for is_cut in [false, true] {
         let file = with(&[]);
         let mut segment = segment(&file.eni, &file.configuration, false);

@@ -17,7 +17,7 @@ use super::{change, in_op, told};
 /// One register controls all ports of a junction: a port that the application had closed stays closed.
 // covers: 2.2, junctions
 #[test]
-fn a_port_that_is_closed_on_purpose_stays_closed_while_rings_are_looked_into() {
+fn a_port_closed_on_purpose_stays_closed_while_rings_are_examined() {
     for by_name in [false, true] {
         let mut world = in_op(43, two_rings(), (JunctionMode::Automatic, &[]));
         let engine = world.application_mut().engine_mut();
@@ -98,7 +98,7 @@ fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>>
 /// junction is outdated, and the response to the request may be lost. A closed port stays closed.
 // covers: 2.2, junctions
 #[test]
-fn a_port_that_was_closed_right_before_two_rings_break_stays_closed() {
+fn a_port_closed_right_before_two_rings_break_stays_closed() {
     let is_closed = |world: &World| {
         let bytes = world.network().device(DeviceIndex(3)).controller.register(map::DL_STATUS, 2);
         DlStatus::decode(&[bytes[0], bytes[1]]).ports[2].loop_closed

@@ -33,7 +33,7 @@ fn not_there(result: Result<World, Error>) -> Option<JunctionConnection> {
 
 // covers: JR-05, JR-06, junctions
 #[test]
-fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
+fn a_wrong_declared_closing_cable_is_refused_closed_and_broken() {
     // Open ports allow all of these but the last.
     for wrong in [(1, 2, 1), (1, 3, 1), (1, 5, 1), (1, 6, 1)].map(connection) {
         for broken in [None, Some(2), Some(3), Some(4), Some(5)] {
@@ -58,7 +58,7 @@ fn a_ring_that_is_declared_to_close_elsewhere_is_refused_whole_and_broken() {
 
 // covers: JR-05, JR-06, junctions
 #[test]
-fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused() {
+fn exchanged_connections_and_those_of_a_line_are_refused() {
     const KINDS: [&str; 7] =
         ["junction", "digital-output-8", "servo", "junction", "digital-input-8", "block", "analog-input-4"];
     let two = || wired(&KINDS, &TWO_RINGS);
@@ -100,7 +100,7 @@ fn connections_of_two_rings_that_are_exchanged_or_of_a_line_are_refused() {
 
 // covers: JR-05, JR-06, junctions
 #[test]
-fn of_random_segments_the_right_connections_are_taken_and_wrong_ones_refused() {
+fn only_right_connections_of_random_segments_are_accepted() {
     let (mut taken, mut wrong) = (0, 0);
     for seed in 0..16 {
         let dice = &mut Dice::new(900 + seed);

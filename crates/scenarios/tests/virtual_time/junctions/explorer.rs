@@ -340,7 +340,7 @@ fn runs(seeds: impl IntoIterator<Item = u64>) {
 
 // covers: CR-17, JR-07, junctions
 #[test]
-fn what_is_told_of_rings_groups_and_looks_at_random_is_what_was_done() {
+fn reports_on_random_rings_groups_and_rescans_match_the_changes() {
     // The last seeds have found faults.
     runs([0, 1, 2, 3, 12, 36, 70, 77]);
 }

@@ -85,7 +85,7 @@ const SETTINGS: [(bool, Setting<'static>); 4] = [
 
 // covers: hot-connect
 #[test]
-fn a_group_behind_a_member_of_a_local_ring_joins_and_leaves_whole_and_broken() {
+fn a_group_behind_a_ring_member_joins_and_leaves_closed_and_broken() {
     let cables = [
         (MAIN, at(0, A)),
         (at(0, B), at(1, A)),
@@ -211,7 +211,7 @@ const WITHOUT_GROUP: [Option<usize>; 5] = [Some(0), Some(1), Some(2), Some(3), S
 /// Automatically, or with a requested rescan.
 // covers: CR-17, JR-07, junctions, ring-events
 #[test]
-fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
+fn a_group_in_a_local_ring_is_part_of_it_only_while_present() {
     let asked = SETTINGS.map(|setting| (false, setting));
     for (seed, (follow, (two_links, setting))) in
         (20..).zip(asked.into_iter().chain([1, 2].map(|it| (true, SETTINGS[it]))))
@@ -274,7 +274,7 @@ fn a_group_in_a_local_ring_is_a_piece_of_it_and_when_it_has_left_no_more() {
 /// One break and one repair are reported, the repair with its true place, for any order of the break and the rescan.
 // covers: JR-07, junctions
 #[test]
-fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
+fn a_break_during_the_join_of_a_group_is_reported_once() {
     for (number, cable) in [4, 3, 5, 4, 6, 2].into_iter().enumerate() {
         let (two_links, setting) = SETTINGS[number % SETTINGS.len()];
         let what = format!("{setting:?}, two links: {two_links}, cable {cable}");
@@ -300,7 +300,7 @@ fn a_break_at_the_moment_of_a_groups_join_is_told_once() {
 /// Two breaks of one ring, or one of each ring: the cabling is not updated until the gap is the only break.
 // covers: junctions
 #[test]
-fn a_group_that_left_while_a_ring_was_broken_is_no_piece_of_it_afterwards() {
+fn a_group_that_left_a_broken_ring_is_no_longer_part_of_it() {
     for (number, (cable, (two_links, setting))) in
         [(6, SETTINGS[0]), (2, SETTINGS[1]), (8, SETTINGS[2]), (7, SETTINGS[3])].into_iter().enumerate()
     {
@@ -331,7 +331,7 @@ fn a_group_that_left_while_a_ring_was_broken_is_no_piece_of_it_afterwards() {
 
 // covers: hot-connect
 #[test]
-fn a_group_that_is_a_piece_of_a_local_ring_joins_and_leaves_without_anybody_looking() {
+fn a_group_in_a_local_ring_joins_and_leaves_without_a_rescan() {
     for (seed, (two_links, setting)) in (10..).zip(SETTINGS) {
         let mut world = piece(false, seed, two_links, setting);
         let what = format!("{setting:?}, two links: {two_links}");

@@ -24,7 +24,7 @@ const KINDS: [&str; 8] = [
 
 // covers: JR-03, junctions
 #[test]
-fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken() {
+fn four_nested_rings_are_learned_closed_and_with_any_one_broken() {
     let mut cables = vec![
         (MAIN, at(0, A)),
         (at(0, D), at(1, A)),
@@ -77,7 +77,7 @@ fn four_rings_one_in_another_are_learned_whole_and_with_any_one_broken() {
 /// first repair.
 // covers: JR-07, cable-errors
 #[test]
-fn a_local_cable_broken_at_the_scan_is_listed_with_its_ends_once_whole() {
+fn a_local_cable_broken_at_the_scan_is_listed_after_its_repair() {
     let cables = |world: &World| -> Vec<Cable> {
         world.application().engine().cable_errors().into_iter().map(|(cable, _)| cable).collect()
     };

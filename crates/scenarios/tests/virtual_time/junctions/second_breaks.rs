@@ -30,7 +30,7 @@ const TWO_STRICT: [JunctionConnection; 2] = [
 
 // covers: JR-02, junctions
 #[test]
-fn of_two_rings_either_may_break_and_a_second_break_is_told_for_what_it_is() {
+fn either_of_two_rings_may_break_and_a_second_break_is_reported() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)] {
         let mut world = in_op(3, two_rings(), setting);
         for cable in [1, 2, 3, 5, 6, 7] {
@@ -79,7 +79,7 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
 /// each ring is examined while the other one is closed off.
 // covers: JR-02, junctions
 #[test]
-fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places() {
+fn two_rings_that_break_at_once_are_reported_with_both_places() {
     let apart = [Duration::ZERO, Duration::from_micros(3), Duration::from_micros(400)];
     let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &TWO_STRICT)];
     for (number, (first, second)) in [(2, 6), (1, 5), (3, 7), (6, 1), (2, 5), (5, 2)].into_iter().enumerate() {
@@ -130,7 +130,7 @@ fn two_rings_that_break_at_once_are_told_as_blocked_and_both_with_their_places()
 /// The same in a closed ring of two links, in which unprocessed copies of the redundant link come back.
 // covers: JR-02, junctions
 #[test]
-fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_too() {
+fn two_local_rings_broken_in_a_ring_of_two_links_have_their_places() {
     let mut cables = TWO_RINGS.to_vec();
     cables.push((at(6, B), REDUNDANT));
     let mut world = in_op(40, wired(&KINDS, &cables), (JunctionMode::Automatic, &[]));
@@ -155,7 +155,7 @@ fn two_local_rings_that_break_in_a_ring_of_two_links_are_told_with_their_places_
 /// A ring behind a member of another ring, before and behind the break of the other ring.
 // covers: JR-02, junctions
 #[test]
-fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places() {
+fn nested_rings_that_break_at_once_are_reported_with_both_places() {
     let kinds = ["junction", "junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"];
     let cables = [
         (MAIN, at(0, A)),
@@ -209,7 +209,7 @@ fn of_a_ring_in_a_ring_that_break_at_once_both_are_told_with_their_places() {
 
 // covers: junctions
 #[test]
-fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
+fn two_breaks_in_one_ring_cut_off_only_the_part_between_them() {
     let mut world = in_op(4, one_ring(), (JunctionMode::Automatic, &[]));
     edge(&mut world, "first break", |world| world.cut(CableId(3)));
     let mark = world.mark();
@@ -231,7 +231,7 @@ fn two_breaks_in_one_ring_cut_off_what_is_between_them_and_nobody_else() {
 
 // covers: junctions
 #[test]
-fn a_member_that_loses_its_power_breaks_the_ring_at_both_its_ports_and_comes_back() {
+fn a_member_without_power_breaks_the_ring_at_both_ports_and_returns() {
     let mut world = in_op(5, one_ring(), (JunctionMode::Strict, &[STRICT]));
     let mark = world.mark();
     world.power_off(DeviceIndex(3));
@@ -252,7 +252,7 @@ fn ring_in_ring() -> Network {
 
 // covers: JR-02, junctions-in-ring
 #[test]
-fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
+fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let mut world = in_op(8, ring_in_ring(), setting);
@@ -292,7 +292,7 @@ fn a_local_ring_in_a_ring_of_two_links_goes_on_with_one_break_anywhere() {
 /// ring that is entered from behind.
 // covers: LC-03, LC-06, crossed-enhanced
 #[test]
-fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
+fn a_broken_local_ring_is_no_crossed_line_for_enhanced_detection() {
     let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
     for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let options = Options::default().with_junctions(mode).with_enhanced_line_crossed(true);

@@ -64,7 +64,7 @@ fn learned(world: &World) -> Vec<Closing> {
 
 // covers: JR-03, junctions
 #[test]
-fn rings_of_any_length_are_learned_and_no_line_is_said_to_be_crossed() {
+fn rings_of_any_length_are_learned_without_a_crossed_line_report() {
     let sizes: [&[usize]; 9] = [&[4], &[12], &[13], &[16], &[20], &[32], &[20, 20], &[32, 7], &[13, 16, 24]];
     for members in sizes {
         for two_links in [false, true] {
@@ -106,7 +106,7 @@ fn long_rings_that_are_broken_at_the_scan_are_learned() {
 /// is reported.
 // covers: JR-03, junctions
 #[test]
-fn rings_that_are_not_learned_are_told_and_hold_up_nobody() {
+fn rings_that_are_not_learned_are_reported_and_delay_nothing() {
     let (network, _, _) = rings(&[2; 17], false);
     let mut world = in_op(72, network, (JunctionMode::Automatic, &[]));
     let not_learned = |world: &World| -> Vec<usize> {

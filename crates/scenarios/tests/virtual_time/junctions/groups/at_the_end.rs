@@ -19,7 +19,7 @@ const END: [(Endpoint, Endpoint); 8] = [
 /// lines.
 // covers: JR-03, JR-04, junctions
 #[test]
-fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
+fn a_group_at_the_end_of_a_local_ring_returns_as_its_end() {
     let strict = [JunctionConnection { head: 1, head_port: 1, tail: 6, tail_port: 1 }];
     let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &strict)];
     for (number, (setting, looks)) in [(0, false), (1, true), (0, true), (1, true)].into_iter().enumerate() {
@@ -71,7 +71,7 @@ fn a_group_that_is_the_end_of_a_local_ring_comes_back_as_what_it_was() {
 /// The group is not known as a part of the ring; but SubDevices entered from the closing cable are not crossed.
 // covers: JR-04, junctions
 #[test]
-fn a_group_not_yet_seen_in_a_local_ring_is_no_crossed_line_when_it_breaks() {
+fn a_break_at_an_unknown_group_in_a_local_ring_is_no_crossed_line() {
     for (seed, two_links) in [(70, false), (71, true)] {
         let mut network = network(&END, two_links);
         GROUP.iter().for_each(|device| network.power_off(*device));
