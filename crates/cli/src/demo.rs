@@ -147,7 +147,7 @@ impl Demo {
                 self.one_cycle();
             }
         }
-        let verdict = self.reporter.summary(&self.application, &self.watch, &self.plan, &self.names);
+        let verdict = self.reporter.summary(&self.application, &self.watch, &self.plan);
         self.report(verdict)
     }
 

@@ -18,7 +18,7 @@ fn bytes(info: &SubDeviceInfo) -> Option<[u32; 2]> {
 
 /// One line per SubDevice, below a heading.
 pub fn lines(scan: &Scan) -> Vec<String> {
-    let heading = "pos  station  alias  vendor      product     out   in  connected to       name".to_owned();
+    let heading = "pos  station  alias  vendor      product     out   in  connected to  name".to_owned();
     let line = |info: &SubDeviceInfo| {
         let position = usize::from(info.position.0);
         let parent = match scan.topology.connection_to(position) {
@@ -28,7 +28,7 @@ pub fn lines(scan: &Scan) -> Vec<String> {
         };
         let bytes = bytes(info).map_or(["?".to_owned(), "?".to_owned()], |both| both.map(|bytes| bytes.to_string()));
         format!(
-            "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<17}  {}",
+            "{:>3}  {}  {:>5}  {:#010x}  {:#010x} {:>4} {:>4}  {parent:<12}  {}",
             position,
             info.station,
             info.alias,

@@ -1,4 +1,4 @@
-//! One TCP client: bytes that are not a whole message yet, answers that it has not read yet.
+//! One TCP client: bytes of an incomplete message, answers that the client has not read yet.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
@@ -6,25 +6,25 @@ use std::time::{Duration, Instant};
 use mio::net::TcpStream;
 use ringcat_wire::mailbox::gateway::{HEADER_LEN, frame_length};
 
-/// Bytes that are read in one go; a message has at most 2,049.
+/// Bytes per read; a message has at most 2,049.
 const PIECE: usize = 4096;
-/// Pieces of one client in one go, so that the others have their turn.
+/// Reads of one client in a row, so that the others are served too.
 const PIECES: usize = 4;
-/// A client that leaves so many bytes of answers unread is cut off.
+/// Most bytes of unread answers before a client is disconnected.
 const UNREAD: usize = 64 * 1024;
-/// A message that has begun has to be complete within.
+/// Time limit from the first byte of a message to its last.
 const MESSAGE_LIMIT: Duration = Duration::from_secs(2);
 
-/// Whether a connection goes on.
+/// State of a connection after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Going {
     /// It waits for the client.
     On,
-    /// There is more to read.
+    /// More can be read.
     Again,
-    /// The client has closed it.
+    /// The client has closed the connection.
     Closed,
-    /// The client does what it must not.
+    /// The client violates the protocol or a limit.
     CutOff,
 }
 
@@ -34,9 +34,9 @@ pub(super) struct Connection {
     pub stream: TcpStream,
     input: Vec<u8>,
     output: Vec<u8>,
-    /// Since when a message is not complete.
+    /// Since when a message is incomplete.
     begun: Option<Instant>,
-    /// When something came last.
+    /// Time of the last received bytes.
     pub active: Instant,
 }
 
@@ -45,7 +45,7 @@ impl Connection {
         Connection { stream, input: Vec::new(), output: Vec::new(), begun: None, active: now }
     }
 
-    /// Takes in what has come and hands out whole messages, as long as `take` has room for them.
+    /// Reads bytes and passes on complete messages, as long as `take` has room for them.
     pub(super) fn read(&mut self, now: Instant, take: &mut impl FnMut(&[u8]) -> bool) -> Going {
         for _ in 0..PIECES {
             match self.hand_out(now, take) {
@@ -68,7 +68,7 @@ impl Connection {
         Going::Again
     }
 
-    /// False where there is no room for the next message; an error where the client sends what is none.
+    /// False where there is no room for the next message; an error where the bytes are no message.
     fn hand_out(&mut self, now: Instant, take: &mut impl FnMut(&[u8]) -> bool) -> Result<bool, ()> {
         let mut at = 0;
         let mut room = true;
@@ -100,7 +100,7 @@ impl Connection {
         self.write()
     }
 
-    /// Sends what the client takes.
+    /// Sends as many bytes as the client takes.
     pub(super) fn write(&mut self) -> Going {
         while !self.output.is_empty() {
             match self.stream.write(&self.output) {
@@ -114,12 +114,12 @@ impl Connection {
         Going::On
     }
 
-    /// It has had its time to complete a message.
+    /// Whether an incomplete message has exceeded its time limit.
     pub(super) fn is_overdue(&self, now: Instant) -> bool {
         self.begun.is_some_and(|begun| now.duration_since(begun) > MESSAGE_LIMIT)
     }
 
-    /// Small answers are sent at once.
+    /// Sends small answers without delay.
     pub(super) fn prepare(&self) -> io::Result<()> {
         self.stream.set_nodelay(true)
     }

@@ -3,12 +3,12 @@
 //!
 //! A thread of its own serves the sockets ([`Gateway`]); messages pass to the engine's thread and answers back through
 //! bounded queues ([`Passage`]). Which message may pass, and which client has its turn, is decided in the engine
-//! ([`ringcat_engine::mail::relay`]), because a client's transfer holds a lane of a mailbox. A client that does not
-//! read its answers, leaves a message unfinished or sends what is no message loses its connection; other clients do not
-//! notice.
+//! ([`ringcat_engine::mail::relay`]), because a client's transfer occupies a lane of a mailbox. A client that does not
+//! read its answers, leaves a message unfinished or sends anything else than messages loses its connection; other
+//! clients are not affected.
 //!
-//! A program that reaches the port may change SubDevices: there is no password in the protocol. So the gateway listens
-//! only where an application opens it, and then only on this host unless another address is named.
+//! A program that reaches the port may change SubDevices: the protocol has no password. So the gateway exists only where
+//! an application opens it, and listens only on this host unless the application gives another address.
 #![forbid(unsafe_code)]
 
 mod connection;
@@ -33,11 +33,11 @@ use server::Server;
 pub use shared::GatewayCounters;
 use shared::{FromClient, Shared};
 
-/// Messages on their way to the engine's thread.
+/// Queued messages to the engine's thread.
 const MESSAGES: usize = 256;
-/// Answers on their way back.
+/// Queued answers.
 const ANSWERS: usize = 1024;
-/// Messages that the engine's thread takes in one go.
+/// Messages that the engine's thread takes per call.
 const TURN: usize = 64;
 
 /// The gateway; it ends when this is dropped.
@@ -50,12 +50,12 @@ pub struct Gateway {
 }
 
 impl Gateway {
-    /// Where it listens.
+    /// The address that it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What it has done.
+    /// Its counters.
     pub fn counters(&self) -> GatewayCounters {
         *self.shared.counters.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -64,10 +64,10 @@ impl Gateway {
 impl Drop for Gateway {
     fn drop(&mut self) {
         self.shared.ended.store(true, Ordering::Relaxed);
-        // One that cannot be woken looks by itself.
+        // If waking fails, the thread checks by itself after a while.
         let _ = self.waker.wake();
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been told by the panic handler.
+            // The panic handler has printed a panic of the thread.
             let _ = thread.join();
         }
     }
@@ -99,8 +99,8 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// Passes messages to the engine and its answers back, a bounded number of them; to be called again and again. True
-    /// when the gateway has gone.
+    /// Passes messages to the engine and its answers back, a bounded number per call; to be called regularly. True when
+    /// the gateway no longer exists.
     pub fn work(&mut self, engine: &mut Engine) -> bool {
         let mut any = false;
         for _ in 0..TURN {
@@ -121,7 +121,7 @@ impl Passage {
         if any {
             let relay = engine.relay_counters();
             self.shared.count(|counters| counters.relay = relay);
-            // One that cannot be woken looks by itself.
+            // If waking fails, the thread checks by itself after a while.
             let _ = self.waker.wake();
         }
         false

@@ -1,13 +1,13 @@
-//! Where the gateway listens, and for how many clients.
+//! Address of the gateway and its number of clients.
 
 use std::net::{Ipv4Addr, SocketAddr};
 
 use ringcat_wire::mailbox::gateway::PORT;
 
-/// Where the gateway listens.
+/// Address of the gateway and its number of clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatewayOptions {
-    /// Address and port, of UDP and TCP; port 0 is any that is free.
+    /// Address and port, for UDP and TCP; port 0 is any free port.
     pub address: SocketAddr,
     /// TCP connections at a time.
     pub connections: usize,

@@ -1,4 +1,4 @@
-//! The sockets of the gateway and the clients at their other ends.
+//! The sockets of the gateway and their clients.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -20,17 +20,17 @@ use crate::shared::{FromClient, Shared};
 const LISTENER: Token = Token(0);
 const DATAGRAMS: Token = Token(1);
 const WAKE: Token = Token(2);
-/// The first client; its number is its token.
+/// Number of the first client; numbers are tokens.
 const FIRST_CLIENT: u64 = 16;
-/// Overdue messages are looked for this often.
-const LOOK: Duration = Duration::from_millis(250);
-/// Pause until a client is looked at again for whose messages there was no room.
+/// Period of checks for overdue messages.
+const CHECK: Duration = Duration::from_millis(250);
+/// Pause before the next attempt where the queue had no room for a message.
 const AGAIN: Duration = Duration::from_millis(1);
-/// Datagrams that are taken in one go.
+/// Datagrams received in a row.
 const BURST: usize = 64;
-/// Senders of datagrams that are told apart.
+/// Most senders of datagrams that are distinguished.
 const PEERS: usize = 64;
-/// When all connections are taken, one that has been silent for so long makes room.
+/// When all connections are in use, a connection that was idle for this time is closed for a new one.
 const SILENT: Duration = Duration::from_secs(10);
 /// Tries to find a port that is free for UDP and TCP.
 const PORT_TRIES: usize = 16;
@@ -42,7 +42,7 @@ struct Peer {
     seen: Instant,
 }
 
-/// The thread's.
+/// State of the thread.
 pub(super) struct Server {
     poll: Poll,
     listener: TcpListener,
@@ -53,7 +53,7 @@ pub(super) struct Server {
     next_client: u64,
     to_engine: SyncSender<FromClient>,
     answers: Receiver<Relayed>,
-    /// Clients that have gone, until the engine knows.
+    /// Ended clients that are not reported to the engine yet.
     gone: Vec<u64>,
     /// Connections with more to read.
     again: Vec<u64>,
@@ -61,7 +61,7 @@ pub(super) struct Server {
 }
 
 impl Server {
-    /// Listens; also what wakes it and where it is.
+    /// Opens the sockets; also returns the waker and the address.
     pub(super) fn open(
         options: GatewayOptions,
         to_engine: SyncSender<FromClient>,
@@ -97,8 +97,8 @@ impl Server {
         let mut datagrams_wait = false;
         while !self.shared.ended.load(Ordering::Relaxed) {
             let busy = datagrams_wait || !self.again.is_empty() || !self.gone.is_empty();
-            // An interrupted wait is as good as one that is over.
-            let _ = self.poll.poll(&mut events, Some(if busy { AGAIN } else { LOOK }));
+            // An interrupted wait is treated like a finished one.
+            let _ = self.poll.poll(&mut events, Some(if busy { AGAIN } else { CHECK }));
             let now = Instant::now();
             for client in std::mem::take(&mut self.again) {
                 self.read(client, now);
@@ -112,7 +112,7 @@ impl Server {
                         let client = client as u64;
                         if event.is_writable() {
                             let going = self.connections.get_mut(&client).map(Connection::write);
-                            self.judge(client, going);
+                            self.apply(client, going);
                         }
                         if event.is_readable() && !self.again.contains(&client) {
                             self.read(client, now);
@@ -126,14 +126,14 @@ impl Server {
             while let Ok(answer) = self.answers.try_recv() {
                 self.deliver(&answer);
             }
-            self.tidy(now);
+            self.clean_up(now);
         }
     }
 
     fn accept(&mut self, now: Instant) {
         while let Ok((mut stream, _)) = self.listener.accept() {
             if self.connections.len() >= self.limit && !self.make_room(now) {
-                // Dropped, it is closed.
+                // Dropping the stream closes it.
                 self.shared.count(|counters| counters.ended += 1);
                 continue;
             }
@@ -143,21 +143,21 @@ impl Server {
                 continue;
             }
             let connection = Connection::new(stream, now);
-            // Without it answers come a little later.
+            // Without it answers are only delayed.
             let _ = connection.prepare();
             self.connections.insert(client, connection);
             self.shared.count(|counters| counters.connections += 1);
         }
     }
 
-    /// Ends the connection that has been silent for longest, if that is long.
+    /// Closes the connection with the longest idle time, if that is long enough.
     fn make_room(&mut self, now: Instant) -> bool {
         let silent = self.connections.iter().min_by_key(|(_, connection)| connection.active);
         let Some(client) = silent.filter(|(_, c)| now.duration_since(c.active) > SILENT).map(|(client, _)| *client)
         else {
             return false;
         };
-        self.judge(client, Some(Going::CutOff));
+        self.apply(client, Some(Going::CutOff));
         true
     }
 
@@ -173,16 +173,16 @@ impl Server {
             Err(TrySendError::Full(_)) => false,
         };
         let going = self.connections.get_mut(&client).map(|connection| connection.read(now, &mut take));
-        self.judge(client, going);
+        self.apply(client, going);
     }
 
-    fn judge(&mut self, client: u64, going: Option<Going>) {
+    fn apply(&mut self, client: u64, going: Option<Going>) {
         match going {
             None | Some(Going::On) => {}
             Some(Going::Again) => self.again.push(client),
             Some(end @ (Going::Closed | Going::CutOff)) => {
                 if let Some(mut connection) = self.connections.remove(&client) {
-                    // It is closed with its descriptor in any case.
+                    // Closing the descriptor deregisters it in any case.
                     let _ = self.poll.registry().deregister(&mut connection.stream);
                     self.gone.push(client);
                     self.shared.count(|counters| counters.ended += u64::from(end == Going::CutOff));
@@ -191,7 +191,7 @@ impl Server {
         }
     }
 
-    /// True where more may wait.
+    /// True where more datagrams may wait.
     fn receive_datagrams(&mut self, now: Instant) -> bool {
         let mut bytes = [0; HEADER_LEN + MAX_LENGTH + 1];
         for _ in 0..BURST {
@@ -205,7 +205,7 @@ impl Server {
         true
     }
 
-    /// The number of the client at this address; the one that has been silent for longest makes room.
+    /// The number of the client at this address; the client with the longest idle time makes room.
     fn peer(&mut self, address: SocketAddr, now: Instant) -> u64 {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.address == address) {
             peer.seen = now;
@@ -223,19 +223,19 @@ impl Server {
 
     fn deliver(&mut self, answer: &Relayed) {
         if let Some(peer) = self.peers.iter().find(|peer| peer.client == answer.client) {
-            // A datagram may be lost on its way, and so at its beginning.
+            // A datagram may be lost anywhere, so also here.
             let _ = self.datagrams.send_to(&answer.bytes, peer.address);
             return;
         }
         let going = self.connections.get_mut(&answer.client).map(|connection| connection.answer(&answer.bytes));
-        self.judge(answer.client, going);
+        self.apply(answer.client, going);
     }
 
-    /// Ends what is overdue, and tells the engine which clients have gone.
-    fn tidy(&mut self, now: Instant) {
+    /// Closes overdue connections, and reports ended clients to the engine.
+    fn clean_up(&mut self, now: Instant) {
         let overdue = self.connections.iter().filter(|(_, connection)| connection.is_overdue(now));
         for client in overdue.map(|(client, _)| *client).collect::<Vec<_>>() {
-            self.judge(client, Some(Going::CutOff));
+            self.apply(client, Some(Going::CutOff));
         }
         let to_engine = &self.to_engine;
         self.gone.retain(|client| matches!(to_engine.try_send(FromClient::Gone(*client)), Err(TrySendError::Full(_))));
@@ -249,7 +249,7 @@ fn sockets(address: SocketAddr) -> io::Result<(TcpListener, UdpSocket)> {
         let listener = TcpListener::bind(address)?;
         match UdpSocket::bind(listener.local_addr()?) {
             Ok(datagrams) => return Ok((listener, datagrams)),
-            // Any free port was asked for, and this one is free for TCP only.
+            // Any free port is requested, and this one is free for TCP only.
             Err(_) if address.port() == 0 && tries < PORT_TRIES => tries += 1,
             Err(error) => return Err(error),
         }

@@ -1,24 +1,24 @@
-//! What passes between the thread of the sockets and the engine's thread.
+//! Data shared by the thread of the sockets and the engine's thread.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
 use ringcat_engine::mail::relay::RelayCounters;
 
-/// What the gateway has done.
+/// Counters of the gateway.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GatewayCounters {
-    /// Connections that were made.
+    /// Accepted connections.
     pub connections: u64,
-    /// Connections that were ended because of what their client did or did not.
+    /// Connections that the gateway closed because of a fault of the client.
     pub ended: u64,
-    /// Datagrams and messages that were dropped because too many came at once.
+    /// Datagrams and messages that were dropped because a queue was full.
     pub dropped: u64,
-    /// What became of the messages.
+    /// Counters of the messages.
     pub relay: RelayCounters,
 }
 
-/// What the thread of the sockets and the rest of the program share.
+/// Shared by the thread of the sockets and the rest of the program.
 #[derive(Debug, Default)]
 pub(crate) struct Shared {
     pub ended: AtomicBool,
@@ -36,6 +36,6 @@ impl Shared {
 pub(crate) enum FromClient {
     /// A message with its EtherCAT header.
     Message(u64, Vec<u8>),
-    /// The client has gone.
+    /// The connection of the client has ended.
     Gone(u64),
 }

@@ -2,7 +2,7 @@
 //!
 //! Both clients send frames of one length and one shape (an LRW and the supervision datagram) through a socket of the
 //! same kind, wait in the same way, and have the same echo at the other end. The bare one only puts a new Idx into its
-//! frame and looks whether it came back; the other runs the whole cyclic half: receive, judge, copy between image and
+//! frame and checks that it came back; the other runs the whole cyclic half: receive, process, copy between image and
 //! frame, queue, send. The clock is read once a cycle. Blocks of both alternate, so that both meet the same machine.
 
 use std::sync::Arc;

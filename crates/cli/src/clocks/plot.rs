@@ -164,7 +164,7 @@ fn colour(number: usize) -> String {
     format!("#{:02x}{:02x}{:02x}", channel(0.0), channel(2.0), channel(4.0))
 }
 
-/// Which colour is whose, as far as there is room.
+/// Colours of the clocks, as far as there is room.
 fn legend(svg: &mut String, clocks: &[ClockStatus]) {
     let left = WIDTH - MARGIN + 8.0;
     for (number, clock) in clocks.iter().enumerate().take(LEGEND) {

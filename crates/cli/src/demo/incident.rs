@@ -1,4 +1,4 @@
-//! What happens to the segment in the demonstration, and what it costs.
+//! Incidents of the segment in the demonstration, and their cost.
 
 use ringcat::sim::cable::{CableId, DeviceIndex};
 use ringcat::text::Names;
@@ -48,7 +48,18 @@ impl Incident {
         }
     }
 
-    /// In words.
+    /// In a few words, with positions only.
+    pub fn summarize(&self) -> String {
+        match self {
+            Incident::Calm => "OP".to_owned(),
+            Incident::Cut { ends: (a, b), .. } => format!("cut {a}-{b}"),
+            Incident::Heal { ends: (a, b), .. } => format!("repair {a}-{b}"),
+            Incident::PowerOff { position, .. } => format!("{position} off"),
+            Incident::PowerOn { position, .. } => format!("{position} on"),
+        }
+    }
+
+    /// In words, with names.
     pub fn describe(&self, names: &Names) -> String {
         let name = |position: usize| match names.0.get(position) {
             Some(name) => format!("{position} \"{name}\""),
@@ -57,7 +68,7 @@ impl Incident {
         match self {
             Incident::Calm => "all are in OP".to_owned(),
             Incident::Cut { ends: (a, b), .. } => format!("cutting the cable between {} and {}", name(*a), name(*b)),
-            Incident::Heal { ends: (a, b), .. } => format!("healing the cable between {} and {}", name(*a), name(*b)),
+            Incident::Heal { ends: (a, b), .. } => format!("repairing the cable between {} and {}", name(*a), name(*b)),
             Incident::PowerOff { position, .. } => format!("switching off SubDevice {}", name(*position)),
             Incident::PowerOn { position, .. } => format!("switching SubDevice {} on again", name(*position)),
         }

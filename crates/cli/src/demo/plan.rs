@@ -1,4 +1,4 @@
-//! What the demonstration does to the segment: which cable, which SubDevice, when.
+//! The incidents of the demonstration: which cable, which SubDevice, when.
 
 use std::time::Duration;
 

@@ -110,28 +110,22 @@ impl Reporter {
     }
 
     /// The closing summary, with what did not hold.
-    pub fn summary(
-        &mut self,
-        application: &Application<SimulatedSegment>,
-        watch: &Watch,
-        plan: &Plan,
-        names: &Names,
-    ) -> Verdict {
+    pub fn summary(&mut self, application: &Application<SimulatedSegment>, watch: &Watch, plan: &Plan) -> Verdict {
         self.say("\nsummary");
         self.totals(application);
         if let Some(remark) = plan.remark {
             self.say(&format!("  {remark}"));
         }
-        self.say("\n  cycles  incomplete  allowed  held back  lacking only the switched-off one  after");
+        self.say("\n  cycles  incomplete  allowed  held back  only that one missing  after");
         for account in &watch.accounts {
             self.say(&format!(
-                "  {:>6}  {:>10}  {:>7}  {:>9}  {:>33}  {}",
+                "  {:>6}  {:>10}  {:>7}  {:>9}  {:>21}  {}",
                 account.cycles,
                 account.incomplete,
                 account.incident.edges(plan.cables_of_device),
                 account.held_back,
                 account.without_one,
-                account.incident.describe(names)
+                account.incident.summarize()
             ));
         }
         self.say("");
@@ -149,8 +143,8 @@ impl Reporter {
             cyclic.sent, cyclic.bytes, cyclic.lost, cyclic.late
         ));
         self.say(&format!(
-            "  everything else: {} frames with {} datagrams, {} bytes on each link, {} datagrams sent again",
-            acyclic.sent, acyclic.datagrams, acyclic.bytes, acyclic.resent
+            "  everything else: {} frames, {} bytes on each link\n    {} datagrams, {} of them sent again",
+            acyclic.sent, acyclic.bytes, acyclic.datagrams, acyclic.resent
         ));
         let stalled = application.links().stalled();
         if stalled > Duration::ZERO {
@@ -188,7 +182,7 @@ impl Reporter {
         verdict(self, held, "at most one incomplete cycle per edge of a cable".to_owned());
         if watch.has_process_data() {
             let text = format!(
-                "outputs and inputs agree with the simulated devices: {} comparisons, {} failed",
+                "process data agrees with the devices: {} comparisons, {} failed",
                 watch.compared, watch.disagreements
             );
             verdict(self, watch.compared > 0 && watch.disagreements == 0, text);
@@ -200,7 +194,7 @@ impl Reporter {
         }
         for drive in &watch.drives {
             let text = format!(
-                "drive {} was enabled for {} cycles, is at {}, and was at most {} increments behind its target",
+                "drive {}: enabled for {} cycles, at {}, at most {} increments behind",
                 drive.subdevice, drive.enabled_cycles, drive.position, drive.lag
             );
             verdict(self, drive.follows(), text);

@@ -11,6 +11,7 @@ use ringcat_sim::controller::Wander;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::register::map;
+use serde_json::Value;
 
 use crate::bench::{Bench, Client, finish, is_asked_for, program};
 use crate::foreign::{FOREIGN, start};
@@ -167,11 +168,11 @@ fn delays_of_ethercrab_and_ringcat_are_equal_and_right() {
         let path = capture.display().to_string();
         let arguments = ["clocks", "--main", "main0", "--for", "100ms", "--json", "--capture", &path];
         let (json, errors) = said(&bench.ringcat(&arguments));
-        assert!(json.contains("\"locked\": true"), "{json}{errors}");
-        let figures = json.lines().filter_map(|line| line.trim().strip_prefix("\"delay_ns\": "));
-        let mut told = figures.map(|figure| figure.trim_end_matches(',').parse().expect("a number"));
-        let told: Vec<i64> =
-            truth.iter().map(|has_clock| has_clock.map_or(0, |_| told.next().expect("a clock"))).collect();
+        let result: Value = serde_json::from_str(json.lines().last().unwrap_or_default()).expect("a line of JSON");
+        assert_eq!(result["locked"], true, "{json}{errors}");
+        let mut told = result["clocks"].as_array().expect("clocks").iter().map(|clock| &clock["delay_ns"]);
+        let mut told = || told.next().expect("a clock").as_i64().expect("a number");
+        let told: Vec<i64> = truth.iter().map(|has_clock| has_clock.map_or(0, |_| told())).collect();
         judge("ringcat reports", &told, &truth);
         judge("ringcat wrote", &written(&bench, count), &truth);
         check_capture(&capture, truth.iter().flatten().count());

@@ -270,7 +270,7 @@ fn a_main_device_in_another_namespace_is_found_by_its_frames() {
     std::thread::sleep(PAUSE);
     let mut findings = Findings::default();
     for line in ["scan --main main1", "run --main main1 --for 1s", "ring --main main1"] {
-        let expected = "FAILED: another MainDevice leads this segment: its frames, from ... arrive on main1";
+        let expected = "FAILED: another MainDevice controls this segment: its frames, from ... arrive on main1";
         findings.judge(line, bench.start_other_ringcat(&words(line)), 2, expected);
     }
     drop(owner);

@@ -11,12 +11,15 @@ mod captures;
 mod clocks;
 mod clocks_in_a_ring;
 mod cuts_beside;
+#[path = "../../../cli/tests/program/documented.rs"]
+mod documented;
 mod eni;
 mod ethernet;
 mod exit_codes;
 mod foreign;
 mod frames;
 mod gateway;
+mod json;
 mod junctions;
 mod mail_captures;
 mod messages;

@@ -100,6 +100,9 @@ fn a_ring_cable_at_another_interface_is_reported_with_its_name() {
         assert!(told.contains(&format!("scan: no frame returns, {advice}")), "{told}");
         assert!(!told.contains("another MainDevice"), "{told}");
     }
+    // The same with marks in other bytes of the source address.
+    let marked = error_of(&bench, &["scan", "--main", "main0", "--source-address", "id-last"]);
+    assert!(marked.contains("frames sent on main0 arrive on main1: a cable of this segment"), "{marked}");
     // Both remedies of the message help.
     let (_, errors) = said(&bench.ringcat(&["scan", "--main", "main0", "--redundant", "main1"]));
     assert!(!errors.contains("arrive on"), "{errors}");
