@@ -51,7 +51,7 @@ fn largest_error(world: &World, devices: std::ops::Range<usize>) -> i64 {
 
 fn not_measured(event: &Event) -> bool {
     matches!(event, Event::ClocksFailed { reason }
-        if reason.contains("process data") || reason.contains("other frames"))
+        if reason.contains("a cyclic frame") || reason.contains("other frames"))
 }
 
 /// Frames are sent as soon as the last ones are back, or several cycles are under way all the time: the cyclic half
