@@ -68,19 +68,17 @@ pub fn address(mac: MacAddress) -> String {
 
 /// An event in one line.
 pub fn describe(timed: &TimedEvent, names: &Names) -> String {
-    let occupants = timed.occupants;
+    let ends = timed.occupants;
     match &timed.event {
         Event::Counted { main, redundant } => format!("SubDevices answering: {main} on MAIN, {redundant} on REDUNDANT"),
         Event::ScanProgress { done, total } => format!("scanning: {done} of {total} SubDevices read"),
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
-        Event::SiiOddity { position, what } => format!("{}: SII: {what}", names.at(*position, occupants[0])),
-        Event::CablingOddity { position, what } => format!("{}: {what}", names.at(*position, occupants[0])),
-        Event::UnconnectedPort0 { position } => {
-            format!("{}: port 0 is not connected", names.at(*position, occupants[0]))
-        }
+        Event::SiiOddity { position, what } => format!("{}: SII: {what}", names.at(*position, ends[0])),
+        Event::CablingOddity { position, what } => format!("{}: {what}", names.at(*position, ends[0])),
+        Event::UnconnectedPort0 { position } => format!("{}: port 0 is not connected", names.at(*position, ends[0])),
         Event::LineCrossed { position: Some(position), entry_port: Some(port) } => {
-            format!("{}: line crossed, frames enter at port {port}", names.at(*position, occupants[0]))
+            format!("{}: line crossed, frames enter at port {port}", names.at(*position, ends[0]))
         }
         Event::CannotDisconnect { link } => {
             format!(
@@ -100,9 +98,9 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         Event::RingOpened { main, redundant } => {
             format!("ring open: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
         }
-        Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable, occupants)),
+        Event::BreakLocated { cable } => format!("Line break {}", names.cable(*cable, ends)),
         Event::RingClosed { main, place, .. } => {
-            let place = place.map_or_else(String::new, |cable| format!(" {}", names.cable(cable, occupants)));
+            let place = place.map_or_else(String::new, |cable| format!(" {}", names.cable(cable, ends)));
             format!("Line is fixed{place}: ring closed, {main} SubDevices on MAIN")
         }
         Event::RingUnsteady { changes } => {
@@ -148,7 +146,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         Event::JunctionsBlocked { blocked: false, .. } => "frames come back again".to_owned(),
         Event::RedundancyLost { cause } => format!("redundancy lost: {cause}"),
         Event::RedundancyRegained => "redundancy regained: the ring stands a break".to_owned(),
-        Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable, occupants)),
+        Event::CableErrors { cable, errors } => format!("CRC errors rise {}: {errors}", names.cable(*cable, ends)),
         Event::LinkDown { link } => format!("{link}: no carrier"),
         Event::LinkUp { link } => format!("{link}: the carrier is back"),
         Event::StateReached { subdevice, state } => format!("{}: {state}", names.of(*subdevice)),
@@ -175,7 +173,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         }
         Event::Unexpected { position, identity } => format!(
             "{}: not declared: vendor {:#010x}, product {:#010x}",
-            names.at(*position, occupants[0]),
+            names.at(*position, ends[0]),
             identity.vendor_id,
             identity.product_code
         ),
@@ -183,7 +181,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
             format!("{}: moved from position {} to {}", names.of(*subdevice), from.0, to.0)
         }
         Event::Mismatch { subdevice, position, field, expected, got } => {
-            let (name, place) = (names.of(*subdevice), names.at(*position, occupants[0]));
+            let (name, place) = (names.of(*subdevice), names.at(*position, ends[0]));
             format!("{name}: expected {field} {expected:#010x}, {place} has {got:#010x}: it is left alone")
         }
         Event::GroupJoined { group } => format!("group {group}: all of it is there and in its state"),
@@ -204,7 +202,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         Event::Skipped { domain } => format!("domain {domain}: skipped, its frames are still out"),
         Event::ClocksLocked { largest_ns } => format!("all clocks are locked, within {largest_ns} ns"),
         Event::ReferenceClock { position: Some(position) } => {
-            format!("the clock of {} is the reference", names.at(*position, occupants[0]))
+            format!("the clock of {} is the reference", names.at(*position, ends[0]))
         }
         Event::ReferenceClock { position: None } => "no clock is left that could be the reference".into(),
         Event::DelaysChanged { clocks, largest_ns } => {
@@ -217,7 +215,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
             );
             let range = range_ns.map_or_else(String::new, |(least, most)| format!(", {least} to {most} ns"));
             let written = if *is_estimated { "the middle is written" } else { "none is written" };
-            let at = names.at(*position, occupants[0]);
+            let at = names.at(*position, ends[0]);
             format!("the propagation delay of {at} cannot be measured, {why}{range}: {written}")
         }
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
