@@ -16,9 +16,9 @@ use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::frame::Frame;
 use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
 use scenarios::dice::Dice;
-use scenarios::meddler::{Meddled, Verdict};
 use scenarios::seeds;
 use scenarios::segments::{descriptions, line, ring};
+use scenarios::tampered_links::{TamperedLinks, Verdict};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -127,7 +127,7 @@ fn eeproms(seed: u64) {
         *network.device_mut(device).controller.sii_image_mut() = image(&mut dice, &right);
     }
     let options = Options::default().with_sii_cache(!dice.one_in(3));
-    let links = Meddled::new(network, LIMIT, |_| Verdict::Arrives);
+    let links = TamperedLinks::new(network, LIMIT, |_| Verdict::Arrives);
     work(MainDevice::request(links, &options), 200, || ());
 }
 
@@ -184,7 +184,7 @@ fn lies(seed: u64) {
     let (one_in, left) = (*dice.pick(&[2, 10, 100]), Rc::new(Cell::new(0)));
     let lies_left = left.clone();
     let mut liar = dice;
-    let links = Meddled::new(network, LIMIT, move |frame| {
+    let links = TamperedLinks::new(network, LIMIT, move |frame| {
         if lies_left.get() == 0 || !liar.one_in(one_in) {
             return Verdict::Arrives;
         }

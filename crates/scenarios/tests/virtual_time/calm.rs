@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use ringcat::{Instant, MainDevice, Options, automatic};
 use ringcat_engine::ring::identity::{Class, class_of};
-use scenarios::meddler::{Meddled, Verdict};
 use scenarios::segments::plant;
+use scenarios::tampered_links::{TamperedLinks, Verdict};
 
 /// Longest acyclic frame: 32 us on the wire, and datagrams for few SubDevices.
 const LONGEST: usize = 400;
@@ -17,7 +17,7 @@ const LONGEST: usize = 400;
 fn in_an_undisturbed_segment_of_50_acyclic_frames_are_short() {
     let (longest, frames) = (Rc::new(Cell::new(0)), Rc::new(Cell::new(0_u32)));
     let (seen, count) = (longest.clone(), frames.clone());
-    let links = Meddled::new(plant(50), Instant(10_000_000_000), move |frame| {
+    let links = TamperedLinks::new(plant(50), Instant(10_000_000_000), move |frame| {
         if class_of(frame) == Some(Class::Acyclic) {
             seen.set(seen.get().max(frame.len()));
             count.set(count.get() + 1);

@@ -12,7 +12,7 @@ use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::sdo::AbortCode;
 use scenarios::loss::Loss;
-use scenarios::mail_questions::{Asker, KINDS, Kind};
+use scenarios::mailbox_requests::{KINDS, Kind, Requester};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
@@ -79,7 +79,7 @@ fn concerns(trouble: Trouble, kind: Kind) -> bool {
 }
 
 /// A request; returns the asker again.
-fn question(world: &mut World, mut asker: Asker, number: u32) -> (Result<(), String>, Asker) {
+fn question(world: &mut World, mut asker: Requester, number: u32) -> (Result<(), String>, Requester) {
     world.run(async move { (asker.ask(number).await, asker) })
 }
 
@@ -91,7 +91,7 @@ fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
         let mut world = World::in_op(1, ring(descriptions(&PLANT), options));
         let (mailbox, station) = (world.mailbox(ALL), world.station_of(ALL));
-        let mut asker = Asker::new(kind, mailbox.clone(), LIMITS, false);
+        let mut asker = Requester::new(kind, mailbox.clone(), LIMITS, false);
         let mut number = 1;
         let mut result;
         (result, asker) = question(&mut world, asker, number);

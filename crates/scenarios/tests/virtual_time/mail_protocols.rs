@@ -21,7 +21,7 @@ use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::register::{Fmmu, map};
 use scenarios::loss::Loss;
-use scenarios::mail_questions::{Asker, Kind};
+use scenarios::mailbox_requests::{Kind, Requester};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
@@ -208,10 +208,10 @@ fn refused_beside_another(world: &mut World, first_is_dropped: bool) -> [Result<
     let by = Duration::from_millis(8);
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::DelayAnswers { count: 3, by }));
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::Refuse { count: 1, detail: ErrorReply::NO_MORE_MEMORY }));
-    let mut idn = Asker::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
+    let mut idn = Requester::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
     let first = world.start(async move { idn.ask(1).await });
     world.run_cycles(2);
-    let mut vendor = Asker::new(Kind::Vendor, world.mailbox(ALL), LIMITS, true);
+    let mut vendor = Requester::new(Kind::Vendor, world.mailbox(ALL), LIMITS, true);
     let second = world.start(async move { [vendor.ask(2).await, vendor.ask(3).await] });
     if first_is_dropped {
         drop(first);
@@ -230,7 +230,7 @@ fn an_ambiguous_error_reply_does_not_shift_later_responses() {
     for first_is_dropped in [false, true] {
         let mut world = world(5);
         // The drive has responded before in SoE, but not yet in VoE.
-        let mut idn = Asker::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
+        let mut idn = Requester::new(Kind::Idn, world.mailbox(ALL), LIMITS, true);
         assert_eq!(world.run(async move { idn.ask(7).await }), Ok(()));
         let [second, third] = refused_beside_another(&mut world, first_is_dropped);
         assert!(second.is_err_and(|error| error.contains("no memory")), "dropped: {first_is_dropped}");

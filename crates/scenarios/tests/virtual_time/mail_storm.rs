@@ -23,8 +23,8 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 use scenarios::dice::Dice;
 use scenarios::ethernet_host::{Addresses, download};
 use scenarios::loss::Loss;
-use scenarios::mail_beside::Beside;
-use scenarios::mail_questions::{Asker, KINDS, Kind};
+use scenarios::mailbox_requests::{KINDS, Kind, Requester};
+use scenarios::mailbox_users::MailboxUsers;
 use scenarios::seeds;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
@@ -80,7 +80,7 @@ fn mail_fault(dice: &mut Dice) -> MailFault {
 }
 
 /// A random fault; cables and power are restored after a while.
-fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: &mut BTreeMap<u16, u32>) {
+fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergencies: &mut BTreeMap<u16, u32>) {
     let device = *dice.pick(&ALL);
     let station = world.station_of(device);
     match dice.below(8) {
@@ -114,7 +114,7 @@ fn happen(world: &mut World, beside: &mut Beside, dice: &mut Dice, emergencies: 
 fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let mailbox = world.mailbox(device);
     let bus = mailbox.bus().clone();
-    let mut asker = Asker::new(KINDS[at], mailbox, LIMITS, true);
+    let mut asker = Requester::new(KINDS[at], mailbox, LIMITS, true);
     let (stop, tally) = (stop.clone(), tally.clone());
     world.start(async move {
         // Numbers differ between devices, kinds and requests.
@@ -165,7 +165,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     let before = quiet_moment(&mut world);
     let stop = Rc::new(Cell::new(false));
     let mut works = Vec::new();
-    let mut beside = Beside::new(&mut world, &ALL);
+    let mut beside = MailboxUsers::new(&mut world, &ALL);
     let mut emergencies = BTreeMap::new();
     for device in ALL {
         // About five of the nine kinds, none twice.
@@ -212,7 +212,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
 }
 
 /// Ends the other users.
-fn end(beside: &mut Beside, world: &mut World, seed: u64) {
+fn end(beside: &mut MailboxUsers, world: &mut World, seed: u64) {
     let until = world.application().now() + END;
     while !beside.stop(world) {
         assert!(world.application().now() < until, "seed {seed}: {beside:?}");
@@ -226,7 +226,7 @@ fn all_answer(world: &mut World, seed: u64) {
         if (device, kind) == (ALL[0], Kind::Address) {
             continue;
         }
-        let mut asker = Asker::new(kind, world.mailbox(device), (END, END), true);
+        let mut asker = Requester::new(kind, world.mailbox(device), (END, END), true);
         let result = world.run(async move { asker.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }

@@ -69,6 +69,6 @@ mod start_up;
 mod startup_commands;
 mod states;
 mod stops;
-mod strangers;
 mod topologies;
+mod unassigned;
 mod under_way;

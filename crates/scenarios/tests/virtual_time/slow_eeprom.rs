@@ -14,8 +14,8 @@ use ringcat_wire::datagram::Header;
 use ringcat_wire::frame::Frame;
 use ringcat_wire::register::map;
 use scenarios::dice::Dice;
-use scenarios::meddler::{Meddled, Verdict};
 use scenarios::segments::{describe, line};
+use scenarios::tampered_links::{TamperedLinks, Verdict};
 use scenarios::tap::Tap;
 
 /// Limit of the virtual time of a scan.
@@ -137,7 +137,7 @@ fn an_sii_command_repeated_after_a_lost_response_has_no_effect() {
         let mut lost = 0;
         // One in four responses to frames with an EEPROM command is lost: the command is repeated while the EEPROM is
         // busy with it or has finished it.
-        let links = Meddled::new(network(vec![terminal(busy); 2]), LIMIT, |bytes| {
+        let links = TamperedLinks::new(network(vec![terminal(busy); 2]), LIMIT, |bytes| {
             let is_command = |it: &Header| it.command == Command::Fpwr && it.address >> 16 == map::SII_CONTROL.0.into();
             let frame = Frame::parse(bytes);
             let has_command = frame.is_ok_and(|frame| frame.datagrams().any(|it| is_command(&it.header)));

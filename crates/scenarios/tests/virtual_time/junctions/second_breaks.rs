@@ -322,8 +322,8 @@ fn a_broken_local_ring_is_no_crossed_line_for_enhanced_detection() {
     }
 }
 
-/// The redundant link is down on purpose, so that crossed lines are located, when two local rings break at once: the
-/// link does not get its partner back in the usual time, since no frame comes back. The breaks are located all the same.
+/// Two local rings break at once while enhanced detection holds the redundant link down: the link does not come back in
+/// the usual time, since no frame comes back. The breaks are located nevertheless.
 // covers: JR-02, LC-03, junctions
 #[test]
 fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {

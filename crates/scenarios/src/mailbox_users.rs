@@ -33,7 +33,7 @@ struct Users {
 
 /// The users of some devices, and their results.
 #[derive(Debug)]
-pub struct Beside {
+pub struct MailboxUsers {
     users: Vec<Users>,
     stopped: bool,
     next: u8,
@@ -43,9 +43,9 @@ pub struct Beside {
     pub failed: u32,
 }
 
-impl Beside {
+impl MailboxUsers {
     /// Users of these devices, which are declared with the same indices.
-    pub fn new(world: &mut World, devices: &[usize]) -> Beside {
+    pub fn new(world: &mut World, devices: &[usize]) -> MailboxUsers {
         let users = devices.iter().map(|device| Users {
             station: world.station_of(*device),
             request: world.application_mut().engine_mut().create_sdo_request(*device, 8),
@@ -56,7 +56,7 @@ impl Beside {
             waited: None,
         });
         let users = users.collect();
-        Beside { users, stopped: false, next: FIRST, answered: 0, failed: 0 }
+        MailboxUsers { users, stopped: false, next: FIRST, answered: 0, failed: 0 }
     }
 
     /// Runs this many cycles and checks all users after each.

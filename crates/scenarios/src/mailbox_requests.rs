@@ -1,6 +1,6 @@
 //! Requests to a device with all mailbox protocols; each response identifies its request.
 //!
-//! An [`Asker`] writes a unique value, reads it back, and knows the possible values: the last written one, and after
+//! A [`Requester`] writes a unique value, reads it back, and knows the possible values: the last written one, and after
 //! failed writes their possible remains. Any other value is the response to another or an older request, and panics.
 
 use ringcat::Limits;
@@ -82,7 +82,7 @@ impl Kind {
 
 /// Sends one kind of request, with unique values.
 #[derive(Debug)]
-pub struct Asker {
+pub struct Requester {
     kind: Kind,
     mailbox: Mailbox,
     limits: Limits,
@@ -115,10 +115,10 @@ fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
-impl Asker {
-    /// An asker; only one of each kind may use a device at a time.
-    pub fn new(kind: Kind, mailbox: Mailbox, limits: Limits, forgets: bool) -> Asker {
-        Asker { kind, mailbox, limits, initial: None, known: Vec::new(), forgets }
+impl Requester {
+    /// A requester; only one of each kind may use a device at a time.
+    pub fn new(kind: Kind, mailbox: Mailbox, limits: Limits, forgets: bool) -> Requester {
+        Requester { kind, mailbox, limits, initial: None, known: Vec::new(), forgets }
     }
 
     /// Writes a value of this number and reads it back.

@@ -21,7 +21,7 @@ pub enum Verdict {
 }
 
 /// Links with a function that receives every returned frame and may change it.
-pub struct Meddled<F> {
+pub struct TamperedLinks<F> {
     segment: SimulatedSegment,
     meddle: F,
     again: Option<(Link, Vec<u8>)>,
@@ -29,10 +29,10 @@ pub struct Meddled<F> {
     idle: u64,
 }
 
-impl<F: FnMut(&mut Vec<u8>) -> Verdict> Meddled<F> {
+impl<F: FnMut(&mut Vec<u8>) -> Verdict> TamperedLinks<F> {
     /// Links into a network. Reaching the limit is a failure.
-    pub fn new(network: Network, limit: Instant, meddle: F) -> Meddled<F> {
-        Meddled { segment: SimulatedSegment::new(network), meddle, again: None, limit, idle: 0 }
+    pub fn new(network: Network, limit: Instant, meddle: F) -> TamperedLinks<F> {
+        TamperedLinks { segment: SimulatedSegment::new(network), meddle, again: None, limit, idle: 0 }
     }
 
     /// The segment.
@@ -46,7 +46,7 @@ impl<F: FnMut(&mut Vec<u8>) -> Verdict> Meddled<F> {
     }
 }
 
-impl<F: FnMut(&mut Vec<u8>) -> Verdict> Links for Meddled<F> {
+impl<F: FnMut(&mut Vec<u8>) -> Verdict> Links for TamperedLinks<F> {
     fn now(&self) -> Instant {
         self.segment.now()
     }
