@@ -1,7 +1,7 @@
 //! `ringcat bench`: figures of this machine, its interfaces and this MainDevice, measured where they are to be used.
 //!
-//! `echo` is the other end of `round-trip`; `cycles` and `rate` need SubDevices, or `ringcat sim`. Each prints lines of a
-//! name, a colon and a figure with its unit.
+//! `echo` is the other end of `round-trip`; `cycles` and `rate` need SubDevices, or `ringcat sim`. Each prints lines of
+//! a name, a colon and a figure with its unit.
 
 mod cycles;
 mod echo;

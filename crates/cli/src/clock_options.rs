@@ -28,8 +28,8 @@ const SYNC_LONG_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as i
 pub struct ClockOptions {
     /// When cycles begin, relative to the system time of the segment
     ///
-    /// The time from the multiples of the cycle time, which is also that of an unshifted SYNC0, to the begin of a cycle:
-    /// 300us or -300us; 0us by default. Cycles then follow the reference clock (master shift).
+    /// The time from the multiples of the cycle time, which is also that of an unshifted SYNC0, to the begin of a
+    /// cycle: 300us or -300us; 0us by default. Cycles then follow the reference clock (master shift).
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = shift, conflicts_with = "bus_shift")]
     phase: Option<i64>,
     /// The reference clock follows this host (bus shift)
@@ -123,8 +123,8 @@ impl ClockOptions {
         }
     }
 
-    /// As [`ClockOptions::declare`] for the declaration of an ENI: SYNC signals and the reference are those of the file,
-    /// master shift or bus shift is an option.
+    /// As [`ClockOptions::declare`] for the declaration of an ENI: SYNC signals and the reference are those of the
+    /// file, master shift or bus shift is an option.
     pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
         if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
             return Err(Failure::new("--sync and --reference: the ENI has the SYNC signals and the reference clock"));

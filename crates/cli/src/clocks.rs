@@ -201,8 +201,8 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Prints events and records differences until a time or, with `ends_with_lock`, until all clocks are locked and all
-    /// SubDevices, which may wait for that, are in their state. Whether clocks are locked.
+    /// Prints events and records differences until a time or, with `ends_with_lock`, until all clocks are locked and
+    /// all SubDevices, which may wait for that, are in their state. Whether clocks are locked.
     fn until(
         &mut self,
         cycles: &CyclicThread<Tee<PacketLinks>>,

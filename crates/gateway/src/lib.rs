@@ -7,8 +7,8 @@
 //! read its answers, leaves a message unfinished or sends anything else than messages loses its connection; other
 //! clients are not affected.
 //!
-//! A program that reaches the port may change SubDevices: the protocol has no password. So the gateway exists only where
-//! an application opens it, and listens only on this host unless the application gives another address.
+//! A program that reaches the port may change SubDevices: the protocol has no password. So the gateway exists only
+//! where an application opens it, and listens only on this host unless the application gives another address.
 #![forbid(unsafe_code)]
 
 mod connection;

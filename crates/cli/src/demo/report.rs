@@ -116,10 +116,10 @@ impl Reporter {
         if let Some(remark) = plan.remark {
             self.say(&format!("  {remark}"));
         }
-        self.say("\n  cycles  incomplete  allowed  held back  only that one missing  after");
+        self.say("\n  cycles  incomplete  allowed  held back  without power  after");
         for account in &watch.accounts {
             self.say(&format!(
-                "  {:>6}  {:>10}  {:>7}  {:>9}  {:>21}  {}",
+                "  {:>6}  {:>10}  {:>7}  {:>9}  {:>13}  {}",
                 account.cycles,
                 account.incomplete,
                 account.incident.edges(plan.cables_of_device),

@@ -1,5 +1,5 @@
-//! The checker of the demonstration: runs the cycles with an application of its own, and compares the process image with
-//! the simulated devices.
+//! The checker of the demonstration: runs the cycles with an application of its own, and compares the process image
+//! with the simulated devices.
 //!
 //! Outputs: every cycle all output bytes change; one cycle later each device in OP must hold the bytes that were sent.
 //! Inputs: what each device offers is noted before a frame passes; the image must show just that one cycle later.

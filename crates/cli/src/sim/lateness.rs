@@ -1,7 +1,7 @@
 //! How well the simulator keeps up with the clock: turns that came later than they were due.
 //!
-//! A stall of this machine, or a frame that takes long to simulate, delays frames without any fault of the MainDevice or
-//! of the simulated segment. It is counted and reported, so that a delayed frame can be traced to it.
+//! A stall of this machine, or a frame that takes long to simulate, delays frames without any fault of the MainDevice
+//! or of the simulated segment. It is counted and reported, so that a delayed frame can be traced to it.
 
 use std::time::Duration;
 
