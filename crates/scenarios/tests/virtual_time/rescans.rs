@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, PortOf, Rescan, RingState, SubDeviceState, Who, automatic};
+use ringcat::{Event, Identified, Options, PortOf, Rescan, RingState, SubDeviceState, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
@@ -49,8 +49,8 @@ fn rescan(world: &mut World) -> Rescan {
 
 /// Index in the declaration for each position.
 fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
-    let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
-    rescan.subdevices.iter().map(|found| index(found.who)).collect()
+    let index = |identified| if let Identified::Declared(index) = identified { Some(index) } else { None };
+    rescan.subdevices.iter().map(|found| index(found.identified)).collect()
 }
 
 // covers: rescan
@@ -75,7 +75,7 @@ fn a_rescan_finds_who_is_new_has_moved_or_is_gone_and_costs_no_working_counter()
     world.run_cycles(50);
     let with_new = rescan(&mut world);
     assert_eq!(declared(&with_new)[4..], [Some(4), Some(5), None, Some(6)]);
-    let Who::Undeclared(identity) = with_new.subdevices[6].who else { panic!("{with_new:?}") };
+    let Identified::Undeclared(identity) = with_new.subdevices[6].identified else { panic!("{with_new:?}") };
     assert_eq!(identity.product_code, world.network().device(NEW).description.identity.product_code);
     assert_eq!(
         (with_new.moved().count(), with_new.missing.len()),

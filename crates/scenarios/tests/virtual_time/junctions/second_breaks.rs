@@ -323,7 +323,7 @@ fn a_local_ring_that_breaks_is_no_crossed_line_for_enhanced_detection_either() {
 }
 
 /// The redundant link is down on purpose, so that crossed lines are located, when two local rings break at once: the
-/// link does not get its partner back in the usual time, since no frame comes back. The breaks are located all the same.
+/// ring cannot close again, since no frame comes back. The breaks are located all the same.
 // covers: JR-02, LC-03, junctions
 #[test]
 fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {
