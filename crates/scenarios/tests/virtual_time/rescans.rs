@@ -344,3 +344,27 @@ fn a_stranger_that_becomes_a_member_has_the_place_that_a_rescan_found_him_at() {
     assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1)]);
     assert!(!world.saw(mark, |event| matches!(event, Event::Moved { .. })));
 }
+
+/// A rescan has the segment for itself while it reads. One that is given up at any time gives that back.
+// covers: rescan
+#[test]
+fn a_rescan_that_is_given_up_blocks_neither_the_next_one_nor_supervision() {
+    let mut world =
+        World::with(1, workshop(), &Options::default(), |scan| automatic(&scan.subdevices, CYCLE)).expect("a world");
+    world.settle();
+    for cycles in 0..6 {
+        let given_up = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let waiting = world.application_mut().engine_mut().start_rescan(LIMIT);
+        world.run_cycles(cycles);
+        drop((waiting, given_up));
+        assert!(rescan(&mut world).is_complete(), "{cycles} cycles");
+    }
+    // A SubDevice that comes needs an address, which waits for the end of rescans.
+    let given_up = world.application_mut().engine_mut().start_rescan(LIMIT);
+    world.power_on(NEW);
+    world.run_cycles(1);
+    drop(given_up);
+    world.run_cycles(2_000);
+    let found = rescan(&mut world);
+    assert!(found.subdevices.iter().any(|found| matches!(found.identified, Identified::Undeclared(_))), "{found:?}");
+}
