@@ -181,7 +181,7 @@ impl MainDevice {
         let led = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
-        // Whoever would have brought it back is gone.
+        // The procedure that would have brought it back is gone.
         self.supervisor.order_link(self.disconnected.take());
         self.scanning.set(false);
         self.requests.end();
@@ -205,7 +205,7 @@ impl MainDevice {
         *self.stopped.borrow()
     }
 
-    /// Events that nobody fetched in time and that were dropped, of both halves.
+    /// Events of both halves that were dropped because they were not fetched in time.
     pub fn events_dropped(&self) -> u64 {
         self.supervisor.events_dropped() + self.cyclic_events.as_ref().map_or(0, Consumer::dropped)
     }

@@ -1,13 +1,13 @@
-//! The model of the segment: what is known of SubDevices, cables, rings and links after activation, and what follows
-//! from what is seen of them.
+//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and what
+//! follows from observations.
 //!
-//! A pure machine: [`Segment::observe`] takes in one [`Observation`] and returns the [`Effects`]: events to tell,
+//! A pure machine: [`Segment::observe`] takes one [`Observation`] and returns the [`Effects`]: events to report,
 //! procedures to start. Nothing else changes it. It sends nothing and waits for nothing; procedures do that, and report
 //! what they found as observations. What the cyclic half must know is posted to the board within `observe`, before
 //! anything else follows.
 //!
-//! Looking takes time, and the segment moves on meanwhile. So findings come with what they were asked of ([`Asked`],
-//! the number of an attempt), and what is out of date is refused.
+//! A scan takes time, and the segment changes meanwhile. So findings carry the versions that they are about ([`Asked`],
+//! the number of an attempt), and findings that are out of date are refused.
 
 mod asked;
 mod attention;

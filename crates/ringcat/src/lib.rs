@@ -152,7 +152,7 @@ pub use ringcat_engine::procedures::services::ports::BlockedPort;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::sii::program::SiiWritten;
 pub use ringcat_engine::procedures::stop::StopError;
-pub use ringcat_engine::procedures::unassigned::rescan::{Found, Rescan, Who};
+pub use ringcat_engine::procedures::unassigned::rescan::{Found, Identified, Rescan};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

@@ -2,7 +2,7 @@
 //!
 //! On two links positions are those of the last scan (CR-09). Increments would follow the way of the frames, which a
 //! break, a crossed SubDevice or a branch behind the way on makes another one; and at an edge, while a frame is out,
-//! nobody knows which. So whoever the scan found at a position is addressed by the station address that it has since.
+//! it is not known which. So the SubDevice that the scan found at a position is addressed by its station address since.
 
 use alloc::vec::Vec;
 
@@ -27,11 +27,11 @@ pub const MAX_DATAGRAMS: usize = 1024;
 pub struct RawDatagram {
     /// The command.
     pub command: Command,
-    /// Whom it addresses, as the command wants it. With two links a position is that of the last scan, or of a rescan
-    /// since then of which the cabling was taken over, wherever a break is and whoever is missing or came in between:
-    /// it leaves with the station address of the SubDevice that was found there. A SubDevice that lost its power
-    /// answers to it again when it was given its address back, one that is not declared only after another look of this
-    /// kind. Other positions, and all with one link, count SubDevices as frames meet them.
+    /// The address, as the command wants it. With two links a position is that of the last scan, or of a rescan
+    /// since then of which the cabling was taken over, wherever a break is and whichever SubDevice is missing or came
+    /// in between: it leaves with the station address of the SubDevice that was found there. A SubDevice that lost its
+    /// power answers to it again when it was given its address back, one that is not declared only after another look
+    /// of this kind. Other positions, and all with one link, count SubDevices as frames meet them.
     pub target: Target,
     /// What is sent; for reads, zeros.
     pub data: Vec<u8>,
@@ -57,7 +57,7 @@ impl MainDevice {
         })
     }
 
-    /// How each of them leaves, and whom it was meant for.
+    /// How each of them leaves, and its original address.
     fn addressed(&self, datagrams: Vec<RawDatagram>) -> Result<Vec<(RawDatagram, Target)>, ServiceError> {
         if datagrams.len() > MAX_DATAGRAMS {
             return Err(ServiceError::TooMany { got: datagrams.len(), limit: MAX_DATAGRAMS });

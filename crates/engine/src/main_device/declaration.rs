@@ -57,21 +57,21 @@ pub struct Declaration {
     pub explicit_lrw: Vec<ExplicitLrw>,
     /// Distributed clocks; `None` leaves them alone.
     pub clocks: Option<ClockConfig>,
-    /// Who must be there for the activation.
+    /// SubDevices that must answer for the activation.
     pub required: Required,
 }
 
-/// Who must be there, and be who is expected, for an activation. Whoever is not is told by an event, is left alone and
-/// may come later.
+/// SubDevices that must answer, with the expected identity, for an activation. An event reports any other; it is left
+/// alone and may come later.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Required {
-    /// Everybody that is declared, optional or not.
-    Everybody,
+    /// All that are declared, optional or not.
+    All,
     /// Those that are not optional.
     #[default]
     Mandatory,
-    /// Nobody.
-    Nobody,
+    /// None.
+    Nothing,
 }
 
 impl Declaration {
@@ -97,7 +97,7 @@ impl Declaration {
 /// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExplicitLrw {
-    /// How whoever wrote the file finds it: its frame, its place in it, its comment.
+    /// How the author of the file finds it: its frame, its place in it, its comment.
     pub name: String,
     /// Its logical address in the file.
     pub logical: LogicalAddress,

@@ -1,4 +1,4 @@
-//! Ethernet of declared SubDevices: who has it, and one port for each.
+//! Ethernet of declared SubDevices: one port for each that supports it.
 
 use alloc::vec::Vec;
 
@@ -20,7 +20,7 @@ pub struct EthernetSubDevice {
 }
 
 impl MainDevice {
-    /// Declared SubDevices that have been seen and whose SII offers EoE, whether they are there now or not; nobody
+    /// Declared SubDevices that have been seen and whose SII offers EoE, whether they answer now or not; none
     /// before activation.
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
         let Some(segment) = &self.segment else { return Vec::new() };
@@ -37,7 +37,7 @@ impl MainDevice {
     }
 
     /// The Ethernet of a declared SubDevice. Its port is opened when it is asked for first and lasts until the
-    /// MainDevice stops; `None` where nobody is declared, or somebody has a port of this mailbox.
+    /// MainDevice stops; `None` where no SubDevice is declared, or this mailbox has a port already.
     pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
         let mailbox = self.segment.as_ref()?.mailbox(subdevice)?;
         while self.ports.len() <= subdevice {

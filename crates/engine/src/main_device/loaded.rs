@@ -75,7 +75,7 @@ impl Loaded {
     }
 }
 
-/// Where a declared connection is in the segment; otherwise who of its SubDevices is optional and not there.
+/// Where a declared connection is in the segment; otherwise which of its SubDevices is optional and does not answer.
 pub(super) fn closing(
     connection: &JunctionConnection,
     found: &[Option<SubDeviceInfo>],

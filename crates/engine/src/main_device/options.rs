@@ -1,4 +1,4 @@
-//! What a MainDevice is told before it begins.
+//! Options of a MainDevice, given before it begins.
 
 use core::time::Duration;
 

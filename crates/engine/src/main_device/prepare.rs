@@ -32,10 +32,10 @@ use crate::supervisor::Bus;
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 
-/// By declaration the SubDevice that was found, and those that nobody declared.
+/// By declaration the SubDevice that was found, and the undeclared ones.
 type Matched = (Vec<Option<SubDeviceInfo>>, Vec<UnassignedSubDevice>);
 
-/// Who is whom.
+/// Matches SubDevices with the declaration.
 pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Scan) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
     let mut owners = vec![None; scan.subdevices.len()];
@@ -46,10 +46,10 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
                 owners[info] = Some(config);
                 found[config] = Some(scan.subdevices[info].clone());
             }
-            Resolution::Absent { config, error } if declaration.required != Required::Everybody => {
+            Resolution::Absent { config, error } if declaration.required != Required::All => {
                 report_absence(bus, config, true, error);
             }
-            Resolution::Failed { config, error } if declaration.required == Required::Nobody => {
+            Resolution::Failed { config, error } if declaration.required == Required::Nothing => {
                 report_absence(bus, config, false, error);
             }
             Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
@@ -175,7 +175,7 @@ pub(super) fn domain_specs(
     lrw: LrwPolicy,
     links: LinkSet,
 ) -> Result<Vec<DomainSpec>, ActivateError> {
-    // With two links it is refused whoever knows it ([`super::lrw::check_lrw`]).
+    // With two links it is always refused ([`super::lrw::check_lrw`]).
     let is_asked_for = lrw == LrwPolicy::Explicit && links == LinkSet::Single;
     let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {

@@ -81,7 +81,7 @@ impl MainDevice {
         self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
     }
 
-    /// Starts to open or close a port. Who is behind one that is closed is gone for everybody.
+    /// Starts to open or close a port. SubDevices behind a closed one are out of reach.
     pub fn start_port_set(
         &mut self,
         subdevice: usize,
@@ -104,7 +104,7 @@ impl MainDevice {
         })
     }
 
-    /// Starts to open all ports that were closed to cut somebody off.
+    /// Starts to open all ports that were closed to cut SubDevices off.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
         let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move {
@@ -118,7 +118,7 @@ impl MainDevice {
         self.start_on(subdevice, move |bus, station| async move { reset::reset_controller(&bus, station).await })
     }
 
-    /// Has whoever supervises look at all SubDevices now, and for new ones, as if the segment had changed. False before
+    /// Has supervision scan all SubDevices now, and search for new ones, as if the segment had changed. False before
     /// activation: there a scan looks.
     pub fn force_topology_change(&mut self) -> bool {
         if let Some(segment) = &self.segment {
@@ -127,9 +127,9 @@ impl MainDevice {
         self.segment.is_some()
     }
 
-    /// Starts to look at the whole segment again while process data goes on: who is at which place now, who is new, has
-    /// moved or is gone. New ones are read, but left alone. Until the segment holds still and it is known of everybody
-    /// who it is, for so long at most; then the result is what is known.
+    /// Starts a scan of the whole segment while process data goes on: which SubDevice is at which place now, which are
+    /// new, have moved or are missing. New ones are read, but left alone. It lasts until the segment holds still and
+    /// all are identified, for so long at most; then the result is what is known.
     ///
     /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, rings behind
     /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does

@@ -1,4 +1,4 @@
-//! How far declared SubDevices and hot connect groups are, as the application is told.
+//! How far declared SubDevices and hot connect groups are, for the application.
 
 use ringcat_wire::al::AlState;
 

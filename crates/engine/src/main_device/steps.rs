@@ -1,6 +1,6 @@
 //! Configuration in steps: load what the application declares, add connections of local rings, apply (JR-05).
 //!
-//! [`MainDevice::activate`] is all of it at once, for those who have nothing to add.
+//! [`MainDevice::activate`] is all of it at once, for applications that have nothing to add.
 
 use alloc::vec::Vec;
 

@@ -1,12 +1,12 @@
 //! Crossed lines in operation (protocol 9.5): whenever ports of SubDevices have changed, the segment is looked at anew
-//! and who is entered at another port than 0 is told, once.
+//! and each SubDevice that frames enter at another port than 0 is reported, once.
 //!
-//! More rings behind junctions than are known are told too: whoever asked for junction redundancy must know that one of
-//! them is not watched.
+//! More rings behind junctions than are known are reported too: an application that wants junction redundancy must know
+//! that one of them is not watched.
 //!
 //! One look proves little: cables that are cut and healed within milliseconds, and frames that get lost meanwhile, make
 //! a straight ring look crossed. So a look counts only if the segment was the same before and behind it, and what it
-//! shows beyond what was told is believed when the next one shows the same.
+//! shows beyond what was reported is believed when the next one shows the same.
 //!
 //! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
 //! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03).
@@ -48,7 +48,7 @@ pub(super) trait Known {
     fn ports(&self, station: StationAddress) -> [PortKind; 4];
     /// Closing cables of the local rings that are known, in a segment in which these are, by position.
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing>;
-    /// Of all of these it is known who they are.
+    /// All of these are identified.
     fn are_known(&self, stations: &[StationAddress]) -> bool;
     /// Ports were read: those that have changed in between have told it to this look.
     fn note_look(&self);
@@ -73,9 +73,9 @@ pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
-/// Who is crossed, and which rings are not known; `None` where the segment changes too much to tell. `told` is what was
-/// told of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down meanwhile;
-/// where it cannot be, that is reported, and the ring is looked at as it is.
+/// Crossed SubDevices, and rings that are not known; `None` where the segment changes too much to tell. `told` is what
+/// was reported of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down
+/// meanwhile; where it cannot be, that is reported, and the ring is looked at as it is.
 pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, told: &LineCheck) -> Option<LineCheck> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
@@ -89,9 +89,9 @@ pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, tol
     bus.force_disconnect(Link::Redundant, false).await;
     wait_for(bus, known, RingState::Closed).await;
     // A carrier that is still missing would be reported as lost. The links read it less often than frames come.
-    let until = bus.now() + LINK_LIMIT;
+    let (until, signal) = (bus.now() + LINK_LIMIT, bus.signal());
     while bus.carriers().contains(&Some(false)) && bus.now() < until {
-        bus.sleep(LINK_PAUSE).await;
+        bus.until_posted(bus.posted(), until, &signal, || false).await;
     }
     found
 }
@@ -116,7 +116,7 @@ pub(super) async fn stays_closed(bus: &Bus) -> bool {
     matches!(view(bus).await, Ok(Some(after)) if after == before) && bus.ring() == RingState::Closed
 }
 
-/// Looks until one shows what was told already, or two in a row show the same.
+/// Looks until one shows what was reported already, or two in a row show the same.
 async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<LineCheck> {
     let mut before = None;
     for attempt in 0..ATTEMPTS {
@@ -159,7 +159,7 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusErr
     let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
     let _latches = latch_anyway(bus).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
-        // Without a clock nobody answers.
+        // Without a clock it does not answer.
         match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
             Ok(bytes) => Ok(Some(DcReceiveTimes::decode(&bytes).ports.map(|time| time.0))),
             Err(BusError::Wkc { .. }) => Ok(None),

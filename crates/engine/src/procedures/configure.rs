@@ -171,7 +171,7 @@ impl BringUp<'_> {
         self.map().await?;
         let reached = self.request(AlState::PreOp, AlState::SafeOp).await;
         if let Err(error) = &reached {
-            // Nobody has to reckon with it until the next attempt.
+            // Process data does not count on it until the next attempt.
             self.part().await?;
             self.explain(error).await;
         }

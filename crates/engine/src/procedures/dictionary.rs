@@ -29,7 +29,7 @@ const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
 /// Whose dictionaries are asked for PDOs after a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReadPdos {
-    /// Nobody's.
+    /// None.
     Never,
     /// Those of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
     #[default]

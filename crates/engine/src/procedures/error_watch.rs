@@ -21,9 +21,9 @@ use crate::topology::PortOf;
 
 /// Pause between two looks.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Damaged frames between two looks that are told at once; fewer when there were some before, too.
+/// Damaged frames between two looks that are reported at once; fewer when there were some before, too.
 const MANY: u64 = 3;
-/// The same cable is told of again after this time at the earliest.
+/// The same cable is reported again after this time at the earliest.
 const AGAIN: Duration = Duration::from_secs(10);
 /// Counters end at 255: from here on they are cleared.
 const FULL: u8 = 128;
@@ -114,7 +114,7 @@ struct Watched {
     cable: Cable,
     /// Since the last look.
     fresh: CableErrors,
-    /// Since it was told of last.
+    /// Since its last report.
     untold: CableErrors,
     /// There were damaged frames at the look before, too.
     continues: bool,

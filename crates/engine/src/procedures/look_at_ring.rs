@@ -1,5 +1,5 @@
-//! Looking at a ring without changing anything: who answers on which link, how they are cabled, what their ports have
-//! counted. Only reads, so that a segment which somebody else operates goes on.
+//! Examining a ring without changing anything: which SubDevices answer on which link, how they are cabled, what their
+//! ports have counted. Only reads, so that a segment which another MainDevice operates goes on.
 
 use alloc::vec::Vec;
 
@@ -21,7 +21,7 @@ pub struct RingLook {
     pub state: RingState,
     /// SubDevices on the main and on the redundant link.
     pub counts: (u16, u16),
-    /// Station addresses by position, as whoever operates the segment has given them; 0 where nobody has.
+    /// Station addresses by position, as the MainDevice that operates the segment has given them; 0 where none has.
     pub stations: Vec<StationAddress>,
     /// AL states by position.
     pub states: Vec<AlStatus>,
@@ -38,7 +38,7 @@ pub struct RingLook {
 /// Looks once. SubDevices are addressed by position, which needs no station addresses.
 ///
 /// # Errors
-/// Frames that are lost again and again, nobody who answers, or SubDevices that come or go meanwhile.
+/// Frames that are lost again and again, no SubDevice that answers, or SubDevices that come or go meanwhile.
 pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     let counted = match bus.brd(map::TYPE, 1).await {
         Ok(counted) if counted.wkc().0 == 0 => return Err(ScanError::NoSubDevices),

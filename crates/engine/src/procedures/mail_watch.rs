@@ -1,4 +1,4 @@
-//! Finding out who has mail that nobody asked for (protocol 6.1).
+//! Finding SubDevices with mail that was not requested (protocol 6.1).
 //!
 //! SubDevices whose SII offers it show the status bit of their send mailbox through an FMMU: each has a bit of its own
 //! in the logical address space, and all answer one read together. The others are asked one by one, so seldom that all
@@ -45,7 +45,7 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
                 open.mailbox.mail_available();
             }
         }
-        // Where some do not answer, nobody knows who: all are asked, until they are found and mended.
+        // Where some do not answer, it is not known which: all are read, until they are found and mended.
         if !look_together(&bus, &mapped).await {
             others.extend(mapped);
         }

@@ -18,7 +18,7 @@ pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, index: usize)
         read_one(bus, known.position, known.station, &SiiCache::new(false)).await
     };
     match read.await {
-        // The reason was told.
+        // The reason was reported.
         Ok(info) if info.is_blank() => {}
         Ok(mut info) => {
             info.keep_read_online(&known);

@@ -37,8 +37,8 @@ const LOOKS: usize = 3;
 /// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
 const LOOK_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: the error of
-/// its that was told and still stands.
+/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: its error
+/// that is reported and still holds.
 pub(super) async fn keep_up(
     bus: &Bus,
     segment: &SharedSegment,
@@ -173,7 +173,7 @@ async fn try_once(
 }
 
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its
-/// error is told, unless it is the one that was.
+/// error is reported, unless it is the one that was.
 async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;

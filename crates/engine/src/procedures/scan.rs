@@ -1,4 +1,4 @@
-//! Finding out who is there (protocol 5.6): count, common ground, station addresses, what each SubDevice is, topology.
+//! Finding all SubDevices (protocol 5.6): count, common ground, station addresses, what each SubDevice is, topology.
 //!
 //! All SubDevices are asked at once, one task each; their datagrams share frames by themselves.
 
@@ -361,7 +361,7 @@ async fn read_registers(bus: &Bus, position: Position, station: StationAddress) 
     let information = Information::decode(answered(&replies, station, registers, 0)?);
     let dl_status = DlStatus::decode(answered(&replies, station, registers, 1)?);
     let alias = u16::from_le_bytes(*answered(&replies, station, registers, 2)?);
-    // Without a clock nobody answers.
+    // Without a clock it does not answer.
     let receive_times = if information.features.dc {
         let times = DcReceiveTimes::decode(answered(&replies, station, registers, 3)?);
         Some(times.ports.map(|time| time.0))

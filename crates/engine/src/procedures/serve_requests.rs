@@ -40,7 +40,7 @@ impl Requests {
         &self.bell
     }
 
-    /// Nobody serves them any more.
+    /// They are not served any more.
     pub(crate) fn end(&self) {
         self.all.borrow().iter().for_each(AcyclicSide::end);
     }

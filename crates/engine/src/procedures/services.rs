@@ -17,7 +17,7 @@ use crate::supervisor::BusError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ServiceError {
-    /// Nobody is declared, or was found, with this number.
+    /// No SubDevice is declared, or was found, with this number.
     NoSubDevice {
         /// The number.
         subdevice: usize,

@@ -89,7 +89,7 @@ impl SharedSegment {
         for effect in effects.0 {
             match effect {
                 Effect::Report(event) => self.bus.report(event),
-                Effect::ReportOf(event, who) => self.bus.report_of(event, who),
+                Effect::ReportOf(event, occupant) => self.bus.report_of(event, occupant),
                 Effect::SuspendMailbox { index } => self.mailboxes.get(index).into_iter().for_each(Mailbox::suspend),
                 Effect::MainCount(count) => self.bus.set_main_count(count),
                 Effect::Occupants(occupants) => self.bus.set_occupants(occupants),

@@ -42,7 +42,7 @@ const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
 /// many real images they differ where nothing else in the fixed area does, though the categories do: they are worth a
 /// read.
 const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
-/// Pause between two looks whether somebody else has read the same SII.
+/// Pause between two checks whether another procedure has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
 
 /// Which categories the engine uses.

@@ -34,7 +34,7 @@ const ASKED_AGAIN: Duration = Duration::from_millis(20);
 pub enum StopError {
     /// The bus failed.
     Bus(BusError),
-    /// Nobody answers any more.
+    /// No SubDevice answers any more.
     NoAnswer,
     /// Some did not get there in time.
     NotReached {

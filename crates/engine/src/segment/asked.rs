@@ -1,6 +1,6 @@
-//! What a question was about: an answer to another one is out of date.
+//! The versions that a read was about: its findings are out of date when these have changed.
 
-/// Versions of what answers may be about.
+/// The versions that findings are about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Asked {
     /// Positions mean places in this cabling.

@@ -138,7 +138,7 @@ impl Attention {
         Instant::NEVER
     }
 
-    /// The state of the ring that had been told when the last round began.
+    /// The state of the ring that had been reported when the last round began.
     pub fn reported(&self) -> RingState {
         self.reported
     }

@@ -9,19 +9,19 @@ use crate::ring::RingState;
 use crate::ring_status::Cable;
 use crate::topology::{PortOf, Topology, ends_of_earlier_break};
 
-/// What was told of breaks.
+/// Breaks as reported.
 #[derive(Debug, Default)]
 pub(super) struct Breaks {
     /// The state of the ring when it was looked at last.
     pub state: RingState,
     /// Looks for a place that are left.
     pub looks: u8,
-    /// Broken cables of the open ring that were told.
+    /// Broken cables of the open ring that were reported.
     pub told: Vec<Cable>,
 }
 
 /// The cables of the ring that no longer have communication, in its order. Branches are none of it: what is behind one
-/// is told as lost. `dl_status` by position.
+/// is reported as lost. `dl_status` by position.
 pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Vec<Cable> {
     let Some(first) = topology.nodes.first() else { return Vec::new() };
     let trunk = trunk(topology);
@@ -45,7 +45,7 @@ pub(super) fn is_broken(dl_status: &[Option<DlStatus>], cable: &Cable) -> Option
     ends.reduce(|one, other| one && other).map(|communicates| !communicates)
 }
 
-/// Who is on the way between the interfaces, by position; everybody where that way is not known.
+/// SubDevices on the way between the interfaces, by position; all where that way is not known.
 fn trunk(topology: &Topology) -> Vec<bool> {
     let mut trunk = vec![false; topology.nodes.len()];
     let mut follow = |end: Option<usize>| {

@@ -1,4 +1,4 @@
-//! Crossed lines, and what was told of them.
+//! Crossed lines, and the events about them.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -43,14 +43,14 @@ pub struct LineCheck {
 }
 
 impl LineCheck {
-    /// Whether it adds nothing to what was told of a segment and takes nothing back.
+    /// Whether it adds nothing to what was reported of a segment and takes nothing back.
     pub fn says_the_same_as(&self, told: &LineCheck) -> bool {
         let crossed = |check: &LineCheck| check.crossings.iter().map(Crossing::station).collect::<BTreeSet<_>>();
         crossed(self) == crossed(told) && self.swapped == told.swapped && self.unknown_rings <= told.unknown_rings
     }
 
-    /// What was told and still stands, with what is new. A closed ring takes nothing back that an open one has shown,
-    /// and an open one shows nothing of those that do not answer.
+    /// What was reported and still holds, with what is new. A closed ring takes nothing back that an open one has
+    /// shown, and an open one shows nothing of those that do not answer.
     pub(super) fn and(mut self, found: LineCheck) -> LineCheck {
         if found.crossings.is_empty() {
             self.crossings.clear();
@@ -90,7 +90,7 @@ pub(super) enum Search {
     Again,
 }
 
-/// Looks out for changes of ports, and has crossings told once each.
+/// Notes changes of ports, and has each crossing reported once.
 #[derive(Debug)]
 pub(super) struct Crossings {
     /// Rings behind junctions are watched.
@@ -99,12 +99,12 @@ pub(super) struct Crossings {
     pub ports: Vec<Option<u16>>,
     /// How far the search is.
     pub search: Search,
-    /// What was told.
+    /// Reported crossings.
     pub told: LineCheck,
 }
 
 impl Crossings {
-    /// What the scan told is not told again.
+    /// Crossings that the scan reported are not reported again.
     pub fn new(cabling: &Cabling, members: &[Member], choices: Choices) -> Crossings {
         let topology = &cabling.topology;
         let told = topology.findings.iter().filter_map(|finding| match *finding {

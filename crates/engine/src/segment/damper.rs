@@ -1,24 +1,24 @@
-//! How often a state that changes is told: each change at once, as long as changes are rare.
+//! How often a state that changes is reported: each change at once, as long as changes are rare.
 //!
-//! A change that follows another one closely is told when the state has held for a moment. Who changes too often for
-//! long is told only when it has been steady for a second: a loose plug bounces for hours.
+//! A change that follows another one closely is reported when the state has held for a moment. A cable that changes too
+//! often for long is reported only when it has been steady for a second: a loose plug bounces for hours.
 
 use core::time::Duration;
 
 use crate::time::Instant;
 
-/// A change that comes so long after the one before is told at once.
+/// A change that comes so long after the one before is reported at once.
 const QUIET: Duration = Duration::from_millis(20);
-/// One that comes earlier is told when it has held for so long.
+/// One that comes earlier is reported when it has held for so long.
 const HOLD: Duration = Duration::from_millis(3);
-/// A state that changes too often is told when it has held for so long.
+/// A state that changes too often is reported when it has held for so long.
 const STEADY: Duration = Duration::from_secs(1);
-/// Changes that may be told in a row.
+/// Changes that may be reported in a row.
 const BUDGET: u32 = 32;
-/// One more may be told each time this has passed: four a second in the long run.
+/// One more may be reported each time this has passed: four a second in the long run.
 const REFILL: Duration = Duration::from_millis(250);
 
-/// Decides when a change is told.
+/// Decides when a change is reported.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Damper {
     changed_at: Option<Instant>,
@@ -57,7 +57,7 @@ impl Damper {
         self.is_prompt || held >= HOLD
     }
 
-    /// It is told. True where from now on it changes too often to be told each time.
+    /// It is reported. True where from now on it changes too often to be reported each time.
     pub(crate) fn tell(&mut self, now: Instant) -> bool {
         let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
         if refills > 0 {
@@ -69,7 +69,7 @@ impl Damper {
         self.is_unsteady && !was
     }
 
-    /// Whether it changes too often to be told each time.
+    /// Whether it changes too often to be reported each time.
     pub(crate) fn is_unsteady(&self, now: Instant) -> bool {
         self.is_unsteady && self.changed_at.is_some_and(|at| now.since(at) < STEADY)
     }
@@ -79,8 +79,8 @@ impl Damper {
 mod tests {
     use super::*;
 
-    /// Looks every 500 us at a state that flips every `half_period`; returns how often it was told, and how often that
-    /// it is unsteady.
+    /// Looks every 500 us at a state that flips every `half_period`; returns how often it was reported, and how often
+    /// that it is unsteady.
     fn flap(half_period: Duration, lasts: Duration) -> (u32, u32) {
         let (mut damper, mut told_state, mut told, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
         let mut now = Instant(0);

@@ -2,8 +2,8 @@
 //! those that need all of that to stay as it is: one at a time.
 //!
 //! None of these can be cancelled: each runs to its undo. Where several are wanted at once the most urgent one is next.
-//! Each ends within its own time limit, and sooner where a more urgent one waits, so that a segment that changes all the
-//! time starves none.
+//! Each ends within its own time limit, and sooner where a more urgent one waits, so that a segment that changes all
+//! the time starves none.
 
 use alloc::vec::Vec;
 

@@ -16,9 +16,9 @@ pub type Shown = (AlStatus, AlStatusCode);
 /// One consequence. They are carried out in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// To be told to the application.
+    /// An event for the application.
     Report(Event),
-    /// The same, about a SubDevice of which it is known which one it is.
+    /// An event about an identified SubDevice.
     ReportOf(Event, Occupant),
     /// Mail to and from a member stops until it is there again.
     SuspendMailbox {
@@ -60,7 +60,7 @@ pub enum Task {
         attempt: u32,
         /// What is known of its registers.
         from: Start,
-        /// Its error that was told and still stands.
+        /// Its error that is reported and still holds.
         told: Option<Shown>,
         /// What has to be found out first.
         check: Check,
@@ -95,14 +95,14 @@ pub enum Task {
 pub struct Effects(pub Vec<Effect>);
 
 impl Effects {
-    /// Tells the application.
+    /// Reports an event.
     pub(super) fn report(&mut self, event: Event) {
         self.0.push(Effect::Report(event));
     }
 
-    /// Tells the application of a SubDevice.
-    pub(super) fn report_of(&mut self, event: Event, who: Occupant) {
-        self.0.push(Effect::ReportOf(event, who));
+    /// Reports an event about a SubDevice.
+    pub(super) fn report_of(&mut self, event: Event, occupant: Occupant) {
+        self.0.push(Effect::ReportOf(event, occupant));
     }
 
     /// Starts a procedure.
@@ -110,7 +110,7 @@ impl Effects {
         self.0.push(Effect::Start(task));
     }
 
-    /// Tells that something could not be configured.
+    /// Reports that a member could not be configured.
     pub(super) fn failed(&mut self, subdevice: usize, reason: String) {
         self.report(Event::ConfigurationFailed { subdevice, reason });
     }

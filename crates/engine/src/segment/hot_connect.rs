@@ -1,4 +1,4 @@
-//! Telling when hot connect groups have joined, and when they have left; having the cabling taken over with them.
+//! Events of hot connect groups that have joined or left, and the cabling with or without them.
 
 use alloc::vec::Vec;
 
@@ -19,7 +19,7 @@ pub fn counts(members: &[Member]) -> Vec<(usize, usize, usize)> {
     groups.iter().map(count).collect()
 }
 
-/// The groups, and which of them were told to have joined.
+/// The groups, and which of them were reported to have joined.
 #[derive(Debug)]
 pub(super) struct HotConnect {
     /// Members by group.

@@ -31,10 +31,10 @@ pub(super) struct LocalRings {
     rings: Vec<Vec<Watched>>,
     closings: Vec<Closing>,
     main_count: usize,
-    /// Who is at the places of the cabling, and the number of that cabling.
+    /// The SubDevices at the places of the cabling, and the version of that cabling.
     places: Places,
     version: u32,
-    /// Cables that were not known and are: from where they come, and who is behind them.
+    /// Cables that have become known: where they begin, and the SubDevice behind them.
     completed: Vec<(PortOf, usize)>,
     /// How many cables are broken.
     broken: usize,
@@ -68,9 +68,9 @@ impl LocalRings {
         }
     }
 
-    /// A break that was told goes on to be that of one cable: one that is broken and has an end in common with the one
-    /// of which it was told, or else is in the same ring, or else has that and is whole again. Where there is none, the
-    /// cable is gone.
+    /// A break that was reported goes on to be that of one cable: one that is broken and has an end in common with the
+    /// one of which it was reported, or else is in the same ring, or else has that and is whole again. Where there is
+    /// none, the cable is gone.
     fn go_over(&mut self, new: LocalRings, status: &[Option<NodeStatus>]) {
         let before = core::mem::replace(self, new);
         let places = &self.places;
@@ -191,7 +191,7 @@ fn watched(ring: &LocalRing) -> Vec<Watched> {
     ring.cables.iter().map(|cable| Watched { cable: *cable, reported: false, whole_since: None }).collect()
 }
 
-/// Who is where, by position.
+/// SubDevices by position.
 #[derive(Clone, Debug, Default)]
 struct Places {
     stations: Vec<StationAddress>,
@@ -200,7 +200,7 @@ struct Places {
 }
 
 impl Places {
-    /// Both ends of a cable, by who is there.
+    /// Both ends of a cable, by the SubDevices there.
     fn ends(&self, cable: &RingCable) -> [Option<End>; 2] {
         [cable.near, Some(cable.far)].map(|at| self.end(at?))
     }

@@ -110,13 +110,13 @@ mod tests {
     }
 
     #[test]
-    fn one_that_cannot_be_read_keeps_its_place_unless_somebody_who_can_needs_it() {
+    fn an_unreadable_one_keeps_its_place_unless_a_readable_one_needs_it() {
         assert_eq!(assigned(&[true, true], &[[Unreadable; 2], [Seen; 2]]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, true], &[[Unreadable], [Seen]]), [None, Some(0)]);
     }
 
     #[test]
-    fn one_that_fits_nowhere_is_nobody() {
+    fn one_that_fits_nowhere_is_no_member() {
         assert_eq!(assigned(&[true, true], &[[No, No], [No, Seen]]), [None, Some(1)]);
         assert_eq!(assigned::<0>(&[true], &[[]]), [None]);
     }

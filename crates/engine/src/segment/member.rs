@@ -1,4 +1,4 @@
-//! A SubDevice that the application declared: who it is, how far it is, what has happened to it.
+//! A SubDevice that the application declared: its identity, its phase, its incidents.
 
 use alloc::rc::Rc;
 use core::time::Duration;
@@ -29,7 +29,7 @@ pub struct Member {
     pub config: Rc<SubDeviceConfig>,
     /// The state to which it is brought: that of the declaration, or another one that was requested since.
     pub target: AlState,
-    /// Who it is; `None` while it has never been seen.
+    /// Its identity and abilities; `None` while it has never answered.
     pub info: Option<SubDeviceInfo>,
     /// Its station address.
     pub station: StationAddress,
@@ -61,7 +61,7 @@ pub struct Member {
 const FIRST_PAUSE: Duration = Duration::from_millis(2);
 /// Longest pause: all are looked at so often anyway.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// So many times in a row are told.
+/// So many times in a row are reported.
 const PATIENCE: u32 = 10;
 
 /// What answers at the address of a lost SubDevice and is not known to be it. It loses the address; one that keeps it
@@ -87,7 +87,7 @@ impl Mistaken {
         (now < self.until).then(|| self.until.since(now))
     }
 
-    /// It keeps the address: to be told now.
+    /// It keeps the address: to be reported now.
     pub fn is_to_tell(&self) -> bool {
         self.times == PATIENCE
     }

@@ -58,7 +58,7 @@ pub struct Segment {
     pub cabling: Cabling,
     /// Ports that were closed to cut SubDevices off.
     pub blocked: Vec<BlockedPort>,
-    /// What junctions of local rings were told to do about their ports.
+    /// Orders to junctions of local rings about their ports.
     pub port_controls: Vec<PortControl>,
     pub(super) board: Arc<Board>,
     pub(super) choices: Choices,
@@ -117,7 +117,7 @@ impl Segment {
         (references == self.clocks.references() && !self.board.clocks.is_held()).then_some(references)
     }
 
-    /// The ring and its links, as they were told.
+    /// The ring and its links, as they were reported.
     pub fn ring_status(&self) -> RingStatus {
         self.ring.status
     }
@@ -157,7 +157,7 @@ impl Segment {
         !self.attention.has_changed(words, self.ring.reported())
     }
 
-    /// What was told of crossed lines.
+    /// Crossed lines as reported.
     pub fn told_crossings(&self) -> &LineCheck {
         self.crossings.told()
     }

@@ -84,7 +84,7 @@ pub enum Observation<'a> {
         /// The attempt that found it out.
         attempt: u32,
     },
-    /// What answers at a lost member's address is another SubDevice, or cannot be told.
+    /// What answers at a lost member's address is another SubDevice, or cannot be identified.
     NotReturned {
         /// The member.
         index: usize,
@@ -241,16 +241,16 @@ pub enum Observation<'a> {
         /// What was posted then.
         words: Words,
     },
-    /// A junction is about to be told something about its ports.
+    /// A junction is about to get an order about its ports.
     PortsOrdered {
         /// The junction.
         station: StationAddress,
         /// What.
         control: DlControl,
     },
-    /// It has been told.
+    /// It has got it.
     PortsTold(StationAddress),
-    /// What a junction was told was read, when it had had so many orders.
+    /// The order that a junction has was read, after so many orders.
     PortsRead {
         /// The junction.
         station: StationAddress,

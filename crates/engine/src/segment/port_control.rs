@@ -1,4 +1,4 @@
-//! What SubDevices were told to do about their ports.
+//! Orders to SubDevices about their ports.
 //!
 //! Rings of which no frame comes back are looked into by writing the loops of all ports of their junctions at once. A
 //! port that was closed on purpose must stay closed then, also where that was less than a look ago, or where the answer
@@ -17,12 +17,12 @@ pub struct BlockedPort {
     pub port: u8,
 }
 
-/// What a junction was told.
+/// The order to a junction.
 #[derive(Clone, Copy, Debug)]
 pub struct PortControl {
     /// The junction.
     pub station: StationAddress,
-    /// What it was told.
+    /// The order.
     pub control: DlControl,
     /// Orders of the application so far.
     pub orders: u32,

@@ -1,5 +1,5 @@
 //! The ring and the links: opened and closed with the counts of both sides, redundancy lost and regained, a carrier
-//! gone and back. Each edge is told once, and not too often ([`Damper`]); what is asked for is always up to date.
+//! gone and back. Each edge is reported once, and not too often ([`Damper`]); what is asked for is always up to date.
 //!
 //! All of it comes from words that the exchange posts: nothing here waits for a frame, so that the event comes in the
 //! cycle whose frames showed the change.
@@ -38,10 +38,10 @@ pub struct Words {
     pub cycles: u64,
 }
 
-/// What is known of the ring, and what was told of it.
+/// What is known of the ring, and what was reported of it.
 #[derive(Debug)]
 pub(super) struct Ring {
-    /// The state that was told last.
+    /// The state that was reported last.
     reported: RingState,
     /// Changes of the ring that were seen.
     changes: u32,
@@ -87,7 +87,7 @@ impl Ring {
         }
     }
 
-    /// The state that was told last.
+    /// The state that was reported last.
     pub fn reported(&self) -> RingState {
         self.reported
     }
@@ -125,7 +125,7 @@ impl Ring {
         [again, is_open.then(|| now + PAUSE)].into_iter().flatten().min()
     }
 
-    /// When a change of a carrier may be told that may not be now.
+    /// When a change of a carrier may be reported that may not be now.
     fn observe_carriers(
         &mut self,
         carriers: [Option<bool>; 2],
@@ -157,7 +157,7 @@ impl Ring {
         again
     }
 
-    /// True while something has still to be told or to settle.
+    /// True while something has still to be reported or to settle.
     fn observe_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
         let word = words.ring;
         if word.changes != self.changes {
@@ -176,7 +176,7 @@ impl Ring {
         !is_settled || !is_told || self.status.unsteady
     }
 
-    /// True where the state was told, and the counts of it are steady.
+    /// True where the state was reported, and the counts of it are steady.
     fn tell_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
         let word = words.ring;
         let Some((number, supervision)) = words.supervision else { return true };
@@ -270,7 +270,7 @@ impl Ring {
         None
     }
 
-    /// True where what is known was told.
+    /// True where what is known was reported.
     fn tell_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
         let before = self.status.redundancy;
         let cause = match (self.reported, word.dead_way) {

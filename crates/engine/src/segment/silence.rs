@@ -10,6 +10,6 @@ pub(super) struct Silence {
     pub last: Option<(Option<u32>, Instant, u64)>,
     /// Not looked at before then.
     pub next: Instant,
-    /// It was told that none comes back.
+    /// It was reported that none comes back.
     pub is_blocked: bool,
 }

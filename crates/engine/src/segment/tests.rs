@@ -1,4 +1,4 @@
-//! From what is posted and seen to what is told, without a bus.
+//! From posted words and observations to events, without a bus.
 
 mod clocks;
 
@@ -37,7 +37,7 @@ const BEHIND: u8 = 0x59;
 
 const OP: Shown = (AlStatus { state: 8, error: false, identification: false, reserved: 0 }, AlStatusCode(0));
 
-/// A change that comes so long after another one is told at once.
+/// A change that comes so long after another one is reported at once.
 const QUIET: Duration = Duration::from_millis(50);
 
 /// A closed ring of so many SubDevices, all of them members and in OP.
@@ -268,7 +268,7 @@ fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look()
 }
 
 #[test]
-fn looks_across_an_isolation_say_nothing_of_who_is_there() {
+fn looks_across_an_isolation_do_not_show_which_subdevices_are_there() {
     let mut ring = Ring::closed(3);
     let asked = ring.segment.asked();
     ring.observe(Observation::Wanted(Wanted { disturbance: Disturbance::IsolateRings, number: 0 }));

@@ -6,7 +6,7 @@ use ringcat_wire::address::{StationAddress, Wkc};
 
 use crate::board::RingWord;
 
-/// Who answers at each position.
+/// The station address at each position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct View {
     /// SubDevices on the main and on the redundant link.

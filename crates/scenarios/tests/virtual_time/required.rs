@@ -48,7 +48,7 @@ fn a_mismatch_is_reported_with_both_values_and_not_configured() {
             |_| (),
             |declaration| {
                 declaration.subdevices[2] = change(declaration.subdevices[2].clone());
-                declaration.required = Required::Nobody;
+                declaration.required = Required::Nothing;
             },
         )
         .expect("activation");
@@ -111,7 +111,7 @@ fn all_subdevices_may_be_required_including_optional_ones() {
             },
         )
     };
-    let error = with(Required::Everybody).expect_err("one is missing");
+    let error = with(Required::All).expect_err("one is missing");
     assert!(error.to_string().contains("no SubDevice at position 3; 3 are present"), "{error}");
     let mut world = with(Required::Mandatory).expect("activation");
     world.until(LIMIT, "settled", |world| world.application().mandatory_settled());
@@ -121,7 +121,7 @@ fn all_subdevices_may_be_required_including_optional_ones() {
 // covers: mandatory
 #[test]
 fn a_missing_mandatory_subdevice_is_reported_and_may_join_later() {
-    let declare = |declaration: &mut Declaration| declaration.required = Required::Nobody;
+    let declare = |declaration: &mut Declaration| declaration.required = Required::Nothing;
     let mut devices = descriptions(&KINDS);
     for device in &mut devices {
         device.alias = 0;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, PortOf, Rescan, RingState, SubDeviceState, Who, automatic};
+use ringcat::{Event, Identified, Options, PortOf, Rescan, RingState, SubDeviceState, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
@@ -49,8 +49,8 @@ fn rescan(world: &mut World) -> Rescan {
 
 /// Index in the declaration for each position.
 fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
-    let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
-    rescan.subdevices.iter().map(|found| index(found.who)).collect()
+    let index = |identified| if let Identified::Declared(index) = identified { Some(index) } else { None };
+    rescan.subdevices.iter().map(|found| index(found.identified)).collect()
 }
 
 // covers: rescan
@@ -75,7 +75,7 @@ fn a_rescan_finds_new_moved_and_missing_subdevices() {
     world.run_cycles(50);
     let with_new = rescan(&mut world);
     assert_eq!(declared(&with_new)[4..], [Some(4), Some(5), None, Some(6)]);
-    let Who::Undeclared(identity) = with_new.subdevices[6].who else { panic!("{with_new:?}") };
+    let Identified::Undeclared(identity) = with_new.subdevices[6].identified else { panic!("{with_new:?}") };
     assert_eq!(identity.product_code, world.network().device(NEW).description.identity.product_code);
     assert_eq!(
         (with_new.moved().count(), with_new.missing.len()),
@@ -343,4 +343,28 @@ fn an_unassigned_subdevice_becomes_a_member_at_its_rescan_place() {
     let mark = world.mark();
     assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1)]);
     assert!(!world.saw(mark, |event| matches!(event, Event::Moved { .. })));
+}
+
+/// A rescan has the segment for itself while it reads. One that is given up at any time gives that back.
+// covers: rescan
+#[test]
+fn a_rescan_that_is_given_up_blocks_neither_the_next_one_nor_supervision() {
+    let mut world =
+        World::with(1, workshop(), &Options::default(), |scan| automatic(&scan.subdevices, CYCLE)).expect("a world");
+    world.settle();
+    for cycles in 0..6 {
+        let given_up = world.application_mut().engine_mut().start_rescan(LIMIT);
+        let waiting = world.application_mut().engine_mut().start_rescan(LIMIT);
+        world.run_cycles(cycles);
+        drop((waiting, given_up));
+        assert!(rescan(&mut world).is_complete(), "{cycles} cycles");
+    }
+    // A SubDevice that comes needs an address, which waits for the end of rescans.
+    let given_up = world.application_mut().engine_mut().start_rescan(LIMIT);
+    world.power_on(NEW);
+    world.run_cycles(1);
+    drop(given_up);
+    world.run_cycles(2_000);
+    let found = rescan(&mut world);
+    assert!(found.subdevices.iter().any(|found| matches!(found.identified, Identified::Undeclared(_))), "{found:?}");
 }

@@ -34,7 +34,7 @@ impl BringUp<'_> {
         self.setup.plan.mailbox.is_empty() || self.mailbox.is_open()
     }
 
-    /// SyncManagers for OP only are switched off first: where nobody but they knows of states, outputs end with them.
+    /// SyncManagers for OP only are switched off first: where only they depend on states, outputs end with them.
     async fn leave_op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::Os).await?;
         if self.setup.plan.is_op_only() {

@@ -1,12 +1,12 @@
 //! Where rings behind junctions are broken when no frame comes back: two of them broke (JR-02).
 //!
 //! The second SubDevice with nothing on its port 0 destroys every frame, but all that are passed before it take part in
-//! it, among them the junction at which its ring begins. So a junction can be told blindly to leave its ring out, by
-//! closing both ports of the ring. One ring after the other is looked into while all others are left out; then the
+//! it, among them the junction at which its ring begins. So a junction can get a blind order to leave its ring out,
+//! by closing both ports of the ring. One ring after the other is looked into while all others are left out; then the
 //! others are reached again, too. The settings are temporary (protocol 2.2, DL control bit 1): what becomes of frames
 //! meanwhile, the loops return to what they were within about a second. All loops of a junction are written at once,
-//! and nobody can be asked for them any more: those that somebody had closed on purpose are known from before
-//! ([`super::orders`]), and stay closed.
+//! and they cannot be read any more: those that were closed on purpose are known from before ([`super::orders`]), and
+//! stay closed.
 //!
 //! A ring behind a member of another one that is broken too is reached from one side of that one: from the side on
 //! which it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side

@@ -2,8 +2,8 @@
 //!
 //! Open ports allow several answers ([`candidates_with`]), so each is tried: both ends of a supposed closing cable are
 //! closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any
-//! other pair of ports cuts somebody off. Where the ring is broken already, the end at the junction alone is closed,
-//! and those between the break and the closing cable, and nobody else, must fall silent. The loops return to what they
+//! other pair of ports cuts SubDevices off. Where the ring is broken already, the end at the junction alone is closed,
+//! and those between the break and the closing cable, and no others, must fall silent. The loops return to what they
 //! were in any case: the setting is temporary (protocol 2.2, DL control bit 1).
 //!
 //! A try in vain says more than no: of a ring that is closed at its junction and somewhere in the middle the members
@@ -51,7 +51,7 @@ pub(in super::super) async fn learn(
         let hinted = likely.drain(..).find_map(|likely| with(&[likely]).filter(|set| set.contains(&likely)));
         let Some(mut set) = hinted.or_else(|| with(&[])) else { break };
         let topology = Topology::with_local_rings(&untimed, main_count, &set);
-        // Who is behind a break depends on the rings that are in it, which are tried first.
+        // Which SubDevices are behind a break depends on the rings that are in it, which are tried first.
         set.sort_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
             match attempt(bus, nodes, &topology, closing).await? {
@@ -110,7 +110,8 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
     Some(first.far.node).filter(is_open)
 }
 
-/// Who of so many answers, by position, while these ports are closed; `None` where frames do not come back then.
+/// Which of so many SubDevices answer, by position, while these ports are closed; `None` where frames do not come back
+/// then.
 pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Result<Option<Vec<bool>>, BusError> {
     let mut controls = Vec::new();
     for port in ports {
@@ -130,7 +131,7 @@ pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Re
     Ok(result.ok())
 }
 
-/// Who answers, by position.
+/// Which SubDevices answer, by position.
 async fn answering(bus: &Bus, count: usize) -> Result<Vec<bool>, BusError> {
     // Where frames do not come back at all this is the quicker way to know.
     bus.brd(map::TYPE, 1).await?;

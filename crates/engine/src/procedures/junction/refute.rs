@@ -1,8 +1,8 @@
 //! Whether a ring that was declared closes where it is said to (JR-05, JR-06), before anybody is configured.
 //!
 //! Open ports do not tell: whatever follows the junction could as well hang on the last member of its ring. So it is
-//! tried, as [`super::learn()`] does: with both ends of the closing cable closed for a moment nobody is out of reach,
-//! and with the end at the junction alone, those behind a break of the ring are and nobody else. Where one end only has
+//! tried, as [`super::learn()`] does: with both ends of the closing cable closed for a moment all answer,
+//! and with the end at the junction alone, all but those behind a break of the ring do. Where one end only has
 //! communication it is no cable between the two. Where neither has, the closing cable may be broken, which shows
 //! nothing: such a ring is believed.
 //!
@@ -22,7 +22,7 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// What is wrong has to be so each time.
 const TRIES: usize = 2;
-/// Looks until everybody answers, and the pause between two of them.
+/// Scans until all answer, and the pause between two of them.
 const LOOKS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
@@ -53,7 +53,7 @@ async fn attempt(
 ) -> Option<(usize, ClosingEvidence)> {
     let topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut numbers: Vec<usize> = (0..closings.len()).collect();
-    // Who is behind a break depends on the rings that are in it.
+    // Which SubDevices are behind a break depends on the rings that are in it.
     numbers.sort_by_key(|number| core::cmp::Reverse(closings[*number].head.node));
     for number in numbers {
         let closing = closings[number];
@@ -82,9 +82,9 @@ async fn attempt(
     None
 }
 
-/// Ports as they are now; `None` where not everybody answers.
+/// Ports as they are now; `None` where not all answer.
 async fn look(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
-    // Where frames of a link got lost for a while nobody waits for them, until one has come back.
+    // Where frames of a link got lost for a while they are not waited for, until one has come back.
     for _ in 0..LOOKS {
         if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.len()) {
             break;

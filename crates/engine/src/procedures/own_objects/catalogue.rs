@@ -1,4 +1,4 @@
-//! Which objects the MainDevice itself has (protocol 10.2, ETG.1510), and what is told of their entries.
+//! Which objects the MainDevice itself has (protocol 10.2, ETG.1510), and their entries.
 
 use alloc::vec::Vec;
 
@@ -13,7 +13,7 @@ const LISTS: u16 = 16;
 /// SubDevices that have objects: the lists have room for no more.
 pub(super) const MAX_MODULES: usize = LIST * LISTS as usize;
 
-/// Bytes of a text: so much is told of a longer one, and a shorter one is filled with zeros where a whole object is
+/// Bytes of a text: a longer one is cut, and a shorter one is filled with zeros where a whole object is
 /// read.
 pub(super) const TEXT_BYTES: usize = 64;
 

@@ -56,7 +56,7 @@ impl<W: Fn(u8) -> bool> Asked<W> {
         self.value(sub_index, maximum).await.is_some()
     }
 
-    /// Whether there are messages in it that nobody has acknowledged.
+    /// Whether there are messages in it that are not acknowledged.
     pub async fn has_news(&self, sub_index: u8) -> bool {
         let news = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
         self.value(sub_index, news).await.is_some_and(|news| news != 0)

@@ -1,4 +1,4 @@
-//! Values of the MainDevice's own objects (protocol 10.2), as of now: what registers say is read when somebody asks.
+//! Values of the MainDevice's own objects (protocol 10.2), as of now: registers are read at each request.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -271,7 +271,7 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
     values
 }
 
-/// Who was at a port at the scan.
+/// The SubDevice at a port at the scan.
 fn neighbour(segment: &Segment, member: &Member, port: u8) -> Option<StationAddress> {
     let node = member.node?;
     let here = segment.cabling.topology.nodes.get(node)?;

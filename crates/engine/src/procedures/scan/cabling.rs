@@ -15,7 +15,7 @@ use crate::segment::{LineCheck, is_swapped};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, Finding, PortOf};
 
-/// Finds out who is crossed while the redundant link is down; false where the ring is not closed or changes meanwhile.
+/// Finds crossed SubDevices while the redundant link is down; false where the ring is not closed or changes meanwhile.
 pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     if !stays_closed(bus).await {
         return false;
@@ -56,7 +56,7 @@ impl Known for Scan {
     }
 
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
-        // Nobody has moved that shortly after.
+        // None has moved that shortly after.
         let place = |at: PortOf| {
             let station = self.subdevices.get(at.node)?.station;
             Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })

@@ -45,7 +45,7 @@ async fn count(bus: &Bus) -> Result<Option<Count>, BusError> {
     }
 }
 
-/// Counts until somebody answers.
+/// Counts until SubDevices answer.
 pub(super) async fn first(bus: &Bus, options: &ScanOptions, begin: Instant) -> Result<Count, ScanError> {
     let mut answered = false;
     loop {

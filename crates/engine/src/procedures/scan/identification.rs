@@ -14,7 +14,7 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, contents: &SiiConte
     let Some(general) = general.and_then(|it| General::decode(it.data.first_chunk::<{ General::LEN }>()?)) else {
         return Ok(None);
     };
-    // Behind a controller that copies AL control there is nobody to answer.
+    // Behind a controller that copies AL control there is no application that answers.
     let emulated = EscConfiguration::from_bits((contents.header.pdi_control >> 8) as u8).device_emulation;
     if general.flags.identification_al_status_code() && !emulated {
         return al_state::identification(bus, station).await;

@@ -30,7 +30,7 @@ pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopCo
     Ok(control.loops[usize::from(port)])
 }
 
-/// Opens or closes a port. Who is behind a port that is closed is gone for everybody.
+/// Opens or closes a port. SubDevices behind a closed port are out of reach.
 pub async fn set(
     bus: &Bus,
     segment: Option<&SharedSegment>,
@@ -82,8 +82,8 @@ pub(crate) async fn block(
     Ok(ports)
 }
 
-/// Opens all ports that were closed to cut somebody off; returns how many there were. Where one cannot be reached now,
-/// all are kept for the next try.
+/// Opens all ports that were closed to cut SubDevices off; returns how many there were. Where one cannot be reached
+/// now, all are kept for the next try.
 pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
     let blocked = segment.view().blocked.clone();
     segment.observe(Observation::Unblocking);

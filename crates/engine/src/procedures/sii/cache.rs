@@ -51,7 +51,7 @@ struct Entry {
 
 /// What the cache has for a fixed area.
 pub(super) enum Found {
-    /// Too few have read it; whoever holds the claim does.
+    /// Too few have read it; the procedure that holds the claim does.
     Nothing(Claim),
     /// Others read it now.
     BeingRead,

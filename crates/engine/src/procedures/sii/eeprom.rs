@@ -62,7 +62,7 @@ pub(super) struct Eeprom {
 }
 
 impl Eeprom {
-    /// Waits until the controller has loaded its configuration, and until the last command of somebody else is done.
+    /// Waits until the controller has loaded its configuration, and until the last command of another user is done.
     pub(super) async fn open(bus: &Bus, station: StationAddress, pace: Pace) -> Result<Eeprom, SiiReadError> {
         let begin = bus.now();
         loop {

@@ -1,7 +1,7 @@
 //! Writing an EEPROM: word by word, each read back (protocol 3.8, 4.7); the alias; loading what was written.
 //!
 //! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off
-//! leaves the one that was there. Afterwards the EEPROM belongs to whom it belonged before.
+//! leaves the one that was there. Afterwards the EEPROM has the owner of before.
 
 use alloc::vec::Vec;
 use core::fmt;

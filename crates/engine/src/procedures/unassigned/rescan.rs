@@ -1,8 +1,8 @@
-//! A look at the whole segment while process data goes on: who is at which place now, who has moved, who is not there
-//! (Master Redundancy 10.8).
+//! A scan of the whole segment while process data goes on: which SubDevice is at which place now, which have moved, are
+//! missing (Master Redundancy 10.8).
 //!
-//! Places are only read, and no process data: nobody's working counter changes. Those without a station address of ours
-//! are found and read by the search of whoever supervises, for which this waits.
+//! It reads positions and no process data: no working counter changes. Supervision finds and reads SubDevices without a
+//! station address of ours, and this waits for that.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -36,12 +36,12 @@ const AGAIN: Duration = Duration::from_millis(50);
 /// The longest of these pauses.
 const LONGEST: Duration = Duration::from_secs(2);
 
-/// Who a SubDevice is.
+/// The identity of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Who {
+pub enum Identified {
     /// A declared one, by its index in the declaration.
     Declared(usize),
-    /// Nobody has declared it. It is left alone.
+    /// An undeclared one. It is left alone.
     Undeclared(Identity),
     /// It was not found out in time.
     Unknown,
@@ -54,8 +54,8 @@ pub struct Found {
     pub position: Position,
     /// Its station address.
     pub station: StationAddress,
-    /// Who it is.
-    pub who: Who,
+    /// Its identity.
+    pub identified: Identified,
     /// Its place in the cabling that was known before, where the order of the declared SubDevices is another one since
     /// because of it.
     pub moved_from: Option<Position>,
@@ -75,21 +75,21 @@ pub struct Rescan {
 }
 
 impl Rescan {
-    /// Of everybody it is known who it is.
+    /// All are identified.
     pub fn is_complete(&self) -> bool {
-        self.subdevices.iter().all(|found| found.who != Who::Unknown)
+        self.subdevices.iter().all(|found| found.identified != Identified::Unknown)
     }
 
     /// Declared SubDevices with the places that they have moved from and to.
     pub fn moved(&self) -> impl Iterator<Item = (usize, Position, Position)> + '_ {
-        self.subdevices.iter().filter_map(|found| match found.who {
-            Who::Declared(index) => Some((index, found.moved_from?, found.position)),
-            Who::Undeclared(_) | Who::Unknown => None,
+        self.subdevices.iter().filter_map(|found| match found.identified {
+            Identified::Declared(index) => Some((index, found.moved_from?, found.position)),
+            Identified::Undeclared(_) | Identified::Unknown => None,
         })
     }
 }
 
-/// Looks until the segment holds still and it is known of everybody who it is, for so long at most. Then what is known
+/// Scans until the segment holds still and all are identified, for so long at most. Then what is known
 /// is the result. Those that have moved are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
     let (rescan, _) = look_until(bus, segment, limit).await?;
@@ -139,7 +139,7 @@ async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
             Some(_turn) => look(bus, segment).await,
             None => Ok(None),
         };
-        // Whose ports changed in between has told it to this look.
+        // This scan has cleared the requests of ports that changed in between.
         segment.observe(Observation::LookAgain);
         let is_last = bus.now() >= until;
         match looked {
@@ -157,7 +157,7 @@ async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
 /// Hands a complete look to the model. True where its cabling is that of the segment from now on.
 fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
     let stations: Vec<StationAddress> = rescan.subdevices.iter().map(|found| found.station).collect();
-    let member = |found: &Found| if let Who::Declared(index) = found.who { Some(index) } else { None };
+    let member = |found: &Found| if let Identified::Declared(index) = found.identified { Some(index) } else { None };
     let members: Vec<Option<usize>> = rescan.subdevices.iter().map(member).collect();
     let seen = Seen { topology: &rescan.topology, stations: &stations, members: &members };
     let before = segment.view().adoptions();
@@ -180,17 +180,17 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
             (None, Some(Knowledge::Known(info))) => Some(&**info),
             (None, _) => None,
         };
-        let who = match (owners.at(at), known) {
-            (Some(index), _) => Who::Declared(index),
+        let identified = match (owners.at(at), known) {
+            (Some(index), _) => Identified::Declared(index),
             // Until it was reported it may be one that is missed.
-            (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Who::Undeclared(info.identity),
-            (None, _) => Who::Unknown,
+            (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Identified::Undeclared(info.identity),
+            (None, _) => Identified::Unknown,
         };
-        subdevices.push(Found { position: Position(at as u16), station: *station, who, moved_from: None });
+        subdevices.push(Found { position: Position(at as u16), station: *station, identified, moved_from: None });
     }
     let place_at_scan = |index: usize| access.members[index].node;
     // In a ring that is open elsewhere than at the scan, or that was open then and has branches, frames meet these in
-    // another order (CR-09): that moves nobody.
+    // another order (CR-09): that is no move.
     let scanned = &access.cabling.topology;
     let was_open = scanned.redundant_head.is_some();
     let is_comparable = match bus.ring() {
@@ -201,7 +201,7 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
     if is_comparable || is_one_line {
         mark_moved(&mut subdevices, place_at_scan);
     }
-    let is_found = |index: &usize| subdevices.iter().any(|found| found.who == Who::Declared(*index));
+    let is_found = |index: &usize| subdevices.iter().any(|found| found.identified == Identified::Declared(*index));
     let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
     let topology = retrace::cabling(&access.cabling, &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
@@ -222,11 +222,11 @@ pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStat
     Ok((view(bus).await?.as_ref() == Some(seen)).then_some(ports))
 }
 
-/// Who has to be taken out, as few as possible, for the others to be in the order of the scan: these have moved.
+/// The fewest SubDevices without which the others are in the order of the scan: these have moved.
 fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<usize>) {
     let mut placed = Vec::new();
     for (at, found) in subdevices.iter().enumerate() {
-        if let Who::Declared(index) = found.who
+        if let Identified::Declared(index) = found.identified
             && let Some(place) = place_at_scan(index)
         {
             placed.push((at, place));
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn as_few_as_possible_have_moved() {
         assert_eq!(moved(&[]), []);
-        assert_eq!(moved(&[0, 2, 3, 7]), [], "gaps and what was put in between move nobody");
+        assert_eq!(moved(&[0, 2, 3, 7]), [], "gaps and what was put in between are no moves");
         assert_eq!(moved(&[0, 1, 3, 4, 2]), [2]);
         assert_eq!(moved(&[4, 0, 1, 2, 3]), [4]);
         assert_eq!(moved(&[0, 3, 4, 1, 2, 5]).len(), 2);

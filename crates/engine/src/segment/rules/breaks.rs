@@ -38,7 +38,8 @@ impl Segment {
         by_position
     }
 
-    /// Tells breaks that have a place now. `reported` is the state of the ring that had been told when the looks began.
+    /// Reports breaks that have a place now. `reported` is the state of the ring that had been reported when the looks
+    /// began.
     pub(in crate::segment) fn observe_breaks(
         &mut self,
         looks: &[Look],
@@ -54,7 +55,7 @@ impl Segment {
             return;
         }
         let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
-        // An interface's cable is told together with the ring.
+        // An interface's cable is reported together with the ring.
         match self.ring.status.place {
             None => self.breaks.told.clear(),
             Some(place) if !self.breaks.told.contains(&place) => self.breaks.told = vec![place],

@@ -1,8 +1,8 @@
 //! Crossed lines in operation (protocol 9.5): whenever ports of SubDevices have changed, the segment is looked at anew,
-//! and each SubDevice that is entered at another port than 0 is told, once.
+//! and each SubDevice that is entered at another port than 0 is reported, once.
 //!
-//! More rings behind junctions than are known are told too: an application that asked for junction redundancy must know
-//! that one of them is not watched.
+//! More rings behind junctions than are known are reported too: an application that asked for junction redundancy must
+//! know that one of them is not watched.
 
 use alloc::vec::Vec;
 
@@ -52,7 +52,7 @@ impl Segment {
         in_control: bool,
         effects: &mut Effects,
     ) {
-        // Ports that changed in between have told it to this look.
+        // This scan has cleared the requests of ports that changed in between.
         self.attention.want();
         self.crossings.search = if found.is_none() && !in_control { Search::Again } else { Search::Idle };
         let Some(found) = found else { return };

@@ -69,7 +69,7 @@ impl Segment {
         missed > 1 && (self.cabling.topology.is_assumed() || here != missed || there != missed)
     }
 
-    /// It is left alone until it is known which of several members it is, and that is told when it lasts.
+    /// It is left alone until it is known which of several members it is, and that is reported when it lasts.
     pub(in crate::segment) fn hold(
         &mut self,
         station: StationAddress,

@@ -1,4 +1,4 @@
-//! What junctions are told to do about their ports.
+//! Orders to junctions about their ports.
 
 use alloc::vec::Vec;
 
@@ -15,7 +15,7 @@ impl Segment {
         heads.filter_map(|head| self.station_of(head)).collect()
     }
 
-    /// What a junction was told; as after a scan where it is not known.
+    /// The order that a junction has; that of a scan where it is not known.
     pub fn control_of(&self, junction: StationAddress) -> DlControl {
         self.port_control(junction).map_or_else(DlControl::default, |told| told.control)
     }

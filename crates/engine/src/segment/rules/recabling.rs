@@ -67,7 +67,7 @@ impl Segment {
         self.cabling = Cabling { version: now.version.wrapping_add(u32::from(is_other)), ..now };
         self.adoptions = self.adoptions.wrapping_add(1);
         effects.0.push(Effect::Occupants(self.occupants()));
-        // What is broken in it may not have been told yet.
+        // What is broken in it may not have been reported yet.
         self.attention.want();
     }
 

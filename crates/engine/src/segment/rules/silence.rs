@@ -10,7 +10,7 @@ use crate::segment::model::Segment;
 use crate::segment::ring::Words;
 use crate::time::Instant;
 
-/// Pause between two looks whether frames come back: silence posts nothing.
+/// Pause between two checks whether frames come back: silence posts nothing.
 const PAUSE: Duration = Duration::from_millis(5);
 /// Frames have not come back for so long: beyond what a break of a single cable can cost.
 const BLOCKED: Duration = Duration::from_millis(20);
@@ -18,8 +18,8 @@ const BLOCKED: Duration = Duration::from_millis(20);
 const BLOCKED_CYCLES: u64 = 3;
 
 impl Segment {
-    /// Tells when no frame comes back while a local ring is open, or all of a sudden where there are two that may have
-    /// broken at once, and has them looked into then; and when frames come back again. Returns when to look again.
+    /// Reports when no frame comes back while a local ring is open, or suddenly where two may have broken at once, and
+    /// starts their examination then; reports when frames come back again. Returns when to check again.
     pub(in crate::segment) fn observe_silence(
         &mut self,
         words: &Words,

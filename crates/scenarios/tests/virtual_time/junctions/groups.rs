@@ -5,8 +5,8 @@ mod at_the_end;
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, DomainMember, Event, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, TimedEvent,
-    Who, automatic,
+    Declaration, DomainMember, Event, Identified, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig,
+    TimedEvent, automatic,
 };
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -160,8 +160,8 @@ fn rescan(world: &mut World) -> Vec<Option<usize>> {
     let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
     let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
     assert_eq!((world.incomplete(mark), rescan.moved().count()), (0, 0), "{:?}", rescan.subdevices);
-    let index = |who| if let Who::Declared(index) = who { Some(index) } else { None };
-    rescan.subdevices.iter().map(|found| index(found.who)).collect()
+    let index = |identified| if let Identified::Declared(index) = identified { Some(index) } else { None };
+    rescan.subdevices.iter().map(|found| index(found.identified)).collect()
 }
 
 fn own(near: (usize, u8), far: (usize, u8), broken: bool) -> Event {
