@@ -15,7 +15,9 @@ use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
+use ringcat_engine::main_device::{
+    ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
+};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
@@ -354,8 +356,8 @@ impl AcyclicHalf for SupervisorThread {
         SupervisorThread::counters(self)
     }
 
-    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo> {
-        self.with(move |engine| info(engine, subdevice)).ok().flatten()
+    fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
+        self.with(move |engine| info(engine, subdevice.0)).ok().flatten()
     }
 
     fn keep_events(&mut self, _now: Instant) {}

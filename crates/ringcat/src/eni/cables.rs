@@ -7,6 +7,7 @@
 use ringcat_config::eni::Port;
 use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::SubDeviceId;
 use ringcat_engine::topology::{PortOf, Topology};
 
 use super::file::{Difference, EniFile};
@@ -57,7 +58,7 @@ impl EniFile {
             }
             let words = |at: Option<PortOf>| at.map_or_else(|| "the MainDevice".to_owned(), into);
             let text = format!("{} is plugged into {}; the file says {}", name(node), words(got), words(said));
-            differences.push(Difference { subdevice: Some(config), is_grave: false, text });
+            differences.push(Difference { subdevice: Some(SubDeviceId(config)), is_grave: false, text });
         }
         differences
     }

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    CyclicThread, Error, Limits, Options, SdoAddress, Services, SupervisorThread, TransferLimits, automatic,
+    CyclicThread, Error, Limits, Options, SdoAddress, Services, SubDeviceId, SupervisorThread, TransferLimits,
+    automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -22,8 +23,8 @@ const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[
                        [[device]]\ntype = \"digital-output-8\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
-const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
+const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.request, LIMITS.answer);
 /// The SubDevice with all protocols, by index and by station address.
 const ALL: usize = 1;
 const NUMBER: u16 = 0x2001;
@@ -47,7 +48,7 @@ impl Bench {
         let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
         let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
         let address = SocketAddr::from(([127, 0, 0, 1], 0));
-        let gateway = supervisor.start_gateway(GatewayOptions { address, connections })?;
+        let gateway = supervisor.start_gateway(GatewayOptions::at(address).with_connections(connections))?;
         let scan = supervisor.scan()?;
         let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
         let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
@@ -81,9 +82,9 @@ impl Bench {
     /// Our own traffic works.
     fn own_traffic(&self, value: u16) {
         let supervisor = self.cycles.supervisor();
-        let object = SdoAddress::new(NUMBER, 200);
-        supervisor.sdo_download(ALL, object, value.to_le_bytes().to_vec(), TRANSFER).expect("it can be written");
-        assert_eq!(supervisor.sdo_upload(ALL, object, TRANSFER.bytes(2)).expect("it can be read"), value.to_le_bytes());
+        let speaker = supervisor.subdevice(SubDeviceId(ALL)).limits(TRANSFER);
+        speaker.sdo_write(NUMBER, 200, value).expect("it can be written");
+        assert_eq!(speaker.sdo_read::<u16>(NUMBER, 200).expect("it can be read"), value);
     }
 }
 
@@ -272,8 +273,9 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
         });
         for round in 0..5 {
             bench.own_traffic(0x5A00 + round);
-            let large = bench.cycles.supervisor().sdo_upload(ALL, SdoAddress::new(LARGE, 0), TRANSFER.bytes(200_000));
-            assert_eq!(large.expect("nobody is in our transfer").len(), 100_000);
+            let speaker = bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.bytes(200_000));
+            let large = speaker.sdo_read::<Vec<u8>>(LARGE, 0);
+            assert_eq!(large.expect("no other message is in this transfer").len(), 100_000);
         }
     });
     let counters = bench.gateway.counters();
@@ -307,7 +309,7 @@ fn before_activation_address_0_has_the_objects_that_need_no_declaration() {
     let (_, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ()).expect("a thread");
     let address = SocketAddr::from(([127, 0, 0, 1], 0));
-    let gateway = supervisor.start_gateway(GatewayOptions { address, connections: 1 }).expect("a free port");
+    let gateway = supervisor.start_gateway(GatewayOptions::at(address).with_connections(1)).expect("a free port");
     let stream = TcpStream::connect(gateway.address()).expect("it listens");
     stream.set_read_timeout(Some(LIMIT)).expect("a timeout");
     let mut client = Client { socket: Socket::Tcp(stream), station: 0, counter: 0 };
