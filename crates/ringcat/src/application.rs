@@ -222,8 +222,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.acyclic.pop_event(now)
     }
 
-    /// The ring and both links: carriers, who answers on each in which states, the place of a break, redundancy. Not
-    /// for the cyclic path.
+    /// The ring and both links: carriers, SubDevices on each link and their states, location of a break, redundancy.
+    /// Not for the cyclic path.
     pub fn ring_status(&self) -> RingStatus {
         self.acyclic.ring_status()
     }

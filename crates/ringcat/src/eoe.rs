@@ -24,7 +24,7 @@ use crate::supervisor_thread::SupervisorThread;
 const LOOK: Duration = Duration::from_millis(20);
 /// Frames that one interface may hand to the host in one go, so that the others and the bus have their turn.
 const BURST: usize = 64;
-/// News that are kept until somebody takes them.
+/// News that are kept until they are taken.
 const NEWS: usize = 64;
 
 /// A network interface of the host, seen from its other end.
@@ -113,7 +113,7 @@ pub enum EthernetNews {
         /// The SubDevice, by its index in the declaration.
         subdevice: SubDeviceId,
     },
-    /// Somebody removed it. It is made anew.
+    /// Another program removed it. It is made again.
     Removed {
         /// Its name.
         name: String,
@@ -135,7 +135,7 @@ impl fmt::Display for EthernetNews {
             EthernetNews::Made { name, subdevice } => {
                 write!(f, "network interface {name} leads to SubDevice {subdevice}")
             }
-            EthernetNews::Removed { name } => write!(f, "{name}: somebody removed it; it is made anew"),
+            EthernetNews::Removed { name } => write!(f, "{name}: removed by another program; it is made again"),
             EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
             EthernetNews::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
             EthernetNews::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),

@@ -223,7 +223,7 @@ impl<L: Links> MainDevice<L> {
     /// Looks at the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
-    /// Frames that are lost again and again, nobody who answers, or SubDevices that come or go meanwhile.
+    /// Frames that are lost repeatedly, no SubDevice that answers, or SubDevices that come or go meanwhile.
     pub fn look_at_ring(&mut self) -> Result<RingLook, Error> {
         let bus = self.engine.bus();
         Ok(self.run(look_at_ring(bus))?)

@@ -36,7 +36,7 @@ use crate::window::Window;
 
 /// A request, and what the cyclic half posts, waits for so long at most until the thread looks.
 const LONGEST_SLEEP: Duration = Duration::from_micros(500);
-/// And for so long when there was one of late: who asks one thing after the other is not to wait for each.
+/// And for so long after a recent request, so that a sequence of requests does not wait for each one.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
 /// How long that is.
 const ATTENTIVE: Duration = Duration::from_millis(2);
@@ -278,7 +278,7 @@ impl SupervisorThread {
         self.0.published.rest.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Events that nobody fetched in time and that were dropped.
+    /// Events that were not taken in time and were dropped.
     pub fn events_dropped(&self) -> u64 {
         self.rest().events_dropped
     }

@@ -140,7 +140,7 @@ impl EniFile {
             text: format!("SubDevice {config} \"{}\" of the file: {error}", name(config)),
         };
         let mut differences = Vec::new();
-        // Whoever is not who is expected is told once.
+        // A SubDevice of another identity is reported once.
         let mut told = Vec::new();
         for resolution in resolve(configs, found) {
             match resolution {

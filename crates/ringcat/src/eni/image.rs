@@ -48,7 +48,7 @@ pub struct EniVariable {
     pub bits: u32,
     /// Index in the declaration of the SubDevice whose process data it is.
     pub subdevice: Option<SubDeviceId>,
-    /// The domain that exchanges it; `None` where nobody does.
+    /// The domain that exchanges it; `None` where no domain does.
     pub domain: Option<DomainId>,
 }
 
@@ -222,7 +222,7 @@ impl EniImage {
         Some(variable.data_type.value(self.read(variable), bits))
     }
 
-    /// Sets the first 64 bits of an output variable; false for inputs, which nobody can set.
+    /// Sets the first 64 bits of an output variable; false for inputs, which cannot be set.
     pub fn write(&mut self, variable: &EniVariable, value: u64) -> bool {
         if variable.direction == Direction::Outputs {
             variable.entry().write(&mut self.outputs, value);

@@ -335,7 +335,7 @@ fn what_cannot_be_passed_on_is_answered_with_an_error_reply() {
         ErrorReply::UNSUPPORTED_PROTOCOL,
         "objects only"
     );
-    assert_eq!(client.refused(&message(0x4711, 1, Protocol::Coe, &upload)), ErrorReply::INVALID_HEADER, "nobody");
+    assert_eq!(client.refused(&message(0x4711, 1, Protocol::Coe, &upload)), ErrorReply::INVALID_HEADER, "no SubDevice");
     assert_eq!(client.refused(&message(bench.terminal, 1, Protocol::Coe, &upload)), ErrorReply::UNSUPPORTED_PROTOCOL);
     assert_eq!(client.refused(&message(station, 1, Protocol::Other(9), &upload)), ErrorReply::UNSUPPORTED_PROTOCOL);
     assert_eq!(client.refused(&message(station, 1, Protocol::Eoe, &[0; 64])), ErrorReply::SERVICE_NOT_SUPPORTED);
@@ -359,7 +359,7 @@ fn a_client_that_leaves_in_a_transfer_loses_it_and_nobody_waits_for_that() {
     drop(leaving);
     bench.own_traffic(2);
     assert!(begin.elapsed() < Duration::from_millis(900), "{:?}", begin.elapsed());
-    // Over UDP nobody sees that it has left.
+    // Over UDP its end is not visible.
     pausing.begin_upload();
     let begin = Instant::now();
     patient.write(3, 0x33);
@@ -391,7 +391,7 @@ fn garbage_half_messages_floods_and_clients_that_do_not_read_hurt_only_themselve
     {
         datagrams.send(bytes);
     }
-    // A message in pieces is as good as any, and half of one holds nobody up.
+    // A message in pieces is as good as any, and half of one delays no other client.
     let mut half = bench.tcp();
     let whole = message(bench.station, 5, Protocol::Coe, &[0x00, 0x20, 0x40, 0x01, 0x20, 0x01, 0, 0, 0, 0]);
     for byte in &whole[..whole.len() - 1] {
@@ -401,7 +401,7 @@ fn garbage_half_messages_floods_and_clients_that_do_not_read_hurt_only_themselve
     half.send(&whole[whole.len() - 1..]);
     assert_eq!(half.receive().0.counter, 5);
     half.send(&whole[..7]);
-    // A flood that nobody reads the answers to.
+    // A flood without a reader of its answers.
     let flood = bench.tcp();
     let Socket::Tcp(mut stream) = flood.socket else { unreachable!() };
     let begin = Instant::now();
