@@ -6,7 +6,8 @@ mod sync;
 
 use clap::Args;
 use ringcat::{
-    ClockConfig, ClockStatus, Declaration, ReferenceClock, SubDeviceInfo, SyncSignals, Trigger, system_time,
+    ClockConfig, ClockStatus, Declaration, ReferenceClock, SubDeviceId, SubDeviceInfo, SyncSignals, Trigger,
+    system_time,
 };
 
 use crate::failure::Failure;
@@ -58,7 +59,7 @@ fn reference(text: &str) -> Result<ReferenceClock, String> {
         "first" => Ok(ReferenceClock::FirstWithClock),
         "sync" => Ok(ReferenceClock::FirstConfigured),
         text => {
-            let position = text.parse().map(ReferenceClock::Declared);
+            let position = text.parse().map(|index| ReferenceClock::Declared(SubDeviceId(index)));
             position.map_err(|_| format!("expected first, sync or a position, got \"{text}\""))
         }
     }
@@ -111,7 +112,7 @@ impl ClockOptions {
             ReferenceClock::FirstConfigured => {
                 Err("--reference sync: no SubDevice has SYNC signals; add --sync".into())
             }
-            ReferenceClock::Declared(position) => match found.get(position) {
+            ReferenceClock::Declared(position) => match found.get(position.0) {
                 None => Err(format!("--reference {position}: there are SubDevices 0 to {}", found.len() - 1)),
                 Some(info) if info.controller.features.dc => Ok(()),
                 Some(info) => Err(format!(
@@ -149,7 +150,7 @@ fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &De
     let position = match reference {
         ReferenceClock::FirstWithClock => return None,
         ReferenceClock::FirstConfigured => declaration.subdevices.iter().position(|config| config.sync.is_some())?,
-        ReferenceClock::Declared(position) => position,
+        ReferenceClock::Declared(SubDeviceId(position)) => position,
     };
     let first = found[..position].iter().position(|info| info.controller.features.dc)?;
     Some(format!(
@@ -189,7 +190,7 @@ mod tests {
     fn the_reference_is_a_rule_or_a_position() {
         assert_eq!(reference("first"), Ok(ReferenceClock::FirstWithClock));
         assert_eq!(reference("sync"), Ok(ReferenceClock::FirstConfigured));
-        assert_eq!(reference("12"), Ok(ReferenceClock::Declared(12)));
+        assert_eq!(reference("12"), Ok(ReferenceClock::Declared(SubDeviceId(12))));
         assert!(reference("-1").is_err() && reference("last").is_err());
     }
 
@@ -202,13 +203,16 @@ mod tests {
         let error =
             |options: ClockOptions| options.check(&found, &[None, None], 1_000_000).expect_err("it must be refused");
         let with = |reference| ClockOptions { reference, ..ClockOptions::default() };
-        assert!(error(with(ReferenceClock::Declared(0))).contains("\"coupler\" has no distributed clock"));
-        assert!(error(with(ReferenceClock::Declared(2))).contains("SubDevices 0 to 1"));
+        assert!(error(with(ReferenceClock::Declared(SubDeviceId(0)))).contains("\"coupler\" has no distributed clock"));
+        assert!(error(with(ReferenceClock::Declared(SubDeviceId(2)))).contains("SubDevices 0 to 1"));
         assert!(error(with(ReferenceClock::FirstConfigured)).contains("add --sync"));
         let far = ClockOptions { phase: Some(-1_000_000), ..ClockOptions::default() };
         assert!(error(far).contains("less than the cycle of 1000 us, got -1000 us"));
-        let good =
-            ClockOptions { phase: Some(-999_999), reference: ReferenceClock::Declared(1), ..ClockOptions::default() };
+        let good = ClockOptions {
+            phase: Some(-999_999),
+            reference: ReferenceClock::Declared(SubDeviceId(1)),
+            ..ClockOptions::default()
+        };
         assert!(good.are_given() && good.check(&found, &[None, None], 1_000_000).is_ok());
         assert!(!ClockOptions::default().are_given());
     }
@@ -221,8 +225,8 @@ mod tests {
         let mut declaration = ringcat::automatic(&found, std::time::Duration::from_millis(1));
         declaration.subdevices[2].sync = Some(SyncSignals::sync0(1_000_000, 0));
         let warned = |reference| in_front(reference, &found, &declaration).is_some();
-        assert!(warned(ReferenceClock::Declared(2)) && warned(ReferenceClock::FirstConfigured));
-        assert!(!warned(ReferenceClock::Declared(1)) && !warned(ReferenceClock::FirstWithClock));
+        assert!(warned(ReferenceClock::Declared(SubDeviceId(2))) && warned(ReferenceClock::FirstConfigured));
+        assert!(!warned(ReferenceClock::Declared(SubDeviceId(1))) && !warned(ReferenceClock::FirstWithClock));
     }
 
     #[test]

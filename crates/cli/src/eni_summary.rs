@@ -12,7 +12,7 @@ use ringcat::Direction;
 use ringcat::config::Configuration;
 use ringcat::config::eni::{Eni, SubDevice};
 use ringcat::eni::EniFile;
-use ringcat::{ConfigAddress, ReferenceClock, SubDeviceConfig, SyncManagerRole};
+use ringcat::{ConfigAddress, GroupId, ReferenceClock, SubDeviceConfig, SyncManagerRole};
 
 use crate::failure::Failure;
 use crate::json::data::Data;
@@ -89,13 +89,14 @@ fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
         counted(image.copies.len(), "copy", "copies")
     ));
     for domain in &declaration.domains {
-        let members: Vec<usize> = domain.members.iter().map(|member| member.subdevice).collect();
+        let members: Vec<usize> = domain.members.iter().map(|member| member.subdevice.0).collect();
         let period = time(domain.period);
         let assumed = if configuration.cycle.is_none() { " (the file has no cycle time)" } else { "" };
         lines.push(format!("task        every {period}{assumed}: SubDevices {}", ranges(&members)));
     }
     for lrw in &declaration.explicit_lrw {
-        lines.push(format!("LRW         {}: SubDevices {}", lrw.name, ranges(&lrw.subdevices)));
+        let subdevices: Vec<usize> = lrw.subdevices.iter().map(|subdevice| subdevice.0).collect();
+        lines.push(format!("LRW         {}: SubDevices {}", lrw.name, ranges(&subdevices)));
     }
     if let Some(clocks) = &declaration.clocks {
         let reference = match clocks.reference {
@@ -106,7 +107,7 @@ fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
         lines.push(format!("clocks      {reference} is the reference and {follows}"));
     }
     for (number, name) in configuration.groups.iter().enumerate() {
-        let of_group = |index: &usize| declaration.subdevices[*index].group == Some(number);
+        let of_group = |index: &usize| declaration.subdevices[*index].group == Some(GroupId(number));
         let members: Vec<usize> = (0..count).filter(of_group).collect();
         lines.push(format!("group       \"{}\": SubDevices {}", one_line(name), ranges(&members)));
     }

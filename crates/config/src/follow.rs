@@ -51,13 +51,10 @@ pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
         plugged_into: *plugged_into,
         net_id: subdevice.mailbox.as_ref().and_then(|mailbox| mailbox.net_id),
     });
-    let declaration = Declaration {
-        subdevices: configs,
-        domains: cyclic.domains,
-        clocks,
-        explicit_lrw: cyclic.explicit_lrw,
-        ..Declaration::default()
-    };
+    let mut declaration = Declaration::default().with_optional_clocks(clocks);
+    declaration.subdevices = configs;
+    declaration.domains = cyclic.domains;
+    declaration.explicit_lrw = cyclic.explicit_lrw;
     let subdevices = facts.collect();
     Ok(Configuration { declaration, subdevices, groups, image, cycle: cyclic.cycle, notices: notices.into_list(eni) })
 }

@@ -23,6 +23,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 
+use crate::declared::GroupId;
 use crate::info::{Direction, SubDeviceInfo};
 
 pub use crate::info::IdentityField;
@@ -112,7 +113,7 @@ pub struct SubDeviceConfig {
     /// The segment works without it.
     pub optional: bool,
     /// Number of the [group](Group) to which it belongs.
-    pub group: Option<usize>,
+    pub group: Option<GroupId>,
     /// SyncManagers with settings that override the SII.
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs by SyncManager; SyncManagers without an assignment, or all if this is `None`, have the PDOs of the SII.

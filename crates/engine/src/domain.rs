@@ -1,8 +1,16 @@
 //! Process data domains: numbers, and the states that follow from working counters.
 
+use core::fmt;
+
 /// Number of a domain, in the order of declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DomainId(pub usize);
+
+impl fmt::Display for DomainId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 /// State of a domain by its working counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

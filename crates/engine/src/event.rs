@@ -17,7 +17,8 @@ pub use log::EventLog;
 
 pub use crate::ring_status::Occupant;
 
-use crate::domain::DomainStatus;
+use crate::declared::{Address, GroupId, SubDeviceId};
+use crate::domain::{DomainId, DomainStatus};
 use crate::info::IdentityField;
 use crate::link::Link;
 use crate::ring::FrameLimit;
@@ -27,6 +28,7 @@ use crate::topology::{Closing, PortOf};
 
 /// An event with its time.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TimedEvent {
     /// The `now` of the call in which the engine detected it.
     pub at: Instant,
@@ -41,6 +43,13 @@ impl TimedEvent {
     /// An event without SubDevices at cabling positions.
     pub const fn new(at: Instant, event: Event) -> TimedEvent {
         TimedEvent { at, event, occupants: [None; 2] }
+    }
+
+    /// The same event with the SubDevices at its cabling positions.
+    #[must_use]
+    pub const fn with_occupants(mut self, occupants: [Option<Occupant>; 2]) -> TimedEvent {
+        self.occupants = occupants;
+        self
     }
 }
 
@@ -118,7 +127,7 @@ pub enum Event {
         /// Station address of the SubDevice with the port `far`; `None` if it is unknown.
         station: Option<StationAddress>,
         /// Indices in the declaration of the SubDevices at both ends, `near` first.
-        declared: [Option<usize>; 2],
+        declared: [Option<SubDeviceId>; 2],
         /// The cable broke.
         broken: bool,
         /// Number of broken cables of all such rings now. One is tolerated. With two in one ring, the SubDevices
@@ -216,14 +225,14 @@ pub enum Event {
     /// A SubDevice reached a state.
     StateReached {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The state.
         state: AlState,
     },
     /// A SubDevice refused a requested state, or left its state without a request.
     StateError {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The requested state; `None` if there was no request.
         requested: Option<AlState>,
         /// Its AL status.
@@ -234,31 +243,31 @@ pub enum Event {
     /// A SubDevice no longer answers.
     Lost {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// A SubDevice that was lost answers again.
     Returned {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// The configuration of a SubDevice failed; it is retried.
     ConfigurationFailed {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Step and reason.
         reason: String,
     },
     /// A setting in a declaration that the SubDevice may not follow.
     PlanOddity {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The setting.
         what: String,
     },
     /// A start-up command read an object with another value than required.
     StartupRead {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Number of the command in the declaration, from 0.
         number: usize,
         /// Index of the object.
@@ -272,8 +281,8 @@ pub enum Event {
     },
     /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps its last ones.
     Emergency {
-        /// Index in the declaration; before activation the position.
-        subdevice: usize,
+        /// The SubDevice: before activation by its position.
+        subdevice: Address,
         /// Its content.
         emergency: Emergency,
     },
@@ -287,7 +296,7 @@ pub enum Event {
     /// A rescan found a declared SubDevice at another position than the scan.
     Moved {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Its position at the scan.
         from: Position,
         /// Its position now.
@@ -296,7 +305,7 @@ pub enum Event {
     /// A SubDevice of another identity is at the place of a declared one. It is not configured.
     Mismatch {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Position.
         position: Position,
         /// The field that differs.
@@ -309,17 +318,17 @@ pub enum Event {
     /// All SubDevices of a hot connect group are in their declared target states.
     GroupJoined {
         /// Its number.
-        group: usize,
+        group: GroupId,
     },
     /// SubDevices of a hot connect group that had joined left their declared target states.
     GroupLeft {
         /// Its number.
-        group: usize,
+        group: GroupId,
     },
     /// A declared SubDevice is absent.
     Missing {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Whether the declaration allows its absence.
         optional: bool,
     },
@@ -338,14 +347,14 @@ pub enum Event {
     /// The state of a domain changed.
     Domain {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// The new state.
         status: DomainStatus,
     },
     /// A domain was due while its previous frames were still on the wire.
     Skipped {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
     },
     /// All clocks are locked (protocol 7.2).
     ClocksLocked {

@@ -4,7 +4,11 @@
 //! returns, the *closing* cable: its *head* is the junction, its *tail* the last SubDevice of the ring. This module
 //! checks the form of a connection; it is compared with the segment when it is applied.
 
+use crate::declared::SubDeviceId;
+
 use core::fmt;
+
+use ringcat_wire::address::Position;
 
 /// Port of a junction to which the closing cable of a declared connection leads (JR-06).
 pub const HEAD_PORT: u8 = 1;
@@ -40,11 +44,11 @@ impl fmt::Display for JunctionMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JunctionConnection {
     /// The junction.
-    pub head: usize,
+    pub head: SubDeviceId,
     /// Its port: [`HEAD_PORT`].
     pub head_port: u8,
     /// The last SubDevice of the ring.
-    pub tail: usize,
+    pub tail: SubDeviceId,
     /// Its port: any but 0.
     pub tail_port: u8,
 }
@@ -79,7 +83,7 @@ pub enum JunctionError {
         /// The connection.
         connection: JunctionConnection,
         /// Index of the SubDevice in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The port.
         port: u8,
     },
@@ -101,12 +105,12 @@ pub enum ClosingEvidence {
     /// A SubDevice did not answer, although it would be reached if the cable existed.
     CutOff {
         /// Position of the first of them.
-        position: usize,
+        position: Position,
     },
     /// A SubDevice behind the break answered.
     StillThere {
         /// Position of the first of them.
-        position: usize,
+        position: Position,
     },
     /// No frame came back.
     NoFrame,
@@ -157,10 +161,10 @@ impl core::error::Error for JunctionError {}
 impl JunctionConnection {
     /// Checks a connection against earlier ones and against the number of declared SubDevices (JR-06).
     pub fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
-        if self.head >= declared {
+        if self.head >= SubDeviceId(declared) {
             return Err(JunctionError::UnknownHead(*self));
         }
-        if self.tail >= declared {
+        if self.tail >= SubDeviceId(declared) {
             return Err(JunctionError::UnknownTail(*self));
         }
         if self.head_port != HEAD_PORT {
@@ -186,7 +190,7 @@ mod tests {
     // covers: JR-06, junctions
     #[test]
     fn a_connection_has_its_head_at_port_1_and_its_tail_not_at_port_0() {
-        let good = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+        let good = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
         assert_eq!(good.check(&[], 5), Ok(()));
         let head = |head_port| JunctionConnection { head_port, ..good };
         for port in [0, 2, 3, 4, 255] {
@@ -199,7 +203,7 @@ mod tests {
         assert_eq!(tail(3).check(&[], 5), Ok(()));
         assert_eq!(good.check(&[], 4), Err(JunctionError::UnknownTail(good)));
         assert_eq!(good.check(&[], 1), Err(JunctionError::UnknownHead(good)));
-        let same_subdevice = JunctionConnection { tail: 1, ..good };
+        let same_subdevice = JunctionConnection { tail: SubDeviceId(1), ..good };
         assert_eq!(same_subdevice.check(&[], 5), Err(JunctionError::Taken(same_subdevice)));
         assert_eq!(good.check(&[tail(2)], 5), Err(JunctionError::Taken(good)), "the head has one port 1");
     }

@@ -22,6 +22,7 @@ mod bell;
 pub mod board;
 pub mod clocks;
 pub mod config;
+pub mod declared;
 pub mod direction;
 pub mod domain;
 pub mod event;

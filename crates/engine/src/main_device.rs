@@ -38,12 +38,12 @@ pub use active::Active;
 pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
-pub use declare::SubDeviceId;
 pub use ethernet::EthernetSubDevice;
 pub use options::Options;
 pub use pending::Pending;
 pub use states::{GroupState, SubDeviceState};
 
+pub use crate::declared::{Address, GroupId, SubDeviceId};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, Event, TimedEvent};

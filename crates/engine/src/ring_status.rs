@@ -13,6 +13,7 @@ use ringcat_wire::al::AlState;
 
 pub use cables::{CableErrors, cables, port_errors};
 
+use crate::declared::SubDeviceId;
 use crate::link::Link;
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -52,7 +53,7 @@ pub struct Occupant {
     /// Station address.
     pub station: StationAddress,
     /// Index in the declaration; `None` for an undeclared SubDevice.
-    pub declared: Option<usize>,
+    pub declared: Option<SubDeviceId>,
 }
 
 /// Whether the ring tolerates a further break.

@@ -151,7 +151,7 @@ mod tests {
 
     fn open() -> (Gateway, Passage) {
         let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        Gateway::open(GatewayOptions { address: any, ..GatewayOptions::default() }).expect("a free port")
+        Gateway::open(GatewayOptions::at(any)).expect("a free port")
     }
 
     fn next(passage: &Passage) -> FromClient {

@@ -7,6 +7,7 @@ use ringcat_engine::mail::relay::RelayCounters;
 
 /// Counters of the gateway.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GatewayCounters {
     /// Accepted connections.
     pub connections: u64,

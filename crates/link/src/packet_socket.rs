@@ -52,6 +52,7 @@ impl Default for PacketOptions {
 
 /// Counters of a socket.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LinkCounters {
     /// Frames that the kernel accepted for sending.
     pub sent: u64,

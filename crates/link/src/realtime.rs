@@ -13,6 +13,7 @@ use crate::kernel::errno;
 
 /// A setting that was not permitted or not possible.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RealtimeWarning {
     what: String,
     errno: i32,

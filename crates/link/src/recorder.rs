@@ -40,6 +40,7 @@ pub struct Recorded {
 
 /// Why there is no capture, or only a partial capture.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct RecorderError {
     path: PathBuf,
     error: io::Error,

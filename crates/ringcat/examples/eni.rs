@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         cycle += 1;
         if cycle > 60_000 {
-            return Err("not everybody is in OP after a minute".into());
+            return Err("not all SubDevices are in OP after a minute".into());
         }
     }
     for variable in image.variables() {

@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for _ in 0..500 {
         application.cycle(|data| {
             // Inputs count while they are fresh: those of a SubDevice that does not answer keep their last values.
-            let fresh = data.freshness(DomainId(0), buttons.0) == Freshness::Fresh;
+            let fresh = data.freshness(DomainId(0), buttons) == Freshness::Fresh;
             let stopped = fresh && data.get(stop);
             let lit = (data.cycle() / 50 % 8) as usize;
             for (channel, light) in lights.iter().enumerate() {

@@ -14,10 +14,10 @@ use ringcat::shared_segment::SharedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::text::{Names, describe};
-use ringcat::{AlState, DomainId, Error, LastOutputs, Links, Options, SupervisorThread, automatic};
+use ringcat::{AlState, DomainId, Error, LastOutputs, Links, Options, SubDeviceId, SupervisorThread, automatic};
 
 const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n";
-const LAMPS: usize = 1;
+const LAMPS: SubDeviceId = SubDeviceId(1);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     match std::env::args().nth(1) {
@@ -39,14 +39,15 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     let application = supervisor.clone().activate(automatic(&scan.subdevices, Duration::from_millis(1)), cyclic)?;
-    let lamps: Vec<_> = (0..8).filter_map(|channel| application.entry(LAMPS, 0x7000 + 0x10 * channel, 1)).collect();
+    let lamps: Vec<_> =
+        (0..8).filter_map(|channel| application.output::<bool>(LAMPS, 0x7000 + 0x10 * channel, 1).ok()).collect();
 
     // The cycles: no allocation, no lock, no waiting in here. `prepare` is the place for `ringcat::realtime`.
     let prepare = ringcat::realtime::precise_timers;
     let cycles = application.start_cycles(prepare, move |data| {
         let lit = (data.cycle() / 50) as usize;
         for (channel, lamp) in lamps.iter().enumerate() {
-            data.write(lamp, u64::from(channel == lit % lamps.len()));
+            data.set(*lamp, channel == lit % lamps.len());
         }
         ControlFlow::Continue(())
     })?;

@@ -3,7 +3,7 @@
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceState};
+use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
@@ -44,7 +44,7 @@ pub trait AcyclicHalf {
     fn counters(&self) -> AcyclicCounters;
 
     /// What the scan found about a declared SubDevice. Not for the cyclic path.
-    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo>;
+    fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo>;
 
     /// Looks at the events that wait; they stay to be taken. Not for the cyclic path.
     fn keep_events(&mut self, now: Instant);
@@ -109,8 +109,8 @@ impl AcyclicHalf for Inline {
         self.engine.counters()
     }
 
-    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo> {
-        info(&self.engine, subdevice)
+    fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
+        info(&self.engine, subdevice.0)
     }
 
     fn keep_events(&mut self, now: Instant) {

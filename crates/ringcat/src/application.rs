@@ -18,7 +18,7 @@ use ringcat_engine::clocks::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
-use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, Pending, SubDeviceState};
+use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
@@ -193,7 +193,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     /// Where a PDO entry of a declared SubDevice lies.
-    pub fn entry(&self, subdevice: usize, index: u16, sub_index: u8) -> Option<Entry> {
+    pub fn entry(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Option<Entry> {
         self.cyclic.directory.entry(subdevice, index, sub_index)
     }
 
@@ -222,8 +222,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.acyclic.pop_event(now)
     }
 
-    /// The ring and both links: carriers, who answers on each in which states, the place of a break, redundancy. Not
-    /// for the cyclic path.
+    /// The ring and both links: carriers, SubDevices on each link and their states, location of a break, redundancy.
+    /// Not for the cyclic path.
     pub fn ring_status(&self) -> RingStatus {
         self.acyclic.ring_status()
     }

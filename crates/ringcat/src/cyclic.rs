@@ -247,7 +247,7 @@ impl Cyclic {
         self.window.expect_cycle(next);
     }
 
-    /// Judges a domain, for who runs the steps of a cycle itself.
+    /// Evaluates a domain, for an application that runs the steps of a cycle itself.
     pub fn process(&mut self, domain: DomainId, now: Instant) -> DomainStatus {
         let status = self.exchange.process(domain, now);
         if let Some(rate) = self.rates.get_mut(domain.0) {
@@ -256,7 +256,8 @@ impl Cyclic {
         status
     }
 
-    /// Sends what was queued, for who runs the steps of a cycle itself: the next one is taken to be a period away.
+    /// Sends what was queued, for an application that runs the steps of a cycle itself: the next one is expected one
+    /// period later.
     pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
         self.pace.cycles += 1;
         self.next_cycle = now + self.period;
@@ -270,7 +271,7 @@ impl Cyclic {
         self.news.publish(&self.pace, self.exchange.counters(), self.exchange.ring(), &self.rates);
     }
 
-    /// Makes known who else sends on this wire.
+    /// Publishes the address of another sender on this wire.
     pub fn publish_foreign(&mut self) {
         if let Some(foreign) = self.exchange.pop_foreign()
             && let Some(source) = foreign.bytes.get(6..12).and_then(|bytes| bytes.try_into().ok())

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use ringcat_engine::mail::eoe::{EthernetStatus, MAX_FRAME, QUEUE};
-use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine};
+use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine, SubDeviceId};
 use ringcat_engine::time::Instant;
 use ringcat_link::tap::{TapError, TapInterface};
 
@@ -24,7 +24,7 @@ use crate::supervisor_thread::SupervisorThread;
 const LOOK: Duration = Duration::from_millis(20);
 /// Frames that one interface may hand to the host in one go, so that the others and the bus have their turn.
 const BURST: usize = 64;
-/// News that are kept until somebody takes them.
+/// News that are kept until they are taken.
 const NEWS: usize = 64;
 
 /// A network interface of the host, seen from its other end.
@@ -68,6 +68,7 @@ pub type MakeInterface = Box<dyn FnMut(&str, [u8; 6]) -> Result<Box<dyn HostInte
 
 /// How interfaces are named and addressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EthernetOptions {
     /// Number of this MainDevice, for names.
     pub index: u16,
@@ -76,6 +77,11 @@ pub struct EthernetOptions {
 }
 
 impl EthernetOptions {
+    /// Interfaces of the MainDevice with this number, whose main link has this MAC address.
+    pub const fn new(index: u16, main: [u8; 6]) -> EthernetOptions {
+        EthernetOptions { index, main }
+    }
+
     /// Name of a SubDevice's interface: `eoeXsY` by its position, `eoeXaY` by its alias where it has one.
     pub fn name(&self, subdevice: &EthernetSubDevice) -> String {
         match subdevice.alias {
@@ -105,9 +111,9 @@ pub enum EthernetNews {
         /// Its name.
         name: String,
         /// The SubDevice, by its index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
-    /// Somebody removed it. It is made anew.
+    /// Another program removed it. It is made again.
     Removed {
         /// Its name.
         name: String,
@@ -129,7 +135,7 @@ impl fmt::Display for EthernetNews {
             EthernetNews::Made { name, subdevice } => {
                 write!(f, "network interface {name} leads to SubDevice {subdevice}")
             }
-            EthernetNews::Removed { name } => write!(f, "{name}: somebody removed it; it is made anew"),
+            EthernetNews::Removed { name } => write!(f, "{name}: removed by another program; it is made again"),
             EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
             EthernetNews::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
             EthernetNews::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),
@@ -238,7 +244,7 @@ struct Switch {
     shared: Arc<Shared>,
     ends: Vec<End>,
     /// SubDevices whose interface cannot be made.
-    refused: Vec<usize>,
+    refused: Vec<SubDeviceId>,
     look_at: Instant,
 }
 
@@ -294,7 +300,7 @@ impl Switch {
             }
         }
         let interfaces = self.ends.iter().filter_map(|end| {
-            let status = engine.ethernet_port(end.subdevice.subdevice)?.status();
+            let status = engine.ethernet_port(end.subdevice.subdevice.0)?.status();
             let End { name, subdevice, refused, .. } = end;
             Some(EthernetInterface { name: name.clone(), subdevice: *subdevice, status, refused: *refused })
         });
@@ -327,7 +333,7 @@ impl End {
     /// Moves frames both ways; whether the carrier has to change, and to what.
     fn pass(&mut self, engine: &mut Engine) -> Option<bool> {
         let mut room = [0; MAX_FRAME + 1];
-        let port = engine.ethernet_port(self.subdevice.subdevice);
+        let port = engine.ethernet_port(self.subdevice.subdevice.0);
         let Some(port) = port.filter(|port| port.is_up()) else {
             // What was sent to a SubDevice that is away must not reach it when it is back.
             for _ in 0..QUEUE {
@@ -358,8 +364,8 @@ mod tests {
     // covers: eoe-interfaces
     #[test]
     fn interfaces_are_named_and_addressed_by_position_or_alias() {
-        let options = EthernetOptions { index: 0, main: [0x00, 0x1B, 0x21, 0xAA, 0xBB, 0xCC] };
-        let by_position = EthernetSubDevice { subdevice: 4, position: Position(2), alias: 0 };
+        let options = EthernetOptions::new(0, [0x00, 0x1B, 0x21, 0xAA, 0xBB, 0xCC]);
+        let by_position = EthernetSubDevice { subdevice: SubDeviceId(4), position: Position(2), alias: 0 };
         let by_alias = EthernetSubDevice { alias: 1000, ..by_position };
         assert_eq!((options.name(&by_position), options.name(&by_alias)), ("eoe0s2".into(), "eoe0a1000".into()));
         assert_eq!(options.mac(&by_position), [0x02, 0xAA, 0xBB, 0xCC, 0, 2]);

@@ -13,7 +13,7 @@ use ringcat_engine::supervisor::BusError;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
 
-use crate::mapped::{DoesNotFit, MapError};
+use crate::mapped::{DoesNotFit, MapError, WriteError};
 use crate::not_ready::NotReady;
 use crate::subdevice::SubDeviceError;
 
@@ -39,6 +39,8 @@ pub enum Error {
     Map(MapError),
     /// A value has more bits than its place in the process data.
     DoesNotFit(DoesNotFit),
+    /// Process data was not written.
+    Write(WriteError),
     /// Work did not end in time.
     TimedOut {
         /// The limit.
@@ -77,10 +79,11 @@ impl fmt::Display for Error {
             Error::NotReady(error) => error.fmt(f),
             Error::Map(error) => error.fmt(f),
             Error::DoesNotFit(error) => error.fmt(f),
+            Error::Write(error) => error.fmt(f),
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(StopError::Bus(BusError::Lost { .. })) => f.write_str(
-                "stop: no frame comes back on any interface, so SubDevices were not taken to INIT: they keep their state \
-                 until their watchdogs expire. Are the cables of the host unplugged?",
+                "stop: no frame comes back on any interface, so no SubDevice was brought to INIT: they keep their \
+                 states until their watchdogs expire. Are the cables of the host unplugged?",
             ),
             Error::Stop(error) => write!(f, "stop: {error}"),
             #[cfg(feature = "sim")]
@@ -106,6 +109,7 @@ impl std::error::Error for Error {
             Error::NotReady(error) => Some(error),
             Error::Map(error) => Some(error),
             Error::DoesNotFit(error) => Some(error),
+            Error::Write(error) => Some(error),
             Error::Stop(error) => Some(error),
             #[cfg(feature = "sim")]
             Error::Segment(error) => Some(error),
@@ -136,6 +140,7 @@ errors! {
     NotReady(NotReady),
     Map(MapError),
     DoesNotFit(DoesNotFit),
+    Write(WriteError),
     Stop(StopError),
 }
 

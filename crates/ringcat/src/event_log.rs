@@ -216,7 +216,7 @@ mod tests {
     }
 
     fn at(ms: u64, event: Event) -> TimedEvent {
-        TimedEvent { at: Instant(ms * 1_000_000), event, occupants: [None; 2] }
+        TimedEvent::new(Instant(ms * 1_000_000), event)
     }
 
     fn foreign() -> Event {

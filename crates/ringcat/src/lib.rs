@@ -94,7 +94,6 @@ pub mod text;
 #[cfg(feature = "tracing")]
 mod trace;
 mod value;
-mod visit;
 pub mod window;
 
 pub use acyclic::{AcyclicHalf, Inline};
@@ -105,12 +104,12 @@ pub use job::Job;
 pub use limits::TransferLimits;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
-pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, Output, OutputBits, Wanted};
+pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, Output, OutputBits, Wanted, WriteError};
 pub use not_ready::{NotReady, Reason};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
-pub use subdevice::{Address, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
+pub use subdevice::{SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
 pub use value::{Number, ObjectValue};
 
@@ -139,8 +138,8 @@ pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
 pub use ringcat_engine::mail::{Limits, Mailbox, MailboxError};
 pub use ringcat_engine::main_device::{
-    ActivateError, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupState,
-    HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
+    ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
+    GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;

@@ -63,6 +63,6 @@ impl TransferLimits {
     }
 
     pub(crate) const fn of_message(self) -> Limits {
-        (self.request, self.answer)
+        Limits::new(self.request, self.answer)
     }
 }

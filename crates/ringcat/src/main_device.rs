@@ -8,15 +8,13 @@ use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
-use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::mail::Mailbox;
-use ringcat_engine::main_device::{
-    ActivateError, Declaration, DomainConfig, DomainMember, MainDevice as Engine, Options as Engineering, Pending,
-};
+use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending};
 use ringcat_engine::procedures::dictionary::ReadPdos;
 use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
+use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
 use crate::acyclic::{Inline, carry_out_link_order};
@@ -166,19 +164,17 @@ impl Options {
     /// An engine for these links.
     pub(crate) fn engine(&self, links: &impl Links) -> Engine {
         let (main, redundant) = links.addresses();
-        let options = Engineering {
-            sii_cache: self.sii_cache,
-            pdos: self.pdos,
-            supervision: self.supervision,
-            codec: self.source_address,
-            settle: self.settle,
-            patience: self.patience,
-            junctions: self.junctions,
-            follow_groups: self.follow_groups,
-            enhanced_line_crossed: self.enhanced_line_crossed,
-            max_datagrams_per_frame: self.max_datagrams_per_frame,
-            ..Engineering::new(main, redundant)
-        };
+        let mut options = Engineering::new(main, redundant);
+        options.sii_cache = self.sii_cache;
+        options.pdos = self.pdos;
+        options.supervision = self.supervision;
+        options.codec = self.source_address;
+        options.settle = self.settle;
+        options.patience = self.patience;
+        options.junctions = self.junctions;
+        options.follow_groups = self.follow_groups;
+        options.enhanced_line_crossed = self.enhanced_line_crossed;
+        options.max_datagrams_per_frame = self.max_datagrams_per_frame;
         Engine::new(options, links.now())
     }
 }
@@ -227,7 +223,7 @@ impl<L: Links> MainDevice<L> {
     /// Looks at the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
-    /// Frames that are lost again and again, nobody who answers, or SubDevices that come or go meanwhile.
+    /// Frames that are lost repeatedly, no SubDevice that answers, or SubDevices that come or go meanwhile.
     pub fn look_at_ring(&mut self) -> Result<RingLook, Error> {
         let bus = self.engine.bus();
         Ok(self.run(look_at_ring(bus))?)
@@ -253,8 +249,8 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
-    pub fn mailbox(&self, position: usize) -> Option<Mailbox> {
-        self.engine.mailbox(position)
+    pub fn mailbox(&self, position: Position) -> Option<Mailbox> {
+        self.engine.mailbox(position.0.into())
     }
 
     /// Runs an async function of the engine to its end.
@@ -384,11 +380,9 @@ impl<M> From<Box<Refused<M>>> for Error {
 
 /// Everything that was scanned, as its SII says, in one domain.
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
-    let members = (0..subdevices.len()).map(|subdevice| DomainMember { subdevice, sync_managers: None });
-    Declaration {
-        lrw: LrwPolicy::default(),
-        domains: vec![DomainConfig::new(period, members.collect())],
-        subdevices: subdevices.iter().map(SubDeviceConfig::from_info).collect(),
-        ..Declaration::default()
+    let mut declaration = Declaration::with_period(period);
+    for subdevice in subdevices {
+        declaration.add(SubDeviceConfig::from_info(subdevice));
     }
+    declaration
 }

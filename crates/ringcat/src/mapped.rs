@@ -9,13 +9,16 @@ mod bits;
 mod error;
 mod place;
 mod search;
+mod write;
 
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::SubDeviceId;
 
 pub use bits::{DoesNotFit, OutputBits};
+pub(crate) use bits::{signed, unsigned};
 pub use error::{MapError, MappedObject, Wanted};
 pub use place::{Input, Mapped, Output};
+pub use write::WriteError;
 
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
@@ -101,6 +104,6 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     fn search(&self, subdevice: SubDeviceId) -> Result<Search, MapError> {
-        Search::new(self.directory(), subdevice, self.acyclic.info(subdevice.0))
+        Search::new(self.directory(), subdevice, self.acyclic.info(subdevice))
     }
 }

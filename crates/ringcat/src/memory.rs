@@ -1,6 +1,6 @@
 //! Links in memory: frames go into rings of fixed size, a peer answers in the same process.
 //!
-//! For tests, benches and for whoever brings frames to the wire by other means. Nothing is allocated after
+//! For tests, benches and for applications with another way to the wire. Nothing is allocated after
 //! construction; what does not fit is counted.
 
 use ringcat_engine::link::Link;

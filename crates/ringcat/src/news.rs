@@ -36,7 +36,7 @@ pub struct News {
 }
 
 /// Fields of [`CyclicCounters`].
-const COUNTERS: usize = 16;
+const COUNTERS: usize = CyclicCounters::COUNT;
 
 fn zeros<const N: usize>() -> [AtomicU64; N] {
     [const { AtomicU64::new(0) }; N]
@@ -78,42 +78,7 @@ impl News {
 
     /// Counters of process data.
     pub fn counters(&self) -> CyclicCounters {
-        let [
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-        ] = load(&self.counters);
-        CyclicCounters {
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-        }
+        CyclicCounters::from_words(load(&self.counters))
     }
 
     /// Last judgement of a domain.
@@ -213,43 +178,7 @@ impl News {
         let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
         let delays = [ns(pace.last_delay), ns(pace.longest_delay)];
         store(&self.pace, &[pace.cycles, pace.late, pace.skipped, pace.paused, delays[0], delays[1]]);
-        let CyclicCounters {
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-        } = *counters;
-        let numbers = [
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-        ];
-        store(&self.counters, &numbers);
+        store(&self.counters, &counters.to_words());
         self.publish_rates(rates);
         if self.restart.load(Ordering::Relaxed) {
             self.restart.store(false, Ordering::Relaxed);

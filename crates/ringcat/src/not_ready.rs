@@ -5,9 +5,9 @@ use std::fmt;
 use std::time::Duration;
 
 use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId, SubDeviceState};
+use ringcat_engine::main_device::{Address, MainDevice as Engine, SubDeviceId, SubDeviceState};
 
-use crate::subdevice::{Address, SubDeviceName};
+use crate::subdevice::SubDeviceName;
 
 /// Events that are kept for the application while it waits; older ones are dropped and counted.
 const KEPT: usize = 4096;
@@ -68,14 +68,14 @@ impl Failures {
         #[cfg(feature = "tracing")]
         crate::trace::tell(timed);
         match &timed.event {
-            Event::ConfigurationFailed { subdevice, reason } => {
-                if self.0.len() <= *subdevice {
-                    self.0.resize(*subdevice + 1, None);
+            Event::ConfigurationFailed { subdevice: SubDeviceId(index), reason } => {
+                if self.0.len() <= *index {
+                    self.0.resize(*index + 1, None);
                 }
-                self.0[*subdevice] = Some(reason.clone());
+                self.0[*index] = Some(reason.clone());
             }
             Event::StateReached { subdevice, .. } | Event::Lost { subdevice } => {
-                if let Some(reason) = self.0.get_mut(*subdevice) {
+                if let Some(reason) = self.0.get_mut(subdevice.0) {
                     *reason = None;
                 }
             }

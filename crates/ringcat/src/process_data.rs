@@ -8,10 +8,10 @@ use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::{Directory, SubDeviceId};
 use ringcat_engine::time::Instant;
 
-use crate::mapped::{DoesNotFit, Mapped, Output, OutputBits};
+use crate::mapped::{DoesNotFit, Mapped, Output, OutputBits, WriteError, signed, unsigned};
 use crate::value::Number;
 
-/// When a domain is due, and how it was judged last.
+/// When a domain is due, and its state at the last evaluation.
 #[derive(Debug)]
 pub(crate) struct Rate {
     /// The domain is due every so many cycles.
@@ -19,7 +19,7 @@ pub(crate) struct Rate {
     pub status: DomainStatus,
 }
 
-/// The images of all domains and what is known of them.
+/// The images of all domains, and the states of domains and inputs.
 #[derive(Debug)]
 pub struct ProcessData<'a> {
     pub(crate) exchange: &'a mut Exchange,
@@ -40,7 +40,7 @@ impl ProcessData<'_> {
         self.now
     }
 
-    /// Last judgement of a domain.
+    /// State of a domain when its frames were last evaluated.
     pub fn status(&self, domain: DomainId) -> DomainStatus {
         self.rates.get(domain.0).map_or_else(DomainStatus::default, |rate| rate.status)
     }
@@ -55,18 +55,57 @@ impl ProcessData<'_> {
         self.exchange.read(entry)
     }
 
-    /// Value of an entry, sign-extended.
+    /// Value of an entry, sign-extended from its width.
     pub fn read_signed(&self, entry: &Entry) -> i64 {
         entry.read_signed(self.exchange.image(entry.domain))
     }
 
-    /// Sets an entry to the lower bits of a value. What is written to an input is lost with the next frame; see
-    /// [`ProcessData::set`].
-    pub fn write(&mut self, entry: &Entry, value: u64) {
-        self.exchange.write(entry, value);
+    /// Sets an output to an unsigned value; [`ProcessData::set`] knows its type and cannot fail.
+    ///
+    /// # Errors
+    /// The entry is an input or not in the image, or the value has more bits. Nothing is changed then.
+    ///
+    /// ```
+    /// use ringcat::{Entry, ProcessData, WriteError};
+    ///
+    /// fn start(data: &mut ProcessData<'_>, motor: &Entry, sensor: &Entry) -> Result<(), WriteError> {
+    ///     data.write(motor, 1)?;
+    ///     assert!(matches!(data.write(sensor, 1), Err(WriteError::NotAnOutput { .. })));
+    ///     Ok(())
+    /// }
+    /// ```
+    pub fn write(&mut self, entry: &Entry, value: u64) -> Result<(), WriteError> {
+        self.check(entry)?;
+        let bits = unsigned(value, entry.bit_length)?;
+        self.exchange.write(entry, bits);
+        Ok(())
     }
 
-    /// Value of an input, or of an output as it stands.
+    /// Sets an output to a signed value.
+    ///
+    /// # Errors
+    /// As [`ProcessData::write`].
+    pub fn write_signed(&mut self, entry: &Entry, value: i64) -> Result<(), WriteError> {
+        self.check(entry)?;
+        let bits = signed(value, entry.bit_length)?;
+        self.exchange.write(entry, bits);
+        Ok(())
+    }
+
+    /// An entry that may be written by value.
+    fn check(&self, entry: &Entry) -> Result<(), WriteError> {
+        let start = u64::from(entry.bit_offset);
+        let bits = start..start + u64::from(entry.bit_length);
+        let image_bits = self.exchange.image(entry.domain).len() as u64 * 8;
+        match entry.bit_length {
+            _ if bits.end > image_bits => Err(WriteError::Outside { domain: entry.domain, end: bits.end, image_bits }),
+            1..=64 if self.directory.are_outputs(entry.domain, bits.clone()) => Ok(()),
+            1..=64 => Err(WriteError::NotAnOutput { domain: entry.domain, start }),
+            length => Err(WriteError::Length { bits: length }),
+        }
+    }
+
+    /// Value of an input, or the value of an output that the next frame sends.
     ///
     /// ```
     /// use ringcat::{Input, Output, ProcessData};
@@ -130,40 +169,55 @@ impl ProcessData<'_> {
     }
 
     fn place_of(&self, subdevice: SubDeviceId, sync_manager: u8) -> Option<(DomainId, Range<usize>, Direction)> {
-        let areas = self.directory.areas(subdevice.0);
+        let areas = self.directory.areas(subdevice);
         let area = areas.iter().find(|area| area.placed.area.sync_manager == sync_manager)?;
         let start = area.placed.image_offset as usize;
         let end = start + usize::from(area.placed.area.length);
         Some((area.domain, start..end, area.direction))
     }
 
-    /// A domain's whole image.
+    /// A domain's whole image, inputs and outputs.
     pub fn image(&self, domain: DomainId) -> &[u8] {
         self.exchange.image(domain)
     }
 
-    /// A domain's whole image, to write outputs.
-    pub fn image_mut(&mut self, domain: DomainId) -> &mut [u8] {
-        self.exchange.image_mut(domain)
+    /// Bytes of a domain's image, to write outputs.
+    ///
+    /// # Errors
+    /// The bytes are not all outputs, or not in the image.
+    pub fn outputs_mut(&mut self, domain: DomainId, bytes: Range<usize>) -> Result<&mut [u8], WriteError> {
+        let [start, end] = [bytes.start, bytes.end].map(|at| (at as u64).saturating_mul(8));
+        let image_bits = self.exchange.image(domain).len() as u64 * 8;
+        if end > image_bits {
+            return Err(WriteError::Outside { domain, end, image_bits });
+        }
+        let are_outputs = self.directory.are_outputs(domain, start..end);
+        let image = self.exchange.image_mut(domain).get_mut(bytes).filter(|_| are_outputs);
+        image.ok_or(WriteError::NotAnOutput { domain, start })
     }
 
     /// Sets all outputs of all domains to zero.
     pub fn zero_outputs(&mut self) {
-        for subdevice in 0..self.directory.subdevice_count() {
+        self.fill_outputs(0);
+    }
+
+    /// Sets each byte of all outputs of all domains to a value.
+    pub fn fill_outputs(&mut self, byte: u8) {
+        for subdevice in (0..self.directory.subdevice_count()).map(SubDeviceId) {
             for area in self.directory.areas(subdevice).iter().filter(|area| area.direction == Direction::Outputs) {
                 let start = area.placed.image_offset as usize;
                 let end = start + usize::from(area.placed.area.length);
-                self.exchange.image_mut(area.domain)[start..end].fill(0);
+                self.exchange.image_mut(area.domain)[start..end].fill(byte);
             }
         }
     }
 
     /// How old a SubDevice's inputs are.
-    pub fn freshness(&self, domain: DomainId, subdevice: usize) -> Freshness {
-        self.exchange.freshness(domain, subdevice)
+    pub fn freshness(&self, domain: DomainId, subdevice: SubDeviceId) -> Freshness {
+        self.exchange.freshness(domain, subdevice.0)
     }
 
-    /// Where process data lies.
+    /// The places of all process data.
     pub fn directory(&self) -> &Directory {
         self.directory
     }

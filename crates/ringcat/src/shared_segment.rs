@@ -1,7 +1,7 @@
 //! A simulated segment in real time whose links may be used by two threads: for trying applications whose halves have
 //! threads of their own, without an interface.
 //!
-//! Virtual time follows the wall clock. Whoever sends, receives or waits brings the segment up to date first.
+//! Virtual time follows the wall clock. Each call to send, receive or wait brings the segment up to date first.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -64,7 +64,7 @@ impl SharedSegment {
         (half(Half::Cyclic), half(Half::Acyclic))
     }
 
-    /// The segment, for who looks into it from another thread.
+    /// The segment, for access from another thread.
     pub fn plant(&self) -> Plant {
         Plant { inner: self.inner.clone(), begin: self.begin }
     }

@@ -26,14 +26,13 @@ use std::future::Future;
 use std::time::Duration;
 
 use ringcat_engine::mail::Mailbox;
-use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId};
+use ringcat_engine::main_device::{Address, MainDevice as Engine, SubDeviceId};
 use ringcat_wire::address::Position;
 
 pub use error::{SubDeviceError, SubDeviceFailure};
-pub use name::{Address, SubDeviceName};
+pub use name::SubDeviceName;
 pub(crate) use resolve::info;
-use start::start;
-pub(crate) use start::{Opening, start_with_mailbox};
+use start::{Opening, start, start_with_mailbox};
 
 use crate::acyclic::Inline;
 use crate::application::Application;

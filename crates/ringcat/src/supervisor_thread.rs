@@ -15,7 +15,9 @@ use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
+use ringcat_engine::main_device::{
+    ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
+};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
@@ -34,7 +36,7 @@ use crate::window::Window;
 
 /// A request, and what the cyclic half posts, waits for so long at most until the thread looks.
 const LONGEST_SLEEP: Duration = Duration::from_micros(500);
-/// And for so long when there was one of late: who asks one thing after the other is not to wait for each.
+/// And for so long after a recent request, so that a sequence of requests does not wait for each one.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
 /// How long that is.
 const ATTENTIVE: Duration = Duration::from_millis(2);
@@ -276,7 +278,7 @@ impl SupervisorThread {
         self.0.published.rest.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Events that nobody fetched in time and that were dropped.
+    /// Events that were not taken in time and were dropped.
     pub fn events_dropped(&self) -> u64 {
         self.rest().events_dropped
     }
@@ -354,8 +356,8 @@ impl AcyclicHalf for SupervisorThread {
         SupervisorThread::counters(self)
     }
 
-    fn info(&self, subdevice: usize) -> Option<SubDeviceInfo> {
-        self.with(move |engine| info(engine, subdevice)).ok().flatten()
+    fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
+        self.with(move |engine| info(engine, subdevice.0)).ok().flatten()
     }
 
     fn keep_events(&mut self, _now: Instant) {}

@@ -16,7 +16,7 @@ use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, MIN_FRAME, WIRE_OVERHEAD, wir
 const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
 /// A pause between two cycles that is shorter has no room for a frame: there is no window to keep then.
 pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wire_time_ns(MAX_FRAME) / 2);
-/// A cyclic half that is so much later than it said has stopped: nobody's frames are in the way then.
+/// A cyclic half that is so much later than it said has stopped: no cyclic frames follow then.
 const SILENCE_NS: u64 = 20_000_000;
 /// A cycle that is due may begin any moment: the wire is looked at again after this.
 const LOOK_AGAIN: Duration = Duration::from_micros(50);
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn acyclic_frames_end_before_the_next_cycle_begins() {
         let window = Window::default();
-        assert_eq!(window.bytes(Instant(0)), usize::MAX, "nobody sends cyclic frames");
+        assert_eq!(window.bytes(Instant(0)), usize::MAX, "no cyclic frames are sent");
         window.expect_cycle(Instant(MS));
         let bytes = window.bytes(Instant(0));
         assert!(wire_time_ns(bytes) <= MS && wire_time_ns(bytes) > MS * 9 / 10, "{bytes}");

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use ringcat::{Direction, DomainId};
+use ringcat::{Direction, DomainId, SubDeviceId};
 use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::DeviceIndex;
 
@@ -28,7 +28,7 @@ pub struct Area {
 /// The areas of a SubDevice, in the order of its SyncManagers.
 pub fn areas_of(directory: &Directory, subdevice: usize, device: DeviceIndex) -> impl Iterator<Item = Area> {
     let (mut outputs, mut inputs) = (0, 0);
-    directory.areas(subdevice).iter().map(move |entries| {
+    directory.areas(SubDeviceId(subdevice)).iter().map(move |entries| {
         let start = entries.placed.image_offset as usize;
         let length = usize::from(entries.placed.area.length);
         let at = match entries.direction {

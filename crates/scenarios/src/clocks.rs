@@ -66,7 +66,7 @@ pub fn clock_tree(mut descriptions: Vec<DeviceDescription>) -> Network {
 
 /// All scanned SubDevices in one domain, with clocks.
 pub fn with_clocks(scan: &Scan, config: ClockConfig) -> Declaration {
-    Declaration { clocks: Some(config), ..automatic(&scan.subdevices, CYCLE) }
+    automatic(&scan.subdevices, CYCLE).with_clocks(config)
 }
 
 /// Usual settings of scenarios.

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, JunctionConnection, JunctionMode, Options};
+use ringcat::{ClockConfig, Event, JunctionConnection, JunctionMode, Options, SubDeviceId};
 use ringcat_engine::main_device::RawDatagram;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::controller::Wander;
@@ -130,7 +130,12 @@ impl Plan {
         self.connect(end, at(junction, B));
         let port = |port: Port| port.index() as u8;
         let tail = self.devices - 1;
-        self.connections.push(JunctionConnection { head: junction, head_port: port(B), tail, tail_port: port(B) });
+        self.connections.push(JunctionConnection {
+            head: SubDeviceId(junction),
+            head_port: port(B),
+            tail: SubDeviceId(tail),
+            tail_port: port(B),
+        });
     }
 
     /// A trunk with branches and rings behind junctions; the trunk may be closed to a ring of two links.

@@ -190,7 +190,7 @@ impl Requester {
         match self.kind {
             Kind::Object | Kind::LargeObject => coe::write(mailbox, self.object(), value, limits).await.map_err(said),
             Kind::File => {
-                let options = FoeOptions { limits, ..FoeOptions::default() };
+                let options = FoeOptions::default().with_limits(limits);
                 foe::write(mailbox, "question", options, &mut Bytes::new(value), |_| ()).await.map(drop).map_err(said)
             }
             Kind::Idn => soe::write(mailbox, self.idn(), value, limits).await.map_err(said),
@@ -215,7 +215,7 @@ impl Requester {
         match self.kind {
             Kind::Object | Kind::LargeObject => coe::read(mailbox, self.object(), limits, room).await.map_err(said),
             Kind::File => {
-                let options = FoeOptions { limits, ..FoeOptions::default() };
+                let options = FoeOptions::default().with_limits(limits);
                 let mut sink = Bounded::new(room);
                 foe::read(mailbox, "question", options, &mut sink, |_| ()).await.map_err(said)?;
                 Ok(sink.into_bytes())

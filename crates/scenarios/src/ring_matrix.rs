@@ -26,7 +26,7 @@ use crate::phases::{End, Phase as StartPhase, start_up};
 use crate::segments::{cable_of_ring, descriptions, ring};
 use crate::world::{CYCLE, Mark, World};
 
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
 const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
 /// Bytes of a download over TCP.
 const STREAM: usize = 60_000;
@@ -338,7 +338,7 @@ async fn write_and_read_object(mailbox: Mailbox) -> Vec<u8> {
 }
 
 async fn write_and_read_file(mailbox: Mailbox) -> Vec<u8> {
-    let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+    let options = FoeOptions::default().with_limits(LIMITS);
     let data = pattern();
     foe::write(&mailbox, "recipe", options, &mut Bytes::new(&data), |_| ()).await.expect("a break is no error");
     let mut sink = Bounded::new(BYTES);

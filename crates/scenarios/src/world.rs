@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use ringcat::{
     Application, Declaration, Direction, DomainId, Error, Event, Instant, JunctionConnection, Links, MainDevice,
-    Options, ProcessData, Scan, TimedEvent, automatic,
+    Options, ProcessData, Scan, SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{Directory, Pending};
@@ -177,11 +177,10 @@ impl World {
         let number = self.cycles;
         let mut due = Vec::new();
         let result = self.application.cycle(|data| {
-            for (domain, outputs) in self.outputs.iter().enumerate() {
-                let domain = DomainId(domain);
+            for (domain, outputs) in (0..).map(DomainId).zip(&self.outputs) {
                 if data.is_due(domain) {
                     due.push((domain, data.status(domain)));
-                    write_pattern(data.image_mut(domain), outputs, number);
+                    write_pattern(data, domain, outputs, number);
                 }
             }
             work(data)
@@ -482,7 +481,7 @@ fn station(device: &Device) -> u16 {
 /// Ranges of the outputs in each domain's image.
 fn output_ranges(directory: &Directory, domains: usize, declared: usize) -> Vec<Vec<Range<usize>>> {
     let mut ranges = vec![Vec::new(); domains];
-    for area in (0..declared).flat_map(|subdevice| directory.areas(subdevice)) {
+    for area in (0..declared).flat_map(|subdevice| directory.areas(SubDeviceId(subdevice))) {
         if area.direction == Direction::Outputs {
             let start = area.placed.image_offset as usize;
             ranges[area.domain.0].push(start..start + usize::from(area.placed.area.length));
@@ -492,8 +491,10 @@ fn output_ranges(directory: &Directory, domains: usize, declared: usize) -> Vec<
 }
 
 /// New outputs in every cycle, different from byte to byte.
-fn write_pattern(image: &mut [u8], outputs: &[Range<usize>], number: u64) {
-    for at in outputs.iter().cloned().flatten() {
-        image[at] = (number as u8).wrapping_mul(31).wrapping_add((at as u8).wrapping_mul(7));
+fn write_pattern(data: &mut ProcessData<'_>, domain: DomainId, outputs: &[Range<usize>], number: u64) {
+    for range in outputs {
+        let bytes = data.outputs_mut(domain, range.clone()).expect("they are outputs");
+        let pattern = |at: usize| (number as u8).wrapping_mul(31).wrapping_add((at as u8).wrapping_mul(7));
+        bytes.iter_mut().zip(range.clone()).for_each(|(byte, at)| *byte = pattern(at));
     }
 }

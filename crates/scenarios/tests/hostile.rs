@@ -93,8 +93,7 @@ fn work<L: Links>(mut main_device: MainDevice<L>, cycles: u32, stop: impl Fn()) 
     };
     for number in 0..cycles {
         application.cycle(|data| {
-            let domain = ringcat::DomainId(0);
-            data.image_mut(domain).fill(number as u8);
+            data.fill_outputs(number as u8);
         });
         while application.pop_event().is_some() {}
     }

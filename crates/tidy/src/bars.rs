@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use crate::known::Counts;
 use crate::tree::{File, Tree};
-use crate::{Finding, circles, dependencies, interface, limits, words};
+use crate::{Finding, circles, dependencies, handed_on, limits, words};
 
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub fn rows(tree: &Tree, packet: &str) -> Result<Vec<Row>, Finding> {
         polling(tree),
         none("words for people outside of the allow-list", "1,361", words::for_people(tree)),
         printed("lines of the engine", "42,982", format!("{all}, without files of tests {without}")),
-        printed("public items of `ringcat`", "not counted", interface::items(tree).len().to_string()),
+        printed("public items of `ringcat`", "not counted", handed_on::items(tree).len().to_string()),
         Row {
             what: "documentation examples",
             before: "1",

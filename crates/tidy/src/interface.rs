@@ -1,10 +1,11 @@
-//! The public items of the library `ringcat` according to its sources: a list kept in the repository, so that a review
-//! shows every change of the interface.
+//! The public items of the library `ringcat`, as its sources have them: a list that is kept in the repository, so that
+//! a review shows every change of the interface.
 //!
-//! Input: the tree, formatted by rustfmt. Output: a line for each item: re-exports of the crate root, public types with
-//! their fields and variants, traits with their items, public functions, and implemented traits. The list does not
-//! contain items created by macros, and of types of lower crates only the name. It contains public items of private
-//! modules, also if the crate root does not name them.
+//! In goes the tree, formatted by rustfmt; out comes a line for each item: what the crate root re-exports, public types
+//! with their fields and variants, traits with their items, public functions, and the traits that types implement. For
+//! a type of a lower crate that is re-exported by name, the module `handed_on` adds the same lines. Macros are not
+//! expanded: the list has the items in the macro's body and each line of its calls, so that a change of either shows.
+//! Items of private modules are listed where they are public, also if the crate root does not name them.
 
 use crate::Finding;
 use crate::tree::{File, Tree};
@@ -12,14 +13,14 @@ use crate::tree::{File, Tree};
 /// The list.
 pub const LIST: &str = "crates/ringcat/public-items.txt";
 /// The sources.
-const SOURCES: &str = "crates/ringcat/src/";
+pub(crate) const SOURCES: &str = "crates/ringcat/src/";
 /// One level of rustfmt.
 const INDENT: usize = 4;
 
-/// Context of a line.
+/// What a line belongs to.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
-    /// The file itself, or an item without public parts.
+    /// The file itself, or something of which nothing is public.
     Nothing,
     /// A public struct: its public fields.
     Struct,
@@ -31,20 +32,41 @@ enum Inside {
     Impl,
     /// A list of names that the crate root re-exports.
     Names,
+    /// The definition of a macro: the public items in its body.
+    Macro,
+    /// A call of a macro at the top of a file: its lines.
+    Call,
 }
 
-/// One line for each public item, sorted by file.
-pub fn items(tree: &Tree) -> Vec<String> {
-    let mut files: Vec<&File> = tree.rust().filter(|file| file.path.starts_with(SOURCES)).collect();
+/// A public item.
+pub(crate) struct Item {
+    /// Module path of its file below `src`.
+    module: String,
+    /// The types that it is about: its own name, that of its owner, those that a macro makes.
+    pub owners: Vec<String>,
+    /// Signature, with that of its owner before it.
+    pub text: String,
+}
+
+/// One line for each public item of the library itself, sorted by file.
+pub(crate) fn own_items(tree: &Tree) -> Vec<String> {
+    items_of(tree, SOURCES).into_iter().map(|item| format!("{}: {}", item.module, item.text)).collect()
+}
+
+/// The items of all files below a place, sorted by file. Files of tests have none.
+pub(crate) fn items_of(tree: &Tree, sources: &str) -> Vec<Item> {
+    let is_test = |path: &str| path.split('/').any(|part| matches!(part, "tests" | "tests.rs"));
+    let mut files: Vec<&File> = tree.rust().filter(|file| file.path.starts_with(sources)).collect();
+    files.retain(|file| !is_test(&file.path));
     files.sort_by(|one, other| one.path.cmp(&other.path));
-    files.into_iter().flat_map(of_file).collect()
+    files.into_iter().flat_map(|file| of_file(file, sources)).collect()
 }
 
-fn of_file(file: &File) -> Vec<String> {
-    let module = file.path.trim_start_matches(SOURCES).trim_end_matches(".rs").replace('/', "::");
-    let mut found = Vec::new();
+fn of_file(file: &File, sources: &str) -> Vec<Item> {
+    let module = file.path.trim_start_matches(sources).trim_end_matches(".rs").replace('/', "::");
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
     let (mut inside, mut owner, mut is_test) = (Inside::Nothing, String::new(), false);
-    let mut lines = file.text.lines().peekable();
+    let mut lines = file.text.lines();
     while let Some(line) = lines.next() {
         let depth = (line.len() - line.trim_start().len()) / INDENT;
         let text = line.trim();
@@ -60,19 +82,11 @@ fn of_file(file: &File) -> Vec<String> {
         if depth == 0 && matches!(text, "}" | "};") {
             inside = Inside::Nothing;
         }
-        let is_wanted = match (depth, inside) {
-            (0, _) => text.starts_with("pub ") || text.starts_with("impl"),
-            (1, Inside::Struct | Inside::Impl) => text.starts_with("pub "),
-            (1, Inside::Enum) => text.starts_with(char::is_uppercase),
-            (1, Inside::Trait) => ["fn ", "type ", "const "].iter().any(|start| text.starts_with(start)),
-            (1, Inside::Names) => true,
-            _ => false,
-        };
-        if !is_wanted {
+        if !is_wanted(inside, depth, text) {
             continue;
         }
         let mut item = text.to_owned();
-        while !is_whole(&item) {
+        while inside != Inside::Call && !is_whole(&item) {
             let Some(more) = lines.next() else { break };
             item.push(' ');
             item.push_str(more.trim());
@@ -80,19 +94,94 @@ fn of_file(file: &File) -> Vec<String> {
         let signature = signature(&item);
         if depth == 0 {
             inside = kind(&item);
-            owner.clone_from(&signature);
-            // Re-exports on several lines are complete here, and an impl without a trait is listed by its items.
-            if inside != Inside::Impl {
-                found.push(format!("{module}: {signature}"));
+            owner = macro_name(&item).map_or_else(|| signature.clone(), |name| format!("{name}!"));
+            match inside {
+                // Named by their items.
+                Inside::Impl | Inside::Macro => {}
+                Inside::Call if item.ends_with('{') => {}
+                Inside::Call => found.push((item.clone(), words(&item))),
+                _ => found.push((signature.clone(), vec![name_of(&signature)])),
             }
         } else {
-            found.push(format!("{module}: {owner}: {signature}"));
+            let text = if inside == Inside::Call { text.trim_end_matches(',') } else { signature.as_str() };
+            let about = if inside == Inside::Call { words(text) } else { vec![name_of(&owner)] };
+            found.push((format!("{owner}: {text}"), about));
         }
     }
-    found
+    with_what_macros_make(&mut found);
+    let item = |(text, owners)| Item { module: module.clone(), owners, text };
+    found.into_iter().map(item).collect()
 }
 
-/// Whether an item is complete: brackets are closed, and a body, a semicolon or a comma follows.
+fn is_wanted(inside: Inside, depth: usize, text: &str) -> bool {
+    match (depth, inside) {
+        (0, _) => text.starts_with("pub ") || text.starts_with("impl") || macro_name(text).is_some(),
+        (1, Inside::Struct | Inside::Impl) => text.starts_with("pub "),
+        (1, Inside::Enum) => text.starts_with(char::is_uppercase),
+        (1, Inside::Trait) => ["fn ", "type ", "const "].iter().any(|start| text.starts_with(start)),
+        (1, Inside::Names) => true,
+        (1, Inside::Call) => !matches!(text, ")" | "]" | "}"),
+        (_, Inside::Macro) => text.starts_with("pub ") || text.starts_with("impl"),
+        _ => false,
+    }
+}
+
+/// What a macro's body makes is about every type that its calls name.
+fn with_what_macros_make(found: &mut [(String, Vec<String>)]) {
+    let calls: Vec<(String, Vec<String>)> = found.to_vec();
+    for (text, owners) in found {
+        let Some((name, rest)) = text.split_once("!: ") else { continue };
+        if rest.starts_with("pub ") || rest.starts_with("impl") {
+            let of_calls =
+                calls.iter().filter(|(call, _)| call.starts_with(name) && call[name.len()..].starts_with('!'));
+            owners.extend(of_calls.flat_map(|(_, words)| words.clone()));
+        }
+    }
+}
+
+/// The name of a macro that is defined or called in this line.
+fn macro_name(text: &str) -> Option<&str> {
+    let text = text.strip_prefix("macro_rules! ").map_or(text, |rest| rest);
+    let (name, rest) = text.split_once(|c: char| !(c.is_alphanumeric() || c == '_'))?;
+    let is_call = text.len() > name.len() && text[name.len()..].starts_with('!');
+    let is_definition = rest.starts_with('{') && !name.is_empty() && !name.starts_with("impl");
+    (is_call || is_definition).then_some(name)
+}
+
+/// All names in a text.
+fn words(text: &str) -> Vec<String> {
+    let words = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+    words.filter(|word| word.starts_with(char::is_uppercase)).map(str::to_owned).collect()
+}
+
+/// The type that a signature is about: the one that it declares, or for which an impl is.
+fn name_of(signature: &str) -> String {
+    let text = signature.rsplit_once(" for ").map_or(signature, |(_, after)| after);
+    let text = text.strip_prefix("pub ").unwrap_or(text);
+    let is_impl = signature.starts_with("impl") && !signature.contains(" for ");
+    let text = if is_impl { without_parameters(text.trim_start_matches("impl")) } else { text };
+    let keywords = ["const", "unsafe", "async", "fn", "struct", "enum", "trait", "type", "static", "use", "mod"];
+    let mut names = text.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|word| !word.is_empty());
+    names.find(|word| !keywords.contains(word)).unwrap_or_default().to_owned()
+}
+
+/// What follows the `<...>` behind `impl`.
+fn without_parameters(text: &str) -> &str {
+    let mut depth = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '<' => depth += 1,
+            '>' if !text[..at].ends_with('-') => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 && !c.is_whitespace() {
+            return if c == '>' { &text[at + 1..] } else { &text[at..] };
+        }
+    }
+    text
+}
+
+/// Whether an item has come to its end: brackets are closed, and a body, a semicolon or a comma follows.
 fn is_whole(item: &str) -> bool {
     let opened = item.chars().filter(|c| matches!(c, '(' | '[')).count();
     let closed = item.chars().filter(|c| matches!(c, ')' | ']')).count();
@@ -114,6 +203,8 @@ fn kind(item: &str) -> Inside {
     let opens = item.ends_with('{');
     let starts = |words: &[&str]| words.iter().any(|word| item.starts_with(word));
     match () {
+        () if item.starts_with("macro_rules!") => Inside::Macro,
+        () if macro_name(item).is_some() => Inside::Call,
         () if !opens => Inside::Nothing,
         () if starts(&["pub struct"]) => Inside::Struct,
         () if starts(&["pub enum"]) => Inside::Enum,
@@ -124,9 +215,8 @@ fn kind(item: &str) -> Inside {
     }
 }
 
-/// Differences between the list and the sources.
-pub fn changes(tree: &Tree, list: &str) -> Vec<Finding> {
-    let now = items(tree);
+/// Where the list and the sources differ.
+pub fn changes(now: &[String], list: &str) -> Vec<Finding> {
     let before: Vec<&str> = list.lines().collect();
     let gone = before.iter().filter(|item| !now.iter().any(|other| other == *item)).map(|item| format!("- {item}"));
     let new = now.iter().filter(|item| !before.contains(&item.as_str())).map(|item| format!("+ {item}"));
@@ -138,7 +228,8 @@ mod tests {
     use super::*;
 
     fn items_of(text: &str) -> Vec<String> {
-        of_file(&File::new(&format!("{SOURCES}links/name.rs"), text))
+        let items = of_file(&File::new(&format!("{SOURCES}links/name.rs"), text), SOURCES);
+        items.into_iter().map(|item| format!("{}: {}", item.module, item.text)).collect()
     }
 
     #[test]
@@ -165,10 +256,10 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_reported_in_both_directions() {
+    fn a_change_is_told_in_both_directions() {
         let text = "//! Text.\n\npub fn new() {}\n";
         let tree = Tree { files: vec![File::new(&format!("{SOURCES}a.rs"), text)] };
-        let changes = changes(&tree, "a: pub fn old()\n");
+        let changes = changes(&own_items(&tree), "a: pub fn old()\n");
         let texts: Vec<&str> = changes.iter().map(|finding| finding.text.as_str()).collect();
         assert_eq!(texts, ["- a: pub fn old()", "+ a: pub fn new()"]);
     }

@@ -23,36 +23,37 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("queue", &[]),
     ("direction", &[]),
     ("domain", &[]),
+    ("declared", &[]),
     ("bell", &[]),
     ("request", &["bell"]),
-    ("junction", &[]),
+    ("junction", &["declared"]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["info", "link"]),
-    ("ring_status", &["time", "link", "ring", "topology"]),
-    ("config", &["info"]),
+    ("ring_status", &["declared", "time", "link", "ring", "topology"]),
+    ("config", &["declared", "info"]),
     ("clocks", &["topology"]),
     ("plan", &["info", "topology", "config"]),
-    ("layout", &["link", "ring", "direction", "domain"]),
+    ("layout", &["declared", "link", "ring", "direction", "domain"]),
     // what happened
-    ("event", &["time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
+    ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
     // what is known of the segment, and what follows from what is seen
-    ("segment", &["time", "link", "ring", "board", "info", "topology", "ring_status", "config", "clocks", "plan",
-        "layout", "event", "junction"]),
+    ("segment", &["declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
+        "plan", "layout", "event", "junction"]),
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event"]),
-    ("mail", &["time", "config", "event", "supervisor"]),
-    ("procedures", &["time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status", "config",
-        "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
+    ("mail", &["declared", "time", "config", "event", "supervisor"]),
+    ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
+        "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology", "ring_status",
-        "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request", "junction",
-        "procedures"]),
+    ("main_device", &["declared", "time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology",
+        "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request",
+        "junction", "procedures"]),
 ];
 
 /// The engine's sources.

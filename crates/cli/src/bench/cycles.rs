@@ -191,9 +191,10 @@ fn exchange<H: AcyclicHalf>(
 /// nanoseconds.
 fn one_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) -> u64 {
     application.cycle(|data| {
-        if let [first, second, .., last] = data.image_mut(DOMAIN) {
+        let last = data.image(DOMAIN).last().copied().unwrap_or_default();
+        if let Ok([first, second]) = data.outputs_mut(DOMAIN, 0..2) {
             *first = first.wrapping_add(1);
-            *second = *last;
+            *second = last;
         }
         data.now().0
     })

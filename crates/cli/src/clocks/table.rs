@@ -9,11 +9,11 @@ use crate::json::clocks::{Clock, Clocks, HiddenDelay};
 use crate::json::values::Times;
 
 fn name<'a>(clock: &ClockStatus, names: &'a Names) -> &'a str {
-    clock.subdevice.and_then(|subdevice| names.0.get(subdevice)).map_or("", String::as_str)
+    clock.subdevice.and_then(|subdevice| names.0.get(subdevice.0)).map_or("", String::as_str)
 }
 
 fn signals_of(clock: &ClockStatus, signals: &[Option<SyncSignals>]) -> Option<SyncSignals> {
-    clock.subdevice.and_then(|subdevice| signals.get(subdevice).copied().flatten())
+    clock.subdevice.and_then(|subdevice| signals.get(subdevice.0).copied().flatten())
 }
 
 /// Whether a delay is known, or one was estimated.
@@ -91,6 +91,8 @@ pub fn json(
 
 #[cfg(test)]
 mod tests {
+    use ringcat::SubDeviceId;
+
     use super::*;
     use ringcat::HiddenDelay;
     use ringcat::wire::address::{Position, StationAddress};
@@ -99,7 +101,7 @@ mod tests {
         ClockStatus {
             position: 3,
             station: StationAddress(0x1004),
-            subdevice: Some(0),
+            subdevice: Some(SubDeviceId(0)),
             is_reference: false,
             delay_ns: 1_050,
             hidden: None,

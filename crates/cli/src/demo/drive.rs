@@ -1,7 +1,7 @@
 //! Servo drives of the demonstrated segment: enabled as CiA 402 says, then moved back and forth.
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, Entry, ProcessData};
+use ringcat::{Application, Entry, ProcessData, SubDeviceId};
 
 /// CONTROLWORD, STATUSWORD, MODES_OF_OPERATION, TARGET_POSITION, POSITION_ACTUAL_VALUE (CiA 402).
 const CONTROLWORD: u16 = 0x6040;
@@ -75,7 +75,7 @@ pub struct Drive {
 impl Drive {
     /// The drive that a SubDevice is, if its process data has what a drive needs.
     pub fn find(application: &Application<SimulatedSegment>, subdevice: usize) -> Option<Drive> {
-        let entry = |index| application.entry(subdevice, index, 0);
+        let entry = |index| application.entry(SubDeviceId(subdevice), index, 0);
         Some(Drive {
             subdevice,
             controlword: entry(CONTROLWORD)?,
@@ -104,10 +104,11 @@ impl Drive {
         } else {
             self.wanted = self.position;
         }
-        data.write(&self.controlword, self.state.controlword());
-        data.write(&self.target, u64::from(self.wanted as u32));
+        // The entries are outputs of these widths: they were looked up as such.
+        let _ = data.write(&self.controlword, self.state.controlword());
+        let _ = data.write_signed(&self.target, self.wanted.into());
         if let Some(mode) = &self.mode {
-            data.write(mode, CSP);
+            let _ = data.write(mode, CSP);
         }
     }
 

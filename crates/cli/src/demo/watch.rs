@@ -9,7 +9,7 @@ use ringcat::sim::network::Network;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::wire::al::{AlState, AlStatus};
 use ringcat::wire::register::map;
-use ringcat::{Application, Direction, DomainId, DomainState, DomainStatus, Freshness};
+use ringcat::{Application, Direction, DomainId, DomainState, DomainStatus, Freshness, ProcessData, SubDeviceId};
 
 use super::drive::Drive;
 use super::incident::Incident;
@@ -113,9 +113,10 @@ impl Watch {
         let without_power = self.without_power;
         application.cycle(|data| {
             finding.status = data.status(DOMAIN);
-            finding.missing = without_power.map_or(0, |subdevice| data.directory().contribution(subdevice));
+            finding.missing =
+                without_power.map_or(0, |subdevice| data.directory().contribution(SubDeviceId(subdevice)));
             for (subdevice, place) in places.iter_mut().enumerate() {
-                let fresh = data.freshness(DOMAIN, subdevice) == Freshness::Fresh;
+                let fresh = data.freshness(DOMAIN, SubDeviceId(subdevice)) == Freshness::Fresh;
                 if !place.inputs.is_empty() {
                     finding.note(subdevice, fresh, without_power);
                     // Below SAFEOP a device offers nothing; it may have got there since.
@@ -127,7 +128,7 @@ impl Watch {
                         }
                     }
                 }
-                place.write_pattern(data.image_mut(DOMAIN), number, subdevice);
+                place.write_pattern(data, number, subdevice);
             }
             for drive in drives {
                 if without_power == Some(drive.subdevice) {
@@ -251,7 +252,11 @@ impl Finding {
 impl Place {
     fn new(application: &Application<SimulatedSegment>, subdevice: usize) -> Place {
         let areas = |direction| {
-            let areas = application.directory().areas(subdevice).iter().filter(move |area| area.direction == direction);
+            let areas = application
+                .directory()
+                .areas(SubDeviceId(subdevice))
+                .iter()
+                .filter(move |area| area.direction == direction);
             areas.map(|area| (area.placed.image_offset as usize, usize::from(area.placed.area.length))).collect()
         };
         Place {
@@ -264,13 +269,14 @@ impl Place {
         }
     }
 
-    fn write_pattern(&mut self, image: &mut [u8], number: u64, subdevice: usize) {
+    fn write_pattern(&mut self, data: &mut ProcessData<'_>, number: u64, subdevice: usize) {
         for (start, length) in &self.outputs {
-            for (at, byte) in image[*start..start + length].iter_mut().enumerate() {
+            let bytes = data.outputs_mut(DOMAIN, *start..start + length).unwrap_or_default();
+            for (at, byte) in bytes.iter_mut().enumerate() {
                 *byte = pattern(number, subdevice, at);
             }
         }
-        self.under_way = gather(image, &self.outputs);
+        self.under_way = gather(data.image(DOMAIN), &self.outputs);
     }
 }
 

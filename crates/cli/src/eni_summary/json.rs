@@ -17,18 +17,18 @@ pub(super) fn json(model: &Eni, configuration: &Configuration) -> eni::EniFile {
         let members = domain
             .members
             .iter()
-            .map(|member| eni::Member { subdevice: member.subdevice, sync_managers: member.sync_managers.clone() });
+            .map(|member| eni::Member { subdevice: member.subdevice.0, sync_managers: member.sync_managers.clone() });
         eni::Task { cycle_ns: ns(domain.period), members: members.collect() }
     });
     let lrw = declaration.explicit_lrw.iter().map(|lrw| eni::Lrw {
         name: lrw.name.clone(),
         logical: lrw.logical.0,
         length: lrw.length,
-        subdevices: lrw.subdevices.clone(),
+        subdevices: lrw.subdevices.iter().map(|subdevice| subdevice.0).collect(),
     });
     let clocks = declaration.clocks.as_ref().map(|clocks| {
         let reference = match clocks.reference {
-            ReferenceClock::Declared(index) => Some(index),
+            ReferenceClock::Declared(index) => Some(index.0),
             ReferenceClock::FirstWithClock | ReferenceClock::FirstConfigured => None,
         };
         eni::Clocks { reference, bus_shift: clocks.bus_shift }
@@ -72,7 +72,7 @@ fn subdevice(index: usize, configuration: &Configuration) -> Option<eni::SubDevi
         name: facts.name.clone(),
         station: facts.station,
         address: address(config),
-        group: config.group,
+        group: config.group.map(|group| group.0),
         vendor_id: config.expected.vendor_id,
         product_code: config.expected.product_code,
         revision: config.expected.revision,

@@ -55,10 +55,10 @@ impl BesideArguments {
         if self.eoe {
             let main = interface::list().into_iter().find(|found| found.name == interfaces.links.main);
             let main = main.map(|found| found.mac).unwrap_or_default();
-            beside.ethernet = Some(supervisor.start_ethernet(EthernetOptions { index: self.index, main })?);
+            beside.ethernet = Some(supervisor.start_ethernet(EthernetOptions::new(self.index, main))?);
         }
         if let Some(address) = self.gateway {
-            let gateway = supervisor.start_gateway(GatewayOptions { address, ..GatewayOptions::default() })?;
+            let gateway = supervisor.start_gateway(GatewayOptions::at(address))?;
             say!("mailbox gateway on {} (UDP and TCP)", gateway.address());
             if !address.ip().is_loopback() {
                 warn(format_args!(
@@ -90,7 +90,7 @@ impl Beside {
         let interfaces = self.ethernet.iter().flat_map(Ethernet::interfaces);
         let json = |EthernetInterface { name, subdevice, status, refused }: EthernetInterface| run::Ethernet {
             interface: name,
-            subdevice: subdevice.subdevice,
+            subdevice: subdevice.subdevice.0,
             sent_frames: status.counters.tx_frames,
             sent_bytes: status.counters.tx_bytes,
             dropped_frames: status.counters.tx_dropped,

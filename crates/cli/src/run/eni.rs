@@ -125,7 +125,7 @@ impl EniNetwork {
             Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw)) => {
                 let names = self.names().0;
                 let members: Vec<&str> =
-                    lrw.subdevices.iter().filter_map(|at| Some(names.get(*at)?.as_str())).collect();
+                    lrw.subdevices.iter().filter_map(|at| Some(names.get(at.0)?.as_str())).collect();
                 Failure::new(format!(
                     "{}: an LRW of {} bytes over {} SubDevices ({}) cannot be used with two interfaces, because a \
                      break of the ring would divide it: add --split-lrw to have it sent as LRD and LWR, or leave \

@@ -139,7 +139,7 @@ impl Run {
         let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
         for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
             let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
-            let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice));
+            let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice.0));
             let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));
             let position = clock.position;
             say!("  the clock of position {position}{name} is not locked: its difference is {difference}");

@@ -149,8 +149,8 @@ mod tests {
     // covers: lost-frames
     #[test]
     fn lost_frames_are_missing_late_or_damaged_and_no_incomplete_cycles_besides() {
-        let counters =
-            CyclicCounters { lost: 76, lost_late: 71, lost_damaged: 2, incomplete: 76, ..Default::default() };
+        let mut counters = CyclicCounters::default();
+        (counters.lost, counters.lost_late, counters.lost_damaged, counters.incomplete) = (76, 71, 2, 76);
         let mut exchanged = Exchanged { after: seen(counters, 3_704, 0), ..settled() };
         let expected = ["3 frames did not come back", "71 frames came back too late", "2 frames came back damaged"];
         assert_eq!(reasons(&exchanged), expected);
@@ -165,7 +165,8 @@ mod tests {
     fn a_few_cycles_that_this_machine_left_out_are_no_failure_and_many_are() {
         let few = Exchanged { after: seen(CyclicCounters::default(), 1_000, 90), ..settled() };
         assert_eq!(reasons(&few), [""; 0]);
-        let skipped = CyclicCounters { skipped: 500, ..Default::default() };
+        let mut skipped = CyclicCounters::default();
+        skipped.skipped = 500;
         let many = Exchanged { after: seen(skipped, 1_000, 500), ..settled() };
         assert_eq!(reasons(&many), ["the cycle time was not kept: 1000 of 2000 cycles left out"]);
     }

@@ -136,7 +136,7 @@ pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
     let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
     say!("  clocks: {locked} of {} locked", clocks.len());
     if let Some(clock) = farthest(clocks).filter(|_| locked > 0) {
-        let name = clock.subdevice.and_then(|subdevice| names.0.get(subdevice)).map_or("", String::as_str);
+        let name = clock.subdevice.and_then(|subdevice| names.0.get(subdevice.0)).map_or("", String::as_str);
         say!(
             "  farthest from the reference since its lock: position {} \"{name}\", {} ns",
             clock.position,

@@ -142,7 +142,7 @@ impl Wires {
     /// Counters of the interfaces as keys of JSON.
     pub fn json(&self) -> Vec<Interface> {
         let interface = |(link, socket): &(HostLink, PacketSocket)| {
-            let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
+            let LinkCounters { sent, received, down, busy, refused, overrun, truncated, .. } = socket.counters();
             Interface {
                 link: link.to_string(),
                 received_frames: received,
@@ -158,7 +158,7 @@ impl Wires {
     /// Counters of the interfaces, and how late this simulator was.
     pub fn summary(&self) -> String {
         let line = |(link, socket): &(HostLink, PacketSocket)| {
-            let LinkCounters { sent, received, down, busy, refused, overrun, truncated } = socket.counters();
+            let LinkCounters { sent, received, down, busy, refused, overrun, truncated, .. } = socket.counters();
             let unsent = down + busy + refused;
             format!(
                 "{link} interface: {received} frames received, {overrun} lost in a full ring, {truncated} too long, \

@@ -21,6 +21,7 @@ impl fmt::Display for Place {
 
 /// Why a file cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EniError {
     /// Position, if the error has one.
     pub place: Option<Place>,
@@ -32,6 +33,7 @@ pub struct EniError {
 
 /// The kind of error.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Problem {
     /// A limit is exceeded.
     TooMuch {

@@ -2,6 +2,7 @@
 //! from the cyclic commands. RingCAT measures delays and computes offsets and start times.
 
 use ringcat_engine::config::{ClockConfig, ReferenceClock, SubDeviceConfig, SyncSignals};
+use ringcat_engine::declared::SubDeviceId;
 use ringcat_wire::register::map;
 
 use super::cyclic::Cyclic;
@@ -63,6 +64,9 @@ fn signals(assign_activate: u16, cycle_0: u32, register_1: u32, shift: i32) -> S
 pub(super) fn of_segment(eni: &Eni, configs: &[SubDeviceConfig], cyclic: &Cyclic) -> Option<ClockConfig> {
     let by_element = eni.subdevices.iter().position(|subdevice| subdevice.clock.as_ref().is_some_and(|c| c.reference));
     let used = cyclic.distributes || by_element.is_some() || configs.iter().any(|config| config.sync.is_some());
-    let reference = cyclic.reference.or(by_element).map_or(ReferenceClock::default(), ReferenceClock::Declared);
+    let reference = cyclic
+        .reference
+        .or(by_element)
+        .map_or(ReferenceClock::default(), |index| ReferenceClock::Declared(SubDeviceId(index)));
     used.then(|| ClockConfig { reference, bus_shift: cyclic.bus_shift, ..ClockConfig::default() })
 }

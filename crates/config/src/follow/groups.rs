@@ -1,6 +1,7 @@
 //! Hot connect groups: the head is identified by alias or identification, its members follow it (protocol 8.2).
 
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
+use ringcat_engine::main_device::GroupId;
 
 use super::bus::Bus;
 use super::identity::{Mark, group_mark};
@@ -31,7 +32,7 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
             let config = &mut configs[member];
             config.address = address(offset)?;
             config.optional = true;
-            config.group = Some(number);
+            config.group = Some(GroupId(number));
         }
         names.push(group.name.clone());
     }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use ringcat_config::{ImageArea, ImageCopy};
+use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::Direction;
 use ringcat_wire::address::LogicalAddress;
 
@@ -98,7 +99,7 @@ fn an_lrw_is_declared_with_the_subdevices_that_it_addresses() {
     let declaration = configured(SMALL).declaration;
     let [lrw] = &declaration.explicit_lrw[..] else { panic!("{:?}", declaration.explicit_lrw) };
     assert!(lrw.name.starts_with("frame 1, command 4 \"drive\" (line "), "{}", lrw.name);
-    assert_eq!((lrw.logical, lrw.length, &lrw.subdevices[..]), (LogicalAddress(0x1000_0000), 6, &[3][..]));
+    assert_eq!((lrw.logical, lrw.length, &lrw.subdevices[..]), (LogicalAddress(0x1000_0000), 6, &[SubDeviceId(3)][..]));
 }
 
 #[test]
@@ -113,14 +114,14 @@ fn tasks_become_domains_each_with_its_cycle_and_members() {
     let one = configured(SMALL);
     assert_eq!(one.cycle, Some(Duration::from_millis(2)));
     let members: Vec<Vec<usize>> =
-        one.declaration.domains.iter().map(|d| d.members.iter().map(|m| m.subdevice).collect()).collect();
+        one.declaration.domains.iter().map(|d| d.members.iter().map(|m| m.subdevice.0).collect()).collect();
     assert_eq!(members, [vec![1_usize, 2, 3]]);
     let border = "</Frame></Cyclic><Cyclic><CycleTime>500</CycleTime><Frame>";
     let drive = "<Cmd><State>SAFEOP</State><State>OP</State><Comment>drive</Comment>";
     let two = changed(&[(drive, &format!("{border}{drive}"))]);
     let domains = &two.declaration.domains;
     let members: Vec<(Duration, Vec<usize>)> =
-        domains.iter().map(|d| (d.period, d.members.iter().map(|m| m.subdevice).collect())).collect();
+        domains.iter().map(|d| (d.period, d.members.iter().map(|m| m.subdevice.0).collect())).collect();
     assert_eq!(members, [(Duration::from_millis(2), vec![1_usize, 2]), (Duration::from_micros(500), vec![3])]);
     assert_eq!(two.cycle, Some(Duration::from_micros(500)));
     assert!(two.declaration.explicit_lrw[0].name.starts_with("task 2, frame 1, command 1"));
@@ -137,7 +138,7 @@ fn sync_managers_of_different_tasks_are_members_of_both() {
     let configuration = changed(&[(lrw, &format!("{lwr}{border}{lrd}"))]);
     let domains = &configuration.declaration.domains;
     let drive =
-        |domain: usize| domains[domain].members.iter().find(|m| m.subdevice == 3).unwrap().sync_managers.clone();
+        |domain: usize| domains[domain].members.iter().find(|m| m.subdevice.0 == 3).unwrap().sync_managers.clone();
     assert_eq!((drive(0), drive(1)), (Some(vec![2]), Some(vec![3])));
     assert!(configuration.declaration.explicit_lrw.is_empty());
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use ringcat_config::eni::{self, FileKind, Problem};
 use ringcat_config::{Configuration, follow};
 use ringcat_engine::config::{ConfigAddress, ReferenceClock, SyncManagerRole, SyncSignals};
+use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::Direction;
 
 /// The files of a directory of the shared data, sorted by name.
@@ -70,7 +71,7 @@ fn drives_of_ec_engineer_have_sync_managers_clocks_and_one_lrw() {
             assert!(config.startup.len() >= 19, "{name}: the PDO assignment is written as the file says");
         }
         let clocks = declaration.clocks.as_ref().expect("the file uses clocks");
-        assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(0), true));
+        assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(0)), true));
         let [lrw] = &declaration.explicit_lrw[..] else { panic!("{name}: {:?}", declaration.explicit_lrw) };
         assert_eq!(lrw.subdevices.len(), *count, "{name}");
         assert_eq!(found.cycle, Some(Duration::from_millis(1)));

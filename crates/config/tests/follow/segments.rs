@@ -2,6 +2,7 @@
 
 use ringcat_config::eni::Port;
 use ringcat_engine::config::{ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock};
+use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
 
 use crate::{SMALL, changed, configured, has_notice, refused};
@@ -56,7 +57,7 @@ fn a_hot_connect_group_is_found_by_alias_and_its_members_follow_it() {
     let expected = [ConfigAddress::Position(0), alias(0), alias(1), ConfigAddress::Position(1)];
     assert_eq!(addresses(&configuration), expected, "those of a group are not counted");
     let groups: Vec<_> = configuration.declaration.subdevices.iter().map(|c| (c.group, c.optional)).collect();
-    assert_eq!(groups, [(None, false), (Some(0), true), (Some(0), true), (None, false)]);
+    assert_eq!(groups, [(None, false), (Some(GroupId(0)), true), (Some(GroupId(0)), true), (None, false)]);
     assert_eq!(configuration.groups, ["Gripper"]);
 }
 
@@ -86,7 +87,7 @@ fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
 #[test]
 fn the_reference_clock_is_the_subdevice_addressed_by_the_cyclic_time_command() {
     let clocks = configured(SMALL).declaration.clocks.expect("the file uses clocks");
-    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(3), false));
+    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(3)), false));
     let bus_shift = "<Cmd><Cmd>5</Cmd><Adp>1004</Adp><Ado>2320</Ado><DataLength>4</DataLength></Cmd>";
     let first = "<Comment>time</Comment><Cmd>13</Cmd><Adp>0</Adp>";
     let frame = "<Frame>\n        <Cmd><State>PREOP</State>";
@@ -95,7 +96,7 @@ fn the_reference_clock_is_the_subdevice_addressed_by_the_cyclic_time_command() {
         (frame, &frame.replace("<Frame>", &format!("<Frame>{bus_shift}"))),
     ]);
     let clocks = shifted.declaration.clocks.unwrap();
-    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(0), true));
+    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(0)), true));
 }
 
 // covers: eni-commands

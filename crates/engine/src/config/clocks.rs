@@ -1,5 +1,6 @@
 //! Distributed clocks as the application declares them: for the whole segment, and for one SubDevice (protocol 7).
 
+use crate::declared::SubDeviceId;
 use core::time::Duration;
 
 /// The reference clock that all other clocks follow.
@@ -12,7 +13,7 @@ pub enum ReferenceClock {
     FirstConfigured,
     /// The SubDevice with this index in the declaration. SubDevices that frames pass before it receive a time that the
     /// host predicts instead of the reference time: a reference clock in front of all others is more exact.
-    Declared(usize),
+    Declared(SubDeviceId),
 }
 
 /// Time that a frame takes through a SubDevice's controller from port to port (protocol 7.1). No register contains it,

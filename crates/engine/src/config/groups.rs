@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use super::matching::{at_place, find_marked, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
+use crate::declared::GroupId;
 use crate::info::SubDeviceInfo;
 
 /// A hot connect group.
@@ -33,7 +34,7 @@ impl Group {
     }
 
     /// The declarations of a group with this number: optional, with places behind the head.
-    pub fn into_configs(self, number: usize) -> impl Iterator<Item = SubDeviceConfig> {
+    pub fn into_configs(self, number: GroupId) -> impl Iterator<Item = SubDeviceConfig> {
         let head = self.members.first().map(|head| head.address).unwrap_or(ConfigAddress::Position(0));
         (0..).zip(self.members).map(move |(offset, config)| SubDeviceConfig {
             address: head.behind(offset),
@@ -46,7 +47,7 @@ impl Group {
 
 /// Indices of the members of each group, head first.
 pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<Vec<usize>> {
-    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    let mut groups: BTreeMap<GroupId, Vec<usize>> = BTreeMap::new();
     for (index, config) in configs.into_iter().enumerate() {
         if let Some(number) = config.group {
             groups.entry(number).or_default().push(index);

@@ -5,6 +5,7 @@ use core::fmt;
 use ringcat_wire::address::Position;
 
 use super::ConfigAddress;
+use crate::declared::SubDeviceId;
 use crate::info::IdentityField;
 
 /// Why a declaration has no SubDevice.
@@ -43,7 +44,7 @@ pub enum ConfigError {
         /// Position of the SubDevice.
         position: Position,
         /// Number of the earlier declaration.
-        first: usize,
+        first: SubDeviceId,
     },
 }
 

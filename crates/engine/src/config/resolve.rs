@@ -10,6 +10,7 @@ use super::groups::{self, groups};
 use super::matching::{at_place, find_marked, missing_error};
 use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
+use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 
 /// Two SubDevices with the same alias.
@@ -164,7 +165,8 @@ fn claim(mut resolutions: Vec<Resolution>, infos: &[SubDeviceInfo]) -> Vec<Resol
             match owners[info] {
                 None => owners[info] = Some(config),
                 Some(first) => {
-                    let error = ConfigError::DeclaredTwice { position: infos[info].position, first };
+                    let error =
+                        ConfigError::DeclaredTwice { position: infos[info].position, first: SubDeviceId(first) };
                     *resolution = Resolution::Failed { config, error };
                 }
             }

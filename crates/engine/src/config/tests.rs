@@ -8,6 +8,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::sii::Identity;
 
 use super::*;
+use crate::declared::SubDeviceId;
 
 fn infos(products: &[u32]) -> Vec<SubDeviceInfo> {
     let info = |(position, product_code): (u16, &u32)| SubDeviceInfo {
@@ -112,7 +113,7 @@ fn two_subdevices_with_the_same_alias_are_an_ambiguous_address() {
 
 #[test]
 fn two_declarations_for_one_subdevice_are_an_error() {
-    let error = ConfigError::DeclaredTwice { position: Position(0), first: 0 };
+    let error = ConfigError::DeclaredTwice { position: Position(0), first: SubDeviceId(0) };
     let resolutions = resolve(&[config(0, 10), SubDeviceConfig::at_alias(0, 0)], &infos(&[10]));
     assert_eq!(resolutions, [found(0, 0), Resolution::Failed { config: 1, error }]);
 }
@@ -184,7 +185,7 @@ fn an_identification_finds_its_bearer_wherever_it_is() {
 fn with_group() -> Vec<SubDeviceConfig> {
     let head = SubDeviceConfig::at_alias(5, 0).expect_product(2, 20);
     let group = Group::new(head).then(SubDeviceConfig::default().expect_product(2, 21));
-    [config(0, 10), config(1, 11)].into_iter().chain(group.into_configs(0)).collect()
+    [config(0, 10), config(1, 11)].into_iter().chain(group.into_configs(GroupId(0))).collect()
 }
 
 // covers: hot-connect

@@ -1,7 +1,7 @@
 //! Events of the exchange, which reach the acyclic half as words in a queue.
 
 use super::Event;
-use crate::domain::{DomainState, DomainStatus};
+use crate::domain::{DomainId, DomainState, DomainStatus};
 use crate::queue::WORDS;
 
 /// Events of the exchange, which are packed into words.
@@ -90,8 +90,8 @@ impl CyclicEvent {
     /// The event as the application receives it.
     pub fn event(self) -> Event {
         match self {
-            CyclicEvent::Domain { domain, status } => Event::Domain { domain: domain.into(), status },
-            CyclicEvent::Skipped { domain } => Event::Skipped { domain: domain.into() },
+            CyclicEvent::Domain { domain, status } => Event::Domain { domain: DomainId(domain.into()), status },
+            CyclicEvent::Skipped { domain } => Event::Skipped { domain: DomainId(domain.into()) },
             CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
         }
     }

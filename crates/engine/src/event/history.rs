@@ -10,6 +10,7 @@ use ringcat_wire::mailbox::coe::{DiagnosisFlags, DiagnosisHistory, DiagnosisKind
 use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::Event;
+use crate::declared::{Address, SubDeviceId};
 use crate::time::Instant;
 
 /// Number of messages kept: one incident causes about five.
@@ -30,7 +31,7 @@ pub struct Incident {
     /// Number of the text (docs/mailbox-gateway.md).
     pub number: u16,
     /// Index in the declaration of the SubDevice concerned.
-    pub subdevice: Option<usize>,
+    pub subdevice: Option<SubDeviceId>,
     /// Additional code; 0 if there is none.
     pub detail: u32,
 }
@@ -54,7 +55,7 @@ impl Incident {
             Event::LinkUp { link } => (10, Information, None, link.index() as u32),
             Event::CableErrors { .. } => (11, Warning, None, 0),
             Event::Emergency { subdevice, emergency } => {
-                (12, Warning, Some(subdevice), u32::from(emergency.error_code))
+                (12, Warning, declared(subdevice), u32::from(emergency.error_code))
             }
             Event::JunctionChanged { broken, declared: [_, subdevice], .. } => {
                 (13, if broken { Warning } else { Information }, subdevice, broken.into())
@@ -62,6 +63,14 @@ impl Incident {
             _ => return None,
         };
         Some(Incident { at, kind, number, subdevice, detail })
+    }
+}
+
+/// The declared SubDevice; a position before activation says nothing about the declaration.
+const fn declared(subdevice: Address) -> Option<SubDeviceId> {
+    match subdevice {
+        Address::Declared(subdevice) => Some(subdevice),
+        Address::Scanned(_) => None,
     }
 }
 
@@ -174,7 +183,9 @@ mod tests {
 
     fn history(incidents: usize) -> History {
         let mut history = History::default();
-        (0..incidents).for_each(|subdevice| history.note(Instant(subdevice as u64), &Event::Lost { subdevice }));
+        (0..incidents).for_each(|subdevice| {
+            history.note(Instant(subdevice as u64), &Event::Lost { subdevice: SubDeviceId(subdevice) })
+        });
         history
     }
 
@@ -183,10 +194,10 @@ mod tests {
     fn a_full_history_overwrites_the_oldest_message_and_sets_the_lost_flag() {
         let mut history = history(50);
         assert_eq!((history.newest(), history.flags().0, history.has_unacknowledged()), (55, 0, true));
-        history.note(Instant(50), &Event::Returned { subdevice: 50 });
+        history.note(Instant(50), &Event::Returned { subdevice: SubDeviceId(50) });
         assert_eq!((history.newest(), history.flags().0), (6, DiagnosisFlags::LOST));
-        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(50)));
-        assert_eq!(history.incident(7).map(|incident| incident.subdevice), Some(Some(1)), "the oldest");
+        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(SubDeviceId(50))));
+        assert_eq!(history.incident(7).map(|incident| incident.subdevice), Some(Some(SubDeviceId(1))), "the oldest");
         assert_eq!((history.incident(5), history.incident(56)), (None, None));
     }
 
@@ -207,13 +218,17 @@ mod tests {
         let mut history = History::default();
         assert_eq!(history.set_flags(DiagnosisFlags::EMERGENCY), Err(AbortCode::VALUE_RANGE));
         assert_eq!(history.set_flags(DiagnosisFlags::NO_INFORMATION | DiagnosisFlags::ACKNOWLEDGE), Ok(()));
-        history.note(Instant(0), &Event::Returned { subdevice: 0 });
+        history.note(Instant(0), &Event::Returned { subdevice: SubDeviceId(0) });
         assert_eq!(history.newest(), 0);
-        (0..60).for_each(|subdevice| history.note(Instant(1), &Event::Lost { subdevice }));
-        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(0)), "not overwritten");
+        (0..60).for_each(|subdevice| history.note(Instant(1), &Event::Lost { subdevice: SubDeviceId(subdevice) }));
+        assert_eq!(
+            history.incident(6).map(|incident| incident.subdevice),
+            Some(Some(SubDeviceId(0))),
+            "not overwritten"
+        );
         assert!(history.flags().has(DiagnosisFlags::LOST | DiagnosisFlags::ACKNOWLEDGE));
         assert_eq!((history.acknowledge(55), history.flags().has(DiagnosisFlags::LOST)), (Ok(()), false));
-        history.note(Instant(2), &Event::Lost { subdevice: 99 });
-        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(99)));
+        history.note(Instant(2), &Event::Lost { subdevice: SubDeviceId(99) });
+        assert_eq!(history.incident(6).map(|incident| incident.subdevice), Some(Some(SubDeviceId(99))));
     }
 }

@@ -79,6 +79,7 @@ impl EventLog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::DomainId;
     use crate::link::Link;
 
     #[test]
@@ -87,7 +88,7 @@ mod tests {
         for n in 0..100 {
             log.push(Instant(n), Event::ForeignFrame { arrived_on: Link::Main, bytes: alloc::vec![0; 60] });
         }
-        log.push(Instant(100), Event::Skipped { domain: 0 });
+        log.push(Instant(100), Event::Skipped { domain: DomainId(0) });
         assert_eq!(log.dropped(), 100 - FOREIGN_KEPT as u64);
         let kept: Vec<_> = core::iter::from_fn(|| log.pop()).collect();
         assert_eq!(kept.len(), FOREIGN_KEPT + 1);
@@ -99,9 +100,9 @@ mod tests {
     fn the_log_keeps_the_newest() {
         let mut log = EventLog::default();
         for n in 0..KEPT + 3 {
-            log.push(Instant(n as u64), Event::Skipped { domain: n });
+            log.push(Instant(n as u64), Event::Skipped { domain: DomainId(n) });
         }
         assert_eq!(log.dropped(), 3);
-        assert_eq!(log.pop().unwrap().event, Event::Skipped { domain: 3 });
+        assert_eq!(log.pop().unwrap().event, Event::Skipped { domain: DomainId(3) });
     }
 }

@@ -2,6 +2,7 @@
 
 /// Counters of the cyclic half since activation. A frame is counted once, whatever number of copies it has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct CyclicCounters {
     /// Frames sent.
     pub sent: u64,
@@ -42,5 +43,90 @@ impl CyclicCounters {
     /// Of the lost frames, those that never came back.
     pub const fn missing(&self) -> u64 {
         self.lost.saturating_sub(self.lost_late).saturating_sub(self.lost_damaged)
+    }
+}
+
+impl CyclicCounters {
+    /// Number of counters.
+    pub const COUNT: usize = 16;
+
+    /// All counters, to hand them to another thread one by one.
+    pub const fn to_words(&self) -> [u64; CyclicCounters::COUNT] {
+        let CyclicCounters {
+            sent,
+            bytes,
+            received,
+            lost,
+            lost_late,
+            lost_damaged,
+            half,
+            copies_lost,
+            overtaken,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        } = *self;
+        [
+            sent,
+            bytes,
+            received,
+            lost,
+            lost_late,
+            lost_damaged,
+            half,
+            copies_lost,
+            overtaken,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        ]
+    }
+
+    /// The counters of [`CyclicCounters::to_words`].
+    pub const fn from_words(words: [u64; CyclicCounters::COUNT]) -> CyclicCounters {
+        let [
+            sent,
+            bytes,
+            received,
+            lost,
+            lost_late,
+            lost_damaged,
+            half,
+            copies_lost,
+            overtaken,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        ] = words;
+        CyclicCounters {
+            sent,
+            bytes,
+            received,
+            lost,
+            lost_late,
+            lost_damaged,
+            half,
+            copies_lost,
+            overtaken,
+            late,
+            corrupt,
+            foreign,
+            other,
+            skipped,
+            incomplete,
+            stale_copies,
+        }
     }
 }

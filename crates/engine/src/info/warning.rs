@@ -9,6 +9,7 @@ pub(super) const MAILBOX_HEADER: u16 = 6;
 
 /// A fault in the SII of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct InfoWarning {
     /// Category; `None` for the fixed area.
     pub category: Option<CategoryKind>,

@@ -14,6 +14,7 @@ use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 use super::error::LayoutError;
 use super::plan::PlannedPresence;
 use super::spec::{AreaSpec, Cut, Delivers, DomainSpec, Witness};
+use crate::declared::SubDeviceId;
 use crate::direction::Direction;
 
 /// Room for datagrams in a frame.
@@ -187,7 +188,7 @@ pub(super) fn chunks(
     for group in areas.chunk_by(|a, b| a.subdevice == b.subdevice) {
         if let Some(long) = group.iter().find(|area| usize::from(area.length) > MAX_DATA) {
             let AreaSpec { subdevice, sync_manager, length, .. } = *long;
-            return Err(LayoutError::AreaTooLong { subdevice, sync_manager, length });
+            return Err(LayoutError::AreaTooLong { subdevice: SubDeviceId(subdevice), sync_manager, length });
         }
         let subdevice = group[0].subdevice;
         let witness =

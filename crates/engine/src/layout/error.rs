@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::declared::SubDeviceId;
 use ringcat_wire::datagram::MAX_DATA;
 
 /// Why domains cannot be laid out.
@@ -11,7 +12,7 @@ pub enum LayoutError {
     /// An area is longer than a datagram can carry.
     AreaTooLong {
         /// Index of the SubDevice.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// SyncManager.
         sync_manager: u8,
         /// Its bytes.

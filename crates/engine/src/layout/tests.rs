@@ -7,6 +7,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
+use crate::declared::SubDeviceId;
 use crate::direction::Direction;
 
 fn area(subdevice: usize, sync_manager: u8, direction: Direction, length: u16) -> AreaSpec {
@@ -161,7 +162,7 @@ fn a_domain_larger_than_a_frame_is_cut_between_areas() {
 #[test]
 fn an_area_beyond_a_datagram_is_refused_with_its_name() {
     let error = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1487)])], LinkSet::Single, false).unwrap_err();
-    assert_eq!(error, LayoutError::AreaTooLong { subdevice: 7, sync_manager: 3, length: 1487 });
+    assert_eq!(error, LayoutError::AreaTooLong { subdevice: SubDeviceId(7), sync_manager: 3, length: 1487 });
     let full = Layout::new(&[spec(vec![area(7, 3, Direction::Inputs, 1486)])], LinkSet::Single, true).unwrap();
     // No room left for the supervision datagram: it has a frame of its own.
     assert_eq!(full.domains[0].frames.len(), 2);

@@ -12,8 +12,22 @@ use super::reader;
 use super::shared::SharedMailbox;
 use crate::time::Instant;
 
-/// Time limits: until the mailbox accepts the request, until the answer is available.
-pub type Limits = (Duration, Duration);
+/// Time limits of one message and its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Limits {
+    /// Until the mailbox of the SubDevice accepts the message.
+    pub request: Duration,
+    /// Until the answer is available.
+    pub answer: Duration,
+}
+
+impl Limits {
+    /// These limits for a message and for its answer.
+    pub const fn new(request: Duration, answer: Duration) -> Limits {
+        Limits { request, answer }
+    }
+}
 
 /// Longest time that messages without an answer may stay in the mailbox.
 const POST_LIMIT: Duration = Duration::from_millis(100);
@@ -267,12 +281,12 @@ impl Conversation {
         limits: Limits,
         accept: impl FnMut(&[u8]) -> Option<T>,
     ) -> Result<T, MailboxError> {
-        self.limit = limits.1;
+        self.limit = limits.answer;
         self.keep_unclaimed();
         // The answer may arrive before the write is confirmed.
         self.open = true;
-        self.write(payload, limits.0, Some(limits.1)).await.inspect_err(|_| self.open = false)?;
-        self.answer(limits.1, accept).await
+        self.write(payload, limits.request, Some(limits.answer)).await.inspect_err(|_| self.open = false)?;
+        self.answer(limits.answer, accept).await
     }
 
     /// Waits for a further part of an answer.

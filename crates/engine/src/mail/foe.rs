@@ -19,6 +19,7 @@ use super::{Mailbox, MailboxError};
 
 /// Parameters of a transfer besides the file name.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct FoeOptions {
     /// Password, 0 for none.
     pub password: u32,
@@ -34,10 +35,40 @@ impl Default for FoeOptions {
     fn default() -> FoeOptions {
         FoeOptions {
             password: 0,
-            limits: (Duration::from_millis(100), Duration::from_secs(3)),
+            limits: Limits::new(Duration::from_millis(100), Duration::from_secs(3)),
             busy_pause: Duration::from_millis(5),
             busy_limit: Duration::from_secs(30),
         }
+    }
+}
+
+impl FoeOptions {
+    /// The same options with this password; 0 for none.
+    #[must_use]
+    pub const fn with_password(mut self, password: u32) -> FoeOptions {
+        self.password = password;
+        self
+    }
+
+    /// The same options with these time limits of one message.
+    #[must_use]
+    pub const fn with_limits(mut self, limits: Limits) -> FoeOptions {
+        self.limits = limits;
+        self
+    }
+
+    /// The same options with this pause before a message is repeated after BUSY.
+    #[must_use]
+    pub const fn with_busy_pause(mut self, pause: Duration) -> FoeOptions {
+        self.busy_pause = pause;
+        self
+    }
+
+    /// The same options with this longest BUSY without progress.
+    #[must_use]
+    pub const fn with_busy_limit(mut self, limit: Duration) -> FoeOptions {
+        self.busy_limit = limit;
+        self
     }
 }
 

@@ -13,6 +13,7 @@ use super::error::MailboxError;
 use super::lane::{Lane, LaneState};
 use super::shared::{Session, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
+use crate::declared::Address;
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -24,9 +25,9 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    /// A mailbox that is not in use yet. `subdevice` is its number in events.
-    pub fn new(bus: &Bus, subdevice: usize) -> Mailbox {
-        Mailbox { shared: SharedMailbox::new(bus, subdevice) }
+    /// A mailbox that is not in use yet. `subdevice` names it in events.
+    pub fn new(bus: &Bus, subdevice: impl Into<Address>) -> Mailbox {
+        Mailbox { shared: SharedMailbox::new(bus, subdevice.into()) }
     }
 
     /// The SubDevice has entered PREOP or BOOT with this mailbox: counters restart. `send_manager` is the SyncManager

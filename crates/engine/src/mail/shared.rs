@@ -15,6 +15,7 @@ use super::eoe::Traffic;
 use super::lane::{Lane, LaneState};
 use super::recent::Recent;
 use super::unsolicited::UnsolicitedQueues;
+use crate::declared::Address;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
@@ -78,7 +79,7 @@ pub(super) struct MailboxState {
 pub(super) struct SharedMailbox {
     pub bus: Bus,
     /// Index in the declaration, before activation the position; for events.
-    pub subdevice: usize,
+    pub subdevice: Address,
     state: RefCell<MailboxState>,
     /// Notifies conversations and receivers.
     pub changed: Signal,
@@ -87,7 +88,7 @@ pub(super) struct SharedMailbox {
 }
 
 impl SharedMailbox {
-    pub(super) fn new(bus: &Bus, subdevice: usize) -> Rc<SharedMailbox> {
+    pub(super) fn new(bus: &Bus, subdevice: Address) -> Rc<SharedMailbox> {
         let state = MailboxState {
             session: None,
             recent: Recent::default(),

@@ -42,6 +42,7 @@ impl fmt::Display for SoeAddress {
 
 /// Why an access failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SoeError {
     /// The element.
     pub address: SoeAddress,
@@ -142,7 +143,7 @@ async fn read_inner(
             conversation.complete();
             return Ok(all);
         }
-        let (data, follow) = conversation.more(limits.1, answer).await??;
+        let (data, follow) = conversation.more(limits.answer, answer).await??;
         if follow != left - 1 {
             return Err(SoeFailure::Fragments { expected: left - 1, got: follow });
         }
@@ -172,7 +173,7 @@ async fn write_inner(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits
         rest = tail;
         let message = SoeMessage { incomplete: true, number: left, ..whole(data) };
         let length = encode(&message, &mut payload)?;
-        conversation.send(&payload[..length], limits.0).await?;
+        conversation.send(&payload[..length], limits.request).await?;
         conversation.check_parts()?;
         left -= 1;
     }

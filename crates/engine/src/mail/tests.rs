@@ -22,12 +22,13 @@ use ringcat_wire::source_address::MacCodec;
 use self::device::{Device, STATION};
 use self::server::AllProtocols;
 use super::{Limits, Mailbox};
+use crate::declared::SubDeviceId;
 use crate::link::{Link, LinkSet};
 use crate::ring::Identity;
 use crate::supervisor::Supervisor;
 use crate::time::Instant;
 
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 const MAIN: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 1]);
 const REDUNDANT: MacAddress = MacAddress([0, 0, 0x5E, 0, 0x53, 2]);
 /// Round-trip time of a frame.
@@ -60,7 +61,7 @@ impl Bench {
         let supervisor = Supervisor::new(identity, links, Instant(0));
         let server = AllProtocols::new(usize::from(size) - 6);
         let device = Device::new(size, server);
-        let mailbox = Mailbox::new(&supervisor.bus(), 0);
+        let mailbox = Mailbox::new(&supervisor.bus(), SubDeviceId(0));
         mailbox.open(StationAddress(STATION), device.layout, 1);
         Bench { supervisor, mailbox, device, now: Instant(1_000), under_way: Vec::new() }
     }

@@ -16,6 +16,7 @@ use super::prepare::{
 };
 use crate::board::Board;
 use crate::config::ClockConfig;
+use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
@@ -78,7 +79,7 @@ impl MainDevice {
         let closings = loaded.closings(&topology, &members, &stations);
         let cables = cables(&topology, self.options.links());
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
-        let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, index)).collect();
+        let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, SubDeviceId(index))).collect();
         let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
         let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
         let known = Known {

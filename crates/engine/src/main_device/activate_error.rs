@@ -9,6 +9,8 @@ use ringcat_wire::al::AlState;
 
 use super::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::config::ConfigError;
+use crate::declared::SubDeviceId;
+use crate::domain::DomainId;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
 use crate::segment::setup::SetupError;
@@ -24,14 +26,14 @@ pub enum ActivateError {
     /// A declared SubDevice is not there, or another one is.
     Config {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// What is wrong.
         error: ConfigError,
     },
     /// A SubDevice cannot be configured as declared.
     Setup {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// What is wrong.
         error: SetupError,
     },
@@ -44,28 +46,28 @@ pub enum ActivateError {
     /// A SubDevice is to stay in a state that process data and mailbox do not lead to.
     Target {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The state that was declared.
         target: AlState,
     },
     /// The head of a hot connect group has neither alias nor identification.
     Headless {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// Process data of a SubDevice was put into two domains.
     TwoDomains {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// The SyncManager.
         sync_manager: u8,
         /// The domains.
-        domains: [usize; 2],
+        domains: [DomainId; 2],
     },
     /// The period of a domain is zero, or no multiple of the shortest one.
     Period {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// Its period.
         period: Duration,
         /// The shortest period.
@@ -74,12 +76,12 @@ pub enum ActivateError {
     /// There is no domain, and a SubDevice has process data: it would reach OP without ever exchanging any.
     NoDomain {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// SYNC0 does not go with the cycle: it would come at another time of each cycle.
     SyncCycle {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// Cycle of SYNC0.
         sync0: Duration,
         /// The shortest period.
@@ -88,7 +90,7 @@ pub enum ActivateError {
     /// No cycle of a domain may be under way, or more than [`MAX_UNDER_WAY`].
     UnderWay {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// What was declared.
         under_way: u8,
     },
@@ -96,38 +98,38 @@ pub enum ActivateError {
     /// by the other (protocol CR-16, 9.2.2).
     LrwOnTwoLinks {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// First logical address of the datagram.
         logical: LogicalAddress,
         /// Its bytes.
         length: usize,
         /// Indices in the declaration of the SubDevices that it addresses.
-        subdevices: Vec<usize>,
+        subdevices: Vec<SubDeviceId>,
     },
     /// A configuration file names an LRW over several SubDevices, and there are two links (protocol CR-16, 9.2.2).
     NamedLrwOnTwoLinks(ExplicitLrw),
     /// LRW was asked for, and a SubDevice does not know it.
     LrwUnknown {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// Process data does not fit.
     Layout(LayoutError),
     /// SYNC signals are declared for a SubDevice, but no distributed clocks, or it has no clock.
     NoClock {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// It has a clock.
         has_clock: bool,
     },
     /// A domain names a SubDevice that was not declared.
     UnknownMember {
         /// Number of the domain.
-        domain: usize,
+        domain: DomainId,
         /// Index that was given.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
 }
 
@@ -165,12 +167,14 @@ impl fmt::Display for ActivateError {
             ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
                 f,
                 "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
-                 {subdevices:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice"
+                 {:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice",
+                list(subdevices)
             ),
             ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
                 f,
-                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {subdevices:?} cannot \
-                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice"
+                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {:?} cannot \
+                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice",
+                list(subdevices)
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
@@ -189,6 +193,11 @@ impl fmt::Display for ActivateError {
     }
 }
 
+/// Indices as a list: `[2, 3]`.
+fn list(subdevices: &[SubDeviceId]) -> impl fmt::Debug + '_ {
+    core::fmt::from_fn(move |f| f.debug_list().entries(subdevices.iter().map(|subdevice| subdevice.0)).finish())
+}
+
 /// Microseconds, with a fraction where there is one.
 fn in_us(time: Duration) -> impl fmt::Display {
     let ns = time.as_nanos();
@@ -198,13 +207,18 @@ fn in_us(time: Duration) -> impl fmt::Display {
     })
 }
 
-fn fmt_period(f: &mut fmt::Formatter<'_>, domain: usize, period: Duration, shortest: Duration) -> fmt::Result {
+fn fmt_period(f: &mut fmt::Formatter<'_>, domain: DomainId, period: Duration, shortest: Duration) -> fmt::Result {
     let [shortest, period] = [shortest, period].map(|time| time.as_micros());
     write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us and not zero, ")?;
     write!(f, "got {period} us")
 }
 
-fn fmt_sync_cycle(f: &mut fmt::Formatter<'_>, subdevice: usize, sync0: Duration, period: Duration) -> fmt::Result {
+fn fmt_sync_cycle(
+    f: &mut fmt::Formatter<'_>,
+    subdevice: SubDeviceId,
+    sync0: Duration,
+    period: Duration,
+) -> fmt::Result {
     let [sync0, period] = [sync0, period].map(in_us);
     write!(f, "declaration {subdevice}: SYNC0 every {sync0} us does not go with cycles of {period} us: ")?;
     f.write_str("one must be a multiple of the other")

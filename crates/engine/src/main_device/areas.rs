@@ -3,8 +3,10 @@
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
+use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::{Direction, SubDeviceInfo};
@@ -18,6 +20,8 @@ pub struct Directory {
     subdevices: Vec<Vec<AreaEntries>>,
     /// What each SubDevice adds to the working counters of all domains.
     contributions: Vec<u32>,
+    /// Bits of outputs by domain, in order and without gaps inside a range.
+    outputs: Vec<(DomainId, Range<u64>)>,
 }
 
 /// An area with the entries in it.
@@ -43,7 +47,34 @@ impl Directory {
                 *sum += u32::from(wkc.0);
             }
         }
-        Directory { subdevices, contributions }
+        let mut directory = Directory { subdevices, contributions, outputs: Vec::new() };
+        directory.outputs = directory.output_ranges();
+        directory
+    }
+
+    fn output_ranges(&self) -> Vec<(DomainId, Range<u64>)> {
+        let areas = self.subdevices.iter().flatten().filter(|area| area.direction == Direction::Outputs);
+        let range = |area: &AreaEntries| {
+            let start = u64::from(area.placed.image_offset) * 8;
+            (area.domain, start..start + u64::from(area.placed.area.length) * 8)
+        };
+        let mut ranges: Vec<_> = areas.map(range).filter(|(_, bits)| !bits.is_empty()).collect();
+        ranges.sort_unstable_by_key(|(domain, bits)| (*domain, bits.start));
+        ranges.dedup_by(|(domain, bits), (domain_before, before)| {
+            let continues = domain == domain_before && bits.start <= before.end;
+            if continues {
+                before.end = before.end.max(bits.end);
+            }
+            continues
+        });
+        ranges
+    }
+
+    /// Whether all these bits of a domain's image are outputs.
+    pub fn are_outputs(&self, domain: DomainId, bits: Range<u64>) -> bool {
+        let behind = self.outputs.partition_point(|(other, range)| (*other, range.start) <= (domain, bits.start));
+        let before = behind.checked_sub(1).and_then(|at| self.outputs.get(at));
+        bits.is_empty() || before.is_some_and(|(other, range)| *other == domain && bits.end <= range.end)
     }
 
     /// Number of declared SubDevices.
@@ -52,17 +83,17 @@ impl Directory {
     }
 
     /// What a SubDevice adds to the working counters of its domains when it takes part.
-    pub fn contribution(&self, subdevice: usize) -> u32 {
-        self.contributions.get(subdevice).copied().unwrap_or(0)
+    pub fn contribution(&self, subdevice: SubDeviceId) -> u32 {
+        self.contributions.get(subdevice.0).copied().unwrap_or(0)
     }
 
     /// All areas of a SubDevice.
-    pub fn areas(&self, subdevice: usize) -> &[AreaEntries] {
-        self.subdevices.get(subdevice).map_or(&[], Vec::as_slice)
+    pub fn areas(&self, subdevice: SubDeviceId) -> &[AreaEntries] {
+        self.subdevices.get(subdevice.0).map_or(&[], Vec::as_slice)
     }
 
     /// The place of a PDO entry; the first one where it is mapped more than once.
-    pub fn entry(&self, subdevice: usize, index: u16, sub_index: u8) -> Option<Entry> {
+    pub fn entry(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Option<Entry> {
         let entries = self.areas(subdevice).iter().flat_map(|area| &area.entries);
         entries.into_iter().find(|(i, s, _)| (*i, *s) == (index, sub_index)).map(|(_, _, entry)| *entry)
     }

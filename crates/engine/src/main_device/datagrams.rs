@@ -12,6 +12,7 @@ use ringcat_wire::datagram::Target;
 
 use super::MainDevice;
 use super::pending::Pending;
+use crate::declared::SubDeviceId;
 use crate::layout::Layout;
 use crate::link::LinkSet;
 use crate::procedures::junction::{UnderWay, ordering};
@@ -93,7 +94,11 @@ impl MainDevice {
             return Ok(());
         };
         match covered(&segment.view().layout, logical, datagram.data.len()) {
-            Some(subdevices) => Err(ServiceError::LrwOnTwoLinks { logical, length: datagram.data.len(), subdevices }),
+            Some(subdevices) => Err(ServiceError::LrwOnTwoLinks {
+                logical,
+                length: datagram.data.len(),
+                subdevices: subdevices.map(SubDeviceId),
+            }),
             None => Ok(()),
         }
     }

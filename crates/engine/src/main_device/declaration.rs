@@ -2,12 +2,12 @@
 
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::ops::Range;
 use core::time::Duration;
 
 use ringcat_wire::address::LogicalAddress;
 
 use crate::config::{ClockConfig, Group, SubDeviceConfig};
+use crate::declared::{GroupId, SubDeviceId};
 use crate::layout::LrwPolicy;
 
 /// Cycles of a domain that may be under way at once, at the most.
@@ -38,13 +38,14 @@ impl DomainConfig {
 #[derive(Clone, Debug)]
 pub struct DomainMember {
     /// Index of the SubDevice in the declaration.
-    pub subdevice: usize,
+    pub subdevice: SubDeviceId,
     /// SyncManagers whose process data belongs to the domain; `None` for all.
     pub sync_managers: Option<Vec<u8>>,
 }
 
 /// What the application declares.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Declaration {
     /// The SubDevices that are expected.
     pub subdevices: Vec<SubDeviceConfig>,
@@ -85,12 +86,12 @@ impl Declaration {
     }
 
     /// Declares a hot connect group. Returns its number, and the indices of its members, head first.
-    pub fn add_group(&mut self, group: Group) -> (usize, Range<usize>) {
+    pub fn add_group(&mut self, group: Group) -> (GroupId, Vec<SubDeviceId>) {
         let numbers = self.subdevices.iter().filter_map(|config| config.group);
-        let number = numbers.max().map_or(0, |last| last + 1);
+        let group_id = numbers.max().map_or(GroupId(0), |GroupId(last)| GroupId(last + 1));
         let first = self.subdevices.len();
-        self.subdevices.extend(group.into_configs(number));
-        (number, first..self.subdevices.len())
+        self.subdevices.extend(group.into_configs(group_id));
+        (group_id, (first..self.subdevices.len()).map(SubDeviceId).collect())
     }
 }
 
@@ -104,5 +105,5 @@ pub struct ExplicitLrw {
     /// Its bytes.
     pub length: usize,
     /// Indices in the declaration of the SubDevices that it addresses.
-    pub subdevices: Vec<usize>,
+    pub subdevices: Vec<SubDeviceId>,
 }

@@ -1,24 +1,13 @@
 //! A declaration, put together step by step.
 
 use alloc::vec;
-use core::fmt;
 use core::time::Duration;
 
 use super::declaration::{Declaration, DomainConfig, DomainMember, Required};
 use crate::config::{ClockConfig, SubDeviceConfig};
+use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::layout::LrwPolicy;
-
-/// Index of a SubDevice in the declaration. It stays the same wherever the SubDevice is on the bus; where that is, a
-/// [`Position`](ringcat_wire::address::Position) says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SubDeviceId(pub usize);
-
-impl fmt::Display for SubDeviceId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 impl Declaration {
     /// A declaration with one domain of this period, [`DomainId`] 0, and no SubDevices yet.
@@ -38,7 +27,7 @@ impl Declaration {
         let subdevice = self.subdevices.len();
         self.subdevices.push(config);
         if let Some(domain) = self.domains.get_mut(domain.0) {
-            domain.members.push(DomainMember { subdevice, sync_managers: None });
+            domain.members.push(DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
         }
         SubDeviceId(subdevice)
     }
@@ -59,7 +48,7 @@ impl Declaration {
     pub fn assign(&mut self, domain: DomainId, subdevice: SubDeviceId, sync_manager: u8) {
         if let Some(domain) = self.domains.get_mut(domain.0) {
             let sync_managers = Some(vec![sync_manager]);
-            domain.members.push(DomainMember { subdevice: subdevice.0, sync_managers });
+            domain.members.push(DomainMember { subdevice, sync_managers });
         }
     }
 
@@ -67,6 +56,13 @@ impl Declaration {
     #[must_use]
     pub fn with_clocks(mut self, clocks: ClockConfig) -> Declaration {
         self.clocks = Some(clocks);
+        self
+    }
+
+    /// The same, with distributed clocks or without any.
+    #[must_use]
+    pub fn with_optional_clocks(mut self, clocks: Option<ClockConfig>) -> Declaration {
+        self.clocks = clocks;
         self
     }
 

@@ -6,13 +6,14 @@ use ringcat_wire::address::Position;
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
+use crate::declared::SubDeviceId;
 use crate::mail::eoe::EthernetPort;
 
 /// A SubDevice through which Ethernet frames may pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EthernetSubDevice {
     /// Index in the declaration.
-    pub subdevice: usize,
+    pub subdevice: SubDeviceId,
     /// Position in the scan's order.
     pub position: Position,
     /// Alias; 0 is none.
@@ -31,7 +32,7 @@ impl MainDevice {
                 let info = member.info.as_ref()?;
                 let speaks = info.protocols.0 & MailboxProtocols::EOE != 0 && info.mailbox.is_some();
                 let (position, alias) = (info.position, info.alias);
-                speaks.then_some(EthernetSubDevice { subdevice, position, alias })
+                speaks.then_some(EthernetSubDevice { subdevice: SubDeviceId(subdevice), position, alias })
             })
             .collect()
     }

@@ -7,6 +7,7 @@ use ringcat_wire::register::PortKind;
 
 use super::activate_error::ActivateError;
 use super::declaration::Declaration;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
@@ -69,7 +70,7 @@ impl Loaded {
             let rings = topology.local_rings.iter().map(|ring| ring.closing);
             return rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
         }
-        let end = |subdevice: usize, port: u8| Some((members.get(subdevice)?.station, port));
+        let end = |subdevice: SubDeviceId, port: u8| Some((members.get(subdevice.0)?.station, port));
         let ends = |it: &JunctionConnection| Some([end(it.head, it.head_port)?, end(it.tail, it.tail_port)?]);
         self.connections.iter().filter_map(ends).collect()
     }
@@ -79,10 +80,10 @@ impl Loaded {
 pub(super) fn closing(
     connection: &JunctionConnection,
     found: &[Option<SubDeviceInfo>],
-) -> Result<Result<Closing, usize>, JunctionError> {
+) -> Result<Result<Closing, SubDeviceId>, JunctionError> {
     let JunctionConnection { head, head_port, tail, tail_port } = *connection;
     for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {
-        let Some(info) = found.get(subdevice).and_then(Option::as_ref) else {
+        let Some(info) = found.get(subdevice.0).and_then(Option::as_ref) else {
             return Ok(Err(subdevice));
         };
         let ports = &info.controller.ports;
@@ -90,7 +91,7 @@ pub(super) fn closing(
             return Err(JunctionError::NoSuchPort { connection: *connection, subdevice, port });
         }
     }
-    let node = |subdevice: usize| found[subdevice].as_ref().map_or(0, |info| usize::from(info.position.0));
+    let node = |subdevice: SubDeviceId| found[subdevice.0].as_ref().map_or(0, |info| usize::from(info.position.0));
     let closing = Closing {
         head: PortOf { node: node(head), port: head_port },
         tail: PortOf { node: node(tail), port: tail_port },

@@ -6,6 +6,8 @@ use ringcat_wire::command::Command;
 
 use super::activate_error::ActivateError;
 use super::declaration::ExplicitLrw;
+use crate::declared::SubDeviceId;
+use crate::domain::DomainId;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
 
@@ -33,10 +35,10 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
         if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {
             return Err(ActivateError::LrwOnTwoLinks {
-                domain,
+                domain: DomainId(domain),
                 logical: datagram.logical,
                 length: usize::from(datagram.outputs) + usize::from(datagram.inputs),
-                subdevices: datagram.contributions.iter().map(|(subdevice, _)| *subdevice).collect(),
+                subdevices: datagram.contributions.iter().map(|(subdevice, _)| SubDeviceId(*subdevice)).collect(),
             });
         }
     }

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::future::Future;
 
+use ringcat_wire::address::Position;
 use ringcat_wire::al::AlState;
 
 use super::MainDevice;
@@ -32,8 +33,10 @@ impl MainDevice {
             _ => None,
         };
         let bus = self.supervisor.bus();
-        while self.visited.len() <= position && info.is_some() {
-            self.visited.push(Mailbox::new(&bus, self.visited.len()));
+        if info.is_some() {
+            // A scan counts SubDevices in 16 bits (protocol 2.2).
+            let new = (0..=position as u16).skip(self.visited.len()).map(|it| Mailbox::new(&bus, Position(it)));
+            self.visited.extend(new);
         }
         let mailbox = self.visited.get(position).cloned();
         self.start(async move {

@@ -12,6 +12,7 @@ use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 
 /// What a MainDevice needs to know before it sends its first frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Options {
     /// Address of the main interface.
     pub main: MacAddress,

@@ -16,6 +16,8 @@ use super::activate_error::ActivateError;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
 use crate::config::{ConfigError, Resolution, can_be_head, groups, resolve};
+use crate::declared::SubDeviceId;
+use crate::domain::DomainId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
@@ -53,7 +55,7 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
                 report_absence(bus, config, false, error);
             }
             Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
-                return Err(ActivateError::Config { subdevice: config, error });
+                return Err(ActivateError::Config { subdevice: SubDeviceId(config), error });
             }
             Resolution::Extra { info } => extra.push(info),
         }
@@ -72,7 +74,7 @@ pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceI
     for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
         let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
         if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
-            return Err(ActivateError::NoClock { subdevice, has_clock });
+            return Err(ActivateError::NoClock { subdevice: SubDeviceId(subdevice), has_clock });
         }
     }
     Ok(())
@@ -81,10 +83,10 @@ pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceI
 fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigError) {
     bus.report(match error {
         ConfigError::Mismatch { position, field, expected, got } => {
-            Event::Mismatch { subdevice, position, field, expected, got }
+            Event::Mismatch { subdevice: SubDeviceId(subdevice), position, field, expected, got }
         }
         ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
-            Event::Missing { subdevice, optional }
+            Event::Missing { subdevice: SubDeviceId(subdevice), optional }
         }
     });
 }
@@ -102,7 +104,9 @@ pub(super) fn plan_all(
                 Err(error) if error.fault == PlanFault::Sii => {
                     Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
                 }
-                Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
+                Err(error) => {
+                    Err(ActivateError::Setup { subdevice: SubDeviceId(subdevice), error: SetupError::Plan(error) })
+                }
             },
             None => Ok(Areas::Declared(Declared::absent(config))),
         })
@@ -124,23 +128,23 @@ pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec
 pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
     if let Some(subdevice) = boot {
-        return Err(ActivateError::Target { subdevice, target: AlState::Boot });
+        return Err(ActivateError::Target { subdevice: SubDeviceId(subdevice), target: AlState::Boot });
     }
     let headless = groups(&declaration.subdevices).into_iter().find_map(|members| {
         let head = *members.first()?;
         (!can_be_head(&declaration.subdevices[head])).then_some(head)
     });
     if let Some(subdevice) = headless {
-        return Err(ActivateError::Headless { subdevice });
+        return Err(ActivateError::Headless { subdevice: SubDeviceId(subdevice) });
     }
     let shortest = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
     for (domain, config) in declaration.domains.iter().enumerate() {
         let period = config.period;
         if period.is_zero() || period.as_nanos() % shortest.as_nanos() != 0 {
-            return Err(ActivateError::Period { domain, period, shortest });
+            return Err(ActivateError::Period { domain: DomainId(domain), period, shortest });
         }
         if !(1..=MAX_UNDER_WAY).contains(&config.under_way) {
-            return Err(ActivateError::UnderWay { domain, under_way: config.under_way });
+            return Err(ActivateError::UnderWay { domain: DomainId(domain), under_way: config.under_way });
         }
     }
     check_sync_cycles(declaration, shortest)
@@ -154,7 +158,7 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
         let fits = sync0_ns == 0 || period_ns == 0 || sync0_ns % period_ns == 0 || period_ns.is_multiple_of(sync0_ns);
         if !fits {
             let sync0 = Duration::from_nanos(config.sync.map_or(0, |signals| signals.sync0_cycle_ns.into()));
-            return Err(ActivateError::SyncCycle { subdevice, sync0, period });
+            return Err(ActivateError::SyncCycle { subdevice: SubDeviceId(subdevice), sync0, period });
         }
     }
     Ok(())
@@ -164,7 +168,9 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
 pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
     let has_data = |areas: &Areas| areas.list().iter().any(|(.., length)| *length > 0);
     match plans.iter().position(has_data) {
-        Some(subdevice) if declaration.domains.is_empty() => Err(ActivateError::NoDomain { subdevice }),
+        Some(subdevice) if declaration.domains.is_empty() => {
+            Err(ActivateError::NoDomain { subdevice: SubDeviceId(subdevice) })
+        }
         _ => Ok(()),
     }
 }
@@ -182,23 +188,27 @@ pub(super) fn domain_specs(
         let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };
         for member in &config.members {
             let subdevice = member.subdevice;
-            let Some(areas) = plans.get(subdevice) else {
-                return Err(ActivateError::UnknownMember { domain, subdevice });
+            let Some(areas) = plans.get(subdevice.0) else {
+                return Err(ActivateError::UnknownMember { domain: DomainId(domain), subdevice });
             };
             if is_asked_for && !areas.lrw() {
-                return Err(ActivateError::LrwUnknown { domain, subdevice });
+                return Err(ActivateError::LrwUnknown { domain: DomainId(domain), subdevice });
             }
             spec.lrw &= areas.lrw();
             for (sync_manager, direction, length) in areas.list() {
                 if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
-                    let same = |a: &AreaSpec| a.subdevice == subdevice && a.sync_manager == sync_manager;
+                    let same = |a: &AreaSpec| a.subdevice == subdevice.0 && a.sync_manager == sync_manager;
                     let earlier = specs.iter().position(|spec| spec.areas.iter().any(same));
                     let earlier = earlier.or_else(|| spec.areas.iter().any(same).then_some(domain));
                     if let Some(other) = earlier {
                         let domains = [other, domain];
-                        return Err(ActivateError::TwoDomains { subdevice, sync_manager, domains });
+                        return Err(ActivateError::TwoDomains {
+                            subdevice,
+                            sync_manager,
+                            domains: domains.map(DomainId),
+                        });
                     }
-                    spec.areas.push(AreaSpec { subdevice, sync_manager, direction, length });
+                    spec.areas.push(AreaSpec { subdevice: subdevice.0, sync_manager, direction, length });
                 }
             }
         }
@@ -220,16 +230,16 @@ pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
     for (subdevice, member) in members.iter().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            bus.report(Event::PlanOddity { subdevice, what: warning.to_string() });
+            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: warning.to_string() });
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, member, layout) {
             let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
             let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
-            bus.report(Event::PlanOddity { subdevice, what });
+            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what });
         }
         if member.info.is_none() && declared_areas(&member.config).is_none() {
             let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
-            bus.report(Event::PlanOddity { subdevice, what: what.to_owned() });
+            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: what.to_owned() });
         }
     }
 }
@@ -261,7 +271,7 @@ pub(super) fn members(
         let setup = match &info {
             Some(info) if unfit.is_none() => Some(Rc::new(
                 Setup::new(index, &config, info, layout)
-                    .map_err(|error| ActivateError::Setup { subdevice: index, error })?,
+                    .map_err(|error| ActivateError::Setup { subdevice: SubDeviceId(index), error })?,
             )),
             Some(_) | None => None,
         };

@@ -6,11 +6,12 @@ use alloc::vec::Vec;
 use core::future::Future;
 use core::time::Duration;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
 use super::pending::Pending;
+use crate::declared::{Address, SubDeviceId};
 use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
@@ -41,10 +42,14 @@ impl MainDevice {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let work = self.station(subdevice).map(|station| work(self.bus(), station));
+        let address = match self.segment {
+            Some(_) => Address::Declared(SubDeviceId(subdevice)),
+            None => Address::Scanned(Position(u16::try_from(subdevice).unwrap_or(u16::MAX))),
+        };
         self.start(async move {
             match work {
                 Some(work) => Ok(work.await?),
-                None => Err(ServiceError::NoSubDevice { subdevice }),
+                None => Err(ServiceError::NoSubDevice { subdevice: address }),
             }
         })
     }

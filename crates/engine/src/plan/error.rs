@@ -11,6 +11,7 @@ use crate::info::Direction;
 
 /// A problem and the SubDevice that has it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlanError {
     /// Position of the SubDevice.
     pub position: Position,
@@ -213,6 +214,7 @@ pub enum PlanProblem {
 
 /// A declaration that the SII does not permit. The process data is planned as declared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlanWarning {
     /// The declared PDO assignment differs from the SII, which marks it as fixed. It is not written.
     FixedAssignment {
@@ -272,14 +274,7 @@ impl fmt::Display for PlanProblem {
             Self::NoMemory { sync_manager, start } => {
                 write!(f, "SM {sync_manager}: no memory for its direction at {start:#06x}")
             }
-            Self::OutsideMemory { sync_manager, start, bytes, memory_end } => {
-                write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} exceed the memory, ")?;
-                write!(f, "which ends at {memory_end:#06x}")
-            }
-            Self::Overlap { first, first_bytes, second, second_bytes } => {
-                write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.0, first_bytes.1)?;
-                write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.0, second_bytes.1)
-            }
+            Self::OutsideMemory { .. } | Self::Overlap { .. } => self.fmt_places(f),
             Self::TooFewFmmus { expected, got } => {
                 write!(f, "{expected} FMMUs are needed, the controller has {got}")
             }
@@ -287,13 +282,7 @@ impl fmt::Display for PlanProblem {
                 write!(f, "SM {sync_manager}: the SII describes {expected} bits, {got} are declared, ")?;
                 f.write_str("and without CoE it cannot be changed")
             }
-            Self::NoCoe { index, sub_index } => {
-                write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but the SubDevice has no CoE")
-            }
-            Self::NoSoe { drive, idn } => {
-                write!(f, "{idn} of drive {drive} is to be written, but the SubDevice has no SoE")
-            }
-            Self::NoEoe => f.write_str("IP parameters are to be set, but the SubDevice has no EoE"),
+            Self::NoCoe { .. } | Self::NoSoe { .. } | Self::NoEoe => self.fmt_protocol(f),
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
@@ -308,6 +297,34 @@ impl fmt::Display for PlanProblem {
                 let mask = mask.map_or(String::new(), |mask| format!(" and {mask} of mask"));
                 write!(f, "a command to register {register} has {data} bytes of data{mask}")
             }
+        }
+    }
+}
+
+impl PlanProblem {
+    /// Places in memory that do not go together.
+    fn fmt_places(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Self::OutsideMemory { sync_manager, start, bytes, memory_end } = self {
+            write!(f, "SM {sync_manager}: {bytes} bytes (all buffers) at {start:#06x} exceed the memory, ")?;
+            write!(f, "which ends at {memory_end:#06x}")?;
+        }
+        if let Self::Overlap { first, first_bytes, second, second_bytes } = self {
+            write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.0, first_bytes.1)?;
+            write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.0, second_bytes.1)?;
+        }
+        Ok(())
+    }
+
+    /// A start-up command needs a mailbox protocol that the SubDevice does not have.
+    fn fmt_protocol(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoCoe { index, sub_index } => {
+                write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but the SubDevice has no CoE")
+            }
+            Self::NoSoe { drive, idn } => {
+                write!(f, "{idn} of drive {drive} is to be written, but the SubDevice has no SoE")
+            }
+            _ => f.write_str("IP parameters are to be set, but the SubDevice has no EoE"),
         }
     }
 }

@@ -20,8 +20,8 @@ use super::clocks;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use crate::config::{SdoDownload, SubDeviceConfig, Transition};
-use crate::mail::Mailbox;
 use crate::mail::coe::{self, SdoAddress};
+use crate::mail::{Limits, Mailbox};
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::{Observation, ProcessDataStep};
@@ -242,7 +242,7 @@ impl BringUp<'_> {
     }
 
     async fn assign_pdos(&self) -> Result<(), ConfigureError> {
-        let limits = (self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
+        let limits = Limits::new(self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
         for SdoDownload { index, sub_index, complete_access, data } in &self.setup.plan.assign_sdos {
             let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
             coe::write(&self.mailbox, object, data, limits).await?;

@@ -24,7 +24,7 @@ use crate::supervisor::Bus;
 /// How long one SubDevice may take to tell all its PDOs.
 const LIMIT: Duration = Duration::from_secs(3);
 /// Time limits of one request.
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 
 /// Whose dictionaries are asked for PDOs after a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub enum ReadPdos {
 pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
     let wanted: Vec<SubDeviceInfo> = scan.subdevices.iter().filter(|info| is_wanted(info, which)).cloned().collect();
     let read = bus.gather(wanted, |bus, info| async move {
-        let mailbox = Mailbox::new(&bus, info.position.0.into());
+        let mailbox = Mailbox::new(&bus, info.position);
         let result = bus.within(LIMIT, assignments(&bus, &info, &mailbox)).await;
         let result = result.unwrap_or_else(|_| Err("it takes too long".to_string()));
         // One that does not follow is dealt with when it is configured.

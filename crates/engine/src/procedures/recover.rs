@@ -16,6 +16,7 @@ use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
@@ -118,10 +119,13 @@ async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
 
 pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
     match error {
-        ConfigureError::State(al_state::StateError::Refused { requested, status, code }) => {
-            Event::StateError { subdevice: index, requested: Some(*requested), status: *status, code: *code }
-        }
-        error => Event::ConfigurationFailed { subdevice: index, reason: error.to_string() },
+        ConfigureError::State(al_state::StateError::Refused { requested, status, code }) => Event::StateError {
+            subdevice: SubDeviceId(index),
+            requested: Some(*requested),
+            status: *status,
+            code: *code,
+        },
+        error => Event::ConfigurationFailed { subdevice: SubDeviceId(index), reason: error.to_string() },
     }
 }
 
@@ -196,7 +200,7 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     mailbox.resume();
     if status.error {
         if told.replace((status, code)) != Some((status, code)) {
-            bus.report(Event::StateError { subdevice: *index, requested: None, status, code });
+            bus.report(Event::StateError { subdevice: SubDeviceId(*index), requested: None, status, code });
         }
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }

@@ -114,7 +114,7 @@ async fn execute(
 ) -> Result<Done, RequestFailure> {
     let (station, mailbox) = target;
     // The whole has a limit; no part of it needs a shorter one.
-    let limits = (order.timeout, order.timeout);
+    let limits = Limits::new(order.timeout, order.timeout);
     let read = match order.subject {
         Subject::Object { index, sub_index, complete_access } => {
             object(&mailbox, SdoAddress { index, sub_index, complete_access }, order, limits).await?

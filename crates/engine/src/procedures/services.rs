@@ -11,6 +11,7 @@ use core::fmt;
 use ringcat_wire::address::LogicalAddress;
 
 use super::sii::program::SiiProgramError;
+use crate::declared::{Address, SubDeviceId};
 use crate::supervisor::BusError;
 
 /// Why a service was not done.
@@ -19,8 +20,8 @@ use crate::supervisor::BusError;
 pub enum ServiceError {
     /// No SubDevice is declared, or was found, with this number.
     NoSubDevice {
-        /// The number.
-        subdevice: usize,
+        /// Its index in the declaration, before activation its position.
+        subdevice: Address,
     },
     /// The bus failed, or the SubDevice does not answer.
     Bus(BusError),
@@ -41,7 +42,7 @@ pub enum ServiceError {
     /// It hangs on the main link itself: there is no port before it.
     OnTheLink {
         /// The SubDevice.
-        subdevice: usize,
+        subdevice: SubDeviceId,
     },
     /// Nothing is declared yet.
     NotActive,
@@ -62,14 +63,14 @@ pub enum ServiceError {
         /// Its bytes.
         length: usize,
         /// Two of those whose process data it covers, by their indices in the declaration.
-        subdevices: [usize; 2],
+        subdevices: [SubDeviceId; 2],
     },
 }
 
 impl fmt::Display for ServiceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            ServiceError::NoSubDevice { subdevice } => write!(f, "there is no SubDevice {subdevice}"),
+            ServiceError::NoSubDevice { subdevice } => write!(f, "there is no {subdevice}"),
             ServiceError::Bus(error) => error.fmt(f),
             ServiceError::Sii(error) => error.fmt(f),
             ServiceError::Port { port } => write!(f, "there is no port {port}, only 0 to 3"),

@@ -7,6 +7,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
 use super::start::Start;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::ring_status::Occupant;
 
@@ -112,6 +113,6 @@ impl Effects {
 
     /// Reports that a member could not be configured.
     pub(super) fn failed(&mut self, subdevice: usize, reason: String) {
-        self.report(Event::ConfigurationFailed { subdevice, reason });
+        self.report(Event::ConfigurationFailed { subdevice: SubDeviceId(subdevice), reason });
     }
 }

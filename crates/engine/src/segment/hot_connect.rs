@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use super::effect::{Effects, Task};
 use super::member::{Member, Phase};
 use crate::config::groups;
+use crate::declared::GroupId;
 use crate::event::Event;
 
 /// How many of a group's SubDevices answer, how many are in the states that were declared, and of how many.
@@ -52,7 +53,11 @@ impl HotConnect {
             let is = group.iter().all(settled);
             if core::mem::replace(&mut self.joined[number], is) != is {
                 let group = number;
-                effects.report(if is { Event::GroupJoined { group } } else { Event::GroupLeft { group } });
+                effects.report(if is {
+                    Event::GroupJoined { group: GroupId(group) }
+                } else {
+                    Event::GroupLeft { group: GroupId(group) }
+                });
                 self.changes = self.changes.wrapping_add(1);
             }
         }

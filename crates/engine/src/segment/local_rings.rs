@@ -8,6 +8,7 @@ use ringcat_wire::address::StationAddress;
 
 use super::cabling::{Cabling, End};
 use super::member::Member;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::ring_status::{Cable, CableErrors};
 use crate::time::Instant;
@@ -214,7 +215,14 @@ impl Places {
         let declared = |at: Option<PortOf>| at.and_then(|at| *self.declared.get(at.node)?);
         let station = self.stations.get(far.node).copied();
         let declared = [declared(near), declared(Some(far))];
-        Event::JunctionChanged { near, far, station, declared, broken, breaks }
+        Event::JunctionChanged {
+            near,
+            far,
+            station,
+            declared: declared.map(|end| end.map(SubDeviceId)),
+            broken,
+            breaks,
+        }
     }
 }
 
@@ -273,7 +281,14 @@ mod tests {
         let declared = |node: usize| [Some(0), None, Some(7), Some(8)][node];
         let station = Some(StationAddress(0x1001 + far.node as u16));
         let declared = [near.and_then(|near| declared(near.node)), declared(far.node)];
-        Event::JunctionChanged { near, far, station, declared, broken, breaks }
+        Event::JunctionChanged {
+            near,
+            far,
+            station,
+            declared: declared.map(|end| end.map(SubDeviceId)),
+            broken,
+            breaks,
+        }
     }
 
     // covers: JR-07

@@ -22,6 +22,7 @@ use super::silence::Silence;
 use super::unassigned::UnassignedSubDevice;
 use crate::board::Board;
 use crate::board::clocks::References;
+use crate::declared::SubDeviceId;
 use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
 use crate::time::Instant;
@@ -174,14 +175,16 @@ impl Segment {
 
     /// Which SubDevice is at each position of the cabling.
     pub fn occupants(&self) -> Vec<Occupant> {
-        let at =
-            |(node, station): (usize, &StationAddress)| Occupant { station: *station, declared: self.member_at(node) };
+        let at = |(node, station): (usize, &StationAddress)| Occupant {
+            station: *station,
+            declared: self.member_at(node).map(SubDeviceId),
+        };
         self.cabling.stations.iter().enumerate().map(at).collect()
     }
 
     /// The SubDevice with a station address.
     pub fn occupant(&self, station: StationAddress) -> Occupant {
-        Occupant { station, declared: self.member_of(station) }
+        Occupant { station, declared: self.member_of(station).map(SubDeviceId) }
     }
 
     /// The member at a position of the cabling.

@@ -20,6 +20,7 @@ use super::start::Start;
 use super::*;
 use crate::board::{Board, RingWord, Supervision};
 use crate::config::SubDeviceConfig;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionMode;
@@ -250,12 +251,12 @@ fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look()
     let silent = ring.look(&[PASS, PASS, 0]);
     assert_eq!(told(&silent), [], "three are counted: a frame may have gone another way");
     let lost = ring.look(&[PASS, PASS, 0]);
-    assert_eq!(told(&lost), [Event::Lost { subdevice: 2 }]);
+    assert_eq!(told(&lost), [Event::Lost { subdevice: SubDeviceId(2) }]);
     assert!(lost.contains(&Effect::SuspendMailbox { index: 2 }));
     let mut ring = Ring::closed(3);
     ring.counts(2, 0, RingState::Closed);
     ring.cycle();
-    assert_eq!(told(&ring.look(&[PASS, PASS, 0])), [Event::Lost { subdevice: 2 }]);
+    assert_eq!(told(&ring.look(&[PASS, PASS, 0])), [Event::Lost { subdevice: SubDeviceId(2) }]);
     ring.counts(3, 0, RingState::Closed);
     ring.cycle();
     let back = ring.look(&[PASS; 3]);
@@ -264,7 +265,7 @@ fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look()
     let task = Task::BringUp { index: 2, attempt: 2, from: Start::Unknown, told: None, check };
     assert!(back.contains(&Effect::Start(task)), "{back:?}");
     let back = ring.observe(Observation::Returned { index: 2, attempt: 2 });
-    assert_eq!(told(&back), [Event::Returned { subdevice: 2 }]);
+    assert_eq!(told(&back), [Event::Returned { subdevice: SubDeviceId(2) }]);
 }
 
 #[test]
@@ -297,7 +298,7 @@ fn an_attempt_that_is_over_changes_nothing() {
         assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
     }
     let effects = ring.observe(Observation::Reached { index: 0, attempt: 1, state: AlState::Op });
-    assert_eq!(told(&effects), [Event::StateReached { subdevice: 0, state: AlState::Op }]);
+    assert_eq!(told(&effects), [Event::StateReached { subdevice: SubDeviceId(0), state: AlState::Op }]);
 }
 
 #[test]

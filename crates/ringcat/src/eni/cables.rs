@@ -1,12 +1,13 @@
-//! The cables of a network held against `PreviousPort` of a file (protocol 8.2): who is plugged into which port of
-//! whom.
+//! The cables of a network compared with `PreviousPort` of a file (protocol 8.2): which SubDevice is connected to which
+//! port of which other.
 //!
-//! A difference is told and no more: process data finds its SubDevices by their order, but whoever looks for a broken
+//! A difference is told and no more: process data finds its SubDevices by their order, but a search for a broken
 //! cable with the drawing of the machine in hand wants to know.
 
 use ringcat_config::eni::Port;
 use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::SubDeviceId;
 use ringcat_engine::topology::{PortOf, Topology};
 
 use super::file::{Difference, EniFile};
@@ -31,7 +32,7 @@ impl EniFile {
             }
         }
         let names = self.names().0;
-        // Whoever is not of the file has its position for a name.
+        // A SubDevice that is not in the file is named by its position.
         let name = |node: usize| match place.iter().position(|place| *place == Some(node)) {
             Some(config) => format!("\"{}\"", names[config]),
             None => format!("position {node}"),
@@ -46,7 +47,7 @@ impl EniFile {
                     // Missing, so that the next one is plugged in elsewhere.
                     None => continue,
                 },
-                // Where a group's head is plugged in is nobody's concern.
+                // A group's head may be connected anywhere.
                 None if configs[config].group.is_some() => continue,
                 None => None,
             };
@@ -57,7 +58,7 @@ impl EniFile {
             }
             let words = |at: Option<PortOf>| at.map_or_else(|| "the MainDevice".to_owned(), into);
             let text = format!("{} is plugged into {}; the file says {}", name(node), words(got), words(said));
-            differences.push(Difference { subdevice: Some(config), is_grave: false, text });
+            differences.push(Difference { subdevice: Some(SubDeviceId(config)), is_grave: false, text });
         }
         differences
     }

@@ -9,7 +9,7 @@ use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
 use ringcat_config::{Configuration, follow};
 use ringcat_engine::config::{ConfigError, Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::main_device::Declaration;
+use ringcat_engine::main_device::{Declaration, SubDeviceId};
 #[cfg(feature = "sim")]
 use ringcat_sim::network::Network;
 #[cfg(feature = "sim")]
@@ -31,6 +31,7 @@ pub struct EniFile {
 
 /// Why a file cannot be used.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct LoadError {
     /// The file.
     pub path: PathBuf,
@@ -40,6 +41,7 @@ pub struct LoadError {
 
 /// What is wrong with a file.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum LoadFailure {
     /// It cannot be read.
     Read(io::Error),
@@ -53,7 +55,7 @@ pub enum LoadFailure {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// Index in the file; `None` for a SubDevice that is not in it.
-    pub subdevice: Option<usize>,
+    pub subdevice: Option<SubDeviceId>,
     /// The network cannot be activated so.
     pub is_grave: bool,
     /// What.
@@ -133,12 +135,12 @@ impl EniFile {
         let names = self.names().0;
         let name = |config: usize| names.get(config).cloned().unwrap_or_default();
         let differs = |config: usize, is_grave: bool, error: &ConfigError| Difference {
-            subdevice: Some(config),
+            subdevice: Some(SubDeviceId(config)),
             is_grave,
             text: format!("SubDevice {config} \"{}\" of the file: {error}", name(config)),
         };
         let mut differences = Vec::new();
-        // Whoever is not who is expected is told once.
+        // A SubDevice of another identity is reported once.
         let mut told = Vec::new();
         for resolution in resolve(configs, found) {
             match resolution {

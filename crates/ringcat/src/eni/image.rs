@@ -9,7 +9,7 @@ use ringcat_config::{Configuration, ImageArea, ImageCopy, ProcessImage};
 use ringcat_engine::domain::{DomainId, Freshness};
 use ringcat_engine::exchange::{CopyRule, Entry, Exchange};
 use ringcat_engine::info::Direction;
-use ringcat_engine::main_device::Directory;
+use ringcat_engine::main_device::{Directory, SubDeviceId};
 
 use super::value::{Value, VariableType};
 use crate::process_data::ProcessData;
@@ -47,18 +47,19 @@ pub struct EniVariable {
     /// Bits.
     pub bits: u32,
     /// Index in the declaration of the SubDevice whose process data it is.
-    pub subdevice: Option<usize>,
-    /// The domain that exchanges it; `None` where nobody does.
+    pub subdevice: Option<SubDeviceId>,
+    /// The domain that exchanges it; `None` where no domain does.
     pub domain: Option<DomainId>,
 }
 
 /// Why an ENI's image does not fit the process data of the network.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ImageError {
     /// A part of a SubDevice lies beyond the image.
     Outside {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// In which image.
         direction: Direction,
         /// First bit behind the part.
@@ -69,7 +70,7 @@ pub enum ImageError {
     /// The SubDevice has less process data than the file gives it places.
     TooShort {
         /// Index in the declaration.
-        subdevice: usize,
+        subdevice: SubDeviceId,
         /// In which direction.
         direction: Direction,
         /// Bits of the file.
@@ -221,7 +222,7 @@ impl EniImage {
         Some(variable.data_type.value(self.read(variable), bits))
     }
 
-    /// Sets the first 64 bits of an output variable; false for inputs, which nobody can set.
+    /// Sets the first 64 bits of an output variable; false for inputs, which cannot be set.
     pub fn write(&mut self, variable: &EniVariable, value: u64) -> bool {
         if variable.direction == Direction::Outputs {
             variable.entry().write(&mut self.outputs, value);
@@ -282,7 +283,7 @@ impl Builder<'_> {
         };
         let (end, image) = (u64::from(image_bit) + u64::from(bits), 8 * length as u64);
         if end > image {
-            return Err(ImageError::Outside { subdevice, direction, end, image });
+            return Err(ImageError::Outside { subdevice: SubDeviceId(subdevice), direction, end, image });
         }
         let pieces = self.pieces(area, 0, bits);
         let placed: u64 = pieces.iter().map(|piece| u64::from(piece.bits)).sum();
@@ -295,7 +296,7 @@ impl Builder<'_> {
         if placed < u64::from(bits) {
             let from = u64::from(area.bit_offset);
             let (expected, got) = (from + u64::from(bits), from + placed);
-            return Err(ImageError::TooShort { subdevice, direction, expected, got });
+            return Err(ImageError::TooShort { subdevice: SubDeviceId(subdevice), direction, expected, got });
         }
         match direction {
             Direction::Inputs => self.inputs.extend(pieces),
@@ -307,7 +308,7 @@ impl Builder<'_> {
     /// Domain, first bit in its image and bits of the process data in which an area lies, as one row.
     fn process_data(&self, area: &ImageArea) -> impl Iterator<Item = (DomainId, u32, u32)> {
         let ImageArea { direction, sync_manager, .. } = *area;
-        let areas = self.directory.areas(area.subdevice).iter().filter(move |found| {
+        let areas = self.directory.areas(SubDeviceId(area.subdevice)).iter().filter(move |found| {
             let number = found.placed.area.sync_manager;
             found.direction == direction && sync_manager.is_none_or(|wanted| wanted == number)
         });
@@ -347,7 +348,7 @@ impl Builder<'_> {
             direction: variable.direction,
             bit: variable.image_bit,
             bits: variable.bits,
-            subdevice: variable.subdevice,
+            subdevice: variable.subdevice.map(SubDeviceId),
             domain: pieces.iter().find(holds).map(|piece| piece.domain),
         }
     }

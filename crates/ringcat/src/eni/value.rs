@@ -65,7 +65,7 @@ impl VariableType {
         }
     }
 
-    /// The bits of a value that somebody wrote: `true`, `-5`, `0x1F`, `2.5`. `None` where it is no value of this type,
+    /// The bits of a value as text: `true`, `-5`, `0x1F`, `2.5`. `None` where it is no value of this type,
     /// or has more bits than there are.
     pub fn parse(self, text: &str, length: u16) -> Option<u64> {
         let text = text.trim();

@@ -31,21 +31,29 @@ impl OutputBits {
 
     /// The bits of an unsigned value, if it fits.
     pub(crate) fn unsigned(&self, value: u64) -> Result<u64, DoesNotFit> {
-        let bits = self.entry.bit_length;
-        match value.checked_shr(bits.into()).unwrap_or(0) {
-            0 => Ok(value),
-            _ => Err(DoesNotFit { value: value.into(), bits }),
-        }
+        unsigned(value, self.entry.bit_length)
     }
 
     /// The bits of a signed value, if it fits.
     pub(crate) fn signed(&self, value: i64) -> Result<u64, DoesNotFit> {
-        let bits = self.entry.bit_length;
-        let sign = value >> u32::from(bits.clamp(1, 64) - 1);
-        match sign {
-            0 | -1 => Ok(value as u64),
-            _ => Err(DoesNotFit { value: value.into(), bits }),
-        }
+        signed(value, self.entry.bit_length)
+    }
+}
+
+/// An unsigned value, if it fits into so many bits.
+pub(crate) fn unsigned(value: u64, bits: u16) -> Result<u64, DoesNotFit> {
+    match value.checked_shr(bits.into()).unwrap_or(0) {
+        0 => Ok(value),
+        _ => Err(DoesNotFit { value: value.into(), bits }),
+    }
+}
+
+/// The two's complement of a signed value, if it fits into so many bits.
+pub(crate) fn signed(value: i64, bits: u16) -> Result<u64, DoesNotFit> {
+    let sign = value >> u32::from(bits.clamp(1, 64) - 1);
+    match sign {
+        0 | -1 => Ok(value as u64),
+        _ => Err(DoesNotFit { value: value.into(), bits }),
     }
 }
 

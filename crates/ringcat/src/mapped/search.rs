@@ -25,7 +25,7 @@ impl Search {
             return Err(MapError::NotDeclared { subdevice, declared });
         }
         let (name, pdos) = info.map_or_else(Default::default, |info| (info.name, info.pdos));
-        let areas = directory.areas(subdevice.0).iter();
+        let areas = directory.areas(subdevice).iter();
         let mapped = areas.flat_map(|area| {
             let direction = area.direction;
             area.entries.iter().map(move |(index, sub_index, entry)| (direction, *index, *sub_index, *entry))

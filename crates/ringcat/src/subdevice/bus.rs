@@ -1,6 +1,7 @@
 //! What needs no mailbox: states, registers, ports, the EEPROM, error counters.
 
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::Address;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
@@ -8,7 +9,7 @@ use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{LoopControl, map};
 
-use super::{Address, SubDevice, SubDeviceError, SubDeviceFailure, info};
+use super::{SubDevice, SubDeviceError, SubDeviceFailure, info};
 use crate::services::Services;
 use crate::value::{Number, ObjectValue};
 

@@ -1,5 +1,6 @@
 //! FoE: files of a SubDevice, firmware among them.
 
+use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::foe::{self, FoeOptions, FoeProgress};
 use ringcat_engine::mail::stream::{Bounded, Bytes};
 
@@ -53,7 +54,8 @@ impl<S: Services> SubDevice<S> {
     /// A packet may take longer than an object: flash memory is erased meanwhile.
     fn file_options(&self) -> FoeOptions {
         let options = FoeOptions::default();
-        let (request, answer) = self.limits.of_message();
-        FoeOptions { limits: (request.max(options.limits.0), answer.max(options.limits.1)), ..options }
+        let Limits { request, answer, .. } = options.limits;
+        let limits = Limits::new(self.limits.request.max(request), self.limits.answer.max(answer));
+        options.with_limits(limits)
     }
 }

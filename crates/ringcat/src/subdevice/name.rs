@@ -1,40 +1,9 @@
-//! Which SubDevice is meant, and how messages name it.
+//! How messages name a SubDevice.
 
 use std::fmt;
 
-use ringcat_engine::main_device::SubDeviceId;
-use ringcat_wire::address::{Position, StationAddress};
-
-/// Which SubDevice is meant: by its place in the declaration, or by its place on the bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Address {
-    /// Index in the declaration; to be used once a declaration is active.
-    Declared(SubDeviceId),
-    /// Position on the bus at the last scan; to be used before a declaration is active.
-    Scanned(Position),
-}
-
-impl From<SubDeviceId> for Address {
-    fn from(subdevice: SubDeviceId) -> Address {
-        Address::Declared(subdevice)
-    }
-}
-
-impl From<Position> for Address {
-    fn from(position: Position) -> Address {
-        Address::Scanned(position)
-    }
-}
-
-impl fmt::Display for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Address::Declared(subdevice) => write!(f, "SubDevice {subdevice}"),
-            Address::Scanned(position) => write!(f, "SubDevice at position {position}"),
-        }
-    }
-}
+use ringcat_engine::main_device::Address;
+use ringcat_wire::address::StationAddress;
 
 /// A SubDevice as messages name it: `SubDevice 1 "servo" (0x1002)`.
 #[derive(Clone, Debug, PartialEq, Eq)]

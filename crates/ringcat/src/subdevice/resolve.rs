@@ -1,52 +1,33 @@
-//! From how an application names a SubDevice to how the engine knows it, and to its name in messages.
+//! Finds the SubDevice that an application names, and its name for messages.
 
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId};
-use ringcat_wire::address::Position;
+use ringcat_engine::main_device::{Address, MainDevice as Engine};
 
 use super::error::SubDeviceFailure;
-use super::name::{Address, SubDeviceName};
+use super::name::SubDeviceName;
 
-impl Address {
-    /// From the number that services take: an index in the declaration once one is active, a position before.
-    pub(crate) fn of_number(engine: &Engine, number: usize) -> Address {
-        match (is_active(engine), u16::try_from(number)) {
-            (false, Ok(position)) => Address::Scanned(Position(position)),
-            (true, _) | (false, Err(_)) => Address::Declared(SubDeviceId(number)),
-        }
-    }
-
-    /// The number by which the engine knows it now.
-    pub(crate) fn find(self, engine: &Engine) -> Result<usize, SubDeviceFailure> {
-        let scanned = engine.scanned_count();
-        match (self, scanned) {
-            (_, None) => Err(SubDeviceFailure::NotScanned),
-            (Address::Declared(subdevice), Some(_)) => match engine.stations().len() {
-                0 => Err(SubDeviceFailure::NotActive),
-                declared if subdevice.0 < declared => Ok(subdevice.0),
-                declared => Err(SubDeviceFailure::NotDeclared { declared }),
-            },
-            (Address::Scanned(_), Some(_)) if is_active(engine) => Err(SubDeviceFailure::Active),
-            (Address::Scanned(position), Some(scanned)) => match usize::from(position.0) {
-                number if number < scanned => Ok(number),
-                _ => Err(SubDeviceFailure::NoPosition { scanned }),
-            },
-        }
+/// The number of a SubDevice in the engine: its index in the declaration, before activation its position.
+pub(super) fn find(engine: &Engine, address: Address) -> Result<usize, SubDeviceFailure> {
+    let Some(scanned) = engine.scanned_count() else { return Err(SubDeviceFailure::NotScanned) };
+    let declared = engine.stations().len();
+    match address {
+        Address::Declared(_) if declared == 0 => Err(SubDeviceFailure::NotActive),
+        Address::Declared(subdevice) if subdevice.0 < declared => Ok(subdevice.0),
+        Address::Declared(_) => Err(SubDeviceFailure::NotDeclared { declared }),
+        Address::Scanned(_) if declared > 0 => Err(SubDeviceFailure::Active),
+        Address::Scanned(position) if usize::from(position.0) < scanned => Ok(position.0.into()),
+        Address::Scanned(_) => Err(SubDeviceFailure::NoPosition { scanned }),
     }
 }
 
-fn is_active(engine: &Engine) -> bool {
-    !engine.stations().is_empty()
-}
-
-/// What the scan found about it; `None` where it was not there.
+/// What the scan found about a SubDevice; `None` where it was absent.
 pub(crate) fn info(engine: &Engine, number: usize) -> Option<SubDeviceInfo> {
     engine.info_at(engine.station(number)?)
 }
 
 impl SubDeviceName {
     pub(crate) fn of(engine: &Engine, address: Address) -> SubDeviceName {
-        let number = address.find(engine).ok();
+        let number = find(engine, address).ok();
         let info = number.and_then(|number| info(engine, number));
         let station = number.and_then(|number| engine.station(number));
         SubDeviceName { address, name: info.map_or_else(String::new, |info| info.name), station }

@@ -4,13 +4,13 @@ use std::future::Future;
 use std::time::Duration;
 
 use ringcat_engine::mail::{Mailbox, MailboxError};
-use ringcat_engine::main_device::{MainDevice as Engine, Pending};
+use ringcat_engine::main_device::{Address, MainDevice as Engine, Pending};
 use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_wire::al::AlState;
 
 use super::error::{SubDeviceError, SubDeviceFailure};
-use super::name::{Address, SubDeviceName};
-use super::resolve::info;
+use super::name::SubDeviceName;
+use super::resolve::{find, info};
 
 /// Starts work on a SubDevice, with its name in what goes wrong.
 pub(super) fn start<T, E, W>(
@@ -26,7 +26,7 @@ where
 {
     let subdevice = SubDeviceName::of(engine, address);
     let bus = engine.bus();
-    let work = address.find(engine).map(|number| work(engine, number));
+    let work = find(engine, address).map(|number| work(engine, number));
     engine.start(async move {
         let done = async { Ok(work?.await?) };
         let result = match within {
@@ -38,7 +38,7 @@ where
 }
 
 /// Starts work in a SubDevice's mailbox.
-pub(crate) fn start_with_mailbox<T, E, W>(
+pub(super) fn start_with_mailbox<T, E, W>(
     engine: &mut Engine,
     address: Address,
     opening: Opening,
@@ -64,7 +64,7 @@ where
 
 /// What is done about a mailbox that is not in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Opening {
+pub(super) enum Opening {
     /// Its SubDevice is brought to PREOP; for those that are not declared.
     BringToPreOp,
     /// Nothing.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
     Application, Declaration, Direction, DomainConfig, DomainId, DomainMember, DomainState, Error, Event, MainDevice,
-    Options, PdoEntry, PdoMapping, SubDeviceConfig, SubDeviceState, SyncSignals, automatic,
+    Options, PdoEntry, PdoMapping, SubDeviceConfig, SubDeviceId, SubDeviceState, SyncSignals, automatic,
 };
 use ringcat_wire::al::AlState;
 
@@ -53,7 +53,7 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let (main_device, good) = scanned(SEGMENT);
 
     let mut twice = good.clone();
-    let again = vec![DomainMember { subdevice: 1, sync_managers: None }];
+    let again = vec![DomainMember { subdevice: SubDeviceId(1), sync_managers: None }];
     twice.domains.push(DomainConfig::new(MILLISECOND, again));
     let (text, main_device) = refusal(main_device, twice);
     assert_eq!(text, "activation: declaration 1: process data of SyncManager 0 is in domain 0 and in domain 1");
@@ -84,7 +84,9 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let (text, main_device) = refusal(main_device, wrong);
     assert!(text.contains("SubDevice 1: expected product code 0x00001234, got 0x07d80008"), "{text}");
 
-    let (text, main_device) = refusal(main_device, Declaration { domains: Vec::new(), ..good.clone() });
+    let mut wrong = good.clone();
+    wrong.domains.clear();
+    let (text, main_device) = refusal(main_device, wrong);
     assert!(text.contains("declaration 1 has process data and there is no domain to exchange it"), "{text}");
 
     let mut sync = good.clone();
@@ -108,22 +110,23 @@ fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error>
     let mut application = main_device.activate(declaration)?;
     let events = run(&mut application, 1);
     let text = "its outputs come every 150 ms, its watchdog expires after 100 ms".to_owned();
-    assert!(events.contains(&Event::PlanOddity { subdevice: 0, what: text }), "{events:?}");
+    assert!(events.contains(&Event::PlanOddity { subdevice: SubDeviceId(0), what: text }), "{events:?}");
     Ok(())
 }
 
 // covers: declaration
 #[test]
 fn without_a_domain_subdevices_are_still_supervised() -> Result<(), Error> {
-    let (main_device, declaration) = scanned(SEGMENT);
-    let subdevices = declaration.subdevices.into_iter().map(|config| config.target(AlState::PreOp)).collect();
-    let mut application = main_device.activate(Declaration { subdevices, ..Declaration::default() })?;
+    let (main_device, found) = scanned(SEGMENT);
+    let mut declaration = Declaration::default();
+    declaration.subdevices = found.subdevices.into_iter().map(|config| config.target(AlState::PreOp)).collect();
+    let mut application = main_device.activate(declaration)?;
     run(&mut application, 20);
     assert!(application.all_settled());
     let device = ringcat_sim::cable::DeviceIndex(1);
     application.links_mut().network_mut().power_off(device);
     let events = run(&mut application, 20);
-    assert!(events.contains(&Event::Lost { subdevice: 1 }), "{events:?}");
+    assert!(events.contains(&Event::Lost { subdevice: SubDeviceId(1) }), "{events:?}");
     application.links_mut().network_mut().power_on(device);
     run(&mut application, 20);
     assert!(application.all_settled());
@@ -152,13 +155,13 @@ fn an_absent_optional_subdevice_has_its_place_and_leaves_the_domain_complete() -
         SubDeviceConfig::at_position(3).expect_product(0xC47, 0x4711).optional().assign(0, Direction::Inputs, pdos);
     declaration.subdevices.push(absent);
     declaration.subdevices.push(SubDeviceConfig::at_position(4).expect_product(0xC47, 0x4712).optional());
-    let members = [3, 4].map(|subdevice| DomainMember { subdevice, sync_managers: None });
+    let members = [3, 4].map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
     declaration.domains[0].members.extend(members);
     let mut application = main_device.activate(declaration)?;
-    let entry = application.entry(3, 0x6000, 3).expect("the declaration says where it lies");
+    let entry = application.entry(SubDeviceId(3), 0x6000, 3).expect("the declaration says where it lies");
     assert_eq!((entry.bit_length, entry.bit_offset % 8), (1, 2));
     let events = run(&mut application, 100);
-    let without_place = |event: &Event| matches!(event, Event::PlanOddity { subdevice: 4, .. });
+    let without_place = |event: &Event| matches!(event, Event::PlanOddity { subdevice: SubDeviceId(4), .. });
     assert!(events.iter().any(without_place), "{events:?}");
     assert!(application.all_settled());
     assert_eq!(application.exchange_mut().status(DomainId(0)).state, DomainState::Complete);

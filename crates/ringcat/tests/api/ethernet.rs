@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::eoe::{EthernetNews, EthernetOptions, HostInterface};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{CyclicThread, Error, LastOutputs, Options, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Error, LastOutputs, Options, SubDeviceId, SupervisorThread, automatic};
 use ringcat_link::TapError;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -30,7 +30,7 @@ alias = 1000
 ";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const OPTIONS: EthernetOptions = EthernetOptions { index: 3, main: [0, 0, 0, 7, 8, 9] };
+const OPTIONS: EthernetOptions = EthernetOptions::new(3, [0, 0, 0, 7, 8, 9]);
 
 /// One interface, as the host sees it.
 #[derive(Default)]
@@ -123,7 +123,7 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
             })
     });
     let news = ethernet.take_news();
-    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: 1 });
+    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1) });
     assert!(news.iter().any(|news| news.to_string() == "eoe3a1000: frames can pass"), "{news:?}");
     cycles.supervisor().all_settled();
     let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;

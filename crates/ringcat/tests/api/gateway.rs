@@ -9,9 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{
-    CyclicThread, Error, Limits, Options, SdoAddress, Services, SupervisorThread, TransferLimits, automatic,
-};
+use ringcat::{CyclicThread, Error, Limits, Options, SubDeviceId, SupervisorThread, TransferLimits, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::mailbox::foe::FoeMessage;
@@ -22,8 +20,8 @@ const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[
                        [[device]]\ntype = \"digital-output-8\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
-const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
+const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.request, LIMITS.answer);
 /// The SubDevice with all protocols, by index and by station address.
 const ALL: usize = 1;
 const NUMBER: u16 = 0x2001;
@@ -47,7 +45,7 @@ impl Bench {
         let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
         let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
         let address = SocketAddr::from(([127, 0, 0, 1], 0));
-        let gateway = supervisor.start_gateway(GatewayOptions { address, connections })?;
+        let gateway = supervisor.start_gateway(GatewayOptions::at(address).with_connections(connections))?;
         let scan = supervisor.scan()?;
         let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
         let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
@@ -81,9 +79,9 @@ impl Bench {
     /// Our own traffic works.
     fn own_traffic(&self, value: u16) {
         let supervisor = self.cycles.supervisor();
-        let object = SdoAddress::new(NUMBER, 200);
-        supervisor.sdo_download(ALL, object, value.to_le_bytes().to_vec(), TRANSFER).expect("it can be written");
-        assert_eq!(supervisor.sdo_upload(ALL, object, TRANSFER.bytes(2)).expect("it can be read"), value.to_le_bytes());
+        let speaker = supervisor.subdevice(SubDeviceId(ALL)).limits(TRANSFER);
+        speaker.sdo_write(NUMBER, 200, value).expect("it can be written");
+        assert_eq!(speaker.sdo_read::<u16>(NUMBER, 200).expect("it can be read"), value);
     }
 }
 
@@ -272,8 +270,9 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
         });
         for round in 0..5 {
             bench.own_traffic(0x5A00 + round);
-            let large = bench.cycles.supervisor().sdo_upload(ALL, SdoAddress::new(LARGE, 0), TRANSFER.bytes(200_000));
-            assert_eq!(large.expect("nobody is in our transfer").len(), 100_000);
+            let speaker = bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.bytes(200_000));
+            let large = speaker.sdo_read::<Vec<u8>>(LARGE, 0);
+            assert_eq!(large.expect("no other message is in this transfer").len(), 100_000);
         }
     });
     let counters = bench.gateway.counters();
@@ -307,7 +306,7 @@ fn before_activation_address_0_has_the_objects_that_need_no_declaration() {
     let (_, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ()).expect("a thread");
     let address = SocketAddr::from(([127, 0, 0, 1], 0));
-    let gateway = supervisor.start_gateway(GatewayOptions { address, connections: 1 }).expect("a free port");
+    let gateway = supervisor.start_gateway(GatewayOptions::at(address).with_connections(1)).expect("a free port");
     let stream = TcpStream::connect(gateway.address()).expect("it listens");
     stream.set_read_timeout(Some(LIMIT)).expect("a timeout");
     let mut client = Client { socket: Socket::Tcp(stream), station: 0, counter: 0 };
@@ -333,7 +332,7 @@ fn what_cannot_be_passed_on_is_answered_with_an_error_reply() {
         ErrorReply::UNSUPPORTED_PROTOCOL,
         "objects only"
     );
-    assert_eq!(client.refused(&message(0x4711, 1, Protocol::Coe, &upload)), ErrorReply::INVALID_HEADER, "nobody");
+    assert_eq!(client.refused(&message(0x4711, 1, Protocol::Coe, &upload)), ErrorReply::INVALID_HEADER, "no SubDevice");
     assert_eq!(client.refused(&message(bench.terminal, 1, Protocol::Coe, &upload)), ErrorReply::UNSUPPORTED_PROTOCOL);
     assert_eq!(client.refused(&message(station, 1, Protocol::Other(9), &upload)), ErrorReply::UNSUPPORTED_PROTOCOL);
     assert_eq!(client.refused(&message(station, 1, Protocol::Eoe, &[0; 64])), ErrorReply::SERVICE_NOT_SUPPORTED);
@@ -357,7 +356,7 @@ fn a_client_that_leaves_in_a_transfer_loses_it_and_nobody_waits_for_that() {
     drop(leaving);
     bench.own_traffic(2);
     assert!(begin.elapsed() < Duration::from_millis(900), "{:?}", begin.elapsed());
-    // Over UDP nobody sees that it has left.
+    // Over UDP its end is not visible.
     pausing.begin_upload();
     let begin = Instant::now();
     patient.write(3, 0x33);
@@ -389,7 +388,7 @@ fn garbage_half_messages_floods_and_clients_that_do_not_read_hurt_only_themselve
     {
         datagrams.send(bytes);
     }
-    // A message in pieces is as good as any, and half of one holds nobody up.
+    // A message in pieces is as good as any, and half of one delays no other client.
     let mut half = bench.tcp();
     let whole = message(bench.station, 5, Protocol::Coe, &[0x00, 0x20, 0x40, 0x01, 0x20, 0x01, 0, 0, 0, 0]);
     for byte in &whole[..whole.len() - 1] {
@@ -399,7 +398,7 @@ fn garbage_half_messages_floods_and_clients_that_do_not_read_hurt_only_themselve
     half.send(&whole[whole.len() - 1..]);
     assert_eq!(half.receive().0.counter, 5);
     half.send(&whole[..7]);
-    // A flood that nobody reads the answers to.
+    // A flood without a reader of its answers.
     let flood = bench.tcp();
     let Socket::Tcp(mut stream) = flood.socket else { unreachable!() };
     let begin = Instant::now();

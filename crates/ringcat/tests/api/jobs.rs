@@ -9,13 +9,14 @@ use std::task::{Context, Poll, Wake, Waker};
 use std::thread::{Thread, current, park};
 use std::time::{Duration, Instant};
 
+use ringcat::Position;
 use ringcat::shared_segment::SharedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::wire::address::RegisterAddress;
 use ringcat::{
-    AlState, Error, LastOutputs, MainDevice, Options, SdoAddress, Services, SupervisorThread, TransferLimits, automatic,
+    AlState, Error, LastOutputs, MainDevice, Options, SubDeviceId, SupervisorThread, TransferLimits, automatic,
 };
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
@@ -25,7 +26,8 @@ const TRANSFER: TransferLimits = TransferLimits::new(Duration::from_secs(5), Dur
 /// Type, revision and build of a controller.
 const TYPE: RegisterAddress = RegisterAddress(0x0000);
 /// An object that takes many segments.
-const LARGE: SdoAddress = SdoAddress::new(0x2002, 0);
+const LARGE: u16 = 0x2002;
+const SPEAKER: SubDeviceId = SubDeviceId(1);
 
 fn supervisor() -> Result<(SupervisorThread, SharedSegment), Error> {
     let segment = Segment::from_toml(SEGMENT, Path::new("."))?;
@@ -59,11 +61,11 @@ fn block_on<T>(future: impl Future<Output = T>) -> T {
 fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Result<(), Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
     let found = main_device.scan()?;
-    let expected = main_device.register_read(1, TYPE, 3)?;
-    assert!(main_device.register_read(99, TYPE, 3).is_err(), "there is no such SubDevice");
+    let expected = main_device.subdevice(Position(1)).register_read_bytes(TYPE, 3)?;
+    assert!(main_device.subdevice(Position(99)).register_read_bytes(TYPE, 3).is_err(), "there is no such SubDevice");
 
     let mut application = main_device.activate(automatic(&found.subdevices, PERIOD))?;
-    let mut read = application.register_read(1, TYPE, 3);
+    let mut read = application.subdevice(SPEAKER).register_read_bytes(TYPE, 3);
     let mut cycles = 0;
     let polled = loop {
         if let Some(result) = read.take() {
@@ -78,10 +80,11 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
 
     let (supervisor, _cyclic) = supervisor()?;
     supervisor.scan()?;
-    assert_eq!(supervisor.register_read(1, TYPE, 3)?, expected);
-    assert_eq!(supervisor.background().register_read(1, TYPE, 3).finish()?, expected);
-    let failed = supervisor.background().register_read(99, TYPE, 3).finish();
-    assert!(matches!(failed, Err(Error::Service(_))), "{failed:?}");
+    assert_eq!(supervisor.subdevice(Position(1)).register_read_bytes(TYPE, 3)?, expected);
+    assert_eq!(supervisor.background().subdevice(Position(1)).register_read_bytes(TYPE, 3).finish()?, expected);
+    let failed = supervisor.background().subdevice(Position(99)).register_read_bytes(TYPE, 3).finish();
+    let failed = failed.expect_err("there is no such SubDevice").to_string();
+    assert!(failed.contains("the scan found no such position"), "{failed}");
     Ok(())
 }
 
@@ -90,8 +93,8 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
 fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     let (supervisor, _cyclic) = supervisor()?;
     supervisor.scan()?;
-    supervisor.bring_to(1, AlState::PreOp)?;
-    let start = || supervisor.background().sdo_upload(1, LARGE, TRANSFER.bytes(200_000));
+    let speaker = supervisor.background().subdevice(Position(1)).limits(TRANSFER.bytes(200_000));
+    let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
 
     let mut limited = start();
     assert!(limited.wait_for(Duration::ZERO).is_none(), "segments take time");
@@ -127,10 +130,11 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
         std::thread::sleep(Duration::from_millis(1));
     }
     let supervisor = cycles.supervisor().clone();
-    let start = || supervisor.background().sdo_upload(1, LARGE, TRANSFER.bytes(200_000));
+    let speaker = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.bytes(200_000));
+    let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
     start().abort()?;
     drop(start());
-    assert_eq!(supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), TRANSFER.bytes(4))?.len(), 2);
+    assert_eq!(supervisor.subdevice(SPEAKER).sdo_read::<Vec<u8>>(0x2001, 7)?.len(), 2);
 
     // Never ready: only the stop ends it.
     let endless = supervisor.start_job(|_| std::future::pending::<()>());

@@ -1,4 +1,4 @@
-//! Rings behind junctions through the public API: configuration in steps, and the words for what happens.
+//! Rings behind junctions through the public API: configuration in steps, and the lines of their events.
 
 use std::time::Duration;
 
@@ -6,14 +6,15 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{
     ActivateError, Declaration, Error, Event, Instant, JunctionConnection, JunctionError, JunctionMode, MainDevice,
-    Options, Refused, TimedEvent, automatic,
+    Options, Refused, SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_engine::topology::{Closing, PortOf};
 use ringcat_wire::address::StationAddress;
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
 /// The junction is number 1, the members of its ring are 2 to 4.
-const GOOD: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+const GOOD: JunctionConnection =
+    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
 
 fn requested(junctions: JunctionMode) -> MainDevice<SimulatedSegment> {
     let segment = SimulatedSegment::from_toml(SEGMENT).expect("the example is a segment");
@@ -41,7 +42,7 @@ fn refused<T: std::fmt::Debug>(
 
 // covers: JR-05, JR-06, JR-08, junctions
 #[test]
-fn load_add_apply_and_each_misuse_is_an_error_of_its_own() {
+fn each_misuse_of_load_add_and_apply_is_an_error_of_its_own() {
     let mut main_device = requested(JunctionMode::Strict);
     assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::NotLoaded);
     let (error, mut main_device) = refused(main_device.apply());
@@ -61,29 +62,38 @@ fn load_add_apply_and_each_misuse_is_an_error_of_its_own() {
     assert_eq!(junction_error(main_device.add_junction_connection(head)), JunctionError::HeadPort(head));
     let tail = JunctionConnection { tail_port: 0, ..GOOD };
     assert_eq!(junction_error(main_device.add_junction_connection(tail)), JunctionError::TailPort(tail));
-    let unknown = JunctionConnection { tail: 6, ..GOOD };
+    let unknown = JunctionConnection { tail: SubDeviceId(6), ..GOOD };
     assert_eq!(junction_error(main_device.add_junction_connection(unknown)), JunctionError::UnknownTail(unknown));
     main_device.add_junction_connection(GOOD).expect("it fits");
     assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::Taken(GOOD));
+}
 
-    // What only the segment shows comes with the last step; loading again forgets what was added.
+// covers: JR-05, JR-06, junctions
+#[test]
+fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_one() {
+    let mut main_device = requested(JunctionMode::Strict);
+    let scan = main_device.scan().expect("the segment answers");
+    let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
+    // Loading again discards the connections that were added before.
     for (wrong, error) in [
-        (JunctionConnection { tail: 0, tail_port: 2, ..GOOD }, None),
-        (JunctionConnection { head: 2, ..GOOD }, Some((2, 3))),
+        (JunctionConnection { tail: SubDeviceId(0), tail_port: 2, ..GOOD }, None),
+        (JunctionConnection { head: SubDeviceId(2), ..GOOD }, Some((2, 3))),
         (JunctionConnection { tail_port: 3, ..GOOD }, Some((4, 3))),
     ] {
         main_device.load(declaration.clone()).expect("it is what was found");
         main_device.add_junction_connection(wrong).expect("it looks as it should");
         let (got, back) = refused(main_device.apply());
         let expected = match error {
-            Some((subdevice, port)) => JunctionError::NoSuchPort { connection: wrong, subdevice, port },
+            Some((subdevice, port)) => {
+                JunctionError::NoSuchPort { connection: wrong, subdevice: SubDeviceId(subdevice), port }
+            }
             None => JunctionError::NotBehind(wrong),
         };
         assert_eq!(got, ActivateError::Junction(expected));
         main_device = back;
     }
-    // Open ports allow this one as well; it was tried.
-    let wrong = JunctionConnection { tail: 3, ..GOOD };
+    // The ports alone allow this connection; apply closes them for a moment to see whether the cable exists.
+    let wrong = JunctionConnection { tail: SubDeviceId(3), ..GOOD };
     main_device.load(declaration.clone()).expect("it is what was found");
     main_device.add_junction_connection(wrong).expect("it looks as it should");
     let (got, mut main_device) = refused(main_device.apply());
@@ -114,7 +124,7 @@ fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
         near: Some(port(5, 1)),
         far: port(6, 0),
         station: Some(StationAddress(0x1004)),
-        declared: [Some(2), Some(3)],
+        declared: [Some(SubDeviceId(2)), Some(SubDeviceId(3))],
         broken,
         breaks,
     };

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
-    Application, Declaration, DomainId, DomainState, MainDevice, MapError, Options, SubDeviceConfig, SubDeviceId,
-    Wanted,
+    Application, Declaration, DomainId, DomainState, Entry, MainDevice, MapError, Options, SubDeviceConfig,
+    SubDeviceId, Wanted, WriteError,
 };
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"servo\"\n[[device]]\ntype = \"digital-output-8\"\n\
@@ -124,5 +124,43 @@ fn a_cycle_is_driven_in_its_parts_by_a_loop_of_the_applications_own() -> Result<
     assert!(application.all_settled() && complete > 1_000, "{complete} complete cycles in a row");
     let outputs = application.links().network().devices().nth(1).map(|device| device.outputs().to_vec());
     assert_eq!(outputs, Some(vec![1]));
+    Ok(())
+}
+
+// covers: api
+#[test]
+fn writing_inputs_values_that_do_not_fit_and_places_beyond_the_image_is_an_error() -> Result<(), Box<dyn StdError>> {
+    let Plant { mut application, drive, lamps, buttons } = plant()?;
+    application.wait_until_op(LIMIT)?;
+    let domain = DomainId(0);
+    let entry = |subdevice, index, sub_index| application.entry(subdevice, index, sub_index).expect("it is mapped");
+    let [lamp, button, target] = [(lamps, 0x7000, 1), (buttons, 0x6000, 1), (drive, 0x607A, 0)]
+        .map(|(subdevice, index, sub_index)| entry(subdevice, index, sub_index));
+    application.cycle(|data| {
+        let before = data.image(domain).to_vec();
+        let input = data.write(&button, 1);
+        assert!(matches!(input, Err(WriteError::NotAnOutput { start, .. }) if start == button.bit_offset.into()));
+        let too_large = data.write(&lamp, 2);
+        assert_eq!(too_large.unwrap_err().to_string(), "2 does not fit into 1 bits");
+        assert!(matches!(data.write_signed(&target, i64::MAX), Err(WriteError::DoesNotFit(_))));
+        let beyond = Entry { bit_offset: before.len() as u32 * 8, ..lamp };
+        assert!(matches!(data.write(&beyond, 1), Err(WriteError::Outside { .. })));
+        let elsewhere = Entry { domain: DomainId(1), ..lamp };
+        assert!(matches!(data.write(&elsewhere, 1), Err(WriteError::Outside { image_bits: 0, .. })));
+        let both = Entry { bit_length: 65, ..target };
+        assert!(matches!(data.write(&both, 1), Err(WriteError::Length { bits: 65 } | WriteError::NotAnOutput { .. })));
+        assert!(data.outputs_mut(domain, 0..before.len()).is_err(), "there are inputs among them");
+        assert!(matches!(data.outputs_mut(domain, 0..before.len() + 1), Err(WriteError::Outside { .. })));
+        assert!(data.area_mut(buttons, 0).is_none(), "a SyncManager of inputs");
+        assert_eq!(data.image(domain), before, "nothing was changed");
+    });
+    application.cycle(|data| {
+        data.write(&lamp, 1).expect("it fits");
+        data.write_signed(&target, -2).expect("it fits");
+        assert_eq!((data.read(&lamp), data.read_signed(&target)), (1, -2));
+        let at = target.byte_offset();
+        data.outputs_mut(domain, at..at + 4).expect("they are outputs").fill(0x11);
+        assert_eq!(data.read(&target), 0x1111_1111);
+    });
     Ok(())
 }

@@ -11,7 +11,8 @@ use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
-    AlState, Declaration, Error, Event, LastOutputs, MainDevice, Options, Reason, SubDeviceConfig, SupervisorThread,
+    AlState, Declaration, Error, Event, LastOutputs, MainDevice, Options, Reason, SubDeviceConfig, SubDeviceId,
+    SupervisorThread,
 };
 
 const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"servo\"\n\
@@ -52,8 +53,8 @@ fn waiting_for_op_says_which_subdevice_is_missing_and_why() -> Result<(), Box<dy
     assert_eq!(*absent, Reason::Absent);
     // The application goes on, and has missed no event.
     let events: Vec<Event> = std::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
-    assert!(events.iter().any(|event| matches!(event, Event::ConfigurationFailed { subdevice: 1, .. })));
-    assert!(events.iter().any(|event| matches!(event, Event::Lost { subdevice: 2 })), "{events:?}");
+    assert!(events.iter().any(|event| matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(1), .. })));
+    assert!(events.iter().any(|event| matches!(event, Event::Lost { subdevice: SubDeviceId(2) })), "{events:?}");
     Ok(())
 }
 

@@ -9,15 +9,15 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, Services, SupervisorThread,
-    TransferLimits, automatic,
+    Error, LastOutputs, Limits, Options, RawDatagram, RequestState, SdoAddress, Services, SubDeviceId,
+    SupervisorThread, TransferLimits, automatic,
 };
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::{Bounded, Bytes};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
-use ringcat_wire::address::RegisterAddress;
+use ringcat_wire::address::{Position, RegisterAddress};
 use ringcat_wire::al::AlState;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
@@ -26,10 +26,11 @@ use ringcat_wire::register::{LoopControl, map};
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
+const SPEAKER: SubDeviceId = SubDeviceId(1);
 /// Memory that nothing uses.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(10));
-const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
+const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(10));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.request, LIMITS.answer);
 
 // covers: jobs
 #[test]
@@ -39,9 +40,9 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     // Before activation, in PREOP.
-    supervisor.bring_to(1, AlState::PreOp)?;
-    assert_eq!(supervisor.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000))?.len(), 100_000);
-    let mut request = supervisor.create_sdo_request(1, 4)?;
+    let speaker = supervisor.subdevice(Position(1)).limits(TRANSFER.bytes(200_000));
+    assert_eq!(speaker.sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
+    let mut request = supervisor.create_sdo_request(SPEAKER, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let read = Arc::new(AtomicU32::new(0));
     let seen = read.clone();
@@ -64,37 +65,39 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
             ControlFlow::Continue(())
         },
     )?;
-    let end = Instant::now() + LIMIT;
-    while !cycles.supervisor().all_settled() {
-        assert!(Instant::now() < end, "all are in OP");
-        sleep(Duration::from_millis(1));
-    }
+    cycles.supervisor().wait_until_op(LIMIT)?;
     // During process data, by a handle of its own.
     let handle = cycles.supervisor().clone();
-    handle.sdo_download(1, SdoAddress::new(0x2001, 7), vec![0x34, 0x12], TRANSFER)?;
+    let speaker = handle.subdevice(SPEAKER).limits(TRANSFER);
+    speaker.sdo_write(0x2001, 7, 0x1234u16)?;
+    let end = Instant::now() + LIMIT;
     while read.load(Ordering::Relaxed) != 0x1234 {
         assert!(Instant::now() < end, "the cyclic thread reads what another one wrote");
         sleep(Duration::from_millis(1));
     }
-    let error =
-        handle.sdo_upload(1, SdoAddress::new(0x7777, 0), TRANSFER.bytes(4)).expect_err("there is no such object");
+    let error = speaker.sdo_read::<u32>(0x7777, 0).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000"), "{error}");
+    assert_eq!(file_there_and_back(&handle)?, vec![7; 3000]);
+    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let gone = supervisor.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7).expect_err("nothing is active");
+    assert!(gone.to_string().contains("no declaration is active"), "{gone}");
+    Ok(())
+}
+
+/// A file written and read by functions of the engine that run in its thread.
+fn file_there_and_back(handle: &SupervisorThread) -> Result<Vec<u8>, Error> {
     let file = handle.run(|engine| {
-        let mailbox = engine.mailbox(1);
+        let mailbox = engine.mailbox(SPEAKER.0);
         async move {
             let mailbox = mailbox.expect("it is declared");
-            let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+            let options = FoeOptions::default().with_limits(LIMITS);
             foe::write(&mailbox, "recipe", options, &mut Bytes::new(&[7; 3000]), |_| ()).await?;
             let mut sink = Bounded::new(3000);
             foe::read(&mailbox, "recipe", options, &mut sink, |_| ()).await?;
             Ok::<_, foe::FoeError>(sink.into_bytes())
         }
     })?;
-    assert_eq!(file, Ok(vec![7; 3000]));
-    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
-    let gone = supervisor.sdo_upload(1, SdoAddress::new(0x2001, 7), TRANSFER.bytes(4)).expect_err("it is in INIT");
-    assert!(gone.to_string().contains("the mailbox is not in use"), "{gone}");
-    Ok(())
+    Ok(file.expect("the file is transferred"))
 }
 
 // covers: jobs, registers, rescan
@@ -105,25 +108,22 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     // Before activation.
-    supervisor.register_write(1, USER_RAM, vec![1, 2, 3])?;
-    assert_eq!(supervisor.register_read(1, USER_RAM, 3)?, [1, 2, 3]);
-    let image = supervisor.sii_read(1)?;
-    assert!(supervisor.sii_write(1, image[..64].to_vec(), false).is_err(), "no image");
-    assert_eq!(supervisor.sii_write(1, image, false)?.written, 0);
-    assert_eq!(supervisor.statistics(1)?, None);
+    let speaker = supervisor.subdevice(Position(1));
+    speaker.register_write(USER_RAM, vec![1, 2, 3])?;
+    assert_eq!(speaker.register_read_bytes(USER_RAM, 3)?, [1, 2, 3]);
+    let image = speaker.sii_read()?;
+    assert!(speaker.sii_write(image[..64].to_vec(), false).is_err(), "no image");
+    assert_eq!(speaker.sii_write(image, false)?.written, 0);
+    assert_eq!(supervisor.statistics(SPEAKER)?, None);
     assert!(!supervisor.force_topology_change()?);
     assert!(supervisor.rescan(LIMIT).is_err(), "nothing is declared");
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
-    let end = Instant::now() + LIMIT;
-    while !cycles.supervisor().all_settled() {
-        assert!(Instant::now() < end, "all are in OP");
-        sleep(Duration::from_millis(1));
-    }
+    cycles.supervisor().wait_until_op(LIMIT)?;
     let handle = cycles.supervisor().clone();
-    assert_eq!(handle.read_statistics(1)?.readings, 1);
-    handle.clear_statistics(1)?;
-    assert_eq!(handle.port(1, 0)?, LoopControl::Auto);
+    assert_eq!(handle.subdevice(SPEAKER).read_statistics()?.readings, 1);
+    handle.subdevice(SPEAKER).clear_statistics()?;
+    assert_eq!(handle.subdevice(SPEAKER).port(0)?, LoopControl::Auto);
     let rescan = handle.rescan(LIMIT)?;
     assert!(rescan.is_complete() && rescan.subdevices.len() == 2 && rescan.missing.is_empty(), "{rescan:?}");
     let read = RawDatagram { command: Command::Brd, target: Target::Broadcast(map::TYPE), data: vec![0], resend: true };

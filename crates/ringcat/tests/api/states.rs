@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    DomainMember, Error, Event, Group, GroupState, LastOutputs, Options, Services, SubDeviceConfig, SubDeviceState,
-    SupervisorThread, automatic,
+    DomainMember, Error, Event, Group, GroupId, GroupState, LastOutputs, Options, SubDeviceConfig, SubDeviceFailure,
+    SubDeviceId, SubDeviceState, SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -29,8 +29,9 @@ fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
     let mut declaration = automatic(&scan.subdevices[..2], PERIOD);
     let head = SubDeviceConfig::at_alias(5, 0).pdos_of(&scan.subdevices[2]);
     let (group, members) = declaration.add_group(Group::new(head));
-    assert_eq!((group, members.clone()), (0, 2..3));
-    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    assert_eq!((group, members.as_slice()), (GroupId(0), [SubDeviceId(2)].as_slice()));
+    let members = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
+    declaration.domains[0].members.extend(members);
     let application = supervisor.activate(declaration, cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     let end = Instant::now() + LIMIT;
@@ -38,19 +39,20 @@ fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
         assert!(Instant::now() < end, "all are in OP");
         sleep(Duration::from_millis(1));
     }
-    cycles.supervisor().request_state(1, AlState::PreOp)?;
-    cycles.supervisor().request_state(2, AlState::Init)?;
+    cycles.supervisor().subdevice(SubDeviceId(1)).request_state(AlState::PreOp)?;
+    cycles.supervisor().subdevice(SubDeviceId(2)).request_state(AlState::Init)?;
     while cycles.supervisor().states()[1..] != [AlState::PreOp, AlState::Init].map(SubDeviceState::Settled) {
         assert!(Instant::now() < end, "the states are published");
         sleep(Duration::from_millis(1));
     }
     assert_eq!(cycles.supervisor().groups()?, [GroupState { present: 1, settled: 0, members: 1 }]);
-    let refused = cycles.supervisor().request_state(1, AlState::Boot);
-    assert!(matches!(refused, Err(Error::Configure(_))), "it has no boot loader");
-    cycles.supervisor().request_state(1, AlState::Op)?;
-    cycles.supervisor().request_state(2, AlState::Op)?;
+    let refused = cycles.supervisor().subdevice(SubDeviceId(1)).request_state(AlState::Boot);
+    let Err(Error::SubDevice(refused)) = refused else { panic!("it has no boot loader: {refused:?}") };
+    assert!(matches!(refused.failure, SubDeviceFailure::State(_)), "{refused}");
+    cycles.supervisor().subdevice(SubDeviceId(1)).request_state(AlState::Op)?;
+    cycles.supervisor().subdevice(SubDeviceId(2)).request_state(AlState::Op)?;
     let events: Vec<Event> = std::iter::from_fn(|| cycles.supervisor().pop_event()).map(|timed| timed.event).collect();
-    assert!(events.contains(&Event::GroupJoined { group: 0 }));
+    assert!(events.contains(&Event::GroupJoined { group: GroupId(0) }));
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())
 }

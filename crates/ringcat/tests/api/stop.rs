@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, DomainId, LastOutputs, MainDevice, Options, automatic};
+use ringcat::{Application, LastOutputs, MainDevice, Options, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 
-const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\n\
+                       type = \"digital-output-8\"\n\
                        [[device]]\ntype = \"emulated-output-8\"\n[[device]]\ntype = \"servo\"\n";
 const LIMIT: Duration = Duration::from_secs(1);
 
@@ -22,11 +23,11 @@ fn in_op() -> Application<SimulatedSegment> {
         if application.all_settled() {
             break;
         }
-        application.cycle(|data| data.image_mut(DomainId(0)).fill(0xFF));
+        application.cycle(|data| data.fill_outputs(0xFF));
     }
     assert!(application.all_settled());
     for _ in 0..5 {
-        application.cycle(|data| data.image_mut(DomainId(0)).fill(0xFF));
+        application.cycle(|data| data.fill_outputs(0xFF));
     }
     assert_eq!(outputs(application.links().network())[0], [0xFF]);
     application

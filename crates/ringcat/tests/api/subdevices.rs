@@ -14,7 +14,7 @@ use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
     AlState, Declaration, Error, Idn, LastOutputs, LoopControl, MainDevice, Options, Position, RegisterAddress,
-    Services, SubDeviceConfig, SubDeviceFailure, SubDeviceId, SupervisorThread, TransferLimits,
+    SubDeviceConfig, SubDeviceFailure, SubDeviceId, SupervisorThread, TransferLimits,
 };
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n\
@@ -64,11 +64,6 @@ fn before_a_scan_without_a_mailbox_and_not_declared_are_different_errors() -> Re
     };
     assert_eq!(read(SubDeviceId(99)), SubDeviceFailure::NotDeclared { declared: 3 });
     assert_eq!(read(coupler), SubDeviceFailure::NoMailbox);
-    // The services that take bare numbers tell the same apart.
-    let limits = TransferLimits::new(LIMIT, LIMIT).bytes(2);
-    let pending = application.sdo_upload(99, ringcat::SdoAddress::new(0x2001, 7), limits);
-    let error = application.cycle_until(pending, LIMIT, |_| ());
-    assert_eq!(failure(error), SubDeviceFailure::NotDeclared { declared: 3 });
     Ok(())
 }
 

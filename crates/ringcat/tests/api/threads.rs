@@ -9,13 +9,14 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, SupervisorThread, automatic};
+use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, SubDeviceId, SupervisorThread, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::frame::MacAddress;
 
-const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n\
+const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\n\
+                       type = \"digital-output-8\"\n\
                        [[device]]\ntype = \"servo\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
@@ -43,11 +44,11 @@ fn two_threads_bring_everybody_to_op_exchange_data_and_stop_in_order() -> Result
     let scan = supervisor.scan()?;
     assert_eq!(scan.subdevices.len(), 3);
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
-    let output = application.entry(1, 0x7000, 1).expect("the terminal's first channel");
+    let output = application.entry(SubDeviceId(1), 0x7000, 1).expect("the terminal's first channel");
     let cycles = application.start_cycles(
         || (),
         move |data| {
-            data.write(&output, 1);
+            data.write(&output, 1).expect("it is an output");
             ControlFlow::Continue(())
         },
     )?;
@@ -107,7 +108,7 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let good = automatic(&supervisor.scan()?.subdevices, PERIOD);
     let mut wrong = good.clone();
-    wrong.domains[0].members[0].subdevice = 99;
+    wrong.domains[0].members[0].subdevice = SubDeviceId(99);
     let refused = supervisor.activate(wrong, cyclic).expect_err("there is no SubDevice 99");
     assert!(refused.error.to_string().starts_with("activation: "), "{}", refused.error);
     let (supervisor, cyclic) = refused.main_device;
@@ -144,13 +145,13 @@ fn a_panic_of_the_closure_is_an_error_of_its_own_and_the_bus_is_stopped_in_order
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
-    let output = application.entry(1, 0x7000, 1).expect("the terminal's first channel");
+    let output = application.entry(SubDeviceId(1), 0x7000, 1).expect("the terminal's first channel");
     let panics = Arc::new(AtomicBool::new(false));
     let asked = panics.clone();
     let cycles = application.start_cycles(
         || (),
         move |data| {
-            data.write(&output, 1);
+            data.write(&output, 1).expect("it is an output");
             assert!(!asked.load(Ordering::Relaxed), "the recipe has no step {}", 7);
             ControlFlow::Continue(())
         },

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, DomainId, DomainState, Links, MainDevice, Options, Trigger, automatic};
+use ringcat::{Application, DomainId, DomainState, Links, MainDevice, Options, SubDeviceId, Trigger, automatic};
 use ringcat_sim::cable::HostLink;
 use ringcat_sim::fault::Fault;
 
@@ -103,7 +103,7 @@ fn everything_else_goes_on_beside_cycles_that_leave_no_pause() {
 #[test]
 fn an_application_may_take_the_steps_of_a_cycle_itself() {
     let mut application = activated();
-    let output = application.entry(1, 0x7000, 1).expect("the terminal's first channel");
+    let output = application.entry(SubDeviceId(1), 0x7000, 1).expect("the terminal's first channel");
     let domain = DomainId(0);
     let mut next = application.now();
     for cycle in 0..1_000 {
@@ -113,7 +113,7 @@ fn an_application_may_take_the_steps_of_a_cycle_itself() {
             application.receive();
         }
         let status = application.process(domain);
-        application.process_data().write(&output, 1);
+        application.process_data().write(&output, 1).expect("it is an output");
         assert!(application.queue(domain));
         application.send();
         if application.all_settled() && status.state == DomainState::Complete && cycle > 100 {

@@ -39,7 +39,7 @@ const LOOKED_AT: u64 = 3_000;
 const START: u64 = 5_000;
 /// Maximum increase of the instructions of the cyclic half by requests, in percent.
 const BAR: f64 = 1.0;
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(500));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(500));
 const OBJECT: SdoAddress = SdoAddress::new(0x1018, 1);
 
 /// Source of the SDO requests.

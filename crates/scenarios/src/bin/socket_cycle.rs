@@ -154,9 +154,9 @@ fn measured_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>)
 
 /// Minimal work of an application: it reads an input and changes an output.
 fn work(data: &mut ProcessData<'_>) {
-    if let [first, .., last] = data.image_mut(DomainId(0)) {
+    black_box(data.image(DomainId(0)).last());
+    if let Ok([first]) = data.outputs_mut(DomainId(0), 0..1) {
         *first = first.wrapping_add(1);
-        black_box(*last);
     }
 }
 

@@ -3,6 +3,7 @@
 //! [`mutate`] makes typical changes of a file: other numbers, half a datagram, elements that are removed, duplicated or
 //! moved. Random bytes would seldom be valid XML.
 
+use ringcat::SubDeviceId;
 use ringcat::eni::EniFile;
 use ringcat_config::eni;
 use ringcat_config::{Configuration, follow};
@@ -42,8 +43,9 @@ fn holds_together(configuration: &Configuration) {
     assert_eq!(configuration.subdevices.len(), count);
     let members = declaration.domains.iter().flat_map(|domain| &domain.members).map(|member| member.subdevice);
     let by_lrw = declaration.explicit_lrw.iter().flat_map(|lrw| lrw.subdevices.iter().copied());
-    let plugged = configuration.subdevices.iter().filter_map(|facts| facts.plugged_into).map(|(other, _)| other);
-    assert!(members.chain(by_lrw).chain(plugged).all(|subdevice| subdevice < count));
+    let plugged =
+        configuration.subdevices.iter().filter_map(|facts| facts.plugged_into).map(|(other, _)| SubDeviceId(other));
+    assert!(members.chain(by_lrw).chain(plugged).all(|subdevice| subdevice.0 < count));
     for area in &image.areas {
         let room = if area.direction == Direction::Inputs { image.inputs_len } else { image.outputs_len };
         assert!(area.subdevice < count && u64::from(area.image_bit) + u64::from(area.bits) <= room as u64 * 8);

@@ -90,7 +90,7 @@ fn check_words(edge: &Edge, device: usize, is_cut: bool) {
             "redundancy lost: the ring is open".into(),
         ]
     } else {
-        &["redundancy regained: the ring stands a break".into()]
+        &["redundancy restored: the ring tolerates one break".into()]
     };
     for words in expected {
         assert_eq!(edge.told.iter().filter(|told| *told == words).count(), 1, "{}: {:?}", edge.what, edge.told);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Declaration, Event, Options, RingState, Scan, automatic};
+use ringcat::{Declaration, Event, Options, RingState, Scan, SubDeviceId, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
@@ -157,7 +157,7 @@ fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
             world.cut(CableId(second));
             world.run_cycles(gap);
             for subdevice in isolated.clone() {
-                let lost = |event: &Event| *event == Event::Lost { subdevice };
+                let lost = |event: &Event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) };
                 world.until(Duration::from_millis(60), "all of the piece are lost", |world| world.saw(mark, lost));
             }
             let stale = &world.judged(mark).last().expect("cycles went by").stale;
@@ -174,10 +174,12 @@ fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
             let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
             assert!(left.iter().all(|left| isolated.contains(left)), "{left:?} left OP, {isolated:?} were isolated");
             for subdevice in 0..SIXTEEN.len() {
-                let lost = |event: &Event| *event == Event::Lost { subdevice };
+                let lost = |event: &Event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) };
                 assert_eq!(world.saw(mark, lost), isolated.contains(&subdevice), "{subdevice}");
-                let returned =
-                    world.events(healing).iter().filter(|timed| timed.event == Event::Returned { subdevice });
+                let returned = world
+                    .events(healing)
+                    .iter()
+                    .filter(|timed| timed.event == Event::Returned { subdevice: SubDeviceId(subdevice) });
                 assert_eq!(returned.count(), usize::from(isolated.contains(&subdevice)), "{subdevice}");
             }
             let told = ring_events(world.events(healing));

@@ -348,7 +348,9 @@ fn a_group_that_joins_late_or_elsewhere_has_the_clocks_of_its_place() {
     let mut world = World::with(7, two_places(), &Options::default(), |_| {
         let mut declaration = automatic(&infos, CYCLE);
         let (_, members) = declaration.add_group(group);
-        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0]
+            .members
+            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
         declaration.clocks = Some(config());
         declaration.subdevices.iter_mut().for_each(|config| config.sync = Some(SyncSignals::sync0(1_000_000, 0)));
         declaration
@@ -404,7 +406,9 @@ fn the_first_clocks_of_a_segment_may_join_with_a_group() {
         let group = Group::new(member(head, &infos[0])).then(member(SubDeviceConfig::default(), &infos[0]));
         let last = SubDeviceConfig { sync: signals, ..SubDeviceConfig::default() };
         let (_, members) = declaration.add_group(group.then(member(last, &infos[0])));
-        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0]
+            .members
+            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
         declaration.clocks = Some(config());
         declaration
     })

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Declaration, Event, Options, ReferenceClock, SyncSignals, automatic};
+use ringcat::{ClockConfig, Event, Options, ReferenceClock, SubDeviceId, SyncSignals, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::al::AlStatusCode;
@@ -115,7 +115,7 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
     let mark = world.beginning();
     world.run_cycles(2_500);
     let told = |event: &Event| match event {
-        Event::ConfigurationFailed { subdevice: 0, reason } => reason.starts_with(
+        Event::ConfigurationFailed { subdevice: SubDeviceId(0), reason } => reason.starts_with(
             "the clock of position 2 did not lock within 2000 ms: expected a difference of at most 100 ns",
         ),
         _ => false,
@@ -127,7 +127,7 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
 // covers: dc-reference
 #[test]
 fn a_reference_that_the_application_chooses_is_followed() {
-    let chosen = ClockConfig { reference: ReferenceClock::Declared(2), ..config() };
+    let chosen = ClockConfig { reference: ReferenceClock::Declared(SubDeviceId(2)), ..config() };
     let mut world = world(5, line(clocked(6, 30), NetworkOptions::default()), chosen);
     let mark = world.beginning();
     world.run_cycles(2_500);
@@ -163,7 +163,7 @@ fn an_undeclared_reference_is_followed_and_not_configured() {
     let network = line(clocked(3, 30), NetworkOptions::default());
     let mut world = World::with(19, network, &Options::default(), |scan| {
         let clocks = Some(config());
-        Declaration { clocks, ..automatic(&scan.subdevices[1..], CYCLE) }
+        automatic(&scan.subdevices[1..], CYCLE).with_optional_clocks(clocks)
     })
     .expect("it can be activated");
     let before = world.network().device(DeviceIndex(0)).al_status();

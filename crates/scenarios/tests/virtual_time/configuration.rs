@@ -5,8 +5,8 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, Direction, Event, MainDevice, Options, PdoEntry, PdoMapping, Scan, SubDeviceConfig, Watchdog,
-    automatic,
+    Declaration, Direction, Event, MainDevice, Options, PdoEntry, PdoMapping, Scan, SubDeviceConfig, SubDeviceId,
+    Watchdog, automatic,
 };
 use ringcat_engine::mail::coe::{SdoAddress, SdoError, read, write};
 use ringcat_sim::cable::DeviceIndex;
@@ -18,7 +18,7 @@ use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 const FAST: Duration = Duration::from_micros(10);
-const LIMITS: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMITS: ringcat::Limits = ringcat::Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 
 fn declared(network: Network, change: impl Fn(usize, SubDeviceConfig) -> SubDeviceConfig) -> World {
     let declare = |scan: &Scan| -> Declaration {
@@ -101,7 +101,7 @@ fn subdevices_are_found_by_alias_at_any_position() {
     world.run_cycles(20);
     assert_eq!(
         troubles(world.events(world.beginning())),
-        [&Event::Lost { subdevice: 2 }, &Event::Returned { subdevice: 2 }]
+        [&Event::Lost { subdevice: SubDeviceId(2) }, &Event::Returned { subdevice: SubDeviceId(2) }]
     );
 }
 
@@ -139,9 +139,9 @@ fn pdos_are_reassigned_if_the_subdevice_allows_it() {
     world.run_cycles(100);
     assert_eq!(world.network().device(DeviceIndex(3)).inputs().len(), 8);
     assert_eq!(world.network().device(DeviceIndex(14)).inputs().len(), 16);
-    let entry = world.application().entry(3, 0x6010, 0x11).expect("it is mapped");
+    let entry = world.application().entry(SubDeviceId(3), 0x6010, 0x11).expect("it is mapped");
     assert_eq!(entry.bit_length, 16);
-    assert_eq!(world.application().entry(3, 0x6010, 1), None);
+    assert_eq!(world.application().entry(SubDeviceId(3), 0x6010, 1), None);
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
     let mark = world.mark();
     world.power_off(DeviceIndex(3));
@@ -193,7 +193,7 @@ fn objects_are_downloaded_and_an_abort_is_reported_with_its_text() {
     assert_eq!(dictionary.read(0x8000, 2), Ok(123_456u32.to_le_bytes().as_slice()));
     assert_eq!(dictionary.read(0x8010, 3), Ok(b"another 16 bytes".as_slice()));
     let aborted = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: 14, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(14), reason }
             if reason.contains("SDO 0x9999:00: aborted by the SubDevice: 0x06020000"))
     };
     assert!(world.saw(world.beginning(), aborted), "the abort is named with object and code");
@@ -209,7 +209,7 @@ fn a_download_too_long_for_the_object_is_reported_and_retried() {
     });
     world.run_cycles(300);
     let told = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: 3, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(3), reason }
             if reason.contains("SDO 0x8000:03: aborted by the SubDevice"))
     };
     assert!(world.saw(world.beginning(), told));

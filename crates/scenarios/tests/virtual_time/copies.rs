@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat::{CopyRule, DomainConfig, DomainId, DomainMember, Entry, Freshness, Options, Scan, WhenStale, automatic};
+use ringcat::{
+    CopyRule, DomainConfig, DomainId, DomainMember, Entry, Freshness, Options, Scan, SubDeviceId, WhenStale, automatic,
+};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use scenarios::segments::{descriptions, ring};
@@ -22,8 +24,11 @@ fn world(seed: u64) -> World {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         let member = |subdevice| DomainMember { subdevice, sync_managers: None };
         declaration.domains = vec![
-            DomainConfig::new(CYCLE, vec![member(FAST_IN), member(FAST_OUT), member(OUT_16)]),
-            DomainConfig::new(4 * CYCLE, vec![member(SLOW_IN)]),
+            DomainConfig::new(
+                CYCLE,
+                vec![member(SubDeviceId(FAST_IN)), member(SubDeviceId(FAST_OUT)), member(SubDeviceId(OUT_16))],
+            ),
+            DomainConfig::new(4 * CYCLE, vec![member(SubDeviceId(SLOW_IN))]),
         ];
         declaration
     };
@@ -36,7 +41,7 @@ fn world(seed: u64) -> World {
 
 /// The whole of a SubDevice's process data.
 fn whole(world: &World, subdevice: usize) -> Entry {
-    let area = &world.application().directory().areas(subdevice)[0];
+    let area = &world.application().directory().areas(SubDeviceId(subdevice))[0];
     let bit_length = 8 * area.placed.area.length;
     Entry { domain: area.domain, bit_offset: 8 * area.placed.image_offset, bit_length }
 }
@@ -75,7 +80,7 @@ fn inputs_become_outputs_of_another_subdevice_in_the_same_cycle_across_cuts() {
             _ => {}
         }
         let (read, seen) = world.cycle_with(|data| {
-            let fresh = data.freshness(DomainId(0), FAST_IN) == Freshness::Fresh;
+            let fresh = data.freshness(DomainId(0), SubDeviceId(FAST_IN)) == Freshness::Fresh;
             ((data.read(&fast) as u16, data.read(&slow) as u16), fresh)
         });
         // Inputs read in a cycle have reached the outputs when the next one begins.

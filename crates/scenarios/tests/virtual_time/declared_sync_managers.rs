@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::{
     DeclaredSyncManager, DomainMember, Event, MainDevice, Options, PdoEntry, PdoMapping, Scan, SubDeviceConfig,
-    SubDeviceInfo, SyncManagerRole, Transition, automatic,
+    SubDeviceId, SubDeviceInfo, SyncManagerRole, Transition, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -84,8 +84,9 @@ fn world(network: Network, change: impl Fn(SubDeviceConfig) -> SubDeviceConfig) 
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices[DRIVE] = change(declaration.subdevices[DRIVE].clone());
         let drive = &declaration.subdevices[DRIVE];
-        if drive.declared.is_some() && !declaration.domains[0].members.iter().any(|m| m.subdevice == DRIVE) {
-            declaration.domains[0].members.push(DomainMember { subdevice: DRIVE, sync_managers: None });
+        if drive.declared.is_some() && !declaration.domains[0].members.iter().any(|m| m.subdevice == SubDeviceId(DRIVE))
+        {
+            declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(DRIVE), sync_managers: None });
         }
         declaration
     };
@@ -116,7 +117,7 @@ fn exchanges(world: &mut World) {
     world.run_cycles(100);
     let drive = world.network().device(DeviceIndex(DRIVE));
     assert_eq!((drive.outputs().len(), drive.inputs().len()), (6, 6));
-    let entry = world.application().entry(DRIVE, 0x6041, 0).expect("the file says where it lies");
+    let entry = world.application().entry(SubDeviceId(DRIVE), 0x6041, 0).expect("the file says where it lies");
     assert_eq!((entry.bit_length, entry.bit_offset % 8), (16, 0));
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
     let complete = world.judged(world.beginning()).last().map(|judged| judged.delivery);
@@ -191,7 +192,7 @@ fn an_absent_subdevice_has_its_place_from_the_file_and_joins_there() {
     };
     let mut world = World::with(2, network, &Options::default(), declare).expect("the others are there");
     world.run_cycles(100);
-    let entry = world.application().entry(DRIVE, 0x6041, 0).expect("it has a place");
+    let entry = world.application().entry(SubDeviceId(DRIVE), 0x6041, 0).expect("it has a place");
     assert_eq!(entry.bit_length, 16);
     world.power_on(DeviceIndex(DRIVE));
     world.until(Duration::from_secs(5), "in OP", |world| {
@@ -201,7 +202,7 @@ fn an_absent_subdevice_has_its_place_from_the_file_and_joins_there() {
     world.run_cycles(50);
     let drive = world.network().device(DeviceIndex(DRIVE));
     assert_eq!((drive.outputs().len(), drive.inputs().len()), (6, 6));
-    assert_eq!(world.application().entry(DRIVE, 0x6041, 0), Some(entry), "nothing moves");
+    assert_eq!(world.application().entry(SubDeviceId(DRIVE), 0x6041, 0), Some(entry), "nothing moves");
 }
 
 // covers: 3.1, sync-managers-declared

@@ -105,7 +105,7 @@ fn a_domain_with_frames_under_way_is_skipped_and_counted() {
     world.run_cycles(20);
     let counters = world.application().cyclic_counters();
     assert_eq!(counters.skipped, 3, "the frame was out for three cycles more");
-    let skips = world.events(mark).iter().filter(|timed| timed.event == Event::Skipped { domain: 0 });
+    let skips = world.events(mark).iter().filter(|timed| timed.event == Event::Skipped { domain: DomainId(0) });
     assert_eq!(skips.count(), 3);
     assert_eq!(world.incomplete(mark), 0, "it was complete when it came");
     assert_eq!(counters.late, 0);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::{
     Declaration, Direction, DomainConfig, DomainId, DomainMember, DomainState, Event, Options, PdoEntry, PdoMapping,
-    Scan, SubDeviceConfig, SubDeviceState, automatic,
+    Scan, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
@@ -51,7 +51,9 @@ fn in_turn(scan: &Scan, periods: &[u32]) -> Declaration {
         .enumerate()
         .map(|(number, period)| {
             let members = (number..scan.subdevices.len()).step_by(periods.len());
-            let members = members.map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            let members = members
+                .into_iter()
+                .map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
             DomainConfig::new(*period * CYCLE, members.collect())
         })
         .collect();
@@ -93,8 +95,11 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
             sync_managers: (!sync_managers.is_empty()).then(|| sync_managers.to_vec()),
         };
         declaration.domains = vec![
-            DomainConfig::new(CYCLE, vec![member(0, &[0]), member(1, &[2])]),
-            DomainConfig::new(2 * CYCLE, vec![member(0, &[1]), member(1, &[3]), member(2, &[])]),
+            DomainConfig::new(CYCLE, vec![member(SubDeviceId(0), &[0]), member(SubDeviceId(1), &[2])]),
+            DomainConfig::new(
+                2 * CYCLE,
+                vec![member(SubDeviceId(0), &[1]), member(SubDeviceId(1), &[3]), member(SubDeviceId(2), &[])],
+            ),
         ];
         declaration
     };
@@ -129,7 +134,7 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices.push(optional_analog_input(2));
-        declaration.domains[0].members.push(DomainMember { subdevice: 2, sync_managers: None });
+        declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(2), sync_managers: None });
         declaration
     };
     let mut network = line(descriptions(&kinds), NetworkOptions::default());
@@ -137,7 +142,9 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     let mut world = World::with(5, network, &Options::default(), declare).expect("activation");
     world.until(Duration::from_secs(1), "the others settled", |world| world.application().all_settled());
     world.run_cycles(20);
-    assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 2, optional: true }));
+    assert!(
+        world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: SubDeviceId(2), optional: true })
+    );
     assert_eq!(world.application().states()[2], SubDeviceState::Absent);
     assert!(!world.judged(world.beginning()).last().expect("cycles went by").delivery.is_incomplete());
     let mark = world.mark();
@@ -149,7 +156,7 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     world.run_cycles(50);
     assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
     assert_eq!(world.left_op(mark), []);
-    assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }));
+    assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(2) }));
     let status = world.judged(mark).last().expect("cycles went by").status;
     assert_eq!((status.wkc, status.expected), (2, 2));
 }
@@ -199,12 +206,12 @@ fn a_domain_without_a_response_from_the_start_is_reported_once() {
         world.cycle();
     }
     assert!(
-        world.saw(mark, |event| matches!(event, Event::StateReached { subdevice: 0, .. })),
+        world.saw(mark, |event| matches!(event, Event::StateReached { subdevice: SubDeviceId(0), .. })),
         "it does not know of it"
     );
     let told = world.events(mark).iter().filter_map(|timed| match timed.event {
         Event::Domain { domain, status } => Some((domain, status.state, status.wkc, status.returned)),
         _ => None,
     });
-    assert_eq!(told.collect::<Vec<_>>(), [(0, DomainState::Zero, 0, true)]);
+    assert_eq!(told.collect::<Vec<_>>(), [(DomainId(0), DomainState::Zero, 0, true)]);
 }

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use ringcat::{
     Declaration, Direction as Way, DomainConfig, DomainId, DomainMember, DomainState, DomainStatus, Freshness,
-    JunctionMode, LrwPolicy, Options, Scan, Services, automatic,
+    JunctionMode, LrwPolicy, Options, Scan, SubDeviceId, automatic,
 };
 use ringcat_sim::application::{Behaviour, InputFunction, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction, Endpoint};
@@ -147,7 +147,9 @@ fn declare(scan: &Scan, dice: &mut Dice) -> Declaration {
         let periods = *dice.pick(&PERIODS);
         let members = |first: usize| {
             let subdevices = (first..scan.subdevices.len()).step_by(periods.len());
-            subdevices.map(|subdevice| DomainMember { subdevice, sync_managers: None }).collect::<Vec<_>>()
+            subdevices
+                .map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None })
+                .collect::<Vec<_>>()
         };
         let domain = |(first, period): (usize, &u32)| DomainConfig::new(*period * CYCLE, members(first));
         declaration.domains = periods.iter().enumerate().map(domain).filter(|it| !it.members.is_empty()).collect();
@@ -237,7 +239,7 @@ impl Run {
         for (subdevice, count) in self.counts.iter_mut().enumerate() {
             let freshness = exchange.freshness(domain, subdevice);
             let is_input = |way: Way, length: u16| way == Way::Inputs && length > 0;
-            let areas = application.directory().areas(subdevice).iter();
+            let areas = application.directory().areas(SubDeviceId(subdevice)).iter();
             for area in areas.filter(|it| it.domain == domain && is_input(it.direction, it.placed.area.length)) {
                 let first = area.placed.image_offset as usize;
                 let place = first..first + usize::from(area.placed.area.length);
@@ -314,7 +316,7 @@ impl Run {
         let state = *self.dice.pick(&STATES);
         self.all_to_op = false;
         self.world.say(format!("SubDevice {subdevice} to {state}"));
-        drop(self.world.application_mut().request_state(subdevice, state));
+        drop(self.world.application_mut().engine_mut().start_state_request(subdevice, state));
     }
 
     /// Ends all faults; all SubDevices have to return to OP.
@@ -325,7 +327,8 @@ impl Run {
         let subdevices = self.counts.len();
         (0..subdevices).for_each(|device| self.world.power_on(DeviceIndex(device)));
         self.cycles(1_000);
-        (0..subdevices).for_each(|it| drop(self.world.application_mut().request_state(it, AlState::Op)));
+        (0..subdevices)
+            .for_each(|it| drop(self.world.application_mut().engine_mut().start_state_request(it, AlState::Op)));
         let domains = self.images.len();
         self.world.until(Duration::from_secs(30), "all back", |world| {
             let judged = world.judged(world.beginning());

@@ -11,7 +11,7 @@ use ringcat::eni::{EniFile, EniImage, segment};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
     ActivateError, Application, Direction, DomainId, DomainState, Error, Event, Freshness, MainDevice, Options,
-    SubDeviceInfo,
+    SubDeviceId, SubDeviceInfo,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::device::Device;
@@ -143,7 +143,7 @@ impl Plant {
     /// The place of a variable in its SubDevice's process data, from the file alone.
     fn place(&self, variable: usize) -> Option<(usize, Direction, u32, u32)> {
         let variable = &self.image.variables()[variable];
-        let subdevice = variable.subdevice?;
+        let subdevice = variable.subdevice?.0;
         let data = self.file.eni.subdevices[subdevice].process_data.as_ref()?;
         let ranges = if variable.direction == Direction::Outputs { &data.send } else { &data.receive };
         let mut before = 0;
@@ -338,7 +338,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_by_name_unless_it_may_be_split() {
         let Some(file) = file else { continue };
         let Err(Error::Activate(error)) = activate(file.clone(), true, false) else { panic!("{name} was taken") };
         let ActivateError::NamedLrwOnTwoLinks(lrw) = &error else { panic!("{name}: {error}") };
-        assert_eq!(lrw.subdevices, subdevices, "{name}");
+        assert_eq!(lrw.subdevices.iter().map(|subdevice| subdevice.0).collect::<Vec<_>>(), subdevices, "{name}");
         assert!(!lrw.name.is_empty() && error.to_string().contains(&lrw.name), "{name}: {error}");
         let mut plant = activate(file, true, true).expect("split it is allowed");
         plant.settle();
@@ -372,7 +372,9 @@ fn a_network_that_differs_from_the_file_is_reported_per_subdevice() {
         told[1].contains("\"Buttons (1004)\"") && told[1].contains("expected vendor id 0x00000c47, got 0x00000bec")
     );
     assert!(
-        file.compare(&found[..4]).iter().any(|difference| difference.is_grave && difference.subdevice == Some(DRIVE))
+        file.compare(&found[..4])
+            .iter()
+            .any(|difference| difference.is_grave && difference.subdevice == Some(SubDeviceId(DRIVE)))
     );
 }
 

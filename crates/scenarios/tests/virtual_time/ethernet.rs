@@ -4,7 +4,7 @@
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use ringcat::{Event, Limits, Options, automatic};
+use ringcat::{Event, Limits, Options, SubDeviceId, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::eoe::{
     self, EoeFailure, EthernetCounters, EthernetPort, IpSettings, QUEUE, QueueError, TimeStamp,
@@ -21,7 +21,7 @@ use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::{CYCLE, World};
 
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
 const KINDS: [&str; 4] = ["coupler", "digital-input-8", "ethernet-terminal", "all-protocols"];
 /// The EoE devices.
 const TERMINAL: usize = 2;
@@ -100,7 +100,7 @@ fn a_download_shares_the_mailbox_with_objects_and_files() {
     let mailbox = world.mailbox(ALL);
     let files = world.start(async move {
         let data = vec![0x5A; 50_000];
-        let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+        let options = FoeOptions::default().with_limits(LIMITS);
         foe::write(&mailbox, "recipe", options, &mut Bytes::new(&data), |_| ()).await.unwrap();
         let mut sink = Bounded::new(data.len());
         foe::read(&mailbox, "recipe", options, &mut sink, |_| ()).await.unwrap();
@@ -291,7 +291,7 @@ fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
     let mark = world.mark();
     world.run_cycles(200);
     let told = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: TERMINAL, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(TERMINAL), reason }
         if reason.contains("EoE port 0: the SubDevice refused"))
     };
     assert!(world.saw(mark, told), "{:?}", world.events(mark));

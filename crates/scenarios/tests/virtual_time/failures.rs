@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Declaration, Error, Event, Options, Scan, ScanError, SubDeviceState, Timeouts, automatic};
+use ringcat::{Declaration, Error, Event, Options, Scan, ScanError, SubDeviceId, SubDeviceState, Timeouts, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::builder::SegmentBuilder;
@@ -48,7 +48,7 @@ fn after_an_application_stall_all_subdevices_return_to_op() {
         for subdevice in watched {
             let fell = |event: &Event| {
                 matches!(event, Event::StateError { subdevice: fallen, requested: None, code, .. }
-                    if *fallen == subdevice && *code == AlStatusCode::SYNC_MANAGER_WATCHDOG)
+                    if *fallen == SubDeviceId(subdevice) && *code == AlStatusCode::SYNC_MANAGER_WATCHDOG)
             };
             assert!(world.saw(mark, fell), "{subdevice} is named with its code");
         }
@@ -72,7 +72,7 @@ fn every_watchdog_expiry_is_reported_once() {
             fell.sort_unstable();
             let told = troubles(world.events(mark)).into_iter().map(|event| match event {
                 Event::StateError { subdevice, requested: None, code: AlStatusCode::SYNC_MANAGER_WATCHDOG, .. } => {
-                    *subdevice
+                    subdevice.0
                 }
                 other => panic!("{other:?}"),
             });
@@ -120,7 +120,7 @@ fn a_subdevice_hanging_during_configuration_is_reported_and_retried() {
         world.hang(DeviceIndex(3), false);
         world.until(LIMIT, "all in OP", all_well);
         let named = |event: &Event| {
-            matches!(event, Event::ConfigurationFailed { subdevice: 3, reason }
+            matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(3), reason }
             if reason.contains("within 40 ms"))
         };
         assert!(world.saw(world.beginning(), named));
@@ -140,7 +140,7 @@ fn a_refused_transition_is_reported_with_its_code_and_retried() {
             world.until(LIMIT, "all in OP", all_well);
             let refused = world.events(world.beginning()).iter().filter(|timed| {
                 matches!(timed.event, Event::StateError { subdevice, requested, code: got, .. }
-                    if subdevice == device && requested == Some(to) && got == code)
+                    if subdevice == SubDeviceId(device) && requested == Some(to) && got == code)
             });
             assert_eq!(refused.count(), times as usize, "device {device} refuses {to}");
             assert_eq!(troubles(world.events(world.beginning())).len(), times as usize);
@@ -197,7 +197,7 @@ fn a_wrong_sii_checksum_is_reported_and_does_not_affect_others() {
     assert!(world.saw(start, told));
     // The controller does not load such an EEPROM, and without it the application does not run (protocol 4.7).
     let named = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: 2, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(2), reason }
         if reason.contains("expected PREOP"))
     };
     assert!(world.saw(start, named));
@@ -296,8 +296,10 @@ fn a_subdevice_in_op_without_fmmus_is_detected_and_reconfigured() {
     assert!(world.judged(mark).last().expect("cycles went by").delivery.is_incomplete());
     world.run_cycles(1_200);
     assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
-    let named =
-        |event: &Event| matches!(event, Event::ConfigurationFailed { subdevice: 1, reason } if reason.contains("FMMU"));
+    let named = |event: &Event| match event {
+        Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason } => reason.contains("FMMU"),
+        _ => false,
+    };
     assert!(world.saw(mark, named));
     assert!(world.left_op(mark).iter().all(|device| device.0 == 1));
 }

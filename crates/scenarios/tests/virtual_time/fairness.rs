@@ -16,7 +16,7 @@ use ringcat_wire::datagram::Target;
 use scenarios::segments::{descriptions, line};
 use scenarios::world::{CYCLE, World};
 
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
+const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(5));
 const BUDGET: usize = 4_000;
 /// SubDevices with objects, followed by one with files.
 const DRIVES: usize = 50;
@@ -74,7 +74,7 @@ fn a_file_and_a_datagram_flood_leave_others_their_share_of_the_budget() {
     assert!(least >= 20 && most > BUDGET as u64 * 9 / 10, "{least} answers, {most} bytes in a cycle");
     let mailbox = world.mailbox(FILES);
     let file = world.start(async move {
-        let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+        let options = FoeOptions::default().with_limits(LIMITS);
         let mut packets = 0;
         foe::write(&mailbox, "recipe", options, &mut Bytes::new(&[7; 1 << 20]), |_| packets += 1).await.map(drop)
     });

@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, MainDevice, Options, Scan, Services,
-    SubDeviceConfig, SubDeviceInfo, automatic,
+    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, GroupId, MainDevice, Options, Scan,
+    SubDeviceConfig, SubDeviceId, SubDeviceInfo, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -55,8 +55,10 @@ pub fn group(head: SubDeviceConfig) -> Group {
 fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
     let (number, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-    assert_eq!((number, members.clone()), (0, 4..6));
-    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    assert_eq!((number, members.as_slice()), (GroupId(0), [4, 5].map(SubDeviceId).as_slice()));
+    declaration.domains[0]
+        .members
+        .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
     declaration
 }
 
@@ -120,20 +122,20 @@ fn a_group_joins_and_leaves_a_line_without_working_counter_errors_elsewhere() {
         world.fault_in(BETWEEN, Fault::Heal(cable));
         if round > 0 {
             for subdevice in [4, 5] {
-                let _ = world.application_mut().request_state(subdevice, AlState::Op);
+                let _ = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Op);
             }
         }
         until_joined(&mut world);
-        assert_eq!(count(&world, mark, &Event::GroupJoined { group: 0 }), 1);
+        assert_eq!(count(&world, mark, &Event::GroupJoined { group: GroupId(0) }), 1);
         // The group is set to INIT before it is unplugged.
         for subdevice in [5, 4] {
-            let work = world.application_mut().request_state(subdevice, AlState::Init);
+            let work = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Init);
             assert_eq!(world.finish(LIMIT, work), Ok(()));
         }
         world.fault_in(BETWEEN, Fault::Cut(cable));
         until_left(&mut world);
         assert_eq!(errors(&world, mark), 0, "round {round}");
-        assert_eq!(count(&world, mark, &Event::GroupLeft { group: 0 }), 1);
+        assert_eq!(count(&world, mark, &Event::GroupLeft { group: GroupId(0) }), 1);
     }
     assert!(world.left_op(world.beginning()).iter().all(|device| device.0 >= BASE.len()));
 }
@@ -181,7 +183,9 @@ fn a_group_joins_at_another_place_than_it_left() {
         let base = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"];
         let mut declaration = automatic(&infos(&base), CYCLE);
         let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0]
+            .members
+            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
         declaration
     };
     let mut world = World::with(2, network, &Options::default(), declare).expect("scan and activation");
@@ -239,7 +243,9 @@ fn a_group_present_at_the_start_is_found_by_its_identification() {
     let declare = |_: &Scan| {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
         let (_, members) = declaration.add_group(group(SubDeviceConfig::at_identification(4711)));
-        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0]
+            .members
+            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
         declaration
     };
     let network = line(all, NetworkOptions::default());
@@ -266,7 +272,8 @@ fn a_broken_group_is_reported_and_its_remaining_part_is_used() {
     let mut world = world(line(all, NetworkOptions::default()));
     let state = world.application().groups()[0];
     assert_eq!((state.present, state.settled, state.members), (1, 1, 2));
-    let told = |event: &Event| matches!(event, Event::Mismatch { subdevice: 5, position, .. } if position.0 == 5);
+    let told =
+        |event: &Event| matches!(event, Event::Mismatch { subdevice: SubDeviceId(5), position, .. } if position.0 == 5);
     assert!(world.saw(world.beginning(), told));
     world.run_cycles(200);
     assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
@@ -286,7 +293,7 @@ fn adjacent_groups_separated_by_a_break_continue_and_join_again() {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
         for alias in [TOOL, TOOL + 1] {
             let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(alias, 0)));
-            let joined = members.map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            let joined = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
             declaration.domains[0].members.extend(joined);
         }
         declaration

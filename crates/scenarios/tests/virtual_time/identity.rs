@@ -4,7 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Application, DomainId, DomainState, Event, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic,
+    Application, DomainId, DomainState, Event, Freshness, JunctionMode, LastOutputs, MainDevice, Options, SubDeviceId,
+    automatic,
 };
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -157,11 +158,13 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     assert_ne!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
     let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
     let told = |event: &&Event| match event {
-        Event::ConfigurationFailed { subdevice: 1, reason } => reason.contains("does not give up the address"),
+        Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason } => {
+            reason.contains("does not give up the address")
+        }
         _ => false,
     };
     assert_eq!(events.iter().filter(told).count(), 1, "{events:?}");
-    assert_eq!(events.iter().find(|event| matches!(event, Event::Returned { subdevice: 1 })), None);
+    assert_eq!(events.iter().find(|event| matches!(event, Event::Returned { subdevice: SubDeviceId(1) })), None);
     let network = application.links_mut().network_mut();
     network.cut(CableId(2));
     network.power_on(DeviceIndex(1));

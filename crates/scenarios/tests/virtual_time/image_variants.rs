@@ -8,7 +8,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use ringcat::{DomainId, Event, Freshness, Options, automatic};
+use ringcat::{DomainId, Event, Freshness, Options, SubDeviceId, automatic};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::catalogue;
 use ringcat_sim::description::DeviceDescription;
@@ -97,8 +97,8 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
     let begin = world.application().now();
     let reason = |world: &World| {
         let own = |event: &Event| match event {
-            Event::ConfigurationFailed { subdevice: ODD, .. } => Some(Outcome::Refused),
-            Event::StateError { subdevice: ODD, .. } => Some(Outcome::RefusedByDevice),
+            Event::ConfigurationFailed { subdevice: SubDeviceId(ODD), .. } => Some(Outcome::Refused),
+            Event::StateError { subdevice: SubDeviceId(ODD), .. } => Some(Outcome::RefusedByDevice),
             _ => None,
         };
         world.events(world.beginning()).iter().find_map(|timed| own(&timed.event))

@@ -11,7 +11,7 @@ mod sizes;
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, automatic};
+use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, SubDeviceId, automatic};
 use ringcat_engine::mail::coe;
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -28,7 +28,8 @@ type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
 /// Devices of [`RING_BEHIND_JUNCTION`]: an output, the junction. Only some of them have clocks.
 const ONE: [&str; 7] =
     ["digital-output-8", "junction", "servo", "digital-input-8", "block", "coupler", "analog-input-4"];
-const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 4, tail_port: 1 };
+const STRICT: JunctionConnection =
+    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
 
 fn one_ring() -> Network {
     wired(&ONE, &RING_BEHIND_JUNCTION)
@@ -229,7 +230,10 @@ fn a_cut_of_the_line_loses_subdevices_without_a_ring_event() {
     world.run_cycles(200);
     assert_eq!(told(&world, mark), []);
     for subdevice in 0..7 {
-        assert_eq!(world.saw(mark, |event| *event == Event::Lost { subdevice }), subdevice >= 5);
+        assert_eq!(
+            world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) }),
+            subdevice >= 5
+        );
     }
     world.heal(CableId(6));
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
@@ -332,7 +336,7 @@ fn random_segments_with_a_local_ring_work_alike_with_one_break() {
 #[test]
 fn transfers_continue_through_cuts_and_repairs_of_a_local_ring() {
     let mut world = in_op(9, one_ring(), (JunctionMode::Strict, &[STRICT]));
-    let limits: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+    let limits: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
     let object = SdoAddress::new(0x8000, 3);
     // One SubDevice in the ring, one behind it.
     for (subdevice, round) in [(6, 0), (6, 1), (6, 2), (6, 3)] {

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Event, Services};
+use ringcat::{DomainId, DomainState, Event, SubDeviceId};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
@@ -48,7 +48,7 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
     for (subdevice, state, register, length) in registers {
         let mut world = world();
         if state != AlState::Op {
-            let request = world.application_mut().request_state(subdevice, state);
+            let request = world.application_mut().engine_mut().start_state_request(subdevice, state);
             world.finish(Duration::from_secs(1), request).expect("it goes there");
             world.run_cycles(50);
         }
@@ -69,8 +69,10 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
         world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
         // Some SubDevices detect it themselves.
         let told = |event: &Event| match event {
-            Event::ConfigurationFailed { subdevice: of, reason } => *of == subdevice && reason.contains("0x0"),
-            Event::StateError { subdevice: of, .. } => *of == subdevice,
+            Event::ConfigurationFailed { subdevice: of, reason } => {
+                *of == SubDeviceId(subdevice) && reason.contains("0x0")
+            }
+            Event::StateError { subdevice: of, .. } => *of == SubDeviceId(subdevice),
             _ => false,
         };
         assert!(world.saw(mark, told), "{what}: {:?}", world.events(mark));
@@ -85,7 +87,7 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
 #[test]
 fn outputs_for_op_only_are_not_reconfigured_in_safeop() {
     let mut world = world();
-    let request = world.application_mut().request_state(0, AlState::SafeOp);
+    let request = world.application_mut().engine_mut().start_state_request(0, AlState::SafeOp);
     world.finish(Duration::from_secs(1), request).expect("it goes there");
     let mark = world.mark();
     world.run_cycles(3_000);

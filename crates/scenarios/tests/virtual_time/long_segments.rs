@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Declaration, Event, Options, RingState, automatic};
+use ringcat::{ClockConfig, Event, Options, RingState, SubDeviceId, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::address::StationAddress;
@@ -39,7 +39,7 @@ fn in_op(count: usize, is_ring: bool) -> World {
 fn declared(network: Network, clocks: bool) -> World {
     let declare = |scan: &ringcat::Scan| {
         let clocks = clocks.then(ClockConfig::default);
-        Declaration { clocks, ..automatic(&scan.subdevices, CYCLE) }
+        automatic(&scan.subdevices, CYCLE).with_optional_clocks(clocks)
     };
     let mut world = World::with(7, network, &Options::default(), declare).expect("it fits");
     // Inputs of a drive that reaches OP change while frames are under way.
@@ -116,7 +116,7 @@ fn a_subdevice_behind_position_255_that_loses_its_power_comes_back() {
             let mark = world.mark();
             world.power_off(DeviceIndex(device));
             world.run_cycles(40);
-            let lost = |event: &Event| matches!(event, Event::Lost { subdevice } if *subdevice == device);
+            let lost = |event: &Event| matches!(event, Event::Lost { subdevice } if *subdevice == SubDeviceId(device));
             assert!(world.saw(mark, lost), "{device}");
             world.power_on(DeviceIndex(device));
             world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && is_complete(world));

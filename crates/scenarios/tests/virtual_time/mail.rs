@@ -11,7 +11,7 @@ use scenarios::segments::ring_of_16;
 use scenarios::world::World;
 
 const FAST: Duration = Duration::from_micros(10);
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 /// An analogue terminal: settings that can be written in any state.
 const TERMINAL: usize = 3;
 const NUMBER: SdoAddress = SdoAddress::new(0x8000, 1);
@@ -119,10 +119,10 @@ fn a_late_response_is_not_assigned_to_the_next_request() {
     let mailbox = world.mailbox(TERMINAL);
     assert_eq!(world.run(write_and_read(mailbox.clone(), 2)), Ok(()));
     world.hang(DeviceIndex(TERMINAL), true);
-    let limits = (LIMITS.0, Duration::from_millis(20));
+    let limits = Limits::new(LIMITS.request, Duration::from_millis(20));
     let own = mailbox.clone();
     let error = world.run(async move { read(&own, NUMBER, limits, 2).await }).expect_err("it hangs");
-    assert_eq!(error.cause, SdoFailure::Mailbox(MailboxError::NoAnswer { limit: limits.1 }));
+    assert_eq!(error.cause, SdoFailure::Mailbox(MailboxError::NoAnswer { limit: limits.answer }));
     // Another request is dropped while it is under way.
     let own = mailbox.clone();
     let dropped = world.start(async move { read(&own, NUMBER, LIMITS, 2).await });

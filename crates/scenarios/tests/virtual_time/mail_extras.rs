@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::SubDeviceId;
 use ringcat_engine::mail::coe::pdo_mail::{self, PdoMailError};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::soe::command;
@@ -12,7 +13,7 @@ use ringcat_wire::mailbox::soe::Idn;
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "servo"];
 const ALL: usize = 1;
 const SERVO: usize = 2;
@@ -28,7 +29,7 @@ fn pdos_are_sent_and_requested_by_mailbox() {
     let mut world = world(1);
     let mailbox = world.mailbox(SERVO);
     let directory = world.application().directory().clone();
-    let inputs = directory.areas(SERVO).iter().find(|area| area.direction == ringcat::Direction::Inputs);
+    let inputs = directory.areas(SubDeviceId(SERVO)).iter().find(|area| area.direction == ringcat::Direction::Inputs);
     let length = usize::from(inputs.expect("it has inputs").placed.area.length);
     let own = mailbox.clone();
     let sent = world.run(async move {
@@ -36,7 +37,7 @@ fn pdos_are_sent_and_requested_by_mailbox() {
         let rx = pdo_mail::receive(&own, 0x1600, LIMITS).await?;
         // After an SDO whose response must not be mistaken for it, and the reverse.
         let sdo = coe::read(&own, SdoAddress::new(0x1018, 1), LIMITS, 4).await;
-        pdo_mail::send(&own, 0x1600, &rx, LIMITS.0).await?;
+        pdo_mail::send(&own, 0x1600, &rx, LIMITS.request).await?;
         let again = pdo_mail::receive(&own, 0x1600, LIMITS).await?;
         Ok::<_, PdoMailError>((tx?.len(), rx.len(), sdo.map(|sdo| sdo.len()), again.len()))
     });
@@ -50,7 +51,7 @@ fn pdos_are_sent_and_requested_by_mailbox() {
     };
     assert!(unknown.as_ref().is_err_and(refused), "{unknown:?}");
     let own = mailbox.clone();
-    let wrong = world.run(async move { pdo_mail::send(&own, 0x1A00, &[], LIMITS.0).await });
+    let wrong = world.run(async move { pdo_mail::send(&own, 0x1A00, &[], LIMITS.request).await });
     assert_eq!(wrong, Err(PdoMailError::Index { pdo: 0x1A00 }));
     assert_eq!(mailbox.counters().unclaimed, 0);
 }
@@ -69,7 +70,7 @@ fn raw_messages_get_the_next_response_or_none() {
     assert_eq!(answer[..6], [0x00, 0x30, 0x43, 0x00, 0x10, 0x00]);
     let own = mailbox.clone();
     let voe = [0x47, 0x0C, 0, 0, 1, 0, 0xAA, 0xBB];
-    let sent = world.run(async move { raw::send(&own, Lane::Voe, &voe, LIMITS.0).await });
+    let sent = world.run(async move { raw::send(&own, Lane::Voe, &voe, LIMITS.request).await });
     assert_eq!(sent, Ok(()));
     let own = mailbox.clone();
     let unasked = world.run(async move { own.unsolicited(Unsolicited::Voe).await });

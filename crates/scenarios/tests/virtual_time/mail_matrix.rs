@@ -16,7 +16,7 @@ use scenarios::mailbox_requests::{KINDS, Kind, Requester};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(60));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(60));
 const PLANT: [&str; 2] = ["digital-input-8", "all-protocols"];
 /// The device with all protocols, and the addresses of its mailboxes.
 const ALL: usize = 1;

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::SubDeviceId;
 use ringcat_engine::mail::aoe::{self, AoeRoute};
 use ringcat_engine::mail::coe::{self, SdoAddress, history, information};
 use ringcat_engine::mail::foe::{self, FoeFailure, FoeOptions, FoeProgress};
@@ -25,7 +26,7 @@ use scenarios::mailbox_requests::{Kind, Requester};
 use scenarios::segments::{descriptions, ring};
 use scenarios::world::World;
 
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
 /// The device with all protocols.
 const ALL: usize = 2;
 const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "servo", "digital-output-8"];
@@ -54,7 +55,7 @@ async fn objects(mailbox: Mailbox) {
 }
 
 async fn files(mailbox: Mailbox) {
-    let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+    let options = FoeOptions::default().with_limits(LIMITS);
     // A multiple of the packet size, and one more byte.
     for length in [20 * 1012, 20 * 1012 + 1] {
         let data = pattern(length);
@@ -174,7 +175,7 @@ fn duplicated_late_and_miscounted_responses_are_distinguished() {
 fn a_silent_device_is_given_up_in_time_and_works_again_later() {
     let mut world = world(4);
     world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::LoseAnswers { count: 1 }));
-    let limits = (LIMITS.0, Duration::from_millis(50));
+    let limits = Limits::new(LIMITS.request, Duration::from_millis(50));
     let mailbox = world.mailbox(ALL);
     let result = world.run(async move { coe::read(&mailbox, LARGE, limits, LARGE_BYTES).await });
     let error = result.unwrap_err();
@@ -184,7 +185,7 @@ fn a_silent_device_is_given_up_in_time_and_works_again_later() {
     let result = world.run(async move {
         voe::exchange(&mailbox, &Voe { vendor_id: VENDOR, vendor_type: 1, data: vec![] }, limits).await
     });
-    assert_eq!(result, Err(MailboxError::NoAnswer { limit: limits.1 }));
+    assert_eq!(result, Err(MailboxError::NoAnswer { limit: limits.answer }));
     for work in start_all(&mut world) {
         world.finish(Duration::from_secs(20), work);
     }
@@ -281,7 +282,9 @@ fn emergencies_are_events_and_kept_with_the_mailbox() {
     }
     world.finish(Duration::from_secs(5), reading);
     let told = world.events(mark).iter().filter_map(|timed| match timed.event {
-        ringcat::Event::Emergency { subdevice: ALL, emergency } => Some(emergency.error_code),
+        ringcat::Event::Emergency { subdevice: ringcat::Address::Declared(SubDeviceId(ALL)), emergency } => {
+            Some(emergency.error_code)
+        }
         _ => None,
     });
     let told: Vec<u16> = told.collect();
@@ -359,7 +362,7 @@ fn unsolicited_mail_is_kept_for_the_application() {
     post(&mut world, &message);
     let mailbox = world.mailbox(ALL);
     let own = mailbox.clone();
-    let received = world.run(async move { voe::receive(&own, LIMITS.1).await });
+    let received = world.run(async move { voe::receive(&own, LIMITS.answer).await });
     assert_eq!(received, Ok(Voe { vendor_id: VENDOR, vendor_type: 1, data: b"hi".to_vec() }));
     for _ in 0..40 {
         post(&mut world, &message);
@@ -418,5 +421,8 @@ fn mail_of_all_mapped_mailboxes_is_found_with_one_read() {
     let mark = world.mark();
     assert!(world.network_mut().device_mut(DeviceIndex(ALL)).application.emergency(&emergency));
     world.run_cycles(9);
-    assert!(world.saw(mark, |event| matches!(event, ringcat::Event::Emergency { subdevice: ALL, .. })));
+    assert!(world.saw(mark, |event| matches!(
+        event,
+        ringcat::Event::Emergency { subdevice: ringcat::Address::Declared(SubDeviceId(ALL)), .. }
+    )));
 }

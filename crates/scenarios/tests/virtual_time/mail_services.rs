@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{
-    Limits, MainDevice, Options, RequestFailure, RequestState, SdoAddress, Services, TransferLimits, automatic,
-};
+use ringcat::{Limits, MainDevice, Options, Position, RequestFailure, RequestState, TransferLimits, automatic};
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_sim::application::foe::firmware;
@@ -16,9 +14,15 @@ use scenarios::segments::{descriptions, line, ring_of_16};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
-const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.0, LIMITS.1);
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
+const TRANSFER: TransferLimits = TransferLimits::new(LIMITS.request, LIMITS.answer);
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
+
+type Device<'a> = ringcat::SubDevice<&'a mut MainDevice<Tap>>;
+
+fn device(main_device: &mut MainDevice<Tap>, position: u16) -> Device<'_> {
+    main_device.subdevice(Position(position)).limits(TRANSFER.bytes(200_000))
+}
 
 // covers: jobs, sdo
 #[test]
@@ -26,15 +30,13 @@ fn objects_are_accessible_before_activation_which_reconfigures_all() {
     let mut main_device =
         MainDevice::request(Tap::new(line(descriptions(&KINDS), NetworkOptions::default())), &Options::default());
     let scan = main_device.scan().expect("a scan");
-    let object = SdoAddress::new(0x2001, 7);
-    main_device.sdo_download(1, object, &[0x34, 0x12], TRANSFER).expect("it is there");
-    assert_eq!(main_device.sdo_upload(1, object, TRANSFER.bytes(2)).expect("it is there"), [0x34, 0x12]);
-    let large = main_device.sdo_upload(1, SdoAddress::new(0x2002, 0), TRANSFER.bytes(200_000)).expect("in segments");
+    device(&mut main_device, 1).sdo_write(0x2001, 7, vec![0x34u8, 0x12]).expect("it is there");
+    assert_eq!(device(&mut main_device, 1).sdo_read::<Vec<u8>>(0x2001, 7).expect("it is there"), [0x34, 0x12]);
+    let large = device(&mut main_device, 1).sdo_read::<Vec<u8>>(0x2002, 0).expect("in segments");
     assert_eq!(large.len(), 100_000);
-    let error =
-        main_device.sdo_upload(1, SdoAddress::new(0x7777, 0), TRANSFER.bytes(2)).expect_err("there is no such object");
+    let error = device(&mut main_device, 1).sdo_read::<u16>(0x7777, 0).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000 Object does not exist"), "{error}");
-    let error = main_device.sdo_upload(2, object, TRANSFER.bytes(2)).expect_err("it has no mailbox");
+    let error = device(&mut main_device, 2).sdo_read::<u16>(0x2001, 7).expect_err("it has no mailbox");
     assert!(error.to_string().contains("mailbox"), "{error}");
     let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("activation");
     for _ in 0..2000 {
@@ -94,15 +96,17 @@ fn firmware_is_written_in_boot_and_the_new_version_is_reported() {
     let network = line(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     main_device.scan().expect("a scan");
-    let version = SdoAddress::new(0x100A, 0);
-    assert_eq!(main_device.sdo_upload(1, version, TRANSFER.bytes(50)).expect("a version"), b"1.0");
-    main_device.bring_to(1, AlState::Boot).expect("it has a boot loader");
+    let version = |main_device: &mut MainDevice<_>| {
+        main_device.subdevice(Position(1)).sdo_read::<Vec<u8>>(0x100A, 0).expect("a version")
+    };
+    assert_eq!(version(&mut main_device), b"1.0");
+    main_device.subdevice(Position(1)).request_state(AlState::Boot).expect("it has a boot loader");
     let image = firmware::image("2.7", &[0x5A; 20_000]);
-    let mailbox = main_device.mailbox(1).expect("it was visited");
+    let mailbox = main_device.mailbox(Position(1)).expect("it was visited");
     let written = main_device.run(async move {
         foe::write(&mailbox, "firmware.bin", FoeOptions::default(), &mut Bytes::new(&image), |_| ()).await
     });
     assert_eq!(written, Ok(20_000 + 4 + 1 + 3 + 4));
-    main_device.bring_to(1, AlState::Init).expect("it leaves the boot loader");
-    assert_eq!(main_device.sdo_upload(1, version, TRANSFER.bytes(50)).expect("a version"), b"2.7");
+    main_device.subdevice(Position(1)).request_state(AlState::Init).expect("it leaves the boot loader");
+    assert_eq!(version(&mut main_device), b"2.7");
 }

@@ -31,7 +31,7 @@ use scenarios::world::World;
 
 /// Responses later than twice this time cannot be distinguished from those to the next request in SoE, FoE and EoE
 /// (decision 0007): no fault here delays a response that long.
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(250));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(250));
 const PLANT: [&str; 3] = ["all-protocols", "digital-input-8", "all-protocols"];
 /// IP address of the first device; requests write that of the other one.
 const DEVICE: [u8; 4] = [10, 0, 0, 2];
@@ -226,7 +226,7 @@ fn all_answer(world: &mut World, seed: u64) {
         if (device, kind) == (ALL[0], Kind::Address) {
             continue;
         }
-        let mut asker = Requester::new(kind, world.mailbox(device), (END, END), true);
+        let mut asker = Requester::new(kind, world.mailbox(device), ringcat::Limits::new(END, END), true);
         let result = world.run(async move { asker.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }

@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, MainDevice, Options, PdoMapping, ReadPdos, Services, SubDeviceInfo, automatic};
+use ringcat::{
+    Event, Limits, MainDevice, Options, PdoMapping, Position, ReadPdos, SubDeviceId, SubDeviceInfo, automatic,
+};
 use ringcat_engine::mail::coe::{self, SdoAddress, pdo};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -58,7 +60,7 @@ fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary() {
     read.run_cycles(50);
     let pdos: Vec<(u16, Option<u8>)> = odd(&read).pdos.iter().map(|pdo| (pdo.index, pdo.sync_manager)).collect();
     assert_eq!(pdos, [(0x1600, Some(2)), (0x1A00, Some(3))]);
-    assert!(read.application().entry(ODD, 0x6041, 0).is_some(), "entries have names by index");
+    assert!(read.application().entry(SubDeviceId(ODD), 0x6041, 0).is_some(), "entries have names by index");
     assert_eq!(troubles(read.events(read.beginning())), Vec::<&Event>::new());
     assert!(!told(&read, "dictionary"), "missing data is not a contradiction");
     read.power_off(DeviceIndex(ODD));
@@ -84,13 +86,13 @@ fn the_dictionary_has_priority_over_the_sii_which_is_reported() {
     asked.settle();
     asked.run_cycles(50);
     assert!(told(&asked, "SM 3: 16 bits of process data in the SII, but 32 bits in other PDOs of the dictionary"));
-    let areas = asked.application().directory().areas(ODD);
+    let areas = asked.application().directory().areas(SubDeviceId(ODD));
     assert_eq!(areas.iter().map(|area| area.placed.area.length).collect::<Vec<_>>(), [4, 4]);
     let mut trusting = world(devices(), ReadPdos::Missing);
     trusting.run_cycles(100);
     // The SubDevice refuses, and the reason is found.
     let explained = |event: &Event| {
-        matches!(event, Event::PlanOddity { subdevice: ODD, what }
+        matches!(event, Event::PlanOddity { subdevice: SubDeviceId(ODD), what }
             if what == "SM 2: 2 bytes are configured, the PDOs in the dictionary have 4")
     };
     assert!(trusting.saw(trusting.beginning(), explained), "{:?}", troubles(trusting.events(trusting.beginning())));
@@ -105,11 +107,11 @@ fn a_former_pdo_assignment_is_restored_after_a_loss_of_power() {
     let options = Options::default().with_pdos(ReadPdos::Always);
     let mut main_device = MainDevice::request(links, &options);
     main_device.scan().expect("a scan");
-    main_device.bring_to(ODD, AlState::PreOp).expect("it goes there");
-    let mailbox = main_device.mailbox(ODD).expect("it was visited");
+    main_device.subdevice(Position(ODD as u16)).request_state(AlState::PreOp).expect("it goes there");
+    let mailbox = main_device.mailbox(Position(ODD as u16)).expect("it was visited");
     // The compact PDOs, without status.
     let compact: Vec<PdoMapping> = (0..4).map(|channel| PdoMapping::from_sii(0x1A01 + 2 * channel)).collect();
-    let limits = (Duration::from_millis(100), Duration::from_secs(1));
+    let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
     let written = main_device.run(async move { pdo::write_assignment(&mailbox, 3, &compact, limits).await });
     assert_eq!(written, Ok(()));
     let found = main_device.scan().expect("a scan");
@@ -173,7 +175,7 @@ fn mailboxes_on_other_sync_managers_work_as_in_the_sii() {
         assert_eq!(world.scan.subdevices[ODD].mailbox_sync_managers(), (3, 2));
         // A lost response is repeated, unsolicited mail is found.
         world.lose(Loss::of_read(world.station_of(ODD), send).on_the_way_back());
-        let limits = (Duration::from_millis(100), Duration::from_secs(1));
+        let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
         let own = mailbox.clone();
         let vendor = world.run(async move { coe::read(&own, SdoAddress::new(0x1018, 1), limits, 4).await });
         assert_eq!(vendor.map(|vendor| vendor.len()), Ok(4));
@@ -227,7 +229,7 @@ fn a_blank_eeprom_is_reported_and_the_others_reach_op() {
 fn others_run_and_it_says(mut world: World, reason: &str) {
     world.run_cycles(400);
     let failed = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason: got }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(ODD), reason: got }
         if got.contains(reason))
     };
     assert!(world.saw(world.beginning(), failed), "{:?}", troubles(world.events(world.beginning())));
@@ -290,12 +292,12 @@ fn an_sii_repaired_in_operation_is_reported_without_a_place() {
     world.until(Duration::from_secs(5), "it is in SAFEOP", is_safe);
     world.until(Duration::from_secs(5), "all settled", |world| world.application().all_settled());
     let says = |event: &Event| {
-        matches!(event, Event::PlanOddity { subdevice: ODD, what }
+        matches!(event, Event::PlanOddity { subdevice: SubDeviceId(ODD), what }
             if what.contains("it has no place in the process image before the next activation, and stays in SAFEOP"))
     };
     let told = world.events(mark).iter().filter(|timed| says(&timed.event));
     assert_eq!(told.count(), 1, "{:?}", world.events(mark));
-    assert_eq!(world.application().directory().areas(ODD).len(), 0);
+    assert_eq!(world.application().directory().areas(SubDeviceId(ODD)).len(), 0);
     let (mark, compared) = (world.mark(), world.compared());
     world.run_cycles(3_000);
     assert!(world.compared() > compared && world.incomplete(mark) == 0 && is_safe(&world));
@@ -321,12 +323,12 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
     });
     let mut world = started.expect("one bad EEPROM stops no other SubDevice");
     assert!(told(&world, "no category follows the fixed area: the image is truncated"));
-    assert!(world.application().entry(ODD, 0x7000, 1).is_some());
+    assert!(world.application().entry(SubDeviceId(ODD), 0x7000, 1).is_some());
     world.run_cycles(300);
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
     assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
     let failed = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: ODD, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(ODD), reason }
             if reason.contains("SM 2 has process data, the SII describes 0 SyncManagers only"))
     };
     assert!(world.saw(world.beginning(), failed));
@@ -451,5 +453,5 @@ fn a_dictionary_that_does_not_respond_delays_only_its_subdevice() {
     assert!(told(&world, "its dictionary does not tell its PDOs"));
     let seconds = Duration::from_nanos(world.now().0).as_secs();
     assert!(seconds < 10, "{seconds} s");
-    assert_eq!(world.application().entry(ODD, 0x6041, 0), None);
+    assert_eq!(world.application().entry(SubDeviceId(ODD), 0x6041, 0), None);
 }

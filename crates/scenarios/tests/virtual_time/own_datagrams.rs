@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    ActivateError, Declaration, DomainMember, Error, Group, JunctionConnection, JunctionMode, LrwPolicy, Options,
-    RawDatagram, Scan, SubDeviceConfig, automatic,
+    ActivateError, Declaration, DomainId, DomainMember, Error, Group, JunctionConnection, JunctionMode, LrwPolicy,
+    Options, RawDatagram, Scan, SubDeviceConfig, SubDeviceId, automatic,
 };
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::supervisor::{BusError, Reply};
@@ -143,15 +143,15 @@ fn application_positions_are_those_of_a_rescan_that_updated_the_cabling() {
 }
 
 fn with_lrw(scan: &Scan) -> Declaration {
-    Declaration { lrw: LrwPolicy::Explicit, ..automatic(&scan.subdevices, CYCLE) }
+    automatic(&scan.subdevices, CYCLE).with_lrw(LrwPolicy::Explicit)
 }
 
 fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
     let Err(Error::Activate(error)) = result else { panic!("it was taken: {result:?}") };
     let text = error.to_string();
-    let ActivateError::LrwOnTwoLinks { domain: 0, subdevices, .. } = error else { panic!("{text}") };
+    let ActivateError::LrwOnTwoLinks { domain: DomainId(0), subdevices, .. } = error else { panic!("{text}") };
     assert!(text.starts_with("domain 0: an LRW at logical address 0x00000000"), "{text}");
-    (subdevices, text)
+    (subdevices.into_iter().map(|subdevice| subdevice.0).collect(), text)
 }
 
 /// Any declaration has to be applied, and is refused there.
@@ -159,7 +159,7 @@ fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
 #[test]
 fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too() {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
-    let connection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    let connection = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
     for (junctions, connections) in [(JunctionMode::Strict, &[connection][..]), (JunctionMode::Automatic, &[])] {
         let options = Options::default().with_junctions(junctions);
         let network = wired(&kinds, &RING_IN_RING);
@@ -174,7 +174,9 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
         let head = SubDeviceConfig::at_alias(7, 0);
         let head = head.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(&info);
         let (_, members) = declaration.add_group(Group::new(head));
-        declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0]
+            .members
+            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
         declaration
     };
     let (subdevices, text) = refused(World::with(4, segment(), &Options::default(), with_group));

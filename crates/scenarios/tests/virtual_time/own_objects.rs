@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::SubDeviceState;
+use ringcat::{Limits, SubDeviceState};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
@@ -196,7 +196,7 @@ fn faults_of_a_subdevice_are_counted_and_kept_in_the_history() {
     world.judge_latched(false);
     let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
     let mailbox = world.mailbox(2);
-    let limits = (LIMIT, LIMIT);
+    let limits = Limits::new(LIMIT, LIMIT);
     let refused = world.run(async move { coe::read(&mailbox, SdoAddress::new(0x7777, 0), limits, 8).await });
     assert!(refused.is_err());
     assert!(world.network_mut().device_mut(DeviceIndex(2)).application.diagnose(&message(), &[]));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Declaration, Event, Options, Scan, Watchdog, automatic};
+use ringcat::{Declaration, Event, Options, Scan, SubDeviceId, Watchdog, automatic};
 use ringcat_engine::info::Direction;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::{Network, NetworkOptions};
@@ -75,7 +75,8 @@ fn last(world: &World, since: Mark) -> Option<Delivery> {
 
 /// Lost once, returned once, nothing else.
 fn assert_trouble(world: &World, since: Mark, subdevice: usize) {
-    let expected = [Event::Lost { subdevice }, Event::Returned { subdevice }];
+    let expected =
+        [Event::Lost { subdevice: SubDeviceId(subdevice) }, Event::Returned { subdevice: SubDeviceId(subdevice) }];
     assert_eq!(troubles(world.events(since)), expected.iter().collect::<Vec<_>>());
 }
 

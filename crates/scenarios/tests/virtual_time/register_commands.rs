@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ringcat::{
     Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, SubDeviceConfig,
-    Transition, automatic,
+    SubDeviceId, Transition, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -60,7 +60,7 @@ fn failure(mut world: World) -> String {
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != DRIVE);
     assert!(others.into_iter().all(|(_, device)| device.al_status().al_state() == Some(AlState::Op)));
     let reasons = world.events(world.beginning()).iter().find_map(|timed| match &timed.event {
-        Event::ConfigurationFailed { subdevice: DRIVE, reason } => Some(reason.clone()),
+        Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason } => Some(reason.clone()),
         _ => None,
     });
     reasons.unwrap_or_else(|| panic!("{:?}", troubles(world.events(world.beginning()))))
@@ -165,7 +165,7 @@ fn objects_are_read_and_compared_or_reported() {
     let mut world = world(&[upload(0x2001, 7, Some(&[7, 0])), upload(0x2003, 2, None)]);
     world.settle();
     let read = world.events(world.beginning()).iter().filter_map(|timed| match &timed.event {
-        Event::StartupRead { subdevice: DRIVE, number, index, sub_index, comment, data } => {
+        Event::StartupRead { subdevice: SubDeviceId(DRIVE), number, index, sub_index, comment, data } => {
             Some((*number, *index, *sub_index, comment.clone(), data.clone()))
         }
         _ => None,

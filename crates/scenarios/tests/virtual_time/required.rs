@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Declaration, Event, IdentityField, Options, Required, Scan, SubDeviceConfig, SubDeviceState, automatic};
+use ringcat::{
+    Declaration, Event, IdentityField, Options, Required, Scan, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
+};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::NetworkOptions;
@@ -54,7 +56,7 @@ fn a_mismatch_is_reported_with_both_values_and_not_configured() {
         .expect("activation");
         world.run_cycles(200);
         let told = |event: &Event| match event {
-            Event::Mismatch { subdevice: 2, position, field, expected, .. } => {
+            Event::Mismatch { subdevice: SubDeviceId(2), position, field, expected, .. } => {
                 (position.0, *field, *expected) == (2, wanted, value)
             }
             _ => false,
@@ -115,7 +117,9 @@ fn all_subdevices_may_be_required_including_optional_ones() {
     assert!(error.to_string().contains("no SubDevice at position 3; 3 are present"), "{error}");
     let mut world = with(Required::Mandatory).expect("activation");
     world.until(LIMIT, "settled", |world| world.application().mandatory_settled());
-    assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 3, optional: true }));
+    assert!(
+        world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: SubDeviceId(3), optional: true })
+    );
 }
 
 // covers: mandatory
@@ -140,7 +144,9 @@ fn a_missing_mandatory_subdevice_is_reported_and_may_join_later() {
     };
     let mut world = World::with(2, network, &Options::default(), declaring).expect("activation");
     world.run_cycles(100);
-    assert!(world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: 3, optional: false }));
+    assert!(
+        world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: SubDeviceId(3), optional: false })
+    );
     assert!(world.judged(world.beginning()).iter().all(|judged| judged.status.state != ringcat::DomainState::Complete));
     world.power_on(DeviceIndex(3));
     world.settle();

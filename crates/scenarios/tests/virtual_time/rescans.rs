@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Identified, Options, PortOf, Rescan, RingState, SubDeviceState, automatic};
+use ringcat::{Event, Identified, Options, PortOf, Rescan, RingState, SubDeviceId, SubDeviceState, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::SegmentBuilder;
@@ -49,7 +49,7 @@ fn rescan(world: &mut World) -> Rescan {
 
 /// Index in the declaration for each position.
 fn declared(rescan: &Rescan) -> Vec<Option<usize>> {
-    let index = |identified| if let Identified::Declared(index) = identified { Some(index) } else { None };
+    let index = |identified| if let Identified::Declared(index) = identified { Some(index.0) } else { None };
     rescan.subdevices.iter().map(|found| index(found.identified)).collect()
 }
 
@@ -93,17 +93,17 @@ fn a_rescan_finds_new_moved_and_missing_subdevices() {
     world.run_cycles(50);
     let mark = world.mark();
     let moved = rescan(&mut world);
-    assert_eq!(moved.moved().collect::<Vec<_>>(), [(3, Position(3), Position(6))]);
+    assert_eq!(moved.moved().collect::<Vec<_>>(), [(SubDeviceId(3), Position(3), Position(6))]);
     let last = moved.topology.nodes[6];
     assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, crossed");
-    let told = Event::Moved { subdevice: 3, from: Position(3), to: Position(6) };
+    let told = Event::Moved { subdevice: SubDeviceId(3), from: Position(3), to: Position(6) };
     assert!(world.saw(mark, |event| *event == told));
 
     world.power_off(LEAVING);
     world.until(LIMIT, "gone", |world| world.application().states()[6] == SubDeviceState::Absent);
     world.run_cycles(50);
     let gone = rescan(&mut world);
-    assert_eq!((gone.missing.as_slice(), gone.subdevices.len()), ([6].as_slice(), 7));
+    assert_eq!((gone.missing.as_slice(), gone.subdevices.len()), ([SubDeviceId(6)].as_slice(), 7));
 }
 
 // covers: rescan
@@ -190,7 +190,7 @@ fn after_a_rescan_breaks_and_errors_use_the_new_cabling() {
     world.until(LIMIT, "gone", |world| world.application().states()[2] == SubDeviceState::Absent);
     world.run_cycles(50);
     let gone = rescan(&mut world);
-    assert_eq!((gone.missing.as_slice(), gone.moved().count()), ([2].as_slice(), 0));
+    assert_eq!((gone.missing.as_slice(), gone.moved().count()), ([SubDeviceId(2)].as_slice(), 0));
     assert_eq!(damaged(&world), [(Some(2), Some(3), before)], "the same cable keeps its count");
     damage(&mut world);
     let again = damaged(&world);

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Link, Redundancy, RedundancyLoss, RingState, TimedEvent};
+use ringcat::{Event, Link, Redundancy, RedundancyLoss, RingState, SubDeviceId, TimedEvent};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
@@ -191,7 +191,7 @@ fn two_breaks_are_bus_faults_and_redundancy_returns_with_the_last_repair() {
     world.cut(CableId(3));
     world.run_cycles(200);
     let lost: Vec<&Event> = troubles(world.events(mark));
-    assert_eq!(lost, [&Event::Lost { subdevice: 1 }, &Event::Lost { subdevice: 2 }]);
+    assert_eq!(lost, [&Event::Lost { subdevice: SubDeviceId(1) }, &Event::Lost { subdevice: SubDeviceId(2) }]);
     assert_eq!(others(world.events(mark)).len(), 1, "redundancy was lost once");
     world.heal(CableId(1));
     world.until(Duration::from_secs(3), "all back", |world| world.all_in_op() && world.application().all_settled());

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
-use ringcat::{Direction, DomainId, DomainState, MainDevice, Options, automatic};
+use ringcat::{Direction, DomainId, DomainState, MainDevice, Options, SubDeviceId, automatic};
 use ringcat_link::Recorder;
 use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
@@ -68,8 +68,9 @@ fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
     let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
-    let areas: Vec<_> =
-        (0..scan.subdevices.len()).flat_map(|subdevice| application.directory().areas(subdevice).to_vec()).collect();
+    let areas: Vec<_> = (0..scan.subdevices.len())
+        .flat_map(|subdevice| application.directory().areas(SubDeviceId(subdevice)).to_vec())
+        .collect();
     let mut inputs: Vec<_> = areas
         .iter()
         .filter(|area| area.direction == Direction::Inputs)

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
-    ActivateError, ConfigAddress, Direction, DomainMember, Error, Event, LastOutputs, LrwPolicy, MacCodec, MainDevice,
-    Options, PdoEntry, PdoMapping, RingState, Scan, SubDeviceConfig, SubDeviceState, automatic,
+    ActivateError, ConfigAddress, Direction, DomainId, DomainMember, Error, Event, LastOutputs, LrwPolicy, MacCodec,
+    MainDevice, Options, PdoEntry, PdoMapping, RingState, Scan, SubDeviceConfig, SubDeviceId, SubDeviceState,
+    automatic,
 };
 use ringcat_engine::mail::aoe::{self, AoeRoute};
 use ringcat_engine::mail::coe::{self, SdoAddress};
@@ -28,7 +29,7 @@ use scenarios::segments::{SIXTEEN, cable_of_ring, descriptions, ring, ring_of_16
 use scenarios::world::{CYCLE, World};
 
 const FAST: Duration = Duration::from_micros(10);
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(2));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
 /// The device with all protocols.
 const ALL: usize = 2;
 const KINDS: [&str; 5] = ["coupler", "digital-input-8", "all-protocols", "servo", "digital-output-8"];
@@ -48,7 +49,7 @@ async fn all_services(mailbox: Mailbox) {
     let (large, data) = (SdoAddress::new(0x2002, 0), pattern(9_000));
     coe::write(&mailbox, large, &data, LIMITS).await.unwrap();
     assert_eq!(coe::read(&mailbox, large, LIMITS, data.len()).await.unwrap(), data);
-    let options = FoeOptions { limits: LIMITS, ..FoeOptions::default() };
+    let options = FoeOptions::default().with_limits(LIMITS);
     foe::write(&mailbox, "recipe", options, &mut Bytes::new(&data), |_| ()).await.unwrap();
     let mut sink = Bounded::new(data.len());
     foe::read(&mailbox, "recipe", options, &mut sink, |_| ()).await.unwrap();
@@ -128,7 +129,10 @@ fn a_subdevice_power_cycled_on_either_side_is_configured_again() {
         world.power_off(DeviceIndex(device));
         world.run_cycles(300);
         for subdevice in gone.clone() {
-            assert!(world.saw(mark, |event| *event == Event::Lost { subdevice }), "{subdevice} with {device}");
+            assert!(
+                world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) }),
+                "{subdevice} with {device}"
+            );
         }
         world.power_on(DeviceIndex(device));
         world
@@ -166,7 +170,7 @@ fn an_optional_subdevice_joins_on_either_side_of_a_break() {
             declaration.subdevices[2].address = ConfigAddress::Position(3);
             declaration.subdevices[3].address = ConfigAddress::Position(4);
             declaration.subdevices.insert(2, optional_analog_input(2));
-            declaration.domains[0].members.push(DomainMember { subdevice: 4, sync_managers: None });
+            declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(4), sync_managers: None });
             declaration
         };
         let mut world = World::with(9, network, &Options::default(), declare).expect("activation");
@@ -216,7 +220,7 @@ fn a_ring_that_is_broken_from_start_to_end_is_started_stopped_and_started_again(
 }
 
 fn with_lrw(scan: &Scan, lrw: LrwPolicy) -> ringcat::Declaration {
-    ringcat::Declaration { lrw, ..automatic(&scan.subdevices, CYCLE) }
+    automatic(&scan.subdevices, CYCLE).with_lrw(lrw)
 }
 
 // covers: CR-16, 9.2.2, ring-lrw
@@ -225,7 +229,7 @@ fn an_explicit_lrw_is_refused_on_two_links_and_names_datagram_and_subdevices() {
     let refused = World::with(0, segment(), &Options::default(), |scan| with_lrw(scan, LrwPolicy::Explicit));
     let Err(Error::Activate(error)) = refused else { panic!("it was taken: {refused:?}") };
     let ActivateError::LrwOnTwoLinks { domain, subdevices, length, .. } = &error else { panic!("{error}") };
-    assert_eq!((*domain, subdevices.as_slice()), (0, &[1, 2, 3, 4][..]));
+    assert_eq!((*domain, subdevices.as_slice()), (DomainId(0), &[1, 2, 3, 4].map(SubDeviceId)[..]));
     assert!(*length > 2);
     let text = error.to_string();
     assert!(
@@ -269,12 +273,13 @@ fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
         name: format!("frame 1, command {} \"cyclic cmd\"", subdevices[0]),
         logical: LogicalAddress(0x0100_0000),
         length: 12,
-        subdevices: subdevices.to_vec(),
+        subdevices: subdevices.iter().copied().map(SubDeviceId).collect(),
     };
     let declare = |explicit_lrw: Vec<ringcat::ExplicitLrw>| {
-        move |scan: &Scan| ringcat::Declaration {
-            explicit_lrw: explicit_lrw.clone(),
-            ..automatic(&scan.subdevices, CYCLE)
+        move |scan: &Scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.explicit_lrw = explicit_lrw.clone();
+            declaration
         }
     };
     let several = || declare(vec![named(&[1]), named(&[2, 3])]);

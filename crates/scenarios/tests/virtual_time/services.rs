@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, RawDatagram, SubDeviceState};
+use ringcat::{Event, RawDatagram, SubDeviceId, SubDeviceState};
 use ringcat_engine::main_device::MAX_DATAGRAMS;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -96,7 +96,7 @@ fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
     world.until(LIMIT, "back", |world| world.application().all_settled());
     world.recognise();
     world.run_cycles(50);
-    assert!(world.all_in_op() && world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }));
+    assert!(world.all_in_op() && world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(2) }));
     let open = world.application_mut().engine_mut().start_open_blocked();
     assert_eq!(world.finish(LIMIT, open), Ok(0));
     let block = world.application_mut().engine_mut().start_block(0);
@@ -147,9 +147,10 @@ fn a_controller_reset_works_also_when_frames_are_lost() {
         let reset = world.application_mut().engine_mut().start_reset(3);
         assert_eq!(world.finish(LIMIT, reset), Ok(()), "{lost} frames lost");
         assert_eq!(world.network().device(DeviceIndex(3)).controller.starts(), starts + 1, "{lost} frames lost");
-        world.until(LIMIT, "lost", |world| world.saw(mark, |event| *event == Event::Lost { subdevice: 3 }));
+        world
+            .until(LIMIT, "lost", |world| world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(3) }));
         world.until(LIMIT, "back", |world| world.application().all_settled());
-        assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: 3 }));
+        assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(3) }));
         let others = world.left_op(mark).into_iter().filter(|device| *device != DeviceIndex(3)).count();
         assert_eq!(others, 0);
     }

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Freshness};
+use ringcat::{DomainId, DomainState, Freshness, SubDeviceId};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -43,7 +43,7 @@ fn inputs_of_a_disabled_sync_manager_are_not_fresh() {
                 let mut world =
                     World::in_op(1, if closed { ring(described, options) } else { line(described, options) });
                 let what = format!("ring: {closed}, SyncManager {dead}, FMMUs {fmmus:?}");
-                let inputs = world.application().directory().areas(1).to_vec();
+                let inputs = world.application().directory().areas(SubDeviceId(1)).to_vec();
                 assert_eq!(inputs.len(), 2, "{what}");
                 let now = world.now();
                 let controller = &mut world.network_mut().device_mut(DeviceIndex(1)).controller;

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, Scan, SubDeviceConfig, Transition, automatic};
+use ringcat::{Event, Options, Scan, SubDeviceConfig, SubDeviceId, Transition, automatic};
 use ringcat_sim::application::ServedMail;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -146,7 +146,7 @@ fn a_refused_idn_is_told_with_its_number_and_code() {
     });
     world.run_cycles(300);
     let told = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.starts_with("start-up command 1 (SAFEOP to OP): SoE drive 0 S-0-0001 elements 0x40: refused by \
                 the drive"))
     };
@@ -162,7 +162,7 @@ fn a_declared_pause_before_safeop_is_kept() {
     let mut hasty = world(network(), |config| config);
     hasty.run_cycles(1000);
     let refused = |event: &Event| {
-        matches!(event, Event::StateError { subdevice: DRIVE, requested: Some(AlState::SafeOp), code, .. }
+        matches!(event, Event::StateError { subdevice: SubDeviceId(DRIVE), requested: Some(AlState::SafeOp), code, .. }
             if *code == AlStatusCode::EXTERNAL_HARDWARE_NOT_READY)
     };
     assert!(hasty.saw(hasty.beginning(), refused) && !hasty.application().all_settled());
@@ -211,7 +211,7 @@ fn a_state_change_may_have_its_own_time_limit() {
     let mut world = world(segment(slow), |config| config.state_timeout(AlState::PreOp, AlState::SafeOp, limit));
     world.run_cycles(300);
     let named = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.contains("expected SAFEOP within 30 ms"))
     };
     assert!(world.saw(world.beginning(), named), "{:?}", troubles(world.events(world.beginning())));

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::{
-    DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, Services, SubDeviceState, Transition, automatic,
+    DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, SubDeviceId, SubDeviceState, Transition, automatic,
 };
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
@@ -24,14 +24,14 @@ use scenarios::loss::Loss;
 use scenarios::segments::{descriptions, line, ring_of_16};
 use scenarios::world::{CYCLE, Mark, World};
 
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_secs(1));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 const LIMIT: Duration = Duration::from_secs(5);
 const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digital-input-8"];
 /// The SubDevice with a mailbox and a boot loader.
 const DRIVE: usize = 2;
 
 fn request(world: &mut World, subdevice: usize, state: AlState) -> Result<(), ConfigureError> {
-    let work = world.application_mut().request_state(subdevice, state);
+    let work = world.application_mut().engine_mut().start_state_request(subdevice, state);
     world.finish(LIMIT, work)
 }
 
@@ -264,7 +264,7 @@ fn a_refused_state_is_reported_and_the_former_state_restored() {
     let mark = world.mark();
     let error = request(&mut world, DRIVE, AlState::Boot).expect_err("it refuses");
     assert!(error.to_string().contains("refused BOOT"), "{error}");
-    assert!(world.saw(mark, |event| matches!(event, Event::StateError { subdevice: DRIVE, .. })));
+    assert!(world.saw(mark, |event| matches!(event, Event::StateError { subdevice: SubDeviceId(DRIVE), .. })));
     world.settle();
     assert_eq!(state(&world, DRIVE), AlStatus::new(AlState::Op));
 }
@@ -303,7 +303,7 @@ fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
     assert_eq!(request(&mut world, last, AlState::PreOp), Ok(()));
     world.run_cycles(5);
     assert!(!is_missed(&world));
-    let work = world.application_mut().request_state(last, AlState::Op);
+    let work = world.application_mut().engine_mut().start_state_request(last, AlState::Op);
     world.run_cycles(1);
     world.power_off(DeviceIndex(last));
     assert!(world.finish(LIMIT, work).is_err());
@@ -320,9 +320,9 @@ fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
 #[test]
 fn a_later_request_ends_an_earlier_one() {
     let mut world = World::in_op(7, line(descriptions(&KINDS), NetworkOptions::default()));
-    let first = world.application_mut().request_state(DRIVE, AlState::Init);
+    let first = world.application_mut().engine_mut().start_state_request(DRIVE, AlState::Init);
     world.cycle();
-    let second = world.application_mut().request_state(DRIVE, AlState::Op);
+    let second = world.application_mut().engine_mut().start_state_request(DRIVE, AlState::Op);
     assert_eq!(world.finish(LIMIT, first), Err(ConfigureError::Interrupted));
     assert_eq!(world.finish(LIMIT, second), Ok(()));
     world.settle();

@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Application, Declaration, Error, LastOutputs, MainDevice, Options, Scan, StopError, automatic};
+use ringcat::{
+    Application, Declaration, Error, LastOutputs, MainDevice, Options, Scan, StopError, SubDeviceId, automatic,
+};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
@@ -44,7 +46,7 @@ fn without(scan: &Scan, left_out: &[usize]) -> Declaration {
     let names = declaration.subdevices.len();
     for domain in &mut declaration.domains {
         domain.members.truncate(names);
-        domain.members.iter_mut().enumerate().for_each(|(index, member)| member.subdevice = index);
+        domain.members.iter_mut().enumerate().for_each(|(index, member)| member.subdevice = SubDeviceId(index));
     }
     declaration
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Link, Options, Redundancy, RedundancyLoss, RingState, TimedEvent, automatic};
+use ringcat::{Event, Link, Options, Redundancy, RedundancyLoss, RingState, SubDeviceId, TimedEvent, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
@@ -98,7 +98,10 @@ fn a_subdevice_with_one_port_leaves_the_ring_open_which_is_reported() {
     let mark = world.mark();
     world.cut(CableId(2));
     world.run_cycles(100);
-    assert!(world.saw(mark, |event| *event == Event::Lost { subdevice: 2 }), "there is no second way to it");
+    assert!(
+        world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(2) }),
+        "there is no second way to it"
+    );
     world.heal(CableId(2));
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     assert_eq!(world.left_op(mark).iter().filter(|device| device.0 != 2).count(), 0);

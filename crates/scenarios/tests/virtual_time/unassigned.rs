@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainMember, Event, Options, automatic};
+use ringcat::{DomainId, DomainMember, Event, Options, SubDeviceId, automatic};
 use ringcat_engine::config::ConfigAddress;
 use ringcat_engine::main_device::SubDeviceState;
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
@@ -147,7 +147,10 @@ fn a_subdevice_with_the_address_of_an_absent_member_is_not_mistaken() {
     });
     // Only the check once a second can show it.
     world.run_cycles(1500);
-    assert!(!world.saw(mark, |event| *event == Event::Returned { subdevice: 2 }), "it is not the missing SubDevice");
+    assert!(
+        !world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(2) }),
+        "it is not the missing SubDevice"
+    );
     let given = stations(&world)[5];
     assert!(given >= 0xC000 && given != temporary.0, "it has a temporary address again, another one");
     assert_eq!(world.application().states()[2], SubDeviceState::Absent);
@@ -230,7 +233,7 @@ fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
         declaration.subdevices[1].address = ConfigAddress::Position(2);
         declaration.subdevices[2].address = ConfigAddress::Position(3);
         declaration.subdevices.insert(1, twin);
-        let members = (0..4).map(|subdevice| DomainMember { subdevice, sync_managers: None });
+        let members = (0..4).map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
         declaration.domains[0].members = members.collect();
         declaration
     })
@@ -265,7 +268,7 @@ fn other_changes_are_detected_while_a_new_subdevice_is_read() {
     let mark = world.mark();
     world.power_off(DeviceIndex(4));
     world.until(Duration::from_millis(50), "noticed", |world| {
-        world.saw(mark, |event| *event == Event::Lost { subdevice: 4 })
+        world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(4) })
     });
     world.run_cycles(200);
     world.power_on(DeviceIndex(4));

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ringcat::Direction::Inputs;
-use ringcat::{DomainId, DomainState, Event, Freshness, JunctionMode, Options, RingState, automatic};
+use ringcat::{DomainId, DomainState, Event, Freshness, JunctionMode, Options, RingState, SubDeviceId, automatic};
 use ringcat_engine::main_device::AreaEntries;
 use ringcat_sim::application::behaviours::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, Direction};
@@ -84,7 +84,7 @@ impl Stamped {
         // Its checks assume one cycle under way.
         world.judge_latched(false);
         let directory = world.application().directory();
-        let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(subdevice));
+        let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(SubDeviceId(subdevice)));
         let inputs = all.filter(|area| area.direction == Inputs && area.placed.area.length > 0);
         let input = |area: &AreaEntries| Input {
             subdevice: area.placed.area.subdevice,

@@ -10,6 +10,7 @@ use crate::mail::stream::Overflow;
 
 /// Why an SDO transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SdoError {
     /// The object.
     pub object: SdoAddress,

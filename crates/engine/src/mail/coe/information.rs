@@ -212,7 +212,7 @@ async fn next(
     response: InformationOpcode,
     limits: Limits,
 ) -> Result<Fragment, InformationError> {
-    conversation.more(limits.1, |payload| take(payload, response, &[])).await?
+    conversation.more(limits.answer, |payload| take(payload, response, &[])).await?
 }
 
 /// Whether a message belongs to the answer.

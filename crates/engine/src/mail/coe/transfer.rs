@@ -126,7 +126,7 @@ pub(in crate::mail) async fn settle(conversation: &mut Conversation, limits: Lim
                 // The request was not sent: the late answer may still arrive.
                 if conversation.late_mark().is_none() {
                     conversation.mark(late);
-                    conversation.expect_late(limits.1);
+                    conversation.expect_late(limits.answer);
                 }
                 return Err(error);
             }

@@ -8,6 +8,7 @@ use crate::mail::MailboxError;
 
 /// Why IP parameters or the filter of a SubDevice were not set or read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EoeError {
     /// Port of the SubDevice.
     pub port: u8,

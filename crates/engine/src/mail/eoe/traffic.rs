@@ -75,6 +75,7 @@ impl core::error::Error for QueueError {}
 
 /// Counters of one SubDevice's Ethernet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EthernetCounters {
     /// Frames that the SubDevice accepted.
     pub tx_frames: u64,

@@ -11,6 +11,7 @@ use crate::mail::stream::Overflow;
 
 /// Why a file transfer failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FoeError {
     /// Name of the file.
     pub file: String,

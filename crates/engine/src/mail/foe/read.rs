@@ -52,7 +52,7 @@ async fn run(
             // The file is complete, whether or not the last acknowledgement reaches the SubDevice.
             transfer.busy = false;
             let length = acknowledge.encode(&mut transfer.payload).ok_or(FoeFailure::SmallMailbox)?;
-            transfer.conversation.send(&transfer.payload[..length], options.limits.0).await?;
+            transfer.conversation.send(&transfer.payload[..length], options.limits.request).await?;
             return Ok(bytes);
         }
         packet = packet.wrapping_add(1);

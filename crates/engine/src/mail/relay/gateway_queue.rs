@@ -27,8 +27,8 @@ const QUEUE: usize = 64;
 /// Answers that are kept until the gateway takes them.
 const ANSWERS: usize = 1024;
 /// Time limit until a SubDevice accepts a message, and until it answers; files may have to be erased first.
-const LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(1));
-const FILE_LIMITS: Limits = (Duration::from_millis(500), Duration::from_secs(3));
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(1));
+const FILE_LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(3));
 /// Longest time in the queue; after this time the client has repeated the message or disconnected.
 const STALE: Duration = Duration::from_secs(5);
 /// Longest pause of a client within a transfer.
@@ -47,6 +47,7 @@ pub struct Relayed {
 
 /// Counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RelayCounters {
     /// Messages from clients.
     pub messages: u64,
@@ -350,7 +351,7 @@ async fn exchange(
             shared.refuse(job, detail);
             return true;
         }
-        Ok(ExpectedAnswer::None) => conversation.send(&job.payload, limits.0).await,
+        Ok(ExpectedAnswer::None) => conversation.send(&job.payload, limits.request).await,
         Ok(ExpectedAnswer::Matching(filter)) => {
             answers(shared, conversation, dialogue, &filter, job, limits, send).await
         }
@@ -391,6 +392,6 @@ async fn answers(
             return Ok(());
         }
         let accept = |payload: &[u8]| filter.continues(payload).then(|| payload.to_vec());
-        answer = conversation.more(limits.1, accept).await?;
+        answer = conversation.more(limits.answer, accept).await?;
     }
 }

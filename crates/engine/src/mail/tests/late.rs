@@ -37,7 +37,7 @@ impl Bench {
     /// Sends a message of a vendor-specific protocol without an answer.
     fn send_unanswered(&mut self) {
         let mailbox = self.mailbox.clone();
-        assert_eq!(self.run(async move { raw::send(&mailbox, Lane::of(9), &[0], LIMITS.0).await }), Ok(()));
+        assert_eq!(self.run(async move { raw::send(&mailbox, Lane::of(9), &[0], LIMITS.request).await }), Ok(()));
     }
 
     fn refuse(&mut self, detail: u16) -> ErrorReply {
@@ -113,7 +113,7 @@ fn late_fragments_before_the_confirmed_write_do_not_answer_the_next_request() {
 // covers: mailbox
 #[test]
 fn the_answer_to_a_request_abandoned_before_its_write_is_not_the_next_answer() {
-    let limits = (Duration::from_secs(1), 10 * MS);
+    let limits = Limits::new(Duration::from_secs(1), 10 * MS);
     let mut bench = Bench::new(LinkSet::Single, 64);
     let given_up = bench.begin_exchange(b"before", MS, limits);
     // All frames are lost for longer than the time limit of an answer.
@@ -121,7 +121,7 @@ fn the_answer_to_a_request_abandoned_before_its_write_is_not_the_next_answer() {
     while given_up.borrow().is_none() {
         bench.step(|| Fate::LostOut);
     }
-    let next = bench.begin_exchange(b"after", 10 * LIMITS.1, limits);
+    let next = bench.begin_exchange(b"after", 10 * LIMITS.answer, limits);
     while bench.now < end {
         bench.step(|| Fate::LostOut);
     }
@@ -137,7 +137,7 @@ fn after_an_ambiguous_error_reply_a_late_answer_is_expected() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     bench.device.delay = 3 * MS;
     bench.send_unanswered();
-    let first = bench.begin_exchange(b"first", LIMITS.1, LIMITS);
+    let first = bench.begin_exchange(b"first", LIMITS.answer, LIMITS);
     bench.until_served(2);
     let at = bench.now;
     let reply = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
@@ -210,8 +210,8 @@ fn the_refusal_of_ethernet_frames_does_not_end_a_request_of_a_proven_protocol() 
     );
     // The server does not support EoE; its error reply arrives before the answer.
     let mailbox = bench.mailbox.clone();
-    bench.start(async move { mailbox.conversation(Lane::Frames).await?.send(&[0; 12], LIMITS.0).await });
-    let second = bench.begin_exchange(b"second", LIMITS.1, LIMITS);
+    bench.start(async move { mailbox.conversation(Lane::Frames).await?.send(&[0; 12], LIMITS.request).await });
+    let second = bench.begin_exchange(b"second", LIMITS.answer, LIMITS);
     bench.pass(20 * MS);
     assert_eq!(second.take(), Some(Some(Ok(message(b"second")))));
     let kept = bench.mailbox.pop_unsolicited(Unsolicited::Other).map(|mail| mail.protocol);
@@ -227,7 +227,7 @@ fn an_error_reply_to_another_message_does_not_end_the_wait_for_a_late_answer() {
     bench.begin_exchange(b"first", MS / 5, LIMITS);
     bench.until_served(2);
     bench.pass(MS / 2);
-    let second = bench.begin_exchange(b"second", LIMITS.1, LIMITS);
+    let second = bench.begin_exchange(b"second", LIMITS.answer, LIMITS);
     let at = bench.now;
     bench.device.queue_first(Protocol::Error, &ErrorReply::new(ErrorReply::NO_MORE_MEMORY).encode(), at);
     bench.pass(100 * MS);

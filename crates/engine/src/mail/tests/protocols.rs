@@ -15,6 +15,7 @@ use ringcat_wire::mailbox::{ErrorReply, Protocol};
 use super::device::pattern;
 use super::{Bench, Fate, LIMITS};
 use crate::config::{PdoEntry, PdoMapping};
+use crate::declared::{Address, SubDeviceId};
 use crate::link::LinkSet;
 use crate::mail::aoe::{AoeError, AoeRoute};
 use crate::mail::coe::{SdoAddress, SdoFailure, information, pdo, read, write};
@@ -152,9 +153,9 @@ fn an_emergency_between_request_and_response_is_kept_and_is_an_event() {
     );
     assert_eq!(bench.mailbox.pop_emergency().map(|(_, emergency)| emergency), Some(emergency));
     assert_eq!(bench.mailbox.pop_emergency(), None);
-    let reported = core::iter::from_fn(|| bench.supervisor.pop_event()).any(
-        |timed| matches!(timed.event, crate::event::Event::Emergency { subdevice: 0, emergency: e } if e == emergency),
-    );
+    let subdevice = Address::Declared(SubDeviceId(0));
+    let expected = crate::event::Event::Emergency { subdevice, emergency };
+    let reported = core::iter::from_fn(|| bench.supervisor.pop_event()).any(|timed| timed.event == expected);
     assert!(reported);
     for _ in 0..40 {
         bench.device.queue_mail(Protocol::Coe, &mail, bench.now);
@@ -286,10 +287,10 @@ fn vendor_messages_are_exchanged_and_received_unsolicited() {
     // The echo of a message that was sent without waiting is unsolicited.
     let (mailbox, sent) = (bench.mailbox.clone(), message.clone());
     let result = bench.run(async move {
-        voe::send(&mailbox, &sent, LIMITS.0).await?;
+        voe::send(&mailbox, &sent, LIMITS.request).await?;
         mailbox.bus().sleep(Duration::from_millis(2)).await;
         mailbox.mail_available();
-        voe::receive(&mailbox, LIMITS.1).await
+        voe::receive(&mailbox, LIMITS.answer).await
     });
     assert_eq!(result, Ok(message));
 }

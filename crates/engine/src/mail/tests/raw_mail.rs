@@ -48,7 +48,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unsolicited() {
     bench.device.queue_mail(own, b"news", bench.now);
     bench.device.queue_mail(Protocol::Other(12), b"more", bench.now);
     let mailbox = bench.mailbox.clone();
-    let sent = bench.run(async move { raw::send(&mailbox, Lane::of(OWN), b"echo", LIMITS.0).await });
+    let sent = bench.run(async move { raw::send(&mailbox, Lane::of(OWN), b"echo", LIMITS.request).await });
     assert_eq!(sent, Ok(()));
     bench.pass(Duration::from_millis(5));
     bench.mailbox.mail_available();
@@ -57,7 +57,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unsolicited() {
     assert_eq!(bench.unsolicited(Unsolicited::Other), [(own, b"news".to_vec()), more, (own, b"echo".to_vec())]);
     // Another type is not an answer.
     bench.device.queue_mail(Protocol::Other(12), b"more", bench.now);
-    assert_eq!(bench.exchange(OWN, &[0]), Err(MailboxError::NoAnswer { limit: LIMITS.1 }));
+    assert_eq!(bench.exchange(OWN, &[0]), Err(MailboxError::NoAnswer { limit: LIMITS.answer }));
     assert_eq!(bench.unsolicited(Unsolicited::Other), [(Protocol::Other(12), b"more".to_vec())]);
     assert_eq!(bench.exchange(OWN, b"again"), Ok(b"again".to_vec()));
     assert!(bench.mailbox.is_idle());
@@ -68,7 +68,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unsolicited() {
 fn an_error_reply_without_a_waiting_request_is_kept_as_unsolicited_mail() {
     let mut bench = Bench::new(LinkSet::Single, 64);
     let mailbox = bench.mailbox.clone();
-    bench.run(async move { raw::send(&mailbox, Lane::of(7), b"?", LIMITS.0).await }).unwrap();
+    bench.run(async move { raw::send(&mailbox, Lane::of(7), b"?", LIMITS.request).await }).unwrap();
     bench.pass(Duration::from_millis(5));
     bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(5));

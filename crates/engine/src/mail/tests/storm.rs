@@ -23,7 +23,7 @@ use crate::mail::voe::Voe;
 use crate::mail::{Limits, Mailbox, aoe, foe, soe, voe};
 
 /// Long enough for the recovery of losses.
-const LIMITS: Limits = (Duration::from_secs(5), Duration::from_secs(5));
+const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(5));
 
 /// Random numbers from a seed (xorshift).
 struct Random(u64);

@@ -5,7 +5,9 @@ use alloc::format;
 use ringcat_wire::al::AlStatusCode;
 
 use super::{BringUp, ConfigureError};
+use crate::declared::SubDeviceId;
 use crate::event::Event;
+use crate::mail::Limits;
 use crate::mail::coe::pdo;
 use crate::procedures::al_state::StateError;
 
@@ -25,7 +27,7 @@ impl BringUp<'_> {
         if !OF_SIZES.contains(code) || !self.mailbox.is_open() {
             return;
         }
-        let limits = (self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
+        let limits = Limits::new(self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
         for area in &self.setup.plan.process_data {
             // One without such lists has nothing to compare.
             let Ok(pdos) = pdo::read_assignment(&self.mailbox, area.sync_manager, limits).await else { return };
@@ -38,7 +40,7 @@ impl BringUp<'_> {
                     area.length,
                     bits.div_ceil(8)
                 );
-                self.bus.report(Event::PlanOddity { subdevice: self.index, what });
+                self.bus.report(Event::PlanOddity { subdevice: SubDeviceId(self.index), what });
             }
         }
     }

@@ -11,6 +11,7 @@ use crate::supervisor::BusError;
 
 /// A command to a register that failed.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RegisterError {
     /// The first register.
     pub address: RegisterAddress,

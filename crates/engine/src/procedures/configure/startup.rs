@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use super::{BringUp, ConfigureError, StartupError};
 use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::mail::Limits;
 use crate::mail::coe::{self, SdoAddress};
@@ -46,7 +47,7 @@ impl BringUp<'_> {
 
     async fn send(&self, number: usize, command: &StartupCommand) -> Result<(), StartupError> {
         let timeouts = &self.config.timeouts;
-        let limits = |usual: Duration| (timeouts.mailbox_request, command.limit.unwrap_or(usual));
+        let limits = |usual: Duration| Limits::new(timeouts.mailbox_request, command.limit.unwrap_or(usual));
         match &command.action {
             StartupAction::Sdo(SdoDownload { index, sub_index, complete_access, data }) => {
                 let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
@@ -81,7 +82,14 @@ impl BringUp<'_> {
             Some(_) => Ok(()),
             None => {
                 let (subdevice, comment) = (self.index, command.comment.clone());
-                self.bus.report(Event::StartupRead { subdevice, number, index, sub_index, comment, data });
+                self.bus.report(Event::StartupRead {
+                    subdevice: SubDeviceId(subdevice),
+                    number,
+                    index,
+                    sub_index,
+                    comment,
+                    data,
+                });
                 Ok(())
             }
         }

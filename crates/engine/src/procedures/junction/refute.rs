@@ -70,8 +70,8 @@ async fn attempt(
             Some(answers) => {
                 let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
                 match odd.map(|(node, answers)| (node, *answers)) {
-                    Some((position, false)) => ClosingEvidence::CutOff { position },
-                    Some((position, true)) => ClosingEvidence::StillThere { position },
+                    Some((node, false)) => ClosingEvidence::CutOff { position: Position(node as u16) },
+                    Some((node, true)) => ClosingEvidence::StillThere { position: Position(node as u16) },
                     None => continue,
                 }
             }

@@ -10,7 +10,7 @@ use crate::mail::{Limits, Mailbox};
 use crate::procedures::shared_segment::SharedSegment;
 
 /// Other clients of address 0 wait meanwhile.
-const LIMITS: Limits = (Duration::from_millis(100), Duration::from_millis(300));
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(300));
 const DEVICE_TYPE: SdoAddress = SdoAddress::new(0x1000, 0);
 /// Bytes that any of these entries may have.
 const ROOM: usize = 4;

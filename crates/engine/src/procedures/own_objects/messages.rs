@@ -8,14 +8,15 @@ use ringcat_wire::mailbox::coe::{DataType, DiagnosisHistory, DiagnosisMessage, D
 use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::catalogue::{PARAMETERS, Values};
+use crate::declared::SubDeviceId;
 use crate::event::history::{Incident, MESSAGES};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
 /// All entries; places without a message are empty.
 pub(super) fn read(bus: &Bus, segment: Option<&SharedSegment>) -> Values {
-    let station = |subdevice: usize| {
-        let station = segment.and_then(|segment| segment.view().members.get(subdevice).map(|member| member.station));
+    let station = |subdevice: SubDeviceId| {
+        let station = segment.and_then(|segment| segment.view().members.get(subdevice.0).map(|member| member.station));
         station.unwrap_or_default()
     };
     bus.history(|history| {
@@ -80,8 +81,13 @@ mod tests {
     // covers: 6.3
     #[test]
     fn a_message_has_these_bytes() {
-        let incident =
-            Incident { at: Instant(0x0102), kind: DiagnosisKind::Error, number: 3, subdevice: Some(4), detail: 0x1B };
+        let incident = Incident {
+            at: Instant(0x0102),
+            kind: DiagnosisKind::Error,
+            number: 3,
+            subdevice: Some(SubDeviceId(4)),
+            detail: 0x1B,
+        };
         assert_eq!(
             encode(&incident, Some(StationAddress(0x1005))),
             [

@@ -9,6 +9,7 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
+use crate::declared::SubDeviceId;
 use crate::procedures::junction::ordering;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
@@ -127,11 +128,14 @@ async fn set_all(
 /// The ports of its neighbours that lead to a SubDevice.
 fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
     let access = segment.view();
-    let missing = ServiceError::NoSubDevice { subdevice };
+    let missing = ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() };
     let node = access.members.get(subdevice).and_then(|member| member.node).ok_or(missing)?;
     let here = access.cabling.topology.nodes.get(node).ok_or(missing)?;
     let port = |node: usize, port: u8| access.station_of(node).map(|station| BlockedPort { station, port });
-    let parent = here.parent.and_then(|(parent, at)| port(parent, at)).ok_or(ServiceError::OnTheLink { subdevice })?;
+    let parent = here
+        .parent
+        .and_then(|(parent, at)| port(parent, at))
+        .ok_or(ServiceError::OnTheLink { subdevice: SubDeviceId(subdevice) })?;
     let mut ports = Vec::new();
     if bus.ring() == RingState::Closed && bus.links() == crate::link::LinkSet::Ring {
         let behind = here.children.iter().flatten();

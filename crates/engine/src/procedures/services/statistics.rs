@@ -8,6 +8,7 @@ use ringcat_wire::register::{ErrorCounters, map};
 pub use crate::procedures::error_statistics::{PortErrors, Statistics};
 
 use super::ServiceError;
+use crate::declared::SubDeviceId;
 use crate::procedures::error_statistics::{ErrorStatistics, WATCHDOGS};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
@@ -59,7 +60,7 @@ pub(crate) async fn read(
     if bytes.iter().chain(&watchdogs).any(|counter| *counter >= NEARLY_FULL) {
         clear_registers(bus, kept, subdevice, station).await?;
     }
-    kept.find(subdevice).ok_or(ServiceError::NoSubDevice { subdevice })
+    kept.find(subdevice).ok_or(ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() })
 }
 
 /// Clears the counters of one SubDevice, and what was kept of them.

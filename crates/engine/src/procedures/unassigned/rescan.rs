@@ -13,6 +13,7 @@ use ringcat_wire::register::{DlStatus, map};
 use ringcat_wire::sii::Identity;
 
 use super::address::view;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
@@ -40,7 +41,7 @@ const LONGEST: Duration = Duration::from_secs(2);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Identified {
     /// A declared one, by its index in the declaration.
-    Declared(usize),
+    Declared(SubDeviceId),
     /// An undeclared one. It is left alone.
     Undeclared(Identity),
     /// It was not found out in time.
@@ -69,7 +70,7 @@ pub struct Rescan {
     /// All that answer, by position.
     pub subdevices: Vec<Found>,
     /// Declared ones that do not, by their index in the declaration.
-    pub missing: Vec<usize>,
+    pub missing: Vec<SubDeviceId>,
     /// Cabling as the ports tell it now, with the rings behind junctions that are known.
     pub topology: Topology,
 }
@@ -81,7 +82,7 @@ impl Rescan {
     }
 
     /// Declared SubDevices with the places that they have moved from and to.
-    pub fn moved(&self) -> impl Iterator<Item = (usize, Position, Position)> + '_ {
+    pub fn moved(&self) -> impl Iterator<Item = (SubDeviceId, Position, Position)> + '_ {
         self.subdevices.iter().filter_map(|found| match found.identified {
             Identified::Declared(index) => Some((index, found.moved_from?, found.position)),
             Identified::Undeclared(_) | Identified::Unknown => None,
@@ -157,7 +158,7 @@ async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
 /// Hands a complete look to the model. True where its cabling is that of the segment from now on.
 fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
     let stations: Vec<StationAddress> = rescan.subdevices.iter().map(|found| found.station).collect();
-    let member = |found: &Found| if let Identified::Declared(index) = found.identified { Some(index) } else { None };
+    let member = |found: &Found| if let Identified::Declared(index) = found.identified { Some(index.0) } else { None };
     let members: Vec<Option<usize>> = rescan.subdevices.iter().map(member).collect();
     let seen = Seen { topology: &rescan.topology, stations: &stations, members: &members };
     let before = segment.view().adoptions();
@@ -181,7 +182,7 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
             (None, _) => None,
         };
         let identified = match (owners.at(at), known) {
-            (Some(index), _) => Identified::Declared(index),
+            (Some(index), _) => Identified::Declared(SubDeviceId(index)),
             // Until it was reported it may be one that is missed.
             (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Identified::Undeclared(info.identity),
             (None, _) => Identified::Unknown,
@@ -201,8 +202,8 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
     if is_comparable || is_one_line {
         mark_moved(&mut subdevices, place_at_scan);
     }
-    let is_found = |index: &usize| subdevices.iter().any(|found| found.identified == Identified::Declared(*index));
-    let missing = (0..access.members.len()).filter(|index| !is_found(index)).collect();
+    let is_found = |it: &SubDeviceId| subdevices.iter().any(|found| found.identified == Identified::Declared(*it));
+    let missing = (0..access.members.len()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
     let topology = retrace::cabling(&access.cabling, &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
@@ -227,7 +228,7 @@ fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<
     let mut placed = Vec::new();
     for (at, found) in subdevices.iter().enumerate() {
         if let Identified::Declared(index) = found.identified
-            && let Some(place) = place_at_scan(index)
+            && let Some(place) = place_at_scan(index.0)
         {
             placed.push((at, place));
         }

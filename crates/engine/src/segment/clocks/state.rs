@@ -10,6 +10,7 @@ use super::status::{ClockStatus, HiddenDelay};
 use crate::board::clocks::References;
 use crate::clocks::{Cables, FRACTION, Passage, Wiring, branches, round};
 use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig};
+use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
 use crate::time::Instant;
@@ -142,7 +143,7 @@ impl Clocks {
         let status = |(index, node): (usize, &Node)| ClockStatus {
             position: node.position,
             station: node.station,
-            subdevice: node.member,
+            subdevice: node.member.map(SubDeviceId),
             is_reference: self.reference == Some(index),
             delay_ns: node.delay_ns,
             hidden: self.hidden(index),
@@ -175,7 +176,9 @@ impl Clocks {
         let preferred = match self.config.reference {
             ReferenceClock::FirstWithClock => None,
             ReferenceClock::FirstConfigured => candidates().find(|index| self.nodes[*index].is_configured),
-            ReferenceClock::Declared(member) => candidates().find(|index| self.nodes[*index].member == Some(member)),
+            ReferenceClock::Declared(SubDeviceId(member)) => {
+                candidates().find(|index| self.nodes[*index].member == Some(member))
+            }
         };
         preferred.or_else(|| candidates().next())
     }

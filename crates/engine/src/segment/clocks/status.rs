@@ -2,6 +2,8 @@
 
 use ringcat_wire::address::{Position, StationAddress};
 
+use crate::declared::SubDeviceId;
+
 /// What is known about the clock of one SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockStatus {
@@ -10,7 +12,7 @@ pub struct ClockStatus {
     /// Its station address.
     pub station: StationAddress,
     /// Index in the declaration.
-    pub subdevice: Option<usize>,
+    pub subdevice: Option<SubDeviceId>,
     /// It is the reference of the segment.
     pub is_reference: bool,
     /// Nanoseconds from the reference of its part of the segment (0x0928).

@@ -7,6 +7,7 @@ use ringcat_wire::address::StationAddress;
 
 use super::fit::fit;
 use super::group_matching;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::Effects;
@@ -114,6 +115,6 @@ impl Segment {
     pub(in crate::segment) fn mismatch(&self, it: &UnassignedSubDevice, info: &SubDeviceInfo) -> Option<Event> {
         let [subdevice] = self.absent_between(it.between)[..] else { return None };
         let (field, expected, got) = self.members.get(subdevice)?.config.expected.mismatch(info)?;
-        Some(Event::Mismatch { subdevice, position: it.position, field, expected, got })
+        Some(Event::Mismatch { subdevice: SubDeviceId(subdevice), position: it.position, field, expected, got })
     }
 }

@@ -8,6 +8,7 @@ use core::time::Duration;
 use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlState;
 
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::ring::RingState;
@@ -122,7 +123,7 @@ impl Segment {
                 member.suspended = false;
                 let count = &mut member.incidents.state_changes;
                 *count = count.saturating_add(1);
-                effects.report(Event::StateError { subdevice: index, requested: None, status, code });
+                effects.report(Event::StateError { subdevice: SubDeviceId(index), requested: None, status, code });
                 self.start(index, Start::Unknown, Some((status, code)), Check::None, effects);
             }
             // Its station address answers again: it has come back, if it is the same one.
@@ -166,7 +167,7 @@ impl Segment {
         if member.phase != Phase::Absent {
             member.phase = Phase::Absent;
             member.incidents.absences = member.incidents.absences.saturating_add(1);
-            effects.report(Event::Lost { subdevice: index });
+            effects.report(Event::Lost { subdevice: SubDeviceId(index) });
         }
         let is_excused = !member.exchanges(member.target);
         self.board.set_taking_part(index, false);
@@ -203,7 +204,7 @@ impl Segment {
     pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
         if let Some(member) = self.current(index, attempt) {
             member.mistaken = Mistaken::default();
-            effects.report(Event::Returned { subdevice: index });
+            effects.report(Event::Returned { subdevice: SubDeviceId(index) });
         }
     }
 
@@ -232,7 +233,7 @@ impl Segment {
         member.phase = Phase::Settled(state);
         let is_excused = !member.exchanges(state);
         self.board.set_excused(index, is_excused);
-        effects.report(Event::StateReached { subdevice: index, state });
+        effects.report(Event::StateReached { subdevice: SubDeviceId(index), state });
     }
 
     /// A member is to be brought to another state.
@@ -370,7 +371,7 @@ impl Member {
                 self.target = AlState::SafeOp;
                 what.push_str(", and stays in SAFEOP without outputs");
             }
-            effects.report(Event::PlanOddity { subdevice: index, what });
+            effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
         }
         self.setup = Some(Rc::new(setup));
     }

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Check, Effects, Task};
@@ -142,7 +143,7 @@ impl Segment {
         member.info = Some(info);
         member.configured = false;
         self.unassigned.retain(|other| other.station != station);
-        effects.report(Event::Returned { subdevice: index });
+        effects.report(Event::Returned { subdevice: SubDeviceId(index) });
         // Whatever state it is in, it is not one that we brought it to.
         self.start(index, Start::Doubtful, None, Check::None, effects);
     }

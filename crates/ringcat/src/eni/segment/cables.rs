@@ -1,4 +1,4 @@
-//! Who is plugged into whom: as `PreviousPort` says, otherwise into the one before in the file.
+//! Which device is connected to which: as `PreviousPort` says, otherwise to the previous device in the file.
 
 use ringcat_config::eni::Port as FilePort;
 use ringcat_sim::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
@@ -74,7 +74,8 @@ impl Plan<'_> {
         self.cables.push(CableSpec { a, b, delay: DEFAULT_CABLE_DELAY });
     }
 
-    /// A free port of a device, or of the nearest one in front of it; port B of the one before where nobody has any.
+    /// A free port of a device, or of the nearest one in front of it; port B of the previous device where none is
+    /// free.
     fn further(&mut self, index: usize, wanted: usize) -> Endpoint {
         let all = std::iter::once(wanted).chain((0..index).rev());
         let mut ports = all.flat_map(|device| FURTHER.map(|port| (device, port)));

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ringcat::eni::EniImage;
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options, Services};
+use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options, SubDeviceId};
 use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
@@ -107,7 +107,7 @@ fn a_refused_object_is_reported_with_the_comment_of_the_file() {
     let mut plant = activate_on(network, file, false).expect("it fits");
     plant.run(300);
     let told = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.starts_with("start-up command 14 (PREOP to SAFEOP) \"velocity mode\": SDO 0x6060:00: aborted"))
     };
     assert!(plant.events.iter().any(told), "{:?}", plant.events);
@@ -133,7 +133,8 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
     let found = main_device.scan().expect("a scan").subdevices;
     main_device.load(file.declaration(false)).expect("it is sound");
     let at = |station| file.configuration.at_station(station).expect("it is in the file");
-    let connection = JunctionConnection { head: at(1001), head_port: 1, tail: at(1004), tail_port: 1 };
+    let connection =
+        JunctionConnection { head: SubDeviceId(at(1001)), head_port: 1, tail: SubDeviceId(at(1004)), tail_port: 1 };
     main_device.add_junction_connection(connection).expect("it fits");
     let application = main_device.apply().map_err(ringcat::Error::from).expect("it fits");
     let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");
@@ -166,7 +167,7 @@ fn outputs_that_a_file_enables_at_so_are_off_in_safeop() {
     let is_on = |plant: &Plant| plant.device(LAMPS).controller.register(map::sync_manager(0).offset(6), 1)[0] & 1 == 1;
     assert!(is_on(&plant));
     for (to, on) in [(AlState::SafeOp, false), (AlState::Op, true)] {
-        let mut work = plant.application.request_state(LAMPS, to);
+        let mut work = plant.application.engine_mut().start_state_request(LAMPS, to);
         while work.take().is_none() {
             plant.cycle();
         }
@@ -220,7 +221,7 @@ fn registers_checked_by_a_file_are_set_by_the_simulated_eeprom() {
     let mut plant = activate(with_commands_of_the_drive(&check(0x0000, "9900", "")), false, false).unwrap();
     plant.run(300);
     let told = |event: &Event| {
-        matches!(event, Event::ConfigurationFailed { subdevice: DRIVE, reason }
+        matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.contains("\"check 0\": register 0x0000: expected 99 00 within 10 ms, got 11 00"))
     };
     assert!(plant.events.iter().any(told), "{:?}", plant.events);

@@ -1,7 +1,7 @@
 //! Declared connections that do not exist (JR-05, JR-06): they are refused, even if open ports allow them; existing
 //! ones are accepted.
 
-use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, automatic};
+use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, SubDeviceId, automatic};
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
@@ -13,7 +13,7 @@ use super::plans::Plan;
 use super::{ONE, STRICT, changed, edge, in_op, one_ring, told};
 
 fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection {
-    JunctionConnection { head, head_port: 1, tail, tail_port }
+    JunctionConnection { head: SubDeviceId(head), head_port: 1, tail: SubDeviceId(tail), tail_port }
 }
 
 /// The connection that is refused as missing.
@@ -40,7 +40,7 @@ fn a_wrong_declared_closing_cable_is_refused_closed_and_broken() {
             let mut network = one_ring();
             broken.into_iter().for_each(|cable| network.cut(CableId(cable)));
             // With the closing cable cut, another cut cable cannot be located.
-            let is_hidden = broken == Some(5) && wrong.tail == 6;
+            let is_hidden = broken == Some(5) && wrong.tail == SubDeviceId(6);
             let expected = (!is_hidden).then_some(wrong);
             assert_eq!(refused(20, network, &[wrong]), expected, "{wrong}, cable {broken:?}");
         }
@@ -115,11 +115,12 @@ fn only_right_connections_of_random_segments_are_accepted() {
         taken += 1;
         // One connection has another member as its tail.
         let number = dice.below(plan.connections.len() as u64) as usize;
-        let tails = (0..plan.kinds.len()).filter(|node| plan.connections.iter().all(|it| it.tail != *node));
-        let tails: Vec<usize> = tails.filter(|node| *node > plan.connections[number].head).collect();
+        let tails =
+            (0..plan.kinds.len()).filter(|node| plan.connections.iter().all(|it| it.tail != SubDeviceId(*node)));
+        let tails: Vec<usize> = tails.filter(|node| *node > plan.connections[number].head.0).collect();
         let Some(tail) = (!tails.is_empty()).then(|| *dice.pick(&tails)) else { continue };
         let mut other = Plan { connections: plan.connections.clone(), ..plan };
-        other.connections[number] = connection((other.connections[number].head, tail, 1));
+        other.connections[number] = connection((other.connections[number].head.0, tail, 1));
         assert!(not_there(other.try_world(seed, true, true, |_| ())).is_some(), "{}", what(&other));
         wrong += 1;
     }

@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, RingState};
+use ringcat::{Event, RingState, SubDeviceId};
 use ringcat_engine::main_device::Pending;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::fault::Fault;
@@ -46,7 +46,7 @@ impl Run {
     /// Ports of the SubDevices in an event.
     fn ends(&self, event: &Event) -> [Option<(DeviceIndex, u8)>; 2] {
         let Event::JunctionChanged { near, far, declared, .. } = event else { return [None; 2] };
-        let end = |port: Option<u8>, declared: Option<usize>| Some((self.world.device_of(declared?)?, port?));
+        let end = |port: Option<u8>, declared: Option<SubDeviceId>| Some((self.world.device_of(declared?.0)?, port?));
         [end(near.map(|near| near.port), declared[0]), end(Some(far.port), declared[1])]
     }
 
@@ -278,7 +278,7 @@ fn run(seed: u64) {
     let plan = Plan::random(&mut dice);
     let strict = plan.connections.iter().all(|it| it.head_port == 1) && dice.one_in(2);
     // A ring with an absent end is not learned.
-    let is_tail = plan.connections.iter().any(|it| it.tail >= plan.kinds.len());
+    let is_tail = plan.connections.iter().any(|it| it.tail >= SubDeviceId(plan.kinds.len()));
     let group_is_on = plan.has_group && (is_tail || dice.one_in(2));
     let mut world = plan.world(seed, strict, group_is_on);
     world.say(format!("{plan:?}, strict: {strict}"));

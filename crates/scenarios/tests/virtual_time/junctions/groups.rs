@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use ringcat::{
     Declaration, DomainMember, Event, Identified, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig,
-    TimedEvent, automatic,
+    SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
@@ -21,7 +21,8 @@ use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
 
 /// Permanent SubDevices: the second is the junction, the fourth the tail of its ring.
 const BASE: [&str; 5] = ["digital-output-8", "junction", "junction", "digital-input-8", "coupler"];
-const STRICT: JunctionConnection = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+const STRICT: JunctionConnection =
+    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
 /// The group's devices.
 const GROUP: [DeviceIndex; 2] = [DeviceIndex(5), DeviceIndex(6)];
 
@@ -36,7 +37,9 @@ fn network(cables: &[(Endpoint, Endpoint)], two_links: bool) -> Network {
 fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
     let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-    declaration.domains[0].members.extend(members.map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    declaration.domains[0]
+        .members
+        .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
     declaration
 }
 
@@ -160,7 +163,7 @@ fn rescan(world: &mut World) -> Vec<Option<usize>> {
     let pending = world.application_mut().engine_mut().start_rescan(LIMIT);
     let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
     assert_eq!((world.incomplete(mark), rescan.moved().count()), (0, 0), "{:?}", rescan.subdevices);
-    let index = |identified| if let Identified::Declared(index) = identified { Some(index) } else { None };
+    let index = |identified| if let Identified::Declared(index) = identified { Some(index.0) } else { None };
     rescan.subdevices.iter().map(|found| index(found.identified)).collect()
 }
 
@@ -185,10 +188,11 @@ fn names_fit(world: &World, mark: Mark) -> bool {
     let stations = world.application().engine().stations();
     world.events(mark).iter().all(|timed| match timed.event {
         Event::JunctionChanged { near: Some(near), far, station, declared, .. } => {
-            declared == [WITH_GROUP[near.node], WITH_GROUP[far.node]] && station == declared[1].map(|it| stations[it])
+            let with_group = |node: usize| WITH_GROUP[node].map(SubDeviceId);
+            declared == [near.node, far.node].map(with_group) && station == declared[1].map(|it| stations[it.0])
         }
         Event::BreakLocated { cable } | Event::RingClosed { place: Some(cable), .. } => {
-            let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(it), stations[it]));
+            let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(SubDeviceId(it)), stations[it]));
             let occupants = timed.occupants.map(|who| who.map(|who| (who.declared, who.station)));
             occupants == cable.positions().map(|node| expected(node?))
         }

@@ -1,7 +1,8 @@
 //! Random segments with rings behind junctions and a hot connect group, built port by port.
 
 use ringcat::{
-    Declaration, DomainMember, Error, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, automatic,
+    Declaration, DomainMember, Error, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig, SubDeviceId,
+    automatic,
 };
 use ringcat_sim::cable::{DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port::{self, A, B, C, D};
@@ -102,9 +103,9 @@ impl Plan {
         let Endpoint::Device(DeviceIndex(tail), tail_port) = last else { unreachable!("a ring has members") };
         let number = |port: Port| port.index() as u8;
         self.connections.push(JunctionConnection {
-            head: junction,
+            head: SubDeviceId(junction),
             head_port: number(ports.1),
-            tail,
+            tail: SubDeviceId(tail),
             tail_port: number(tail_port),
         });
     }
@@ -159,7 +160,7 @@ impl Plan {
             host => host,
         };
         self.cables.iter_mut().for_each(|(one, other)| (*one, *other) = (end(*one), end(*other)));
-        self.connections.iter_mut().for_each(|it| (it.head, it.tail) = (moved(it.head), moved(it.tail)));
+        self.connections.iter_mut().for_each(|it| (it.head.0, it.tail.0) = (moved(it.head.0), moved(it.tail.0)));
     }
 
     pub fn world(&self, seed: u64, strict: bool, group_is_on: bool) -> World {
@@ -191,7 +192,7 @@ impl Plan {
         let mut declaration = automatic(&infos(&self.kinds), CYCLE);
         if self.has_group {
             let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-            let of_domain = members.map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            let of_domain = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
             declaration.domains[0].members.extend(of_domain);
         }
         declaration

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionConnection, JunctionMode, Options, automatic};
+use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceId, automatic};
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -24,8 +24,8 @@ pub fn two_rings() -> Network {
 }
 
 const TWO_STRICT: [JunctionConnection; 2] = [
-    JunctionConnection { head: 0, head_port: 1, tail: 2, tail_port: 1 },
-    JunctionConnection { head: 3, head_port: 1, tail: 5, tail_port: 1 },
+    JunctionConnection { head: SubDeviceId(0), head_port: 1, tail: SubDeviceId(2), tail_port: 1 },
+    JunctionConnection { head: SubDeviceId(3), head_port: 1, tail: SubDeviceId(5), tail_port: 1 },
 ];
 
 // covers: JR-02, junctions
@@ -168,8 +168,8 @@ fn nested_rings_that_break_at_once_are_reported_with_both_places() {
         (at(0, C), at(5, A)),
     ];
     let strict = [
-        JunctionConnection { head: 0, head_port: 1, tail: 4, tail_port: 1 },
-        JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 },
+        JunctionConnection { head: SubDeviceId(0), head_port: 1, tail: SubDeviceId(4), tail_port: 1 },
+        JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 },
     ];
     let place = |cable: usize, broken, breaks| {
         let (node, port, far) = match cable {
@@ -215,7 +215,7 @@ fn two_breaks_in_one_ring_cut_off_only_the_part_between_them() {
     let mark = world.mark();
     world.cut(CableId(4));
     world.until(Duration::from_millis(60), "3 is lost", |world| {
-        world.saw(mark, |event| *event == Event::Lost { subdevice: 3 })
+        world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(3) })
     });
     world.run_cycles(200);
     let (near, far) = ends(4);
@@ -253,7 +253,7 @@ fn ring_in_ring() -> Network {
 // covers: JR-02, junctions-in-ring
 #[test]
 fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
-    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    let strict = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let mut world = in_op(8, ring_in_ring(), setting);
         for cable in 0..7 {
@@ -293,7 +293,7 @@ fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
 // covers: LC-03, LC-06, crossed-enhanced
 #[test]
 fn a_broken_local_ring_is_no_crossed_line_for_enhanced_detection() {
-    let strict = JunctionConnection { head: 1, head_port: 1, tail: 3, tail_port: 1 };
+    let strict = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
     for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let options = Options::default().with_junctions(mode).with_enhanced_line_crossed(true);
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
