@@ -1,9 +1,9 @@
-//! Arrows between the files of one crate: which file names an item of which other one.
+//! Arrows between the files of one crate: a file names an item of another file.
 //!
-//! In goes a tree and a directory below `crates/`, out come the [`Arrow`]s of its library and its programs together.
-//! Every path in the code counts, in macro invocations too, and leads to the file where the item is written, however
-//! many re-exports lie between. `mod` lines and re-exports (`pub use`, `pub(crate) use`) are no arrows by themselves;
-//! an import is one, as the methods of a trait need it and name it nowhere. Code for tests may name anything.
+//! Input: a tree and a directory below `crates/`. Output: the [`Arrow`]s of its library and its programs together.
+//! Every path in the code counts, also in macro invocations, and points to the file that contains the item, through any
+//! number of re-exports. `mod` lines and re-exports (`pub use`, `pub(crate) use`) are no arrows; an import is one,
+//! because the methods of a trait need it without naming it. Test code may name anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,13 +19,13 @@ use crate::tree::Tree;
 /// One file names an item of another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arrow {
-    /// The path that names it, as it is written.
+    /// The path as written.
     pub path: String,
     /// Line in the file that names it.
     pub line: usize,
 }
 
-/// The first arrow from each file to each other, by both paths.
+/// The first arrow from each file to each other file, by both paths.
 pub type Arrows = BTreeMap<(String, String), Arrow>;
 
 /// Arrows within the crate at `crates/NAME`.
@@ -61,7 +61,7 @@ fn roots(tree: &Tree, name: &str) -> Vec<String> {
     tree.rust().filter(|file| is_root(&file.path)).map(|file| file.path.clone()).collect()
 }
 
-/// Names that hold in a block or a function only.
+/// Names valid only in a block or a function.
 #[derive(Default)]
 struct Scope {
     imports: Vec<Import>,
@@ -93,7 +93,7 @@ impl Walk<'_> {
         }
     }
 
-    /// What a path means here: imports of the blocks around it come before names of the module.
+    /// The meaning of a path: imports of the enclosing blocks take precedence over names of the module.
     fn targets(&self, path: &[String]) -> Vec<Target> {
         let Some((first, rest)) = path.split_first() else { return Vec::new() };
         for scope in self.scopes.iter().rev() {
@@ -118,7 +118,7 @@ impl Walk<'_> {
         self.program.resolve(self.module, path)
     }
 
-    /// Whether a lone name means a variable or an item of a block around this place.
+    /// Whether a single name is a variable or an item of an enclosing block.
     fn is_own(&self, name: &str) -> bool {
         self.scopes.iter().any(|scope| scope.own.contains(name))
     }
@@ -147,7 +147,7 @@ impl Walk<'_> {
         self.scopes.pop();
     }
 
-    /// Paths in the tokens of a macro, which nothing has parsed.
+    /// Paths in the unparsed tokens of a macro.
     fn tokens(&mut self, tokens: TokenStream) {
         let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let mut at = 0;
@@ -187,7 +187,7 @@ impl Walk<'_> {
     }
 }
 
-/// Whether the word at `at` belongs to what stands before it: `a.b`, `a::b`, `::b`, `$b`.
+/// Whether the word at `at` continues an expression: `a.b`, `a::b`, `::b`, `$b`.
 fn continues(tokens: &[TokenTree], at: usize) -> bool {
     let before = |back: usize, wanted: char| {
         at >= back && matches!(&tokens[at - back], TokenTree::Punct(punct) if punct.as_char() == wanted)
@@ -197,7 +197,7 @@ fn continues(tokens: &[TokenTree], at: usize) -> bool {
     field || (before(1, ':') && before(2, ':')) || (before(1, '$') && !is_crate)
 }
 
-/// The path that begins at `at`, and where the tokens behind it begin.
+/// The path that begins at `at`, and the position of the tokens after it.
 fn path_at(tokens: &[TokenTree], mut at: usize) -> (Vec<String>, usize) {
     let mut path = vec![tokens[at].to_string()];
     loop {
@@ -329,7 +329,7 @@ impl<'ast> Visit<'ast> for Walk<'_> {
     }
 
     fn visit_pat(&mut self, pattern: &'ast Pat) {
-        // A lone name that begins with a capital is a constant or a unit struct.
+        // A single name that begins with a capital letter is a constant or a unit struct.
         if let Pat::Ident(name) = pattern
             && name.subpat.is_none()
             && name.ident.to_string().starts_with(char::is_uppercase)

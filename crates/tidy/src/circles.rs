@@ -1,7 +1,7 @@
-//! Files of a crate name each other without circles.
+//! Checks that files of a crate name each other without circles.
 //!
-//! In go the [`Arrows`] of a crate, out come its circles (sets of files that all reach each other) and its longest
-//! chain: how many files a reader may have to open, one after the other, to know what the first of them rests on.
+//! Input: the [`Arrows`] of a crate. Output: its circles (sets of files that all reach each other) and its longest
+//! chain: the number of files that a reader may have to open, one after the other, to understand the first one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -51,9 +51,9 @@ impl Graph {
         groups.map(|group| group.into_iter().map(|file| self.files[file].as_str()).collect()).collect()
     }
 
-    /// The longest way along arrows that leads through no file twice; a circle counts as one place with all its files.
+    /// The longest path along arrows that visits no file twice; a circle counts as one position with all its files.
     pub fn longest_chain(&self) -> Vec<&str> {
-        // Groups come lower ones first.
+        // Groups are ordered from the lowest.
         let groups = self.groups();
         let mut group_of = vec![0; self.files.len()];
         for (at, group) in groups.iter().enumerate() {
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_size_of_a_circle_stands_at_each_of_its_files() {
+    fn each_file_of_a_circle_has_its_size() {
         let file = |name: &str, text: &str| crate::tree::File::new(&format!("crates/x/{name}"), text);
         let files = vec![
             file("Cargo.toml", ""),

@@ -1,7 +1,7 @@
-//! What of `docs/protocol` no test covers: a list to choose the next test from, no rule.
+//! Lists the parts of `docs/protocol` that no test covers, as a source of new tests; not a rule.
 //!
-//! In goes a tree, out comes text. Sections that consist of others or of statements, and the chapters 0 (how to read)
-//! and 11 (appendix), have nothing to cover themselves.
+//! Input: a tree. Output: text. Sections that consist of others or of statements, and the chapters 0 (how to read) and
+//! 11 (appendix), need no test.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -10,7 +10,7 @@ use crate::covers;
 use crate::protocol::Pages;
 use crate::tree::Tree;
 
-/// How often each id is covered, those without a test included.
+/// Number of tests of each id, including ids without a test.
 fn counts(tree: &Tree) -> BTreeMap<String, usize> {
     let pages = Pages::of(tree);
     let parents = |section: &&String| pages.sections.iter().any(|other| other.starts_with(&format!("{section}.")));

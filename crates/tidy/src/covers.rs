@@ -1,7 +1,7 @@
-//! The tests of the tree, and what each covers: names in at most 80 characters, ids on a `// covers:` line above.
+//! The tests of the tree and their coverage: names of at most 80 characters, ids on a `// covers:` line above.
 //!
-//! In goes a tree, out come [`Test`]s and findings. Ids are statements (CR-12) and sections (7.1) of `docs/protocol`,
-//! and rows of `docs/FEATURES.md` (`ring-cut`), separated by commas; several lines may follow each other.
+//! Input: a tree. Output: [`Test`]s and findings. Ids are statements (CR-12) and sections (7.1) of `docs/protocol`, and
+//! rows of `docs/FEATURES.md` (`ring-cut`), separated by commas; several lines may follow each other.
 
 use std::collections::BTreeSet;
 
@@ -10,11 +10,11 @@ use crate::protocol::Pages;
 use crate::tokens::{Token, separator_at, tokens};
 use crate::tree::{File, Tree};
 
-/// Longer names want shortening.
+/// Maximum length of a name.
 pub const MAX_NAME: usize = 80;
-/// What ids stand behind.
+/// Prefix of a line with ids.
 const MARK: &str = "// covers:";
-/// Prefixes of ids that stood in names before there were `covers` lines; two digits follow.
+/// Prefixes of ids that names contained before `covers` lines existed; two digits follow.
 const FORMER_IDS: [&str; 8] = ["cr", "jr", "lc", "mr", "sm", "cf", "fr", "ac"];
 
 /// A function with `#[test]`.
@@ -26,12 +26,12 @@ pub struct Test {
     pub file: String,
     /// Line of its `#[test]`.
     pub line: usize,
-    /// What it covers.
+    /// Ids that it covers.
     pub covers: Vec<String>,
 }
 
 impl Test {
-    /// Directory of the crate that it is in.
+    /// Directory of its crate.
     pub fn home(&self) -> &str {
         self.file.strip_prefix("crates/").and_then(|path| path.split('/').next()).unwrap_or(&self.file)
     }
@@ -73,7 +73,7 @@ fn named(tokens: &[Token]) -> Vec<(String, usize)> {
     names
 }
 
-/// Names that are too long, or carry ids.
+/// Names that are too long or contain ids.
 pub fn unfit_names(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for test in all(tree) {
@@ -97,7 +97,7 @@ fn carries_id(name: &str) -> bool {
     })
 }
 
-/// Ids that mean nothing, and `covers` lines that stand above no test.
+/// Unknown ids, and `covers` lines without a test.
 pub fn unresolved_covers(tree: &Tree, features: &BTreeSet<String>) -> Vec<Finding> {
     let pages = Pages::of(tree);
     let mut findings = Vec::new();
@@ -132,7 +132,7 @@ mod tests {
         "/// Why.\n// covers: CR-12, 7.1\n// covers: ring-cut\n#[test]\nfn it_holds() {}\nfn other() {}\n";
 
     #[test]
-    fn a_test_covers_what_the_lines_above_it_name() {
+    fn a_test_covers_the_ids_in_the_lines_above_it() {
         let tests = all(&tree(SOURCE));
         assert_eq!(tests.len(), 1);
         assert_eq!((tests[0].name.as_str(), tests[0].line, tests[0].home()), ("it_holds", 4, "a"));
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_that_mean_nothing_are_found() {
+    fn unknown_ids_are_found() {
         let features = BTreeSet::from(["ring-cut".to_owned()]);
         assert!(unresolved_covers(&tree(SOURCE), &features).is_empty());
         assert_eq!(unresolved_covers(&tree(SOURCE), &BTreeSet::new()).len(), 1);

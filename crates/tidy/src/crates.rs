@@ -1,20 +1,21 @@
 //! Allowed arrows between crates.
 //!
-//! In go the manifests `crates/*/Cargo.toml`, out comes a finding for every dependency that `ROOMS` does not list.
-//! Normal, build and development dependencies count alike: a test must not know what its crate must not know.
+//! Input: the manifests `crates/*/Cargo.toml`. Output: a finding for every dependency that `ROOMS` does not list.
+//! Normal, build and development dependencies are treated equally: a test must not depend on crates that its crate must
+//! not depend on.
 
 use toml::{Table, Value};
 
 use crate::Finding;
 use crate::tree::{File, Tree};
 
-/// What one crate may depend on.
+/// Allowed dependencies of one crate.
 struct Room {
     /// Directory below `crates/`.
     directory: &'static str,
     /// Crates of this repository.
     internal: Internal,
-    /// Crates from the registry outside of tests.
+    /// Crates from the registry, except in tests.
     external: External,
 }
 
@@ -50,7 +51,7 @@ const ROOMS: &[Room] = &[
     Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     Room {
         directory: "ringcat",
-        // Itself: tests and examples have all features.
+        // The crate itself: tests and examples enable all features.
         internal: Internal::Only(&[
             "ringcat",
             "ringcat-config",
@@ -60,7 +61,7 @@ const ROOMS: &[Room] = &[
             "ringcat-sim",
             "ringcat-wire",
         ]),
-        // Off unless an application asks for its feature.
+        // Disabled unless an application enables its feature.
         external: External::Only(&["tracing"]),
     },
     Room {
@@ -76,10 +77,10 @@ const ROOMS: &[Room] = &[
     },
 ];
 
-/// Tables of a manifest that list dependencies; the first two end up in the product.
+/// Tables of a manifest that list dependencies; the first two are part of the product.
 const TABLES: [&str; 3] = ["dependencies", "build-dependencies", "dev-dependencies"];
 
-/// Dependencies that are not allowed, and crates that have no line in the table.
+/// Dependencies that are not allowed, and crates without a line in the table.
 pub fn forbidden_arrows(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (directory, file) in manifests(tree) {
@@ -126,7 +127,7 @@ fn check(room: &Room, path: &str, manifest: &Table, internal: &[String], finding
     }
 }
 
-/// Table and name of every dependency, those of single targets and renamed ones too.
+/// Table and name of every dependency, including target-specific and renamed ones.
 fn dependencies(manifest: &Table) -> Vec<(&'static str, String)> {
     let targets = manifest.get("target").and_then(Value::as_table);
     let per_target = targets.into_iter().flat_map(|t| t.values()).filter_map(Value::as_table);

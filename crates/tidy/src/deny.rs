@@ -1,8 +1,8 @@
-//! Crates from elsewhere are as `deny.toml` wants them: licences, one version of each, sources.
+//! Checks external crates against `deny.toml`: licences, one version of each, sources.
 //!
-//! In go `deny.toml` and what `cargo metadata` prints, out come findings. The file is in the format of cargo-deny, of
-//! which this follows `licenses.allow`, `bans.skip` and `sources.allow-registry`. It works offline; advisories are left
-//! to cargo-deny itself.
+//! Input: `deny.toml` and the output of `cargo metadata`. Output: findings. The file is in the format of cargo-deny, of
+//! which this module implements `licenses.allow`, `bans.skip` and `sources.allow-registry`. It works offline; only
+//! cargo-deny checks advisories.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -14,10 +14,10 @@ use toml::Table;
 
 use crate::Finding;
 
-/// Where the wishes stand.
+/// The configuration file.
 pub const PAGE: &str = "deny.toml";
 
-/// A crate that the workspace is built from.
+/// A crate used by the workspace.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Package {
     /// Its name.
@@ -30,7 +30,7 @@ pub struct Package {
     pub source: String,
 }
 
-/// What the workspace at `root` is built from on this platform, tests included.
+/// The crates used by the workspace at `root` on this platform, including tests.
 pub fn packages(root: &Path) -> io::Result<Vec<Package>> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let arguments = ["metadata", "--format-version", "1", "--locked", "--offline", "--filter-platform"];
@@ -48,7 +48,7 @@ fn package(value: &Value) -> Package {
     Package { name: text("name"), version: text("version"), licence: text("license"), source: text("source") }
 }
 
-/// What of some packages is not as the text of `deny.toml` wants it.
+/// Packages that violate the text of `deny.toml`.
 pub fn unwanted(wishes: &str, packages: &[Package]) -> Vec<Finding> {
     let table: Table = match wishes.parse() {
         Ok(table) => table,
@@ -94,7 +94,7 @@ fn skipped(table: &Table) -> BTreeSet<String> {
     list.into_iter().flatten().filter_map(name).collect()
 }
 
-/// Whether an SPDX expression can be met with these licences. `WITH` only adds permissions.
+/// Whether these licences satisfy an SPDX expression. `WITH` only adds permissions.
 fn permitted(expression: &str, allowed: &BTreeSet<String>) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();

@@ -1,7 +1,7 @@
 //! Pages that list the tests of each feature and of each part of `docs/protocol`.
 //!
-//! In goes a tree, out come the texts that `cargo run -p tidy -- tests` writes, and findings where the pages in the
-//! repository are older.
+//! Input: a tree. Output: the texts that `cargo run -p tidy -- tests` writes, and findings if the pages in the
+//! repository are out of date.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ pub fn pages(tree: &Tree) -> [(&'static str, String); 2] {
     [("docs/feature-tests.md", of_features(tree)), ("docs/protocol-tests.md", of_protocol(tree))]
 }
 
-/// Pages that are not what the tests say.
+/// Pages that do not match the tests.
 pub fn outdated(tree: &Tree) -> Vec<Finding> {
     let current = |path: &str, text: &str| tree.file(path).is_some_and(|file| file.text == text);
     let old = pages(tree).into_iter().filter(|(path, text)| !current(path, text));
@@ -34,7 +34,7 @@ fn of_features(tree: &Tree) -> String {
     text
 }
 
-/// Statements first, then sections in their order; those that no test covers are left out.
+/// Statements first, then sections in order; those without a test are left out.
 fn of_protocol(tree: &Tree) -> String {
     let tests = covers::all(tree);
     let pages = Pages::of(tree);
@@ -49,7 +49,7 @@ fn of_protocol(tree: &Tree) -> String {
     text
 }
 
-/// The heading of a page, and where it comes from.
+/// The heading of a page and its origin.
 pub(crate) fn opening(title: &str) -> String {
     format!(
         "# {title}\n\nWritten by `cargo run -p tidy -- tests` from the `// covers:` lines of the tests; the tidy check \
@@ -70,7 +70,7 @@ mod tests {
     use crate::tree::File;
 
     #[test]
-    fn pages_list_what_is_covered_and_are_out_of_date_until_they_are_written() {
+    fn pages_list_covered_ids_and_are_out_of_date_until_written() {
         let page = "# 7. Clocks\n## 7.1 Delays\n## 7.10 Late\n| CR-01 | a |\n| CR-02 | b |\n";
         let source = "// covers: CR-02, 7.10, 7.1\n#[test]\nfn shown() {}\n";
         let files = vec![File::new("docs/protocol/a.md", page), File::new("crates/a/src/a.rs", source)];

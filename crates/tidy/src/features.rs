@@ -1,7 +1,7 @@
-//! `docs/FEATURES.md` is short and honest: every row that claims to work is covered by tests.
+//! Checks that `docs/FEATURES.md` is short and honest: tests cover every row with state "works" or "partly".
 //!
-//! In goes a tree, out come findings. A row is `| [capability](feature-tests.md#id) | state | limits |`; a test covers
-//! it with its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row beside the page.
+//! Input: a tree. Output: findings. A row is `| [capability](feature-tests.md#id) | state | limits |`; a test covers it
+//! by its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row.
 
 use std::collections::BTreeSet;
 
@@ -9,31 +9,31 @@ use crate::Finding;
 use crate::covers;
 use crate::tree::Tree;
 
-/// Where the table is.
+/// The page with the table.
 pub(crate) const PAGE: &str = "docs/FEATURES.md";
-/// What the second column may say; the last one needs no test.
+/// Values of the second column; the last one needs no test.
 const STATES: [&str; 3] = ["works", "partly", "not yet"];
-/// So many rows are read in two minutes.
+/// Maximum number of rows, readable in two minutes.
 const MAX_ROWS: usize = 120;
-/// A capability with its limits is one line, without the link.
+/// Maximum length of a capability with its limits, without the link.
 const MAX_WORDS: usize = 170;
 
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What it is called in `covers` lines; empty where the row has none.
+    /// Its id in `covers` lines; empty if the row has none.
     pub id: String,
-    /// What can be done.
+    /// Capability.
     pub capability: String,
     /// One of the states.
     pub state: String,
-    /// What it does not do, and where figures end.
+    /// Limits and measured ranges.
     pub limits: String,
     /// Line on the page.
     pub line: usize,
 }
 
-/// All rows of a page, or what is wrong with one.
+/// All rows of a page; an error for each invalid row.
 pub(crate) fn rows(text: &str) -> Vec<Result<Row, Finding>> {
     let mut rows = Vec::new();
     let mut in_table = false;

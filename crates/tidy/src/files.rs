@@ -1,22 +1,22 @@
-//! Rules for single files: length, name, opening comment, nothing unfinished.
+//! Rules for single files: length, name, opening comment, no unfinished work.
 //!
-//! In goes a tree, out come findings; [`nearly_too_long`] gives warnings only.
+//! Input: a tree. Output: findings; [`nearly_too_long`] returns only warnings.
 
 use crate::Finding;
 use crate::tokens::tokens;
 use crate::tree::{File, Tree};
 
-/// A source file with more lines has to be split.
+/// A longer source file has to be split.
 pub const MAX_LINES: usize = 1000;
-/// A source file with more lines wants splitting.
+/// A longer source file should be split.
 pub const WARN_LINES: usize = 600;
 
-/// Names that say nothing about what is inside.
+/// Names that do not describe the content.
 const EMPTY_NAMES: [&str; 6] = ["utils", "util", "common", "helpers", "misc", "manager"];
 
-/// Marks of work that was left for later, split so that this list does not find itself.
+/// Marks of unfinished work, split so that this list does not match itself.
 const UNFINISHED_WORDS: [&str; 2] = [concat!("TO", "DO"), concat!("FIX", "ME")];
-/// Macros that stand for missing code.
+/// Macros in place of missing code.
 const UNFINISHED_MACROS: [&str; 2] = ["todo", "unimplemented"];
 
 /// Sources with more than [`MAX_LINES`] lines.
@@ -37,7 +37,7 @@ fn longer_than(tree: &Tree, limit: usize) -> Vec<Finding> {
     tree.rust().filter_map(too_long).collect()
 }
 
-/// Files, directories and inline modules with a name that says nothing.
+/// Files, directories and inline modules with a name that does not describe the content.
 pub fn empty_names(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for file in tree.rust() {
@@ -57,7 +57,7 @@ pub fn empty_names(tree: &Tree) -> Vec<Finding> {
     findings
 }
 
-/// Sources that do not open with a `//!` comment; a `tests.rs` beside a module is told about by that module.
+/// Sources without an opening `//!` comment; a `tests.rs` beside a module is described by that module.
 pub fn without_opening_comment(tree: &Tree) -> Vec<Finding> {
     let text = "does not open with a `//!` comment that says what it does, what goes in and out, and its source";
     let silent = |file: &&File| !file.text.starts_with("//! ") && !file.path.ends_with("/tests.rs");
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_say_nothing_are_found_as_file_directory_and_module() {
+    fn empty_names_of_files_directories_and_modules_are_found() {
         assert_eq!(empty_names(&tree("crates/x/src/utils.rs", "")).len(), 1);
         assert_eq!(empty_names(&tree("crates/x/src/common/a.rs", "")).len(), 1);
         assert_eq!(empty_names(&tree("crates/x/src/a.rs", "mod helpers {}")).len(), 1);

@@ -1,10 +1,10 @@
-//! The public items of the library `ringcat`, as its sources have them: a list that is kept in the repository, so that
-//! a review sees every change of the interface.
+//! The public items of the library `ringcat` according to its sources: a list kept in the repository, so that a review
+//! shows every change of the interface.
 //!
-//! In goes the tree, formatted by rustfmt; out comes a line for each item: what the crate root hands on, public types
-//! with their fields and variants, traits with their items, public functions, and the traits that types implement. Not
-//! in the list: what a macro makes, and what a type of a lower crate has besides its name. Items of private modules are
-//! listed where they are public, also if the crate root does not name them.
+//! Input: the tree, formatted by rustfmt. Output: a line for each item: re-exports of the crate root, public types with
+//! their fields and variants, traits with their items, public functions, and implemented traits. The list does not
+//! contain items created by macros, and of types of lower crates only the name. It contains public items of private
+//! modules, also if the crate root does not name them.
 
 use crate::Finding;
 use crate::tree::{File, Tree};
@@ -16,10 +16,10 @@ const SOURCES: &str = "crates/ringcat/src/";
 /// One level of rustfmt.
 const INDENT: usize = 4;
 
-/// What a line belongs to.
+/// Context of a line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
-    /// The file itself, or something of which nothing is public.
+    /// The file itself, or an item without public parts.
     Nothing,
     /// A public struct: its public fields.
     Struct,
@@ -29,7 +29,7 @@ enum Inside {
     Trait,
     /// An impl without a trait: its public functions.
     Impl,
-    /// A list of names that the crate root hands on.
+    /// A list of names that the crate root re-exports.
     Names,
 }
 
@@ -81,7 +81,7 @@ fn of_file(file: &File) -> Vec<String> {
         if depth == 0 {
             inside = kind(&item);
             owner.clone_from(&signature);
-            // What is handed on in several lines is whole by now, and an impl without a trait is named by its items.
+            // Re-exports on several lines are complete here, and an impl without a trait is listed by its items.
             if inside != Inside::Impl {
                 found.push(format!("{module}: {signature}"));
             }
@@ -92,7 +92,7 @@ fn of_file(file: &File) -> Vec<String> {
     found
 }
 
-/// Whether an item has come to its end: brackets are closed, and a body, a semicolon or a comma follows.
+/// Whether an item is complete: brackets are closed, and a body, a semicolon or a comma follows.
 fn is_whole(item: &str) -> bool {
     let opened = item.chars().filter(|c| matches!(c, '(' | '[')).count();
     let closed = item.chars().filter(|c| matches!(c, ')' | ']')).count();
@@ -124,7 +124,7 @@ fn kind(item: &str) -> Inside {
     }
 }
 
-/// Where the list and the sources differ.
+/// Differences between the list and the sources.
 pub fn changes(tree: &Tree, list: &str) -> Vec<Finding> {
     let now = items(tree);
     let before: Vec<&str> = list.lines().collect();
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_in_both_directions() {
+    fn a_change_is_reported_in_both_directions() {
         let text = "//! Text.\n\npub fn new() {}\n";
         let tree = Tree { files: vec![File::new(&format!("{SOURCES}a.rs"), text)] };
         let changes = changes(&tree, "a: pub fn old()\n");

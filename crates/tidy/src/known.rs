@@ -1,8 +1,8 @@
-//! What is not yet as it should be: counts that may shrink and never grow.
+//! Known violations: counts that may shrink and never grow.
 //!
-//! In go the [`Counts`] of a rule and `crates/tidy/known.toml`, out come findings. A key that is not in the file and a
-//! number above the one there are findings; so is an entry that is mended, except for the words, which many hands
-//! mend at once. `cargo run -p tidy -- shrink` lowers the file to what is there.
+//! Input: the [`Counts`] of a rule and `crates/tidy/known.toml`. Output: findings. A key that is not in the file and a
+//! number above that in the file are findings; so is an entry that is larger than needed, except for the words, which
+//! several people correct at the same time. `cargo run -p tidy -- shrink` lowers the file to the current counts.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,29 +12,29 @@ use toml::{Table, Value};
 use crate::Finding;
 use crate::tree::Tree;
 
-/// What a rule counts: a file or an item, and how much there is.
+/// Counts of a rule by file or item.
 pub type Counts = BTreeMap<String, usize>;
 
-/// Where known faults are listed.
+/// The list of known violations.
 pub const PATH: &str = "crates/tidy/known.toml";
 
-/// Known faults by rule.
+/// Known violations by rule.
 #[derive(Default)]
 pub struct Known {
     rules: BTreeMap<String, Counts>,
 }
 
-/// What follows from an entry that is larger than what was found.
+/// Consequence of an entry that is larger than the count.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Mended {
     /// The file has to shrink at once.
     MustShrink,
-    /// It shrinks when there is time.
+    /// It may shrink later.
     MayShrink,
 }
 
 impl Known {
-    /// Reads the file in a tree; without one nothing is known.
+    /// Reads the file in a tree; without the file nothing is known.
     pub fn read(tree: &Tree) -> Result<Known, Finding> {
         let text = tree.file(PATH).map_or("", |file| file.text.as_str());
         let table: Table = text.parse().map_err(|error| Finding::new(PATH, 0, format!("cannot be read: {error}")))?;
@@ -45,7 +45,7 @@ impl Known {
         Ok(Known { rules: table.iter().map(|(rule, value)| (rule.clone(), counts(value))).collect() })
     }
 
-    /// What a rule found, against what is known of it.
+    /// Compares the counts of a rule with the known counts.
     pub fn compare(&self, rule: &str, found: &Counts, mended: Mended) -> Vec<Finding> {
         let nothing = Counts::new();
         let known = self.rules.get(rule).unwrap_or(&nothing);
@@ -77,7 +77,7 @@ impl Known {
     }
 }
 
-/// The file that lists exactly what was found.
+/// The text of the file for these counts.
 pub fn file_of(found: &[(&str, Counts)]) -> String {
     let mut text = String::from(
         "# What is not yet as it should be, by rule: see `src/known.rs`. Written by `cargo run -p tidy -- shrink`, \
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_passes_and_more_of_it_does_not() {
+    fn known_counts_pass_and_larger_ones_do_not() {
         let compare = |found: &[(&str, usize)]| known().compare("rule", &counts(found), Mended::MustShrink).len();
         assert_eq!(compare(&[("a.rs", 3), ("b.rs", 1)]), 0);
         assert_eq!(compare(&[("a.rs", 4), ("b.rs", 1)]), 1);
@@ -117,14 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_that_is_mended_has_to_go() {
+    fn an_outdated_entry_is_found() {
         let found = counts(&[("a.rs", 2)]);
         assert_eq!(known().compare("rule", &found, Mended::MustShrink).len(), 2);
         assert_eq!(known().compare("rule", &found, Mended::MayShrink), []);
     }
 
     #[test]
-    fn the_file_that_is_written_says_what_was_found() {
+    fn the_written_file_contains_the_counts() {
         let text = file_of(&[("rule", counts(&[("a.rs: f", 61)])), ("other", Counts::new())]);
         let known = Known::read(&Tree { files: vec![File::new(PATH, &text)] }).expect("valid");
         assert_eq!(known.compare("rule", &counts(&[("a.rs: f", 61)]), Mended::MustShrink), []);

@@ -1,6 +1,6 @@
-//! Limits of size: lines of a function and of a file, columns of a line, characters of a test's name.
+//! Size limits: lines of a function and of a file, columns of a line, characters of a test name.
 //!
-//! In goes a tree, out come [`Counts`] of what is over a limit.
+//! Input: a tree. Output: [`Counts`] of items beyond a limit.
 
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
@@ -11,12 +11,12 @@ use crate::tree::{File, Tree};
 
 /// Lines of a function, from `fn` to its closing brace: it fits a screen.
 pub const FUNCTION_LINES: usize = 60;
-/// Lines of a file, tests apart.
+/// Lines of a file, except tests.
 pub const FILE_LINES: usize = 500;
 /// Columns of a line.
 pub const COLUMNS: usize = 120;
 
-/// Functions with more than [`FUNCTION_LINES`] lines, each with its lines; tests count like all others.
+/// Functions with more than [`FUNCTION_LINES`] lines, with their lengths; tests are included.
 pub fn long_functions(tree: &Tree) -> Result<Counts, Finding> {
     let mut long = Counts::new();
     for file in tree.rust() {
@@ -71,7 +71,7 @@ pub fn is_test(path: &str) -> bool {
     path.contains("/tests/") || path.ends_with("/tests.rs")
 }
 
-/// How many lines of each file are wider than [`COLUMNS`]. Tables and links in Markdown cannot be wrapped.
+/// Number of lines of each file wider than [`COLUMNS`]. Tables and links in Markdown cannot be wrapped.
 pub fn wide_lines(tree: &Tree) -> Counts {
     let width = |file: &File| {
         let markdown = file.path.ends_with(".md");
@@ -83,7 +83,7 @@ pub fn wide_lines(tree: &Tree) -> Counts {
     written.map(width).filter(|(_, lines)| *lines > 0).collect()
 }
 
-/// Whether there is no place to wrap a line of Markdown behind its list mark.
+/// Whether a line of Markdown cannot be wrapped after its list mark.
 fn is_one_word(line: &str) -> bool {
     !line.trim_start_matches([' ', '-', '*', '>']).contains(' ')
 }
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_wrapped_is_excepted_in_markdown_only() {
+    fn lines_that_cannot_be_wrapped_are_excepted_in_markdown_only() {
         let link = format!("- https://{}", "a".repeat(120));
         let table = format!("| {} |", "a ".repeat(60));
         for line in [&link, &table] {

@@ -1,9 +1,9 @@
 //! Allowed arrows between the modules of the engine.
 //!
-//! In goes the source of `crates/engine/src`, out comes a finding for every path through `crate` or `super` that leads
-//! from one top-level module to another that [`ENGINE`] does not list. Tests may name anything. A name that the crate
-//! root re-exports counts as the module it comes from. What is named with `use` inside a macro's body is seen, paths
-//! that a macro puts together are not.
+//! Input: the source of `crates/engine/src`. Output: a finding for every path through `crate` or `super` from one
+//! top-level module to another that [`ENGINE`] does not list. Tests may name anything. A name that the crate root
+//! re-exports counts as its source module. The check finds `use` inside the body of a macro, but no paths that a macro
+//! composes.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use crate::Finding;
 use crate::tokens::{Token, separator_at, tokens};
 use crate::tree::{File, Tree};
 
-/// Top-level modules of the engine, lower ones first, and what each may name.
+/// Top-level modules of the engine, lower ones first, and the modules that each may name.
 ///
-/// This is the only place to edit when a module appears; `docs/ARCHITECTURE.md` says why the arrows go this way.
-/// The two halves, `exchange` (cyclic) and `supervisor` with its procedures (acyclic), never name each other.
+/// Edit only this table when a module is added; `docs/ARCHITECTURE.md` states why the arrows have these directions. The
+/// two halves, `exchange` (cyclic) and `supervisor` with its procedures (acyclic), never name each other.
 #[rustfmt::skip]
 pub const ENGINE: &[(&str, &[&str])] = &[
     // ground
@@ -55,7 +55,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
         "procedures"]),
 ];
 
-/// Where the engine's sources are.
+/// The engine's sources.
 const ENGINE_SOURCES: &str = "crates/engine/src/";
 
 /// Arrows in the engine that are not in [`ENGINE`], and modules that it does not list.
@@ -102,7 +102,7 @@ fn module_path(path: &str) -> Option<Vec<String>> {
     Some(parts)
 }
 
-/// A top-level name that a file reaches.
+/// A top-level name used by a file.
 struct Arrow {
     to: String,
     line: usize,
@@ -118,11 +118,11 @@ fn arrows(file: &File, module: &[String]) -> Vec<Arrow> {
     walk.arrows
 }
 
-/// A walk through a file that knows in which module it is.
+/// A walk through a file that tracks the current module.
 struct Walk<'a> {
     tokens: &'a [Token],
     module: Vec<String>,
-    /// Brace depth outside of each inline module around this place.
+    /// Brace depth outside of each enclosing inline module.
     inline: Vec<usize>,
     depth: usize,
     arrows: Vec<Arrow>,
@@ -173,7 +173,7 @@ impl Walk<'_> {
         self.tokens.len()
     }
 
-    /// How many modules remain of the current one for a path that starts here with `crate`, `self` or `super`.
+    /// Number of remaining levels of the current module for a path that starts here with `crate`, `self` or `super`.
     fn root_of_path(&self, at: usize) -> Option<usize> {
         let inside_path = at >= 2 && separator_at(self.tokens, at - 2);
         if inside_path || !separator_at(self.tokens, at + 1) {
@@ -187,7 +187,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Follows a path whose first segment is at `at`; only paths that start in the crate root can leave the module.
+    /// Follows a path with its first segment at `at`; only paths that start in the crate root can leave the module.
     fn path(&mut self, mut root: usize, mut at: usize) -> usize {
         at += 3;
         while self.tokens.get(at).is_some_and(|t| t.is_ident("super")) && separator_at(self.tokens, at + 1) {
@@ -203,7 +203,7 @@ impl Walk<'_> {
     }
 }
 
-/// First names of what stands at `at`: one name, or those of each branch of a `{...}`.
+/// First names at `at`: one name, or those of each branch of a `{...}`.
 fn first_names(tokens: &[Token], at: usize) -> Vec<(&str, usize)> {
     let Some(first) = tokens.get(at) else { return Vec::new() };
     if let Some(name) = first.ident() {
@@ -233,7 +233,7 @@ fn first_names(tokens: &[Token], at: usize) -> Vec<(&str, usize)> {
     names
 }
 
-/// Names that the crate root re-exports with `pub use`, each with the module it comes from.
+/// Names that the crate root re-exports with `pub use`, each with its source module.
 fn re_exports(root: &[Token]) -> BTreeMap<String, String> {
     let mut exports = BTreeMap::new();
     let mut at = 0;
@@ -258,7 +258,7 @@ fn re_exports(root: &[Token]) -> BTreeMap<String, String> {
     exports
 }
 
-/// The names that a `use` brings in: those before `,`, `}` and the end.
+/// The names imported by a `use`: those before `,`, `}` and the end.
 fn leaves(path: &[Token]) -> Vec<&str> {
     let is_end = |next: Option<&Token>| next.is_none_or(|t| t.is(',') || t.is('}'));
     path.iter().enumerate().filter(|(at, _)| is_end(path.get(at + 1))).filter_map(|(_, t)| t.ident()).collect()
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_over_super_is_followed() {
+    fn paths_through_super_are_followed() {
         assert_eq!(findings("low.rs", "use super::high::A;").len(), 1);
         assert_eq!(findings("low/part.rs", "use super::super::high::A;").len(), 1);
         assert!(findings("low/part.rs", "use super::high::A;").is_empty());

@@ -1,11 +1,11 @@
-//! The modules of one program or library, the names that each of them holds, and what a path leads to.
+//! The modules of one program or library, their names, and the targets of paths.
 //!
-//! In goes a tree and the path of a root (`src/lib.rs`, `src/main.rs`), out comes a [`Program`]: the files that `mod`
-//! lines reach from there, parsed, and [`Program::resolve`] from a path to the items that it means, through imports,
-//! re-exports, renamed names and globs. Code that is built for tests only is left out.
+//! Input: a tree and the path of a root (`src/lib.rs`, `src/main.rs`). Output: a [`Program`]: the parsed files that
+//! `mod` lines reach, and [`Program::resolve`] from a path to its items, through imports, re-exports, renamed names and
+//! globs. Test-only code is left out.
 //!
-//! A name that no declaration shows, in a module that the path names, counts as an item of that module: a macro made
-//! it. Names of other crates lead nowhere. What a method call or a field reaches is not looked for.
+//! A name without a declaration, in a module that the path names, counts as an item of that module: a macro created it.
+//! Names of other crates have no target. Targets of method calls and fields are not searched.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,13 +20,13 @@ pub type ModuleId = usize;
 /// Index of a file in [`Program::sources`].
 pub type FileId = usize;
 
-/// A parsed file, and the module that it is.
+/// A parsed file and its module.
 pub struct Source {
     /// Relative to the root of the repository.
     pub path: String,
     /// Its module.
     pub module: ModuleId,
-    /// What is in it.
+    /// Its content.
     pub syntax: syn::File,
 }
 
@@ -36,11 +36,11 @@ struct Module {
     parent: Option<ModuleId>,
     names: BTreeMap<String, Vec<Name>>,
     globs: Vec<Vec<String>>,
-    /// Words in macro invocations among the items: a macro may have made an item of that name.
+    /// Words in macro invocations among the items: a macro may have created an item of that name.
     made_by_macros: BTreeSet<String>,
 }
 
-/// What a name stands for in its module.
+/// Meaning of a name in its module.
 enum Name {
     Module(ModuleId),
     Item(Definition),
@@ -48,41 +48,41 @@ enum Name {
     Alias(usize),
 }
 
-/// An item, where it is written and what can follow it in a path.
+/// An item, its file, and the names that can follow it in a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Definition {
     /// Its file.
     pub file: FileId,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
 }
 
-/// Kinds of items that are told apart.
+/// Kinds of items.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Function, constant, static, macro: no path goes on behind it.
+    /// Function, constant, static, macro: a path ends there.
     Value,
     /// A type; of an enum, the names of its variants.
     Type(Vec<String>),
-    /// A trait: its methods need it imported, and name it nowhere.
+    /// A trait: its methods need an import without naming it.
     Trait,
 }
 
-/// What a path leads to.
+/// Target of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A module.
     Module(ModuleId),
-    /// An item, or what belongs to it (variant, associated function).
+    /// An item, or a part of it (variant, associated function).
     Item(Definition),
 }
 
 /// A `use` leaf.
 #[derive(Clone, Debug)]
 pub enum Import {
-    /// A path, and the name that it gets here.
+    /// A path and its local name.
     Named(Vec<String>, String),
-    /// All names of what the path leads to.
+    /// All names of the path's target.
     Glob(Vec<String>),
 }
 
@@ -97,7 +97,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Reads the modules from the file at `root` on.
+    /// Reads the modules, starting with the file at `root`.
     pub fn read(tree: &Tree, root: &str) -> Result<Program, Finding> {
         let mut program =
             Program { sources: Vec::new(), modules: Vec::new(), aliases: Vec::new(), macros: BTreeMap::new() };
@@ -199,7 +199,7 @@ impl Program {
         self.modules[module].add(name.to_string(), Name::Item(Definition { file, kind }));
     }
 
-    /// The module `name` that is written in `module`.
+    /// The module `name` in `module`.
     pub fn child(&self, module: ModuleId, name: &str) -> Option<ModuleId> {
         self.modules[module].names.get(name)?.iter().find_map(|name| match name {
             Name::Module(child) => Some(*child),
@@ -207,17 +207,17 @@ impl Program {
         })
     }
 
-    /// The macro of this name, wherever it is written.
+    /// The macro of this name in any file.
     pub fn macro_named(&self, name: &str) -> Option<&Definition> {
         self.macros.get(name)
     }
 
-    /// What a path means in a module; several where a name stands for a type and a value, nothing of other crates.
+    /// The targets of a path in a module; several if a name is a type and a value, none in other crates.
     pub fn resolve(&self, module: ModuleId, path: &[String]) -> Vec<Target> {
         self.follow(module, path, &mut Vec::new())
     }
 
-    /// What a path means behind `start`.
+    /// The targets of a path after `start`.
     pub fn resolve_behind(&self, start: Vec<Target>, path: &[String]) -> Vec<Target> {
         self.follow_behind(start, path, &mut Vec::new())
     }
@@ -264,7 +264,7 @@ impl Program {
         targets
     }
 
-    /// What a path through a module finds there; what is not to be seen was made by a macro.
+    /// The targets of a name in a module; a name without a declaration was created by a macro.
     fn named_in(&self, module: ModuleId, name: &str, seen: &mut Vec<Seen>) -> Vec<Target> {
         let found = self.lookup(module, name, seen);
         if found.is_empty() && !self.modules[module].names.contains_key(name) && self.modules[module].globs.is_empty() {
@@ -327,7 +327,7 @@ impl Module {
     }
 }
 
-/// What is being followed at the moment: imports may lead in circles.
+/// Steps currently being followed: imports may form circles.
 #[derive(PartialEq, Eq)]
 enum Seen {
     Alias(usize),
@@ -389,7 +389,7 @@ fn words(tokens: TokenStream, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Whether an attribute leaves code out of all builds but those of tests.
+/// Whether an attribute restricts code to test builds.
 pub fn is_for_tests(attribute: &Attribute) -> bool {
     if attribute.path().is_ident("test") {
         return true;

@@ -1,7 +1,7 @@
-//! Places that `docs/ARCHITECTURE.md` sends a reader to exist.
+//! Checks that the paths in `docs/ARCHITECTURE.md` exist.
 //!
-//! In goes a tree, out come findings: a word in backticks that starts with `crates/` or `ci/` has to be a file, or a
-//! directory with something in it when it ends with `/`. Decisions and the changelog may name what is gone.
+//! Input: a tree. Output: findings: a word in backticks that starts with `crates/` or `ci/` has to be a file, or a
+//! non-empty directory if it ends with `/`. Decisions and the changelog may name removed files.
 
 use crate::Finding;
 use crate::tree::Tree;

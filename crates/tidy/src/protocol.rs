@@ -1,21 +1,21 @@
-//! References to `docs/protocol`: every section and statement that is cited exists there.
+//! References to `docs/protocol`: every cited section and statement exists there.
 //!
-//! In goes a tree, out come findings. A section is cited as `protocol 7.1`, several as `protocol 6.1, 6.3` or
-//! `protocol 1.1 to 1.3`; a statement by its id (CR-12). Comments may break the line anywhere. The pages themselves
-//! cite sections by bare numbers, which are not checked.
+//! Input: a tree. Output: findings. A section is cited as `protocol 7.1`, several as `protocol 6.1, 6.3` or `protocol
+//! 1.1 to 1.3`; a statement by its id (CR-12). Comments may break the line anywhere. The pages themselves cite sections
+//! by bare numbers, which are not checked.
 
 use std::collections::BTreeSet;
 
 use crate::Finding;
 use crate::tree::{File, Tree};
 
-/// Where the pages are.
+/// The directory of the pages.
 const PAGES: &str = "docs/protocol/";
-/// The word before a section, and the one that stood there before the pages came into the repository.
+/// The word before a section, and the word used before the pages were part of the repository.
 const WORD: &str = "protocol";
 const FORMER_WORD: &str = "facts";
 
-/// What can be cited.
+/// Ids that can be cited.
 #[derive(Clone, Debug, Default)]
 pub struct Pages {
     /// Numbers of headings: `7`, `7.1`, `7.2.1`.
@@ -47,12 +47,12 @@ impl Pages {
         pages
     }
 
-    /// Whether a section or statement has this name.
+    /// Whether a section or statement with this id exists.
     pub fn know(&self, id: &str) -> bool {
         self.sections.contains(id) || self.statements.contains(id)
     }
 
-    /// Letters that ids of statements begin with.
+    /// First letters of ids of statements.
     fn letters(&self) -> BTreeSet<&str> {
         self.statements.iter().filter_map(|id| id.split_once('-')).map(|(letters, _)| letters).collect()
     }
@@ -63,7 +63,7 @@ fn heading_number(line: &str) -> Option<&str> {
     is_section(number).then_some(number)
 }
 
-/// Digits with points between them.
+/// Digits separated by points.
 fn is_section(word: &str) -> bool {
     word.split('.').all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()))
 }
@@ -81,7 +81,7 @@ fn is_requirement(word: &str) -> bool {
     word.strip_prefix("REQ").is_some_and(|number| number.len() == 3 && is_section(number))
 }
 
-/// Citations that lead nowhere, or in the former way.
+/// Citations that do not exist, or in the former form.
 pub fn unresolved(tree: &Tree) -> Vec<Finding> {
     let pages = Pages::of(tree);
     let cites = |file: &&File| file.is_rust() || file.path.starts_with("ci/") || file.path.starts_with("docs/");
@@ -113,7 +113,7 @@ fn in_file(file: &File, pages: &Pages) -> Vec<Finding> {
     findings
 }
 
-/// Words between blanks with their lines, without the marks of comments.
+/// Words separated by blanks with their lines, without comment marks.
 fn words(text: &str) -> Vec<(&str, usize)> {
     let mut words = Vec::new();
     for (number, line) in text.lines().enumerate() {
@@ -127,12 +127,12 @@ fn trimmed(word: &str) -> &str {
     word.trim_matches(|c: char| !c.is_ascii_alphanumeric())
 }
 
-/// Whether a list of sections may follow the word: nothing closes the sentence behind it.
+/// Whether a list of sections may follow the word: no punctuation closes the sentence after it.
 fn opens_list(word: &str) -> bool {
     word.ends_with(|c: char| c.is_ascii_alphanumeric())
 }
 
-/// The sections at the beginning of some words: each but the last one with a comma, `and` or `to` behind it.
+/// The sections at the beginning of some words: each but the last is followed by a comma, `and` or `to`.
 fn cited<'a>(words: &[(&'a str, usize)]) -> Vec<&'a str> {
     let mut sections = Vec::new();
     let mut awaited = true;
@@ -141,7 +141,7 @@ fn cited<'a>(words: &[(&'a str, usize)]) -> Vec<&'a str> {
         if matches!(*word, "and" | "to") && !sections.is_empty() {
             awaited = true;
         } else if awaited && (is_section(bare) || is_statement(bare)) && !word.starts_with("0x") {
-            // A number alone may count something else after the first: `protocol 7.1, 2 links`.
+            // A further bare number may count something else: `protocol 7.1, 2 links`.
             if is_section(bare) && (sections.is_empty() || bare.contains('.')) {
                 sections.push(bare);
             }
@@ -182,13 +182,13 @@ mod tests {
     }
 
     #[test]
-    fn other_numbers_behind_the_word_are_left_alone() {
+    fn other_numbers_after_the_word_are_ignored() {
         assert!(findings("crates/a/src/a.rs", "// protocol, 17 of them; no protocol (0x0F)\n").is_empty());
         assert!(findings("crates/a/src/a.rs", "// protocol 7.1, 2 links; protocol 7.1: 60 bytes\n").is_empty());
     }
 
     #[test]
-    fn the_former_way_to_cite_is_found() {
+    fn the_former_form_of_citations_is_found() {
         assert_eq!(findings("ci/check-mail", concat!("# Mail (fac", "ts\n# 7.1).\n")).len(), 1);
     }
 }

@@ -1,6 +1,6 @@
-//! Rules that count, by their name in `known.toml`.
+//! Rules that count, with their names in `known.toml`.
 //!
-//! In goes a tree, out come the [`Counts`] of each rule, for the test and for the report of the program `tidy`.
+//! Input: a tree. Output: the [`Counts`] of each rule, for the test and for the report of the program `tidy`.
 
 use crate::known::{Counts, Mended};
 use crate::tree::Tree;
@@ -10,13 +10,13 @@ use crate::{Finding, circles, limits, words};
 pub struct Rule {
     /// Its table in `known.toml`.
     pub name: &'static str,
-    /// What it counts.
+    /// The counter.
     pub count: fn(&Tree) -> Result<Counts, Finding>,
-    /// What follows from an entry that is mended.
+    /// Consequence of an entry that is larger than the count.
     pub mended: Mended,
 }
 
-/// All of them.
+/// All rules.
 pub const RULES: [Rule; 5] = [
     Rule { name: "circles", count: circles::sizes, mended: Mended::MustShrink },
     Rule { name: "long-functions", count: limits::long_functions, mended: Mended::MustShrink },

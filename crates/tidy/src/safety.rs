@@ -1,12 +1,12 @@
-//! Where `unsafe` may be written.
+//! Files that may contain `unsafe`.
 //!
-//! In goes a tree, out come findings: `unsafe` outside the allowed rooms, and a pure crate that does not forbid it.
+//! Input: a tree. Output: findings: `unsafe` outside the allowed files, and a pure crate that does not forbid it.
 
 use crate::Finding;
 use crate::tokens::{Token, tokens};
 use crate::tree::{File, Tree};
 
-/// Rooms and single files that may contain `unsafe`, each with its reason.
+/// Crates and single files that may contain `unsafe`, each with its reason.
 const ALLOWED: &[(&str, &str)] = &[
     ("crates/link/", "talks to the kernel"),
     ("crates/ffi/", "is called from C"),
@@ -17,7 +17,7 @@ const ALLOWED: &[(&str, &str)] = &[
 /// Crates whose root has to say `#![forbid(unsafe_code)]`.
 const FORBIDDING: [&str; 6] = ["wire", "engine", "sim", "config", "gateway", "tidy"];
 
-/// `unsafe` in a place that is not allowed.
+/// `unsafe` in a file that is not allowed to contain it.
 pub fn misplaced(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for file in tree.rust().filter(|file| !allowed(&file.path)) {

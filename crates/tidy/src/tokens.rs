@@ -1,9 +1,9 @@
 //! A small Rust lexer: identifiers and punctuation with their lines; comments, literals and lifetimes are dropped.
 //!
-//! In goes the text of a source file, out come [`Token`]s. It does not judge whether the text is valid Rust; text that
-//! is not gives some tokens, never a panic.
+//! Input: the text of a source file. Output: [`Token`]s. The lexer does not check whether the text is valid Rust;
+//! invalid text results in some tokens, never in a panic.
 
-/// What a token is.
+/// Kind of a token.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// An identifier or keyword.
@@ -12,10 +12,10 @@ pub enum Kind {
     Punct(char),
 }
 
-/// A token and where it stands.
+/// A token and its line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Token {
-    /// What it is.
+    /// Kind.
     pub kind: Kind,
     /// Line, counted from 1.
     pub line: usize,
@@ -41,12 +41,12 @@ impl Token {
     }
 }
 
-/// Whether a path separator stands at `at`.
+/// Whether a path separator is at `at`.
 pub fn separator_at(tokens: &[Token], at: usize) -> bool {
     tokens.get(at).is_some_and(|t| t.is(':')) && tokens.get(at + 1).is_some_and(|t| t.is(':'))
 }
 
-/// Takes a source file apart.
+/// Converts a source file into tokens.
 pub fn tokens(text: &str) -> Vec<Token> {
     let mut lexer = Lexer { chars: text.chars().collect(), at: 0, line: 1, tokens: Vec::new() };
     while let Some(c) = lexer.peek(0) {
@@ -159,7 +159,7 @@ impl Lexer {
         if raw {
             self.raw_string(hashes);
         } else if matches!(word.as_str(), "b" | "c") && matches!(self.peek(0), Some('"' | '\'')) {
-            // A byte or C literal: the prefix goes with it.
+            // A byte or C literal: the prefix belongs to it.
         } else if word == "r" && hashes == 1 {
             self.advance(1);
         } else {

@@ -1,6 +1,6 @@
-//! The files that are checked: everything below `crates/`, `ci/`, `docs/` and `fuzz/`, and some at the root, read once.
+//! The checked files: all files below `crates/`, `ci/`, `docs/` and `fuzz/`, and some in the root, read once.
 //!
-//! In goes the root of the repository, out come paths and texts, sorted. Build output is left out.
+//! Input: the root of the repository. Output: paths and texts, sorted. Build output is left out.
 
 use std::fs;
 use std::io;
@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 pub struct File {
     /// Relative to the root, with `/` between its parts.
     pub path: String,
-    /// What is in it.
+    /// Its text.
     pub text: String,
 }
 
 impl File {
-    /// A file that exists only here.
+    /// A file that exists only in memory.
     pub fn new(path: &str, text: &str) -> File {
         File { path: path.to_owned(), text: text.to_owned() }
     }
@@ -27,7 +27,7 @@ impl File {
     }
 }
 
-/// All files that the checks look at.
+/// All checked files.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
     /// Sorted by path.
@@ -53,11 +53,11 @@ const AT_THE_ROOT: [&str; 9] = [
 /// Kinds of files that are read.
 const EXTENSIONS: [&str; 5] = ["rs", "toml", "md", "sh", "py"];
 
-/// Directories whose files without an extension are scripts, which are read too.
+/// Directories whose files without an extension are scripts and are read too.
 const SCRIPTS: [&str; 1] = ["ci"];
 
 impl Tree {
-    /// Reads the repository that this crate lies in.
+    /// Reads the repository that contains this crate.
     pub fn of_this_repository() -> io::Result<Tree> {
         Tree::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
     }

@@ -33,7 +33,7 @@ fn no_source_is_too_long() {
 }
 
 #[test]
-fn every_name_says_what_is_inside() {
+fn every_name_describes_its_content() {
     none(files::empty_names(&tree()));
 }
 
@@ -99,7 +99,7 @@ fn the_lists_of_tests_are_current() {
 }
 
 #[test]
-fn what_is_cited_of_the_protocol_exists() {
+fn cited_sections_and_statements_exist() {
     none(protocol::unresolved(&tree()));
 }
 
@@ -109,7 +109,7 @@ fn names_of_tests_say_what_holds_in_80_characters() {
 }
 
 #[test]
-fn what_tests_cover_exists() {
+fn ids_covered_by_tests_exist() {
     let tree = tree();
     println!("{}", coverage::report(&tree));
     none(covers::unresolved_covers(&tree, &features::ids(&tree)));
@@ -128,7 +128,7 @@ fn the_list_of_random_scenarios_is_complete() {
 }
 
 #[test]
-fn the_map_leads_somewhere() {
+fn paths_in_the_architecture_page_exist() {
     none(paths::leading_nowhere(&tree()));
 }
 
@@ -137,7 +137,7 @@ fn one_minimum_rust_version_is_named_everywhere() {
     none(toolchain::disagreements(&tree()));
 }
 
-/// What [`RULES`] find: nothing but what `known.toml` lists.
+/// Checks that [`RULES`] find only the counts in `known.toml`.
 fn only_what_is_known(name: &str) {
     let tree = tree();
     let rule = RULES.iter().find(|rule| rule.name == name).expect("a rule of this name");
@@ -168,13 +168,13 @@ fn lines_fit_120_columns() {
 }
 
 #[test]
-fn devices_are_not_spoken_of_as_people() {
+fn no_words_for_people_are_used_for_devices() {
     only_what_is_known("words");
     none(words::stale(&tree()));
 }
 
 #[test]
-fn crates_from_elsewhere_are_as_deny_toml_wants_them() {
+fn external_crates_match_deny_toml() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let wishes = std::fs::read_to_string(root.join(deny::PAGE)).expect("deny.toml can be read");
     let packages = deny::packages(&root).expect("cargo metadata works");
@@ -182,8 +182,7 @@ fn crates_from_elsewhere_are_as_deny_toml_wants_them() {
     none(deny::unwanted(&wishes, &packages));
 }
 
-/// After a change that is meant, `RINGCAT_WRITE_PUBLIC_ITEMS=1 cargo test -p tidy --test tree public` writes the list
-/// anew.
+/// After an intended change, `RINGCAT_WRITE_PUBLIC_ITEMS=1 cargo test -p tidy --test tree public` writes the list.
 #[test]
 fn the_list_of_public_items_is_up_to_date() {
     let tree = tree();

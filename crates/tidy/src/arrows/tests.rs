@@ -24,7 +24,7 @@ fn from_a(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_re_exported_item_is_where_it_is_written() {
+fn a_re_exported_item_belongs_to_its_own_file() {
     for text in [
         "use crate::b::Item;",
         "use super::b::Item;",
@@ -71,7 +71,7 @@ fn modules_re_exports_and_tests_are_no_arrows() {
 }
 
 #[test]
-fn what_a_re_exporting_file_uses_itself_is_an_arrow() {
+fn a_use_in_the_re_exporting_file_is_an_arrow() {
     let child = ("a/b", "pub struct Item; impl Item { pub fn new() -> Item { Item } }");
     let lib = ("lib", "mod a;");
     assert_eq!(arrows(&[lib, ("a", "mod b; pub use b::Item;"), child]), Vec::<String>::new());
@@ -90,7 +90,7 @@ fn parent_and_child_that_use_each_other_are_a_circle() {
 }
 
 #[test]
-fn a_private_import_of_the_parent_leads_on() {
+fn a_private_import_of_the_parent_is_followed() {
     let files = [
         ("lib", "mod a; mod d;"),
         ("a", "mod b; use crate::d::Thing; fn f(_: Thing) {}"),
@@ -101,7 +101,7 @@ fn a_private_import_of_the_parent_leads_on() {
 }
 
 #[test]
-fn globs_bring_what_is_used_and_all_traits() {
+fn globs_import_used_names_and_all_traits() {
     assert_eq!(from_a("use crate::b::*; fn f(_: Item) { }"), ["a -> b", "a -> b/c"]);
     assert_eq!(from_a("use crate::b::inline::*;"), Vec::<String>::new());
     assert_eq!(from_a("use crate::b::inline::*; fn f(_: Deep) {}"), ["a -> b/c"]);
@@ -117,7 +117,7 @@ fn globs_bring_what_is_used_and_all_traits() {
 }
 
 #[test]
-fn imports_that_name_themselves_end() {
+fn circular_imports_terminate() {
     assert_eq!(
         arrows(&[("lib", "mod a;"), ("a", "pub use self::b; pub use b::b as b; fn f(_: b::X) {}")]),
         Vec::<String>::new()
@@ -152,7 +152,7 @@ fn paths_in_macros_are_seen() {
 }
 
 #[test]
-fn macros_and_what_they_make_are_items() {
+fn macros_and_the_items_they_create_are_items() {
     let files = [
         ("lib", "#[macro_use] mod m; mod a; mod b; mod c;"),
         ("m", "macro_rules! number { ($name:ident) => { pub struct $name; } }"),
