@@ -1,7 +1,7 @@
 //! Cables and their effect on a frame (issue 2, part 3; protocol 11.4).
 //!
 //! A cable has two legs, one for each direction. A leg has its far end, its propagation delay, the start of its signal,
-//! and the faults for the next frames. This module determines the fate of a frame at the time at which its last bit is
+//! and the faults for the next frames. This module determines the delivery of a frame at the time at which its last bit is
 //! due at the far end; the network assigns senders and receivers.
 
 use core::fmt;
@@ -98,9 +98,9 @@ impl LegId {
     }
 }
 
-/// Fate of a frame whose last bit is due at the end of a leg.
+/// Delivery of a frame whose last bit is due at the end of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fate {
+pub(crate) enum Delivery {
     /// Arrives completely.
     Arrives,
     /// The signal was lost while the frame was arriving: only its beginning arrives.
@@ -210,16 +210,16 @@ impl Leg {
         steady.then(|| SimTime(self.up_since.0.saturating_add(self.delay_ns)).max(self.detected_at))
     }
 
-    /// Fate of a frame whose first bit was due at the far end at `first_out` and whose last bit is due now: the leg
+    /// Delivery of a frame whose first bit was due at the far end at `first_out` and whose last bit is due now: the leg
     /// must have carried a signal from the entry of the first bit to the exit of the last bit.
-    pub(crate) fn fate(&self, first_out: SimTime) -> Fate {
+    pub(crate) fn delivery(&self, first_out: SimTime) -> Delivery {
         let first_in = first_out.back_ns(self.delay_ns);
         if self.signal && self.up_since <= first_in {
-            return Fate::Arrives;
+            return Delivery::Arrives;
         }
         match self.last_up {
-            Some((up, down)) if up <= first_in && down > first_out => Fate::Truncated { seen: down - first_out },
-            _ => Fate::Lost,
+            Some((up, down)) if up <= first_in && down > first_out => Delivery::Truncated { seen: down - first_out },
+            _ => Delivery::Lost,
         }
     }
 }
@@ -241,9 +241,9 @@ mod tests {
     fn a_frame_that_enters_before_the_cut_and_leaves_after_it_is_lost() {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
-        assert_eq!(leg.fate(SimTime(100_000)), Fate::Lost);
-        assert_eq!(leg.fate(SimTime(105759 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(1) });
-        assert_eq!(leg.fate(SimTime(100001 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(5_759) });
+        assert_eq!(leg.delivery(SimTime(100_000)), Delivery::Lost);
+        assert_eq!(leg.delivery(SimTime(105759 - WIRE)), Delivery::Truncated { seen: Duration::from_nanos(1) });
+        assert_eq!(leg.delivery(SimTime(100001 - WIRE)), Delivery::Truncated { seen: Duration::from_nanos(5_759) });
     }
 
     #[test]
@@ -251,8 +251,8 @@ mod tests {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(200_000));
-        assert_eq!(leg.fate(SimTime(206259 - WIRE)), Fate::Lost);
-        assert_eq!(leg.fate(SimTime(206260 - WIRE)), Fate::Arrives);
+        assert_eq!(leg.delivery(SimTime(206259 - WIRE)), Delivery::Lost);
+        assert_eq!(leg.delivery(SimTime(206260 - WIRE)), Delivery::Arrives);
     }
 
     #[test]
@@ -260,6 +260,6 @@ mod tests {
         let mut leg = leg();
         leg.set_signal(false, SimTime(100_000));
         leg.set_signal(true, SimTime(100_010));
-        assert_eq!(leg.fate(SimTime(104000 - WIRE)), Fate::Truncated { seen: Duration::from_nanos(1_760) });
+        assert_eq!(leg.delivery(SimTime(104000 - WIRE)), Delivery::Truncated { seen: Duration::from_nanos(1_760) });
     }
 }

@@ -56,7 +56,7 @@ use sync_manager::SyncManagers;
 use sync_unit::{LatchUnit, SyncUnit};
 use watchdog::Watchdog;
 
-/// Fate of a received frame.
+/// Result for a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passage {
     /// The frame leaves through this port. If the port is forced open without a link, the frame is lost.

@@ -10,7 +10,7 @@ use super::Application;
 use super::coe::emergency_payload;
 use super::mailbox::faults::MailFault;
 use super::mailbox::record::ServedMail;
-use super::servers::Surroundings;
+use super::servers::ServerContext;
 use crate::controller::Controller;
 use crate::description::DeviceDescription;
 use crate::time::SimTime;
@@ -98,7 +98,7 @@ impl Application {
         let servers = &mut self.servers;
         if let Some(message) = mailbox.take(controller, events, &self.faults, now) {
             self.process_data.advance(now);
-            let mut surroundings = Surroundings {
+            let mut context = ServerContext {
                 description,
                 declared,
                 state: self.machine.state(),
@@ -115,7 +115,7 @@ impl Application {
                 if let Some(record) = record.as_mut().filter(|record| record.len() < MAX_RECORDED) {
                     record.push(ServedMail { at: now, state, protocol, payload: payload.to_vec() });
                 }
-                servers.serve(protocol, payload, &mut surroundings)
+                servers.serve(protocol, payload, &mut context)
             });
         }
         servers.work(mailbox.room(), now);

@@ -193,16 +193,16 @@ impl Mailbox {
     }
 
     fn queue(&mut self, protocol: Protocol, address: u16, payload: Vec<u8>, ready: SimTime, faults: &mut MailFaults) {
-        let Some(fate) = faults.answer() else {
+        let Some(effect) = faults.answer() else {
             return;
         };
-        let ready = ready + fate.delay;
-        if let Some(payload) = fate.before {
+        let ready = ready + effect.delay;
+        if let Some(payload) = effect.before {
             let mail = Mail::New { protocol: Protocol::Coe, address: 0, payload, counter: None };
             self.queue.push_back(Queued { ready, mail, twice: false });
         }
-        let mail = Mail::New { protocol, address, payload, counter: fate.counter };
-        self.queue.push_back(Queued { ready, mail, twice: fate.twice });
+        let mail = Mail::New { protocol, address, payload, counter: effect.counter };
+        self.queue.push_back(Queued { ready, mail, twice: effect.twice });
     }
 
     fn encode(&mut self, mail: Mail) -> Vec<u8> {

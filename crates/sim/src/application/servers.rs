@@ -22,7 +22,7 @@ use crate::time::SimTime;
 
 /// Context of the servers.
 #[derive(Debug)]
-pub struct Surroundings<'a> {
+pub struct ServerContext<'a> {
     /// Settings of the device.
     pub description: &'a DeviceDescription,
     /// Protocols in the SII.
@@ -78,8 +78,8 @@ impl Servers {
     }
 
     /// Serves one message.
-    pub fn serve(&mut self, protocol: Protocol, payload: &[u8], surroundings: &mut Surroundings<'_>) -> Answer {
-        let Surroundings { description, declared, state, room, receive_room, now, .. } = *surroundings;
+    pub fn serve(&mut self, protocol: Protocol, payload: &[u8], context: &mut ServerContext<'_>) -> Answer {
+        let ServerContext { description, declared, state, room, receive_room, now, .. } = *context;
         let boot = state == AlState::Boot;
         let unsupported = Answer::Error(ErrorReply::UNSUPPORTED_PROTOCOL);
         match protocol {
@@ -88,7 +88,7 @@ impl Servers {
             Protocol::Foe if declared.protocols.foe() => {
                 let mut files = Files {
                     description: &description.services.foe,
-                    store: surroundings.files,
+                    store: context.files,
                     boot,
                     receive_data: receive_room.saturating_sub(FoeMessage::OVERHEAD),
                     send_data: room.saturating_sub(FoeMessage::OVERHEAD),
@@ -99,8 +99,8 @@ impl Servers {
             _ if boot => unsupported,
             Protocol::Coe if declared.has_coe() => {
                 let mut objects = Objects {
-                    dictionary: surroundings.dictionary,
-                    process_data: surroundings.process_data,
+                    dictionary: context.dictionary,
+                    process_data: context.process_data,
                     state,
                     complete_access: declared.coe_details.complete_access(),
                     information: declared.coe_details.sdo_information(),
@@ -110,7 +110,7 @@ impl Servers {
             Protocol::Eoe => self.eoe.as_mut().map_or(unsupported, |eoe| eoe.serve(payload, room, now)),
             Protocol::Soe => self.soe.as_mut().map_or(unsupported, |soe| soe.serve(payload, room, state, now)),
             Protocol::Aoe => {
-                let dictionary = &mut *surroundings.dictionary;
+                let dictionary = &mut *context.dictionary;
                 self.aoe.as_mut().map_or(unsupported, |aoe| aoe.serve(payload, room, state, dictionary))
             }
             Protocol::Voe if declared.protocols.voe() => voe::serve(payload, room, description.identity.vendor_id),

@@ -7,7 +7,7 @@ use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME_VLAN, MIN_FRAME};
 use super::route::leaves_paths_unchanged;
 use super::statistics::LossCause;
 use super::{Beyond, Event, Network, Slot};
-use crate::cable::{Endpoint, Fate, HostLink, LegFaults, LegId};
+use crate::cable::{Delivery, Endpoint, HostLink, LegFaults, LegId};
 use crate::controller::Passage;
 use crate::frame::{Fcs, Port, SimFrame};
 use crate::host::Received;
@@ -65,14 +65,14 @@ impl Network {
         let first_bit = self.now.back_ns(self.frames.frame(slot).first_to_last_bit_ns());
         let leg = &self.legs[id.index()];
         let (to, detected) = (leg.to, leg.detected && leg.detected_at <= first_bit);
-        match leg.fate(first_bit) {
-            Fate::Arrives => {}
-            Fate::Truncated { seen } if bytes_within(seen) > 0 => {
+        match leg.delivery(first_bit) {
+            Delivery::Arrives => {}
+            Delivery::Truncated { seen } if bytes_within(seen) > 0 => {
                 let frame = self.frames.frame_mut(slot);
                 frame.truncate(bytes_within(seen));
                 frame.fcs = Fcs::Bad;
             }
-            Fate::Truncated { .. } | Fate::Lost => return self.lose_hop(slot, LossCause::DeadCable),
+            Delivery::Truncated { .. } | Delivery::Lost => return self.lose_hop(slot, LossCause::DeadCable),
         }
         if !detected {
             return self.lose_hop(slot, LossCause::NoLink);

@@ -7,7 +7,7 @@ mod command;
 mod error;
 mod header;
 
-use super::payload::{PayloadError, Pen, split};
+use super::payload::{FieldWriter, PayloadError, split};
 
 pub use command::{AdsRequest, AdsResponse};
 pub use error::AdsErrorCode;

@@ -9,7 +9,7 @@ mod head;
 mod ip;
 mod result;
 
-use super::payload::{PayloadError, Pen, split};
+use super::payload::{FieldWriter, PayloadError, split};
 use head::{
     FRAGMENT, GET_FILTER_REQUEST, GET_FILTER_RESPONSE, GET_IP_REQUEST, GET_IP_RESPONSE, KIND, LAST, PORT_SHIFT,
     SET_FILTER_REQUEST, SET_FILTER_RESPONSE, SET_IP_REQUEST, SET_IP_RESPONSE, TIME_STAMP_RESPONSE,
@@ -97,41 +97,41 @@ impl<'a> EoeMessage<'a> {
     /// Encodes a payload and returns its length; `None` if it does not fit `out`, or if [`EoeFragment`] or
     /// [`AddressFilter`] cannot be encoded. A port or frame number above 15 loses its upper bits.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
+        let mut writer = FieldWriter::new(out);
         let port = u16::from(self.port & 0x0F) << PORT_SHIFT;
         // All messages are complete, except fragments of a frame with several fragments.
         let mut head = |kind: u16, word: u16| {
-            pen.put_u16(kind | port | LAST)?;
-            pen.put_u16(word)
+            writer.put_u16(kind | port | LAST)?;
+            writer.put_u16(word)
         };
         match self.body {
             EoeBody::Fragment(fragment) => return fragment.encode(port, out),
             EoeBody::TimeStamp { frame, time_ns } => {
                 head(TIME_STAMP_RESPONSE, u16::from(frame & 0x0F) << 12)?;
-                pen.put_u32(time_ns)?;
+                writer.put_u32(time_ns)?;
             }
             EoeBody::SetIp(parameters) => {
                 head(SET_IP_REQUEST, 0)?;
-                parameters.encode(&mut pen)?;
+                parameters.encode(&mut writer)?;
             }
             EoeBody::SetIpDone(result) => head(SET_IP_RESPONSE, result.0)?,
             EoeBody::SetFilter(filter) => {
                 head(SET_FILTER_REQUEST, 0)?;
-                filter.encode(&mut pen)?;
+                filter.encode(&mut writer)?;
             }
             EoeBody::SetFilterDone(result) => head(SET_FILTER_RESPONSE, result.0)?,
             EoeBody::GetIp => head(GET_IP_REQUEST, 0)?,
             EoeBody::Ip(result, parameters) => {
                 head(GET_IP_RESPONSE, result.0)?;
-                parameters.encode(&mut pen)?;
+                parameters.encode(&mut writer)?;
             }
             EoeBody::GetFilter => head(GET_FILTER_REQUEST, 0)?,
             EoeBody::Filter(result, filter) => {
                 head(GET_FILTER_RESPONSE, result.0)?;
-                filter.encode(&mut pen)?;
+                filter.encode(&mut writer)?;
             }
         }
-        Some(pen.length())
+        Some(writer.length())
     }
 }
 

@@ -5,7 +5,7 @@
 
 mod error;
 
-use super::payload::{PayloadError, Pen, split};
+use super::payload::{FieldWriter, PayloadError, split};
 
 pub use error::FoeErrorCode;
 
@@ -101,11 +101,11 @@ impl<'a> FoeMessage<'a> {
             FoeMessage::Error { code, text } => (ERROR, code.0, text),
             FoeMessage::Busy { done, entire, text } => (BUSY, u32::from(done) | u32::from(entire) << 16, text),
         };
-        let mut pen = Pen::new(out);
-        pen.put(&[opcode, 0])?;
-        pen.put_u32(number)?;
-        pen.put(rest)?;
-        Some(pen.length())
+        let mut writer = FieldWriter::new(out);
+        writer.put(&[opcode, 0])?;
+        writer.put_u32(number)?;
+        writer.put(rest)?;
+        Some(writer.length())
     }
 }
 

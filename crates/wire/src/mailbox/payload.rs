@@ -55,14 +55,14 @@ pub(super) fn split<'a, const N: usize>(
 }
 
 /// Writes fields one after the other; `None` if the buffer is full.
-pub(super) struct Pen<'b> {
+pub(super) struct FieldWriter<'b> {
     out: &'b mut [u8],
     at: usize,
 }
 
-impl<'b> Pen<'b> {
-    pub const fn new(out: &'b mut [u8]) -> Pen<'b> {
-        Pen { out, at: 0 }
+impl<'b> FieldWriter<'b> {
+    pub const fn new(out: &'b mut [u8]) -> FieldWriter<'b> {
+        FieldWriter { out, at: 0 }
     }
 
     pub fn put(&mut self, bytes: &[u8]) -> Option<()> {

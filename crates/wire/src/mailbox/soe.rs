@@ -8,7 +8,7 @@ mod attribute;
 mod error;
 mod idn;
 
-use super::payload::{PayloadError, Pen, split};
+use super::payload::{FieldWriter, PayloadError, split};
 
 pub use attribute::{IdnAttribute, IdnLength};
 pub use error::SoeErrorCode;
@@ -161,11 +161,11 @@ impl<'a> SoeMessage<'a> {
         if self.error {
             head |= ERROR;
         }
-        let mut pen = Pen::new(out);
-        pen.put(&[head, self.elements.0])?;
-        pen.put_u16(self.number)?;
-        pen.put(self.data)?;
-        Some(pen.length())
+        let mut writer = FieldWriter::new(out);
+        writer.put(&[head, self.elements.0])?;
+        writer.put_u16(self.number)?;
+        writer.put(self.data)?;
+        Some(writer.length())
     }
 
     /// The IDN; `None` in a fragment that is not the last one.

@@ -1,6 +1,6 @@
 //! VoE: messages of a vendor (protocol 6.8).
 
-use super::payload::{PayloadError, Pen, split};
+use super::payload::{FieldWriter, PayloadError, split};
 
 /// A message of a vendor; the vendor defines the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,11 +25,11 @@ impl<'a> VoeMessage<'a> {
 
     /// Encodes the payload and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
-        pen.put_u32(self.vendor_id)?;
-        pen.put_u16(self.vendor_type)?;
-        pen.put(self.data)?;
-        Some(pen.length())
+        let mut writer = FieldWriter::new(out);
+        writer.put_u32(self.vendor_id)?;
+        writer.put_u16(self.vendor_type)?;
+        writer.put(self.data)?;
+        Some(writer.length())
     }
 }
 

@@ -149,7 +149,7 @@ impl<'b> SiiWriter<'b> {
     }
 
     /// Writes a category header and returns the zeroed space after it.
-    fn open(&mut self, kind: CategoryKind, length: usize) -> Result<Room<'_>, SiiWriteError> {
+    fn open(&mut self, kind: CategoryKind, length: usize) -> Result<CategoryData<'_>, SiiWriteError> {
         if kind == CategoryKind::End {
             return Err(SiiWriteError::EndMarker);
         }
@@ -163,17 +163,17 @@ impl<'b> SiiWriter<'b> {
         head.copy_from_slice(&header.encode());
         data.fill(0);
         self.at = end;
-        Ok(Room { data, at: 0 })
+        Ok(CategoryData { data, at: 0 })
     }
 }
 
 /// The data of a category during writing; its size was determined before.
-struct Room<'b> {
+struct CategoryData<'b> {
     data: &'b mut [u8],
     at: usize,
 }
 
-impl Room<'_> {
+impl CategoryData<'_> {
     fn put(&mut self, bytes: &[u8]) {
         let end = self.at + bytes.len();
         self.data[self.at..end].copy_from_slice(bytes);

@@ -88,7 +88,7 @@ pub enum MailFault {
 
 /// Effect on a response.
 #[derive(Clone, Debug, Default)]
-pub struct Fate {
+pub struct ResponseEffect {
     /// Delay.
     pub delay: Duration,
     /// Whether it is sent twice.
@@ -198,7 +198,7 @@ impl MailFaults {
     }
 
     /// Effect on a response; `None` if the response is lost.
-    pub fn answer(&mut self) -> Option<Fate> {
+    pub fn answer(&mut self) -> Option<ResponseEffect> {
         if use_up(&mut self.lose_answers) {
             return None;
         }
@@ -208,7 +208,7 @@ impl MailFaults {
             let error_code = self.emergency.1;
             emergency_payload(&Emergency { error_code, error_register: 0x01, data: [0; 5] })
         });
-        Some(Fate { delay, twice: use_up(&mut self.repeat), counter, before })
+        Some(ResponseEffect { delay, twice: use_up(&mut self.repeat), counter, before })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The data of ADS commands (protocol 6.7; layout of the public ADS specification).
 
-use super::{AdsCommand, AdsErrorCode, PayloadError, Pen, split};
+use super::{AdsCommand, AdsErrorCode, FieldWriter, PayloadError, split};
 
 /// An ADS request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,32 +94,32 @@ impl<'a> AdsRequest<'a> {
 
     /// Encodes the data of the command and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
+        let mut writer = FieldWriter::new(out);
         match *self {
             AdsRequest::ReadDeviceInfo | AdsRequest::ReadState => {}
             AdsRequest::Read { group, offset, length } => {
                 for field in [group, offset, length] {
-                    pen.put_u32(field)?;
+                    writer.put_u32(field)?;
                 }
             }
             AdsRequest::Write { group, offset, data } => {
-                pen.put_u32(group)?;
-                pen.put_u32(offset)?;
-                put_counted(&mut pen, data)?;
+                writer.put_u32(group)?;
+                writer.put_u32(offset)?;
+                put_counted(&mut writer, data)?;
             }
             AdsRequest::WriteControl { ads_state, device_state, data } => {
-                pen.put_u16(ads_state)?;
-                pen.put_u16(device_state)?;
-                put_counted(&mut pen, data)?;
+                writer.put_u16(ads_state)?;
+                writer.put_u16(device_state)?;
+                put_counted(&mut writer, data)?;
             }
             AdsRequest::ReadWrite { group, offset, read_length, data } => {
                 for field in [group, offset, read_length] {
-                    pen.put_u32(field)?;
+                    writer.put_u32(field)?;
                 }
-                put_counted(&mut pen, data)?;
+                put_counted(&mut writer, data)?;
             }
         }
-        Some(pen.length())
+        Some(writer.length())
     }
 }
 
@@ -201,22 +201,22 @@ impl<'a> AdsResponse<'a> {
 
     /// Encodes the data of the response and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
-        pen.put_u32(self.result().0)?;
+        let mut writer = FieldWriter::new(out);
+        writer.put_u32(self.result().0)?;
         match *self {
             AdsResponse::DeviceInfo { major, minor, build, name, .. } => {
-                pen.put(&[major, minor])?;
-                pen.put_u16(build)?;
-                pen.put(&name)?;
+                writer.put(&[major, minor])?;
+                writer.put_u16(build)?;
+                writer.put(&name)?;
             }
-            AdsResponse::Data { data, .. } => put_counted(&mut pen, data)?,
+            AdsResponse::Data { data, .. } => put_counted(&mut writer, data)?,
             AdsResponse::State { ads_state, device_state, .. } => {
-                pen.put_u16(ads_state)?;
-                pen.put_u16(device_state)?;
+                writer.put_u16(ads_state)?;
+                writer.put_u16(device_state)?;
             }
             AdsResponse::Done { .. } => {}
         }
-        Some(pen.length())
+        Some(writer.length())
     }
 }
 
@@ -224,9 +224,9 @@ fn unknown(command: AdsCommand) -> PayloadError {
     PayloadError::Code { what: "ADS command", got: command.code() }
 }
 
-fn put_counted(pen: &mut Pen<'_>, data: &[u8]) -> Option<()> {
-    pen.put_u32(u32::try_from(data.len()).ok()?)?;
-    pen.put(data)
+fn put_counted(writer: &mut FieldWriter<'_>, data: &[u8]) -> Option<()> {
+    writer.put_u32(u32::try_from(data.len()).ok()?)?;
+    writer.put(data)
 }
 
 /// Reads the fields one after the other.

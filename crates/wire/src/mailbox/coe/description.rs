@@ -3,7 +3,7 @@
 //! Converts the data of an [`SdoInformation`](super::SdoInformation) after the reassembly of fragments.
 
 use super::DataType;
-use crate::mailbox::payload::{PayloadError, Pen, split};
+use crate::mailbox::payload::{FieldWriter, PayloadError, split};
 
 /// Object code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,12 +85,12 @@ impl<'a> ObjectDescription<'a> {
 
     /// Encodes data of an object response and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
-        pen.put_u16(self.index)?;
-        pen.put_u16(self.data_type.0)?;
-        pen.put(&[self.max_sub_index, self.code.code()])?;
-        pen.put(self.name)?;
-        Some(pen.length())
+        let mut writer = FieldWriter::new(out);
+        writer.put_u16(self.index)?;
+        writer.put_u16(self.data_type.0)?;
+        writer.put(&[self.max_sub_index, self.code.code()])?;
+        writer.put(self.name)?;
+        Some(writer.length())
     }
 }
 
@@ -275,20 +275,20 @@ impl<'a> EntryDescription<'a> {
                 }
             }
         }
-        let mut pen = Pen::new(out);
-        pen.put_u16(self.index)?;
-        pen.put(&[self.sub_index, info])?;
-        pen.put_u16(self.data_type.0)?;
-        pen.put_u16(self.bit_length)?;
-        pen.put_u16(self.access.0)?;
+        let mut writer = FieldWriter::new(out);
+        writer.put_u16(self.index)?;
+        writer.put(&[self.sub_index, info])?;
+        writer.put_u16(self.data_type.0)?;
+        writer.put_u16(self.bit_length)?;
+        writer.put_u16(self.access.0)?;
         if let Some(unit) = self.unit {
-            pen.put_u16(unit)?;
+            writer.put_u16(unit)?;
         }
         for value in values.into_iter().filter_map(|(value, _)| value) {
-            pen.put(value)?;
+            writer.put(value)?;
         }
-        pen.put(self.name)?;
-        Some(pen.length())
+        writer.put(self.name)?;
+        Some(writer.length())
     }
 }
 

@@ -4,7 +4,7 @@
 //! newest acknowledged message, 4 whether there are new messages, 5 flags. The messages start at subindex 6: octet
 //! strings that [`DiagnosisMessage`] reads and writes.
 
-use crate::mailbox::payload::{PayloadError, Pen, split};
+use crate::mailbox::payload::{FieldWriter, PayloadError, split};
 
 /// Index and subindices of object 0x10F3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -130,14 +130,14 @@ impl<'a> DiagnosisMessage<'a> {
 
     /// Encodes one message and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
-        pen.put_u32(self.code)?;
+        let mut writer = FieldWriter::new(out);
+        writer.put_u32(self.code)?;
         let flags = self.kind.code() | u8::from(self.local_time) << 4 | self.reserved << 5;
-        pen.put(&[flags, self.parameter_count])?;
-        pen.put_u16(self.text)?;
-        pen.put(&self.time_ns.to_le_bytes())?;
-        pen.put(self.parameters)?;
-        Some(pen.length())
+        writer.put(&[flags, self.parameter_count])?;
+        writer.put_u16(self.text)?;
+        writer.put(&self.time_ns.to_le_bytes())?;
+        writer.put(self.parameters)?;
+        Some(writer.length())
     }
 
     /// The parameters one by one; ends at the first truncated parameter.
@@ -165,34 +165,34 @@ impl DiagnosisParameter<'_> {
     /// Encodes the parameter and returns its length; `None` if it does not fit `out`, is longer than 4,095 bytes, or is
     /// a value without the length of its type.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
+        let mut writer = FieldWriter::new(out);
         let length = |data: &[u8]| u16::try_from(data.len()).ok().filter(|length| *length <= MAX_LENGTH);
         match *self {
             DiagnosisParameter::Value(data_type, data) => {
                 if value_length(data_type)? != data.len() || data_type.0 > MAX_LENGTH {
                     return None;
                 }
-                pen.put_u16(data_type.0)?;
-                pen.put(data)?;
+                writer.put_u16(data_type.0)?;
+                writer.put(data)?;
             }
             DiagnosisParameter::Bytes(data) => {
-                pen.put_u16(1 << KIND_SHIFT | length(data)?)?;
-                pen.put(data)?;
+                writer.put_u16(1 << KIND_SHIFT | length(data)?)?;
+                writer.put(data)?;
             }
             DiagnosisParameter::Ascii(data) => {
-                pen.put_u16(2 << KIND_SHIFT | length(data)?)?;
-                pen.put(data)?;
+                writer.put_u16(2 << KIND_SHIFT | length(data)?)?;
+                writer.put(data)?;
             }
             DiagnosisParameter::Unicode(data) => {
-                pen.put_u16(3 << KIND_SHIFT | length(data)?)?;
-                pen.put(data)?;
+                writer.put_u16(3 << KIND_SHIFT | length(data)?)?;
+                writer.put(data)?;
             }
             DiagnosisParameter::Text(text) => {
-                pen.put_u16(4 << KIND_SHIFT)?;
-                pen.put_u16(text)?;
+                writer.put_u16(4 << KIND_SHIFT)?;
+                writer.put_u16(text)?;
             }
         }
-        Some(pen.length())
+        Some(writer.length())
     }
 }
 

@@ -10,7 +10,7 @@ use core::fmt;
 
 use super::{CoeHeader, CoeService};
 use crate::bytes::{u16_at, u32_at};
-use crate::mailbox::payload::{PayloadError, Pen, split};
+use crate::mailbox::payload::{FieldWriter, PayloadError, split};
 use crate::mailbox::sdo::AbortCode;
 
 const INCOMPLETE: u8 = 0x80;
@@ -182,12 +182,12 @@ impl<'a> SdoInformation<'a> {
 
     /// Encodes the payload of a CoE message and returns its length; `None` if it does not fit `out`.
     pub fn encode(&self, out: &mut [u8]) -> Option<usize> {
-        let mut pen = Pen::new(out);
-        pen.put(&CoeHeader::new(CoeService::SdoInformation).encode())?;
-        pen.put(&[self.opcode.code() | if self.incomplete { INCOMPLETE } else { 0 }, 0])?;
-        pen.put_u16(self.fragments_left)?;
-        pen.put(self.data)?;
-        Some(pen.length())
+        let mut writer = FieldWriter::new(out);
+        writer.put(&CoeHeader::new(CoeService::SdoInformation).encode())?;
+        writer.put(&[self.opcode.code() | if self.incomplete { INCOMPLETE } else { 0 }, 0])?;
+        writer.put_u16(self.fragments_left)?;
+        writer.put(self.data)?;
+        Some(writer.length())
     }
 
     /// The list type at the start of reassembled data or of a first fragment, and the numbers that follow.

@@ -1,6 +1,6 @@
 //! The MAC address filter of an EoE SubDevice (protocol 6.5).
 
-use super::{PayloadError, Pen, split};
+use super::{FieldWriter, PayloadError, split};
 
 /// Maximum number of addresses: the count has four bits.
 const MAX_ADDRESSES: usize = 15;
@@ -68,16 +68,16 @@ impl AddressFilter {
         Ok(filter)
     }
 
-    pub(super) fn encode(&self, pen: &mut Pen<'_>) -> Option<()> {
+    pub(super) fn encode(&self, writer: &mut FieldWriter<'_>) -> Option<()> {
         let broadcast = if self.no_broadcast { NO_BROADCAST } else { 0 };
-        pen.put_u16(u16::from(self.address_count) | u16::from(self.mask_count) << 4 | broadcast)?;
+        writer.put_u16(u16::from(self.address_count) | u16::from(self.mask_count) << 4 | broadcast)?;
         for address in &self.addresses {
-            pen.put(address)?;
+            writer.put(address)?;
         }
-        pen.put(&[0; MAC_LEN * (ADDRESS_PLACES - MAX_ADDRESSES)])?;
+        writer.put(&[0; MAC_LEN * (ADDRESS_PLACES - MAX_ADDRESSES)])?;
         for mask in &self.masks {
-            pen.put(mask)?;
+            writer.put(mask)?;
         }
-        pen.put(&[0; MAC_LEN * (MASK_PLACES - MAX_MASKS)])
+        writer.put(&[0; MAC_LEN * (MASK_PLACES - MAX_MASKS)])
     }
 }

@@ -1,7 +1,7 @@
 //! A part of an Ethernet frame (protocol 6.5).
 
 use super::head::{FRAGMENT, LAST, OVERHEAD, TIME_APPENDED, TIME_REQUESTED};
-use crate::mailbox::payload::{PayloadError, Pen};
+use crate::mailbox::payload::{FieldWriter, PayloadError};
 
 /// Unit of offsets and sizes in bytes.
 pub const BLOCK: usize = 32;
@@ -73,14 +73,14 @@ impl<'a> EoeFragment<'a> {
         if self.number > SIX_BITS || self.blocks > SIX_BITS {
             return None;
         }
-        let mut pen = Pen::new(out);
-        pen.put_u16(head)?;
+        let mut writer = FieldWriter::new(out);
+        writer.put_u16(head)?;
         let frame = u16::from(self.frame & 0x0F) << FRAME_SHIFT;
-        pen.put_u16(u16::from(self.number) | u16::from(self.blocks) << OFFSET_SHIFT | frame)?;
-        pen.put(self.data)?;
+        writer.put_u16(u16::from(self.number) | u16::from(self.blocks) << OFFSET_SHIFT | frame)?;
+        writer.put(self.data)?;
         if let Some(time_ns) = self.time_ns {
-            pen.put_u32(time_ns)?;
+            writer.put_u32(time_ns)?;
         }
-        Some(pen.length())
+        Some(writer.length())
     }
 }

@@ -2,7 +2,7 @@
 
 use core::net::Ipv4Addr;
 
-use super::{PayloadError, Pen, split};
+use super::{FieldWriter, PayloadError, split};
 
 /// Bytes of a name.
 pub const MAX_NAME: usize = 32;
@@ -51,7 +51,7 @@ impl<'a> IpParameters<'a> {
     }
 
     /// Writes all fields, with zeros for absent fields: some SubDevices ignore fields that follow an absent field.
-    pub(super) fn encode(&self, pen: &mut Pen<'_>) -> Option<()> {
+    pub(super) fn encode(&self, writer: &mut FieldWriter<'_>) -> Option<()> {
         let present = [
             (self.mac.is_some(), MAC),
             (self.address.is_some(), ADDRESS),
@@ -60,17 +60,17 @@ impl<'a> IpParameters<'a> {
             (self.dns.is_some(), DNS),
             (self.name.is_some(), NAME),
         ];
-        pen.put_u32(present.iter().filter(|(set, _)| *set).fold(0, |flags, (_, bit)| flags | bit))?;
-        pen.put(&self.mac.unwrap_or_default())?;
+        writer.put_u32(present.iter().filter(|(set, _)| *set).fold(0, |flags, (_, bit)| flags | bit))?;
+        writer.put(&self.mac.unwrap_or_default())?;
         for address in [self.address, self.mask, self.gateway, self.dns] {
             let mut octets = address.map(|address| address.octets()).unwrap_or_default();
             octets.reverse();
-            pen.put(&octets)?;
+            writer.put(&octets)?;
         }
         let mut padded = [0; MAX_NAME];
         let name = self.name.unwrap_or_default();
         padded.get_mut(..name.len())?.copy_from_slice(name);
-        pen.put(&padded)
+        writer.put(&padded)
     }
 }
 
