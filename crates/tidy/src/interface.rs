@@ -1,7 +1,7 @@
 //! The public items of the library `ringcat`, as its sources have them: a list that is kept in the repository, so that
 //! a review shows every change of the interface.
 //!
-//! In goes the tree, formatted by rustfmt; out comes a line for each item: what the crate root re-exports, public types
+//! Input: the tree, formatted by rustfmt. Output: a line for each item: what the crate root re-exports, public types
 //! with their fields and variants, traits with their items, public functions, and the traits that types implement. For
 //! a type of a lower crate that is re-exported by name, the module `handed_on` adds the same lines. Macros are not
 //! expanded: the list has the items in the macro's body and each line of its calls, so that a change of either shows.
@@ -17,10 +17,10 @@ pub(crate) const SOURCES: &str = "crates/ringcat/src/";
 /// One level of rustfmt.
 const INDENT: usize = 4;
 
-/// What a line belongs to.
+/// Context of a line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
-    /// The file itself, or something of which nothing is public.
+    /// The file itself, or an item without public parts.
     Nothing,
     /// A public struct: its public fields.
     Struct,
@@ -181,7 +181,7 @@ fn without_parameters(text: &str) -> &str {
     text
 }
 
-/// Whether an item has come to its end: brackets are closed, and a body, a semicolon or a comma follows.
+/// Whether an item is complete: brackets are closed, and a body, a semicolon or a comma follows.
 fn is_whole(item: &str) -> bool {
     let opened = item.chars().filter(|c| matches!(c, '(' | '[')).count();
     let closed = item.chars().filter(|c| matches!(c, ')' | ']')).count();
@@ -215,7 +215,7 @@ fn kind(item: &str) -> Inside {
     }
 }
 
-/// Where the list and the sources differ.
+/// Differences between the list and the sources.
 pub fn changes(now: &[String], list: &str) -> Vec<Finding> {
     let before: Vec<&str> = list.lines().collect();
     let gone = before.iter().filter(|item| !now.iter().any(|other| other == *item)).map(|item| format!("- {item}"));
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_in_both_directions() {
+    fn a_change_is_reported_in_both_directions() {
         let text = "//! Text.\n\npub fn new() {}\n";
         let tree = Tree { files: vec![File::new(&format!("{SOURCES}a.rs"), text)] };
         let changes = changes(&own_items(&tree), "a: pub fn old()\n");
