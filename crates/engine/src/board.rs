@@ -41,7 +41,8 @@ impl Supervision {
         self.main.plus(self.redundant)
     }
 
-    const fn pack(self) -> u64 {
+    /// The packed word: results of copies are put together by OR.
+    pub(crate) const fn pack(self) -> u64 {
         self.main.0 as u64
             | (self.redundant.0 as u64) << 16
             | ((u16::from_le_bytes(self.al_status) & AL_MASK) as u64) << 32
@@ -49,7 +50,10 @@ impl Supervision {
             | (self.irq as u64) << 48
     }
 
-    const fn unpack(word: u64) -> Supervision {
+    /// Bit of a packed word that says [`Supervision::returned`].
+    pub(crate) const RETURNED: u64 = 1 << RETURNED_BIT;
+
+    pub(crate) const fn unpack(word: u64) -> Supervision {
         Supervision {
             main: Wkc(word as u16),
             redundant: Wkc((word >> 16) as u16),
@@ -192,8 +196,10 @@ impl Board {
         bit(&self.unproven, subdevice)
     }
 
-    pub(crate) fn post_supervision(&self, supervision: Supervision) {
-        self.supervision.store(supervision.pack(), Ordering::Relaxed);
+    /// Posts a packed result.
+    #[inline]
+    pub(crate) fn post_supervision(&self, supervision: u64) {
+        self.supervision.store(supervision, Ordering::Relaxed);
         // Single writer: a plain store of the next number is enough, and cheaper than a read-modify-write.
         let count = self.supervision_count.load(Ordering::Relaxed);
         self.supervision_count.store(count + 1, Ordering::Release);
@@ -292,8 +298,8 @@ mod tests {
         let board = Board::new(1);
         assert_eq!(board.supervision(), None);
         let first = Supervision { main: Wkc(3), redundant: Wkc(1), al_status: [0x18, 8], irq: 4, returned: false };
-        board.post_supervision(first);
-        board.post_supervision(Supervision { irq: 0x8004, returned: true, ..first });
+        board.post_supervision(first.pack());
+        board.post_supervision(Supervision { irq: 0x8004, ..first }.pack() | Supervision::RETURNED);
         assert_eq!(board.supervision(), Some((2, Supervision { irq: 0x8004, returned: true, ..first })));
     }
 

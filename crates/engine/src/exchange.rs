@@ -6,6 +6,9 @@
 //!
 //! A flight (one round trip of a frame) ends when its working counters are as expected, when all its copies are
 //! received, or at its deadline. Inputs are delivered as copies arrive, per SubDevice: see `place`.
+//!
+//! Each step has a short way for what mostly happens: one frame per cycle on one link that comes back with the results of
+//! the one before. It is inlined on purpose, all else is not (bins `cycle`, `socket_cycle`).
 
 mod access;
 mod clocks;
@@ -21,6 +24,7 @@ mod missed;
 mod place;
 mod presence;
 mod template;
+mod usual;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -42,6 +46,7 @@ use crate::queue::Producer;
 use crate::ring::{Class, Classified, Identity, Sequence};
 use crate::time::Instant;
 use copy::Copies;
+use counters::Tally;
 use evidence::Evidence;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
@@ -82,7 +87,7 @@ pub struct Exchange {
     others: Vec<CyclicFrame>,
     domains: Vec<Domain>,
     evidence: Evidence,
-    counters: CyclicCounters,
+    tally: Tally,
     foreign: ForeignFrames,
     missed: Missed,
     copies: Copies,
@@ -121,7 +126,7 @@ impl Exchange {
             others,
             domains,
             evidence: Evidence::default(),
-            counters: CyclicCounters::default(),
+            tally: Tally::default(),
             foreign: ForeignFrames::new(),
             missed: Missed::default(),
             copies: Copies::default(),
@@ -131,28 +136,62 @@ impl Exchange {
     }
 
     /// Takes a received frame. Any bytes are allowed.
+    #[inline(always)]
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
+        if self.receive_usual(arrived_on, bytes) {
+            return Received::Taken;
+        }
+        self.receive_any(arrived_on, bytes)
+    }
+
+    /// Takes a frame that came back on the only link with the same results as the one before. Mostly all frames do. In
+    /// all other cases the result is false, and nothing has changed.
+    #[inline(always)]
+    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8]) -> bool {
+        let Some(sequence) = self.identity.main_cyclic(bytes) else { return false };
+        let index = self.by_id[usize::from(sequence.frame_id())];
+        let Some(frame) = self.frames.get_mut(usize::from(index)) else { return false };
+        let Some(domain) = self.domains.get_mut(frame.domain()) else { return false };
+        if arrived_on != Link::Main
+            || !frame.is_back_as_usual(sequence, bytes, domain.inputs_mut())
+            || !self.evidence.ends_as_usual(frame)
+        {
+            return false;
+        }
+        self.taken = index;
+        frame.take_usual(bytes, domain.inputs_mut(), self.cycle);
+        self.board.traffic.post_home(sequence);
+        self.tally.counters.received += 1;
+        if let Some(supervision) = frame.supervision() {
+            self.board.post_supervision(supervision);
+        }
+        true
+    }
+
+    /// As [`Exchange::receive`], for any frame.
+    #[inline(never)]
+    fn receive_any(&mut self, arrived_on: Link, bytes: &[u8]) -> Received {
         let copy = match self.identity.classify(bytes) {
             Classified::Ours(copy) if copy.class == Class::Cyclic => copy,
             Classified::Ours(_) => return Received::Acyclic,
             Classified::Foreign => {
-                self.counters.foreign += 1;
+                self.tally.disturbed().foreign += 1;
                 self.foreign.keep(arrived_on, bytes);
                 return Received::Foreign;
             }
             Classified::Other => {
-                self.counters.other += 1;
+                self.tally.disturbed().other += 1;
                 return Received::Other;
             }
         };
         let index = self.by_id[usize::from(copy.sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
-            self.missed.late(copy.sequence, &mut self.counters);
+            self.missed.late(copy.sequence, self.tally.disturbed());
             return Received::Late;
         };
         let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
         self.taken = index;
-        match frame.receive(copy, arrived_on, bytes, domain.inputs_mut(), self.cycle, &mut self.counters) {
+        match frame.receive(copy, arrived_on, bytes, domain.inputs_mut(), self.cycle, &mut self.tally) {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
                 self.evidence.hear_early(frame, &self.board);
@@ -160,16 +199,16 @@ impl Exchange {
             }
             Step::Finished => {
                 self.board.traffic.post_home(frame.sequence());
-                self.counters.received += 1;
+                self.tally.counters.received += 1;
                 self.evidence.close(frame, &self.board, &mut self.events);
                 Received::Taken
             }
             Step::Late => {
-                self.missed.late(copy.sequence, &mut self.counters);
+                self.missed.late(copy.sequence, self.tally.disturbed());
                 Received::Late
             }
             Step::Corrupt => {
-                self.counters.corrupt += 1;
+                self.tally.disturbed().corrupt += 1;
                 self.missed.damaged(copy.sequence);
                 Received::Corrupt
             }
@@ -178,7 +217,23 @@ impl Exchange {
 
     /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire it
     /// judges each that has come back, in the order of departure; the state of the newest one stays.
+    #[inline(always)]
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
+        let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
+        // Mostly there is one frame per cycle, one cycle on the wire, and all as in the cycle before.
+        if let Some(frame) = domain.only().and_then(|at| self.frames.get(at))
+            && frame.is_complete()
+            && !frame.is_waiting()
+            && domain.judge_again(frame.wkc(), frame.left())
+        {
+            return domain.status(false);
+        }
+        self.process_all(id, now)
+    }
+
+    /// As [`Exchange::process`], whatever the frames show.
+    #[inline(never)]
+    fn process_all(&mut self, id: DomainId, now: Instant) -> DomainStatus {
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
         let mut judged = false;
         while let Some(set) = domain.oldest() {
@@ -191,9 +246,9 @@ impl Exchange {
                 left = frame.left();
             }
             if waiting {
-                let (missed, counters) = (&mut self.missed, &mut self.counters);
+                let (missed, counters) = (&mut self.missed, self.tally.disturbed());
                 let pending = give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, counters);
-                self.board.post_lost(counters.lost);
+                self.board.post_lost(self.tally.counters.lost);
                 if pending {
                     return domain.status(!judged);
                 }
@@ -202,7 +257,7 @@ impl Exchange {
             if !domain.judge(wkc, complete, left) {
                 let returned = self.frames[set.clone()].iter().any(|frame| frame.arrivals().arrived != 0);
                 let judgement = (wkc, complete, returned);
-                note_change(id, domain, judgement, &self.board, &mut self.counters, &mut self.events);
+                note_change(id, domain, judgement, &self.board, self.tally.disturbed(), &mut self.events);
                 if !complete {
                     count_errors(&self.frames[set], &self.board);
                 }
@@ -214,7 +269,24 @@ impl Exchange {
     /// Copies a domain's outputs into its frames, which leave with the next [`Exchange::send`]. A domain with all its
     /// cycles still on the wire is skipped, counted and reported; the result is false then. A domain that is queued
     /// twice sends its latest outputs.
+    #[inline(always)]
     pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
+        if self.copies.is_empty()
+            && let Some(domain) = self.domains.get_mut(id.0)
+            && let Some(at) = domain.next_alone()
+            && let Some(frame) = self.frames.get_mut(at)
+            && frame.is_ready(self.board.taking_part_changes())
+        {
+            frame.load(domain.image(), self.cycle);
+            domain.note_loaded(at);
+            return true;
+        }
+        self.queue_any(id, now)
+    }
+
+    /// As [`Exchange::queue`], for any domain.
+    #[inline(never)]
+    fn queue_any(&mut self, id: DomainId, now: Instant) -> bool {
         let Some(domain) = self.domains.get_mut(id.0) else { return false };
         let set = domain.next();
         let frames = &mut self.frames[set.clone()];
@@ -227,7 +299,10 @@ impl Exchange {
             return false;
         }
         if !self.copies.is_empty() {
-            self.counters.stale_copies += self.copies.run(id.0, &mut self.domains, self.cycle);
+            let stale = self.copies.run(id.0, &mut self.domains, self.cycle);
+            if stale > 0 {
+                self.tally.disturbed().stale_copies += stale;
+            }
         }
         self.domains[id.0].load(set.start, &mut self.frames[set], self.cycle);
         true
@@ -237,13 +312,15 @@ impl Exchange {
     fn make_ready(&mut self, id: DomainId, set: Range<usize>, now: Instant) -> bool {
         let frames = &mut self.frames[set.clone()];
         if frames.iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
-            self.counters.skipped += 1;
+            self.tally.disturbed().skipped += 1;
             self.domains[id.0].count_skip();
             self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
             return false;
         }
         for frame in frames.iter_mut().filter(|frame| frame.is_open()) {
-            self.counters.copies_lost += u64::from(frame.is_delivered());
+            if frame.is_delivered() {
+                self.tally.disturbed().copies_lost += 1;
+            }
             self.evidence.close(frame, &self.board, &mut self.events);
         }
         let changes = self.board.taking_part_changes();
@@ -254,38 +331,30 @@ impl Exchange {
     }
 
     /// Sends the queued frames, each on all links, and ends the cycle.
+    #[inline(always)]
     pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
         self.board.traffic.post_departure(self.cycle);
         for domain in &mut self.domains {
             let Some(set) = domain.leave() else { continue };
             let deadline = Instant(now.0.saturating_add(domain.timeout_ns()));
-            for (index, frame) in (set.start as u16..).zip(&mut self.frames[set]) {
+            for index in set {
+                let Some(frame) = self.frames.get_mut(index) else { continue };
                 self.sequence = self.sequence.next();
-                self.by_id[usize::from(self.sequence.frame_id())] = index;
-                let clocks = frame.clocks().map(|places| {
-                    let payloads = self.evidence.clocks.depart(&self.board, now);
-                    frame.clocks_leave(now, self.evidence.clocks.changes());
-                    (places, payloads)
-                });
-                let bytes = frame.depart(&self.identity, self.sequence, deadline);
-                if let Some((places, payloads)) = &clocks {
-                    places.write(bytes, &payloads[0]);
-                }
-                self.counters.sent += 1;
-                self.counters.bytes += bytes.len() as u64;
-                transmit(Link::Main, bytes);
-                if self.links == LinkSet::Ring {
-                    if let Some((places, payloads)) = &clocks {
-                        places.write(bytes, &payloads[1]);
-                    }
-                    Identity::mark_redundant(bytes, true);
-                    transmit(Link::Redundant, bytes);
-                    Identity::mark_redundant(bytes, false);
-                }
+                self.by_id[usize::from(self.sequence.frame_id())] = index as u16;
+                let bytes = if frame.clocks().is_some() || self.links == LinkSet::Ring {
+                    let leaving = Leaving { identity: &self.identity, links: self.links, board: &self.board, now };
+                    leaving.send(frame, self.sequence, deadline, &mut self.evidence, transmit)
+                } else {
+                    let bytes = frame.depart(&self.identity, self.sequence, deadline);
+                    transmit(Link::Main, bytes);
+                    bytes.len()
+                };
+                self.tally.counters.sent += 1;
+                self.tally.counters.bytes += bytes as u64;
             }
         }
         self.cycle += 1;
-        self.board.post_cycle(self.cycle, self.counters.sent);
+        self.board.post_cycle(self.cycle, self.tally.counters.sent);
     }
 
     /// Applies the supervisor's changes to the participation in process data, for frames of a domain that are not on
@@ -300,6 +369,47 @@ impl Exchange {
             }
             frame.follow(changes, board);
         }
+    }
+}
+
+/// What frames need that leave on two links or carry datagrams of distributed clocks.
+struct Leaving<'a> {
+    identity: &'a Identity,
+    links: LinkSet,
+    board: &'a Board,
+    now: Instant,
+}
+
+impl Leaving<'_> {
+    /// Sends a frame; returns its length.
+    #[inline(never)]
+    fn send(
+        &self,
+        frame: &mut CyclicFrame,
+        sequence: Sequence,
+        deadline: Instant,
+        evidence: &mut Evidence,
+        transmit: &mut impl FnMut(Link, &[u8]),
+    ) -> usize {
+        let clocks = frame.clocks().map(|places| {
+            let payloads = evidence.clocks.depart(self.board, self.now);
+            frame.clocks_leave(self.now, evidence.clocks.changes());
+            (places, payloads)
+        });
+        let bytes = frame.depart(self.identity, sequence, deadline);
+        if let Some((places, payloads)) = &clocks {
+            places.write(bytes, &payloads[0]);
+        }
+        transmit(Link::Main, bytes);
+        if self.links == LinkSet::Ring {
+            if let Some((places, payloads)) = &clocks {
+                places.write(bytes, &payloads[1]);
+            }
+            Identity::mark_redundant(bytes, true);
+            transmit(Link::Redundant, bytes);
+            Identity::mark_redundant(bytes, false);
+        }
+        bytes.len()
     }
 }
 

@@ -153,7 +153,13 @@ impl Exchange {
 
     /// Counters since activation.
     pub fn counters(&self) -> &CyclicCounters {
-        &self.counters
+        &self.tally.counters
+    }
+
+    /// How often any counter was changed except [`CyclicCounters::sent`], [`CyclicCounters::bytes`] and
+    /// [`CyclicCounters::received`]: while this stays the same, so do the others.
+    pub fn disturbances(&self) -> u64 {
+        self.tally.disturbances
     }
 
     /// Takes the oldest kept frame of another MainDevice (protocol MR-10).

@@ -39,6 +39,22 @@ pub struct CyclicCounters {
     pub stale_copies: u64,
 }
 
+/// The counters, and how often any of them was changed that an undisturbed cycle leaves alone.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    pub counters: CyclicCounters,
+    pub disturbances: u64,
+}
+
+impl Tally {
+    /// The counters, to count a disturbance.
+    #[cold]
+    pub fn disturbed(&mut self) -> &mut CyclicCounters {
+        self.disturbances += 1;
+        &mut self.counters
+    }
+}
+
 impl CyclicCounters {
     /// Of the lost frames, those that never came back.
     pub const fn missing(&self) -> u64 {

@@ -114,13 +114,37 @@ impl Domain {
         (self.out > 0).then(|| self.oldest..self.oldest + self.set)
     }
 
+    /// Index of the only frame of the only cycle on the wire, where that is so.
+    #[inline]
+    pub(crate) fn only(&self) -> Option<usize> {
+        (self.out == 1 && self.set == 1).then_some(self.oldest)
+    }
+
+    /// Judges the only cycle on the wire where it is complete like the one before; false, and nothing is judged, where
+    /// the one before was not, or no SubDevice answered.
+    #[inline]
+    pub(crate) fn judge_again(&mut self, wkc: u32, left: u64) -> bool {
+        let is_again = wkc > 0 && self.status.state == DomainState::Complete;
+        if is_again {
+            self.judge(wkc, true, left);
+        }
+        is_again
+    }
+
     /// Indices of the frames to queue next.
     pub(crate) fn next(&self) -> Range<usize> {
         let at = if self.unsent { self.newest } else { self.after(self.newest) };
         at..at + self.set
     }
 
+    /// As [`Domain::next`], where a set is one frame and none is queued.
+    #[inline(always)]
+    pub(crate) fn next_alone(&self) -> Option<usize> {
+        (self.set == 1 && !self.unsent).then(|| self.after(self.newest))
+    }
+
     /// The set after one, by their first frames.
+    #[inline(always)]
     fn after(&self, at: usize) -> usize {
         let next = at + self.set;
         if next == self.frames.end { self.frames.start } else { next }
@@ -152,8 +176,6 @@ impl Domain {
     }
 
     /// Puts the outputs into the frames of the next set, which is then ready to leave in this cycle.
-    // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
-    #[inline(always)]
     pub(crate) fn load(&mut self, next: usize, frames: &mut [CyclicFrame], cycle: u64) {
         for frame in frames {
             frame.load(&self.image.bytes, cycle);
@@ -164,6 +186,12 @@ impl Domain {
             }
             return;
         }
+        self.note_loaded(next);
+    }
+
+    /// Notes that the next set was queued; none is.
+    #[inline(always)]
+    pub(crate) fn note_loaded(&mut self, next: usize) {
         self.newest = next;
         if self.out > 0 && next == self.oldest {
             // It was never judged.
@@ -175,6 +203,7 @@ impl Domain {
     }
 
     /// Indices of the frames that leave now; `None` where none is queued.
+    #[inline(always)]
     pub(crate) fn leave(&mut self) -> Option<Range<usize>> {
         core::mem::take(&mut self.unsent).then(|| self.newest..self.newest + self.set)
     }

@@ -5,7 +5,7 @@
 
 use super::clocks::Clocks;
 use super::flight::CyclicFrame;
-use crate::board::{Board, RingWord};
+use crate::board::{Board, RingWord, Supervision};
 use crate::link::Link;
 use crate::queue::Producer;
 use crate::ring::{RingMonitor, RingState};
@@ -34,6 +34,17 @@ impl Evidence {
         }
     }
 
+    /// Whether the end of a flight that came back on the only link would change nothing: no newer one ended before, no
+    /// clocks, and the state of the ring is known.
+    #[inline(always)]
+    pub fn ends_as_usual(&mut self, frame: &CyclicFrame) -> bool {
+        let is_known = frame.left() >= self.newest && frame.clocks().is_none() && self.monitor.is_open();
+        if is_known {
+            self.newest = frame.left();
+        }
+        is_known
+    }
+
     /// Evaluates a finished flight: posts its evidence about the ring and the result of its supervision datagram.
     // Inlined on purpose: a cycle has few instructions to spare (bin `cycle`).
     #[inline(always)]
@@ -57,7 +68,7 @@ impl Evidence {
     #[cold]
     fn post_ring(&self, frame: &CyclicFrame, board: &Board) {
         let link = if frame.arrivals().returned & Link::Main.bit() != 0 { Link::Main } else { Link::Redundant };
-        let seen = frame.supervision().filter(|_| frame.arrivals().returned != 0);
+        let seen = frame.supervision().filter(|_| frame.arrivals().returned != 0).map(Supervision::unpack);
         let returned = seen.map(|seen| (link, if link == Link::Main { seen.main.0 } else { seen.redundant.0 }));
         let (state, dead_way) = (self.monitor.state(), self.monitor.dead_way());
         board.post_ring(RingWord { state, returned, dead_way, changes: 0 });

@@ -14,11 +14,12 @@ use ringcat_wire::address::Wkc;
 use ringcat_wire::datagram::{CIRCULATING, OVERHEAD};
 
 use super::clocks::{Places, Seen};
-use super::counters::CyclicCounters;
+use super::counters::Tally;
 use super::image::{Image, InputNumber, Moment};
 use super::place::Place;
 use super::presence::Presence;
 use super::template::Template;
+use super::usual::Usual;
 use crate::board::{Board, Supervision};
 use crate::layout::{PlannedFrame, SUPERVISION_LEN};
 use crate::link::Link;
@@ -46,7 +47,7 @@ struct Header {
 }
 
 /// Address and C bit are not part of [`Header`].
-const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
+pub(super) const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
 /// Stage of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +81,8 @@ pub(crate) struct CyclicFrame {
     wkc: u32,
     /// Every process data datagram has exactly the expected working counter.
     complete: bool,
-    seen: Supervision,
+    /// Result of the supervision datagram in the copies received so far, packed.
+    seen: u64,
     /// Offset of the supervision datagram's header.
     supervision_at: Option<usize>,
     /// Datagrams of distributed clocks.
@@ -88,6 +90,8 @@ pub(crate) struct CyclicFrame {
     clocks_seen: Seen,
     headers: Box<[Header]>,
     places: Box<[Place]>,
+    /// What copies mostly show, by the link on which they were sent.
+    usual: [Usual; 2],
     presence: Option<Presence>,
     /// Number of the first inputs in the image.
     first: InputNumber,
@@ -123,7 +127,9 @@ impl CyclicFrame {
     ) -> CyclicFrame {
         let Template { bytes, headers, places, presence, clocks, supervision_at } =
             Template::new(identity, planned, first);
+        let usual = || usual_of(bytes.len(), &headers, &places, supervision_at);
         CyclicFrame {
+            usual: [usual(), usual()],
             all_links,
             domain,
             stage: Stage::Idle,
@@ -135,7 +141,7 @@ impl CyclicFrame {
             followed: 0,
             wkc: 0,
             complete: false,
-            seen: Supervision::default(),
+            seen: 0,
             supervision_at,
             clocks,
             clocks_seen: Seen::default(),
@@ -153,6 +159,7 @@ impl CyclicFrame {
     /// SubDevice would answer. Its working counters are zero, and it stands for the same inputs and outputs.
     pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
         let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
+        // The working counters of places outside are zero: they need no check.
         let places = self.places.iter().map(Place::outside).collect();
         CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first) }
     }
@@ -228,6 +235,7 @@ impl CyclicFrame {
             {
                 presence.forget(link.index());
             }
+            self.usual[link.index()].forget();
         }
     }
 
@@ -249,12 +257,14 @@ impl CyclicFrame {
     }
 
     /// Result of this flight's supervision datagram, if it has one and any copy came back.
-    pub(crate) fn supervision(&self) -> Option<Supervision> {
-        let seen = Supervision { returned: self.arrivals.returned != 0, ..self.seen };
-        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(seen)
+    #[inline(always)]
+    pub(crate) fn supervision(&self) -> Option<u64> {
+        let returned = if self.arrivals.returned != 0 { Supervision::RETURNED } else { 0 };
+        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(self.seen | returned)
     }
 
     /// Copies the outputs in, to leave in this cycle, and clears the previous flight.
+    #[inline(always)]
     pub(crate) fn load(&mut self, image: &[u8], cycle: u64) {
         self.left = cycle + 1;
         for place in &mut self.places {
@@ -264,7 +274,7 @@ impl CyclicFrame {
         self.is_overtaken = false;
         self.complete = self.places.is_empty();
         self.arrivals = Arrivals::default();
-        self.seen = Supervision::default();
+        self.seen = 0;
         if self.clocks.is_some() {
             self.clocks_seen = Seen::default();
         }
@@ -287,6 +297,7 @@ impl CyclicFrame {
     }
 
     /// Starts a flight of the loaded frame; returns the bytes of the main copy.
+    #[inline(always)]
     pub(crate) fn depart(&mut self, identity: &Identity, sequence: Sequence, deadline: Instant) -> &mut [u8] {
         let index = sequence.index(Class::Cyclic);
         if self.index != index {
@@ -300,12 +311,43 @@ impl CyclicFrame {
     }
 
     /// Changes the Idx of all datagrams, needed once in 256 frames.
+    #[cold]
     fn write_index(&mut self, index: u8) {
         for header in &mut self.headers {
             self.tx[header.at + 1] = index;
             header.sent = header_at(&self.tx, header.at);
         }
         self.index = index;
+        self.usual.iter_mut().for_each(Usual::forget);
+    }
+
+    /// Whether bytes are those of the only copy of the current flight, with the same results as the one before, none
+    /// of which was incomplete or came from an older cycle than others in the image.
+    #[inline(always)]
+    pub(crate) fn is_back_as_usual(&self, sequence: Sequence, bytes: &[u8], image: &Image) -> bool {
+        let main = Link::Main.index();
+        self.stage == Stage::Waiting
+            && self.sequence == sequence
+            && self.all_links == Link::Main.bit()
+            && self.views.is_enough[main]
+            && self.left >= image.newest
+            && self.is_usual(main, bytes)
+    }
+
+    /// Takes such a copy: delivers it, and ends the flight.
+    #[inline(always)]
+    pub(crate) fn take_usual(&mut self, bytes: &[u8], image: &mut Image, cycle: u64) {
+        let main = Link::Main.index();
+        self.arrivals = Arrivals { arrived: Link::Main.bit(), returned: Link::Main.bit() };
+        self.wkc = self.usual[main].wkc;
+        self.seen = self.usual[main].supervision;
+        self.complete = true;
+        image.newest = self.left;
+        let moment = Moment { left: self.left, came: cycle + 1 };
+        for place in &mut self.places {
+            place.deliver(main, bytes, image, moment);
+        }
+        self.stage = Stage::Idle;
     }
 
     /// Takes a copy. Delivers into the image as soon as the flight is complete.
@@ -316,12 +358,14 @@ impl CyclicFrame {
         bytes: &[u8],
         image: &mut Image,
         cycle: u64,
-        counters: &mut CyclicCounters,
+        tally: &mut Tally,
     ) -> Step {
         if matches!(self.stage, Stage::Idle | Stage::GivenUp) || self.sequence != copy.sequence {
             return Step::Late;
         }
-        if !self.is_what_was_sent(bytes) {
+        let link = copy.sent_on.index();
+        let is_usual = self.is_usual(link, bytes);
+        if !is_usual && !self.is_what_was_sent(bytes) {
             return Step::Corrupt;
         }
         if !self.arrivals.note(copy.sent_on, arrived_on) {
@@ -329,15 +373,24 @@ impl CyclicFrame {
         }
         let first = self.arrivals.arrived == copy.sent_on.bit();
         let finished = self.arrivals.arrived & self.all_links == self.all_links;
-        let complete = self.count(copy.sent_on, bytes, first);
+        if is_usual {
+            self.wkc += self.usual[link].wkc;
+            self.seen |= self.usual[link].supervision;
+        } else {
+            self.count(copy.sent_on, bytes);
+        }
+        if let Some(clocks) = self.clocks {
+            clocks.read(&mut self.clocks_seen, copy.sent_on, bytes);
+        }
+        let complete = if first { self.views.is_enough[link] } else { self.views.are_enough };
+        self.complete = complete;
         if self.stage == Stage::Waiting {
             let moment = Moment { left: self.left, came: cycle + 1 };
-            let link = copy.sent_on.index();
             if moment.left >= image.newest && (first || !self.views.are_doubled) {
                 image.newest = moment.left;
                 self.places.iter_mut().for_each(|place| place.deliver(link, bytes, image, moment));
             } else {
-                self.deliver_singly(link, bytes, image, moment, counters);
+                self.deliver_singly(link, bytes, image, moment, tally);
             }
             if complete || finished {
                 self.stage = Stage::Delivered;
@@ -348,20 +401,13 @@ impl CyclicFrame {
 
     /// Delivers inputs one by one: a newer flight, or the other copy, may have brought only some of them.
     #[cold]
-    fn deliver_singly(
-        &mut self,
-        link: usize,
-        bytes: &[u8],
-        image: &mut Image,
-        moment: Moment,
-        counters: &mut CyclicCounters,
-    ) {
+    fn deliver_singly(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment, tally: &mut Tally) {
         let mut newest = true;
         for place in &self.places {
             newest &= place.deliver_singly(link, bytes, image, moment);
         }
         if !newest && !core::mem::replace(&mut self.is_overtaken, true) {
-            counters.overtaken += 1;
+            tally.disturbed().overtaken += 1;
         }
     }
 
@@ -369,12 +415,21 @@ impl CyclicFrame {
         bytes.len() >= self.tx.len() && self.headers.iter().all(|header| header_at(bytes, header.at) == header.sent)
     }
 
-    /// Adds the working counters of a copy; true where every process data datagram has exactly the expected one.
-    fn count(&mut self, sent_on: Link, bytes: &[u8], first: bool) -> bool {
+    /// Whether a copy shows the same as the last one on its link, inputs excepted: intact, with the same results.
+    #[inline(always)]
+    fn is_usual(&self, link: usize, bytes: &[u8]) -> bool {
+        bytes.len() >= self.tx.len()
+            && self.usual[link].is_shown_by(bytes)
+            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes))
+    }
+
+    /// Adds the working counters of a copy, and evaluates it where they are others than those of the copy before.
+    #[cold]
+    fn count(&mut self, sent_on: Link, bytes: &[u8]) {
         let link = sent_on.index();
         let mut as_seen =
             self.views.looked[link] && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
-        let mut sum = self.wkc;
+        let mut sum = 0;
         for place in &self.places {
             let wkc = u16_at(bytes, place.wkc_at);
             sum += u32::from(wkc);
@@ -383,25 +438,10 @@ impl CyclicFrame {
         if !as_seen {
             self.look(link, bytes);
         }
-        let complete = if first { self.views.is_enough[link] } else { self.views.are_enough };
-        self.wkc = sum;
-        self.complete = complete;
-        if let Some(clocks) = self.clocks {
-            clocks.read(&mut self.clocks_seen, sent_on, bytes);
-        }
-        if let Some(at) = self.supervision_at
-            && let Some(datagram) = bytes[at..].first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>()
-        {
-            let [.., irq_low, irq_high, al_low, _, wkc_low, wkc_high] = *datagram;
-            self.seen.irq |= u16::from_le_bytes([irq_low, irq_high]);
-            self.seen.al_status[sent_on.index()] = al_low;
-            let wkc = Wkc(u16::from_le_bytes([wkc_low, wkc_high]));
-            match sent_on {
-                Link::Main => self.seen.main = wkc,
-                Link::Redundant => self.seen.redundant = wkc,
-            }
-        }
-        complete
+        let supervision = self.supervision_at.map_or(0, |at| supervision_at(bytes, at, sent_on));
+        self.wkc += sum;
+        self.seen |= supervision;
+        self.usual[link].note(bytes, sum, supervision);
     }
 
     /// Evaluates the datagrams of a copy that differ from the copy before.
@@ -430,6 +470,7 @@ impl CyclicFrame {
     pub(crate) fn follow(&mut self, changes: u32, board: &Board) {
         self.followed = changes;
         self.views = Views::default();
+        self.usual.iter_mut().for_each(Usual::forget);
         self.places.iter_mut().for_each(|place| place.follow(board));
     }
 
@@ -466,7 +507,33 @@ impl CyclicFrame {
 
 /// The [`Header`] of the datagram at an offset; zero for bytes beyond the end.
 fn header_at(bytes: &[u8], at: usize) -> u64 {
-    bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |head| u64::from_le_bytes(*head)) & HEADER_MASK
+    word_at(bytes, at) & HEADER_MASK
+}
+
+/// Eight bytes; beyond the end, zero.
+#[inline(always)]
+pub(super) fn word_at(bytes: &[u8], at: usize) -> u64 {
+    let word = bytes.get(at..at + size_of::<u64>()).and_then(<[u8]>::first_chunk);
+    word.map_or(0, |word| u64::from_le_bytes(*word))
+}
+
+/// Places of a frame that show what SubDevices did with it.
+fn usual_of(length: usize, headers: &[usize], places: &[Place], supervision: Option<usize>) -> Usual {
+    Usual::new(length, headers, places.iter().map(|place| place.wkc_at), supervision)
+}
+
+/// Result of the supervision datagram of a copy, packed.
+fn supervision_at(bytes: &[u8], at: usize, sent_on: Link) -> u64 {
+    let datagram = bytes.get(at..).and_then(<[u8]>::first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>);
+    let Some(&[.., irq_low, irq_high, al_low, _, wkc_low, wkc_high]) = datagram else { return 0 };
+    let mut seen = Supervision { irq: u16::from_le_bytes([irq_low, irq_high]), ..Supervision::default() };
+    seen.al_status[sent_on.index()] = al_low;
+    let wkc = Wkc(u16::from_le_bytes([wkc_low, wkc_high]));
+    match sent_on {
+        Link::Main => seen.main = wkc,
+        Link::Redundant => seen.redundant = wkc,
+    }
+    seen.pack()
 }
 
 /// Two bytes; beyond the end, zero.

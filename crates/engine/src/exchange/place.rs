@@ -273,7 +273,7 @@ impl Place {
     }
 
     /// Puts the inputs of a copy into the image, except where it has newer ones.
-    #[inline]
+    #[inline(always)]
     pub fn deliver(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
         let view = &self.views[link];
         match view.brought {
@@ -284,13 +284,18 @@ impl Place {
                     *whole = moment;
                 }
             }
-            Brought::Part => {
-                view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
-                if !image.note_share(self.datagram, link, view.share, moment) {
-                    let is_met = |part: usize| self.contributions[self.segments[part].contribution].met[link];
-                    self.views[link].share = image.take_share(self.datagram, link, is_met, moment);
-                }
-            }
+            Brought::Part => self.deliver_part(link, bytes, image, moment),
+        }
+    }
+
+    /// Puts the inputs of some SubDevices into the image.
+    #[inline(never)]
+    fn deliver_part(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
+        let view = &self.views[link];
+        view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
+        if !image.note_share(self.datagram, link, view.share, moment) {
+            let is_met = |part: usize| self.contributions[self.segments[part].contribution].met[link];
+            self.views[link].share = image.take_share(self.datagram, link, is_met, moment);
         }
     }
 

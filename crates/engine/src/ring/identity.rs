@@ -24,6 +24,10 @@ const FIRST_INDEX_AT: usize = DATAGRAMS_AT + 1;
 const REDUNDANT_BIT: u8 = 0x08;
 /// Bit of Idx that distinguishes the classes.
 const CLASS_BIT: u8 = 0x80;
+/// Of the four bytes before the first datagram's address, the EtherCAT type and the class bit; and these in a cyclic
+/// frame.
+const TYPE_AND_CLASS: u32 = 0x8000_F000;
+const CYCLIC: u32 = 0x0000_1000;
 
 /// The half of the engine that sent a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,6 +161,20 @@ impl Identity {
         }
     }
 
+    /// The sequence number of a received frame, where it is the main copy of a cyclic frame of this MainDevice with the
+    /// address of the main interface. `None` does not say that it is not: [`Identity::classify`] does.
+    #[inline(always)]
+    pub(crate) fn main_cyclic(&self, bytes: &[u8]) -> Option<Sequence> {
+        let head = bytes.first_chunk::<{ DATAGRAMS_AT + datagram::OVERHEAD }>()?;
+        let (mut word, mut tail) = ([0; 8], [0; 4]);
+        word.copy_from_slice(&head[SOURCE_AT..SOURCE_AT + 8]);
+        tail.copy_from_slice(&head[ETHERNET_HEADER_LEN..FIRST_INDEX_AT + 1]);
+        let (word, tail) = (u64::from_le_bytes(word), u32::from_le_bytes(tail));
+        let is_ours = word & (self.own_mask | u64::from(REDUNDANT_BIT)) == self.own[0];
+        let sequence = Sequence::from_wire((word >> self.id_shift) as u8, (tail >> 24) as u8);
+        (is_ours && tail & TYPE_AND_CLASS == CYCLIC).then_some(sequence)
+    }
+
     /// Classifies a received frame. Any bytes are allowed; only untagged Ethernet frames can be frames of this
     /// MainDevice.
     pub fn classify(&self, bytes: &[u8]) -> Classified {
@@ -220,6 +238,7 @@ mod tests {
             bytes[6] |= 0x02;
             let copy = FrameCopy { class: Class::Acyclic, sequence, sent_on: Link::Main };
             assert_eq!(identity().classify(&bytes), Classified::Ours(copy));
+            assert_eq!(identity().main_cyclic(&bytes), None);
             Identity::mark_redundant(&mut bytes, true);
             let copy = FrameCopy { sent_on: Link::Redundant, ..copy };
             assert_eq!(identity().classify(&bytes), Classified::Ours(copy));
@@ -236,6 +255,22 @@ mod tests {
         let bytes = frame(old, Class::Cyclic);
         let Classified::Ours(copy) = identity().classify(&bytes) else { panic!("not ours") };
         assert_ne!(copy.sequence, new);
+    }
+
+    // covers: CR-24, SM-08
+    #[test]
+    fn the_short_way_finds_the_main_copies_of_cyclic_frames_alone() {
+        let sequence = Sequence::of_frame(0x1234);
+        let mut bytes = frame(sequence, Class::Cyclic);
+        bytes[6] |= 0x02;
+        assert_eq!(identity().main_cyclic(&bytes), Some(sequence));
+        let others: [(usize, u8); 5] = [(6, 0x08), (9, 1), (12, 1), (15, 0x20), (17, 0x80)];
+        for (at, bits) in others {
+            bytes[at] ^= bits;
+            assert_eq!(identity().main_cyclic(&bytes), None, "byte {at}");
+            bytes[at] ^= bits;
+        }
+        assert_eq!(identity().main_cyclic(&bytes[..27]), None);
     }
 
     // covers: SM-08, ring-merge

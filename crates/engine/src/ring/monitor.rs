@@ -66,6 +66,13 @@ impl RingMonitor {
         self.state
     }
 
+    /// Whether the ring is open, or there is one link, and both directions work: copies that returned change nothing
+    /// then.
+    #[inline(always)]
+    pub(crate) fn is_open(&self) -> bool {
+        self.state == RingState::Open && self.alone == [0; 2]
+    }
+
     /// The link whose copies are lost while the copies of the other link arrive on this one: the ring passes frames in
     /// one direction only.
     pub fn dead_way(&self) -> Option<Link> {

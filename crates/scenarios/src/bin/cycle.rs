@@ -6,6 +6,9 @@
 //! it alone on the same frames, is subtracted. Between the two lengths no function that allocates or locks may be
 //! called.
 //!
+//! These figures leave out the socket, waiting, clock reads and publishing: they must not be compared with those of
+//! other stacks, which include all this. Bin `socket_cycle` counts the whole cycle.
+//!
 //! Run without arguments it prints the table; `run CASE exchange|double CYCLES` is the work that callgrind measures.
 
 use std::io;
@@ -19,13 +22,24 @@ use scenarios::figures::{Figures, verdict};
 
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
-/// Maximum instructions of a cycle with one SubDevice on one link: 900 before each copy was evaluated by itself
-/// (decision 0023).
-const BAR: f64 = 945.0;
-/// Maximum cost of two links, as a multiple of one link.
-const RING_BAR: f64 = 1.7;
+/// Maximum instructions of a cycle with one SubDevice on one link, 1 % above what is measured with LWR and LRD, and the goal
+/// (issue 16; its limit of 650 holds for all others).
+const BAR: f64 = 667.0;
+const AIM: f64 = 500.0;
 /// Maximum cost of 50 SubDevices, as a multiple of one SubDevice with as many bytes.
 const FIFTY_BAR: f64 = 1.3;
+/// Most instructions with two links: 1 % above what was measured when one link got its short way (decision 0042). Until
+/// then the bars were multiples of one link's: 1.7, and 1.3 for 50 SubDevices.
+const RING_BARS: [(&str, f64); 8] = [
+    ("closed", 1_200.0),
+    ("cut-main", 1_210.0),
+    ("cut-redundant", 1_250.0),
+    ("sixteen-closed", 1_390.0),
+    ("sixteen-cut-main", 1_400.0),
+    ("sixteen-cut-middle", 1_610.0),
+    ("sixteen-cut-redundant", 1_440.0),
+    ("fifty-of-2-cut", 1_690.0),
+];
 
 struct Case {
     name: &'static str,
@@ -50,8 +64,6 @@ const SPLIT: Case = case("lwr+lrd", 1, 2, false, Cabling::Line);
 const CLOSED: Case = case("closed", 1, 2, false, Cabling::ClosedRing);
 const CUT_MAIN: Case = case("cut-main", 1, 2, false, ON_MAIN);
 const CUT_REDUNDANT: Case = case("cut-redundant", 1, 2, false, ON_REDUNDANT);
-/// Maximum cost of two links with 16 SubDevices, as a multiple of one link (issue 5).
-const SIXTEEN_BAR: f64 = 1.7;
 const CASES: [Case; 23] = [
     unsupervised(LRW, "lrw-unsupervised"),
     unsupervised(SPLIT, "lwr+lrd-unsupervised"),
@@ -212,29 +224,19 @@ fn print(measured: &[Measured]) -> bool {
     println!(
         "  closed, or cut so that it processes the main or the redundant copy. n-of-b: n SubDevices, b + b bytes each."
     );
-    // One link uses LRW if possible: the smaller figure of the two, so the stricter reference.
-    let one_link = find("lrw").net();
     for (case, measured) in CASES.iter().zip(measured) {
         let name =
             format!("{:<28} (with double {:>6.1}, double {:>5.1})", case.name, measured.exchange, measured.double);
         if case.spec.cabling == Cabling::Line && case.spec.subdevices == 1 {
-            figures.at_most(&name, measured.net(), BAR, "instructions");
+            figures.at_most_towards(&name, measured.net(), BAR, AIM, "instructions");
+        } else if let Some((_, bar)) = RING_BARS.iter().find(|(ring, _)| *ring == case.name) {
+            figures.at_most(&name, measured.net(), *bar, "instructions");
         } else {
             figures.show(&name, format!("{:.2} instructions", measured.net()));
         }
     }
-    for name in ["closed", "cut-main", "cut-redundant"] {
-        figures.at_most(&format!("two links, {name}, against one link"), find(name).net() / one_link, RING_BAR, "x");
-    }
-    let sixteen = find("sixteen-lrw").net();
-    for name in ["sixteen-closed", "sixteen-cut-main", "sixteen-cut-middle", "sixteen-cut-redundant"] {
-        let title = format!("two links, {name}, against 16 on one link");
-        figures.at_most(&title, find(name).net() / sixteen, SIXTEEN_BAR, "x");
-    }
     let fifty = find("fifty-of-2").net() / find("one-of-100").net();
     figures.at_most("50 SubDevices of 2 + 2 bytes against one of 100 + 100", fifty, FIFTY_BAR, "x");
-    let fifty = find("fifty-of-2-cut").net() / find("one-of-100-cut").net();
-    figures.at_most("the same, two links, cut in the middle", fifty, FIFTY_BAR, "x");
     print_exactness(&find);
     let forbidden = measured.iter().map(|measured| measured.forbidden.0).sum::<u64>();
     let outside = measured.iter().map(|measured| measured.forbidden.1).sum::<u64>();
