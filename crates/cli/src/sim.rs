@@ -37,6 +37,8 @@ const CARRIER_PERIOD: Duration = Duration::from_millis(1);
 
 /// Options of `ringcat sim`.
 #[derive(Args, Debug)]
+// A simulator that sleeps responds late: it spins unless an option says otherwise.
+#[command(mut_arg("receive", |receive| receive.default_value("busy")))]
 #[command(after_long_help = format!("Orders on the standard input and on the control socket:\n\n{}", orders::HELP))]
 pub struct SimArguments {
     #[command(flatten)]

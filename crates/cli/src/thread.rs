@@ -20,7 +20,7 @@ pub enum Receive {
     Busy,
     /// Sleep: saves the processor, costs tens of microseconds per frame
     Block,
-    /// Spin for 200 us, then sleep
+    /// Sleep until shortly before the usual return of a frame, then spin for up to 200 us, then sleep
     Hybrid,
 }
 
@@ -29,7 +29,7 @@ pub enum Receive {
 #[command(next_help_heading = "Thread")]
 pub struct ThreadArguments {
     /// How to wait for frames
-    #[arg(long, value_enum, default_value = "busy")]
+    #[arg(long, value_enum, default_value = "hybrid")]
     receive: Receive,
     /// Real-time priority (SCHED_FIFO) of the thread that sends and receives
     ///

@@ -171,6 +171,55 @@ pub fn index_of(name: &str) -> Option<u32> {
     (index != 0).then_some(index)
 }
 
+// In the C library, each of the three calls of a cycle is a cancellation point, which costs 30 instructions per call in
+// a program with threads. The plain system call does not have this cost. On 32-bit targets the `timespec` of the kernel
+// and of the library may differ, so these use the library.
+
+/// Sends a frame.
+#[inline(always)]
+pub fn send(fd: RawFd, frame: &[u8]) -> Result<(), i32> {
+    let (start, length, flags) = (frame.as_ptr(), frame.len(), libc::MSG_DONTWAIT);
+    #[cfg(target_pointer_width = "64")]
+    // SAFETY: pointer and length describe the live frame, which the kernel only reads; no address is passed.
+    let sent = unsafe { libc::syscall(libc::SYS_sendto, fd, start, length, flags, std::ptr::null::<u8>(), 0usize) };
+    #[cfg(not(target_pointer_width = "64"))]
+    // SAFETY: pointer and length describe the live frame, which the kernel only reads.
+    let sent = unsafe { libc::send(fd, start.cast(), length, flags) };
+    if sent < 0 { Err(errno()) } else { Ok(()) }
+}
+
+/// Waits until one of the descriptors is ready, at most for `timeout`; true if `polled` has results.
+#[inline(always)]
+pub fn poll(polled: &mut [libc::pollfd], mut timeout: libc::timespec) -> bool {
+    let (places, count, mask) = (polled.as_mut_ptr(), polled.len(), std::ptr::null::<libc::sigset_t>());
+    let timeout = std::ptr::from_mut(&mut timeout);
+    #[cfg(target_pointer_width = "64")]
+    // SAFETY: the pointer refers to `count` live entries; the kernel may write the remaining time to the live timeout; the
+    // signal mask stays as it is.
+    let ready = unsafe { libc::syscall(libc::SYS_ppoll, places, count, timeout, mask, 8usize) };
+    #[cfg(not(target_pointer_width = "64"))]
+    // SAFETY: as above.
+    let ready = unsafe { libc::ppoll(places, count as libc::nfds_t, timeout, mask) };
+    ready > 0
+}
+
+/// Sleeps until a time of the monotonic clock.
+#[inline(always)]
+pub fn sleep_until(until: &libc::timespec) -> Result<(), i32> {
+    let (clock, absolute) = (libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME);
+    let (until, rest) = (std::ptr::from_ref(until), std::ptr::null_mut::<libc::timespec>());
+    #[cfg(target_pointer_width = "64")]
+    // SAFETY: the request is a live timespec; a null remainder is allowed and unused with an absolute time.
+    let error = match unsafe { libc::syscall(libc::SYS_clock_nanosleep, clock, absolute, until, rest) } {
+        0 => 0,
+        _ => errno(),
+    };
+    #[cfg(not(target_pointer_width = "64"))]
+    // SAFETY: as above.
+    let error = unsafe { libc::clock_nanosleep(clock, absolute, until, rest) };
+    if error == 0 { Ok(()) } else { Err(error) }
+}
+
 /// A socket for requests about interfaces; it needs no privileges.
 pub fn request_socket() -> Result<OwnedFd, i32> {
     socket(libc::AF_INET, libc::SOCK_DGRAM, 0)

@@ -45,4 +45,4 @@ pub use recorder::{Recorder, RecorderError, Tap};
 pub use signals::{HeldSignals, Signal};
 pub use sniffer::Sniffer;
 pub use tap::{TapError, TapInterface};
-pub use waiting::wait;
+pub use waiting::{UsualReturn, wait, wait_from};

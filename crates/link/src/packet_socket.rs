@@ -90,6 +90,8 @@ pub struct PacketSocket {
     mode: ReceiveMode,
     counters: LinkCounters,
     overrun: Cell<u64>,
+    /// From the monotonic clock to the Unix clock, in which the kernel stamps frames.
+    unix_offset_ns: u64,
 }
 
 impl PacketSocket {
@@ -129,7 +131,16 @@ impl PacketSocket {
         // An interface that is down leaves a pending error, which the first send would return.
         kernel::clear_error(&fd);
         let (interface, mode) = (interface.to_owned(), options.receive);
-        Ok(PacketSocket { ring, fd, interface, mac, mode, counters: LinkCounters::default(), overrun: Cell::new(0) })
+        Ok(PacketSocket {
+            ring,
+            fd,
+            interface,
+            mac,
+            mode,
+            counters: LinkCounters::default(),
+            overrun: Cell::new(0),
+            unix_offset_ns: monotonic::unix_offset_ns(),
+        })
     }
 
     /// Address of the interface.
@@ -149,12 +160,21 @@ impl PacketSocket {
 
     /// Sends a frame, without FCS: one system call. False if the interface is down or gone or the queue is full. The
     /// next call tries again, so an interface that comes back is used at once.
+    #[inline(always)]
     pub fn send(&mut self, frame: &[u8]) -> bool {
-        let mut result = self.send_once(frame);
+        let result = kernel::send(self.fd(), frame);
+        if result.is_ok() {
+            self.counters.sent += 1;
+        }
+        result.is_ok() || self.send_again(frame, result)
+    }
+
+    #[cold]
+    fn send_again(&mut self, frame: &[u8], mut result: Result<(), i32>) -> bool {
         if result == Err(libc::ENETDOWN) {
             // The error may be pending since the interface went down, although the interface is up again.
             kernel::clear_error(&self.fd);
-            result = self.send_once(frame);
+            result = kernel::send(self.fd(), frame);
         }
         match result {
             Ok(()) => self.counters.sent += 1,
@@ -165,14 +185,8 @@ impl PacketSocket {
         result.is_ok()
     }
 
-    fn send_once(&self, frame: &[u8]) -> Result<(), i32> {
-        // SAFETY: pointer and length describe the live frame, which the kernel only reads.
-        let sent = unsafe { libc::send(self.fd(), frame.as_ptr().cast(), frame.len(), libc::MSG_DONTWAIT) };
-        if sent < 0 { Err(kernel::errno()) } else { Ok(()) }
-    }
-
     /// Passes the oldest received frame to `take`; false if there is none. No system call.
-    #[inline]
+    #[inline(always)]
     pub fn receive(&mut self, take: &mut dyn FnMut(&[u8])) -> bool {
         loop {
             match self.ring.take(take) {
@@ -187,9 +201,22 @@ impl PacketSocket {
         }
     }
 
-    /// When the kernel received the last frame returned, on the monotonic clock. No system call.
-    pub fn received_at_ns(&self) -> u64 {
-        monotonic::of_unix_ns(self.ring.stamp_unix_ns())
+    /// When the kernel received the last frame returned, on the monotonic clock: between these two times. A stamp outside
+    /// shows that the Unix clock was set; its offset is read again then. No system call.
+    #[inline(always)]
+    pub fn received_at_ns(&mut self, after_ns: u64, before_ns: u64) -> u64 {
+        let stamp = self.ring.stamp_unix_ns();
+        let at = stamp.wrapping_sub(self.unix_offset_ns);
+        if (after_ns..=before_ns).contains(&at) {
+            return at;
+        }
+        self.received_at_by_new_offset(stamp)
+    }
+
+    #[cold]
+    fn received_at_by_new_offset(&mut self, stamp: u64) -> u64 {
+        self.unix_offset_ns = monotonic::unix_offset_ns();
+        stamp.saturating_sub(self.unix_offset_ns).min(monotonic::now_ns())
     }
 
     /// Passes the oldest frame in either direction to `take`; false if there is none. No system call.
@@ -200,7 +227,7 @@ impl PacketSocket {
     }
 
     /// Whether a frame waits in the ring. No system call.
-    #[inline]
+    #[inline(always)]
     pub fn has_frame(&self) -> bool {
         self.ring.has_frame()
     }
@@ -213,6 +240,7 @@ impl PacketSocket {
     }
 
     /// The descriptor, readable while frames wait.
+    #[inline]
     pub fn fd(&self) -> RawFd {
         self.fd.as_raw_fd()
     }

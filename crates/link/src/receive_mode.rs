@@ -10,9 +10,10 @@ pub enum ReceiveMode {
     Blocking,
     /// Polls the receive rings.
     BusyPoll,
-    /// Polls for this time, then sleeps.
+    /// Sleeps until shortly before the usual return of a frame, then polls for this time, then sleeps.
     Hybrid {
-        /// Time to poll: slightly longer than the usual round trip of a frame.
+        /// Time to poll: longer than the variation of the return. Frames that return within 50 us are polled for from
+        /// the start.
         spin: Duration,
     },
 }

@@ -2,6 +2,8 @@
 //!
 //! The kernel writes frames into the ring; [`RxRing::take`] returns them in order of arrival, each in place. The status
 //! word of a slot states whether the kernel or this process owns it; nothing else is shared.
+//!
+//! The functions of a cycle are inlined on purpose, so that its closure is called directly (bin `socket_cycle`).
 
 use std::io;
 use std::mem::size_of;
@@ -57,8 +59,8 @@ pub struct RxRing {
     base: NonNull<u8>,
     slots: usize,
     head: usize,
-    /// When the kernel received the frame that was handed out last.
-    stamp_unix_ns: u64,
+    /// When the kernel received the frame that was handed out last: seconds and nanoseconds.
+    stamp: [u32; 2],
 }
 
 // SAFETY: the mapping belongs to this value alone and is not bound to a thread.
@@ -90,30 +92,31 @@ impl RxRing {
         if base == libc::MAP_FAILED {
             return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
         }
-        NonNull::new(base.cast()).map(|base| RxRing { base, slots, head: 0, stamp_unix_ns: 0 }).ok_or(libc::ENOMEM)
+        NonNull::new(base.cast()).map(|base| RxRing { base, slots, head: 0, stamp: [0; 2] }).ok_or(libc::ENOMEM)
     }
 
     /// Whether a frame waits.
-    #[inline]
+    #[inline(always)]
     pub fn has_frame(&self) -> bool {
         self.status().load(Ordering::Acquire) & TP_STATUS_USER != 0
     }
 
     /// Passes the oldest frame to `take` and returns its slot to the kernel.
-    #[inline]
+    #[inline(always)]
     pub fn take(&mut self, take: &mut dyn FnMut(&[u8])) -> Taken {
-        let mut stamp_unix_ns = self.stamp_unix_ns;
+        let mut stamp = self.stamp;
         let taken = self.take_slot(|status, slot| {
-            stamp_unix_ns = stamp(slot);
+            stamp = [u32_at(slot, 16), u32_at(slot, 20)];
             hand_out(status, slot, take)
         });
-        self.stamp_unix_ns = stamp_unix_ns;
+        self.stamp = stamp;
         taken
     }
 
     /// When the kernel received the last frame returned, in nanoseconds since 1970.
+    #[inline]
     pub fn stamp_unix_ns(&self) -> u64 {
-        self.stamp_unix_ns
+        unix_ns(self.stamp)
     }
 
     /// As [`RxRing::take`], for all frames, including outgoing frames and the beginning of long frames; false if there
@@ -122,7 +125,7 @@ impl RxRing {
         self.take_slot(|status, slot| show(status, slot, take)) != Taken::Nothing
     }
 
-    #[inline]
+    #[inline(always)]
     fn take_slot(&mut self, mut hand_out: impl FnMut(u32, &mut [u8]) -> Taken) -> Taken {
         let status = self.status().load(Ordering::Acquire);
         if status & TP_STATUS_USER == 0 {
@@ -137,11 +140,13 @@ impl RxRing {
         taken
     }
 
+    #[inline(always)]
     fn slot(&self) -> NonNull<u8> {
         // SAFETY: the head is below the number of slots that are mapped.
         unsafe { self.base.add(self.head * SLOT) }
     }
 
+    #[inline(always)]
     fn status(&self) -> &AtomicU32 {
         // SAFETY: the status is the first word of the aligned slot and lives as long as the mapping. The slice over the
         // slot in `take` is no longer used when this is called.
@@ -163,16 +168,22 @@ struct Place {
     captured: usize,
 }
 
+#[inline(always)]
+fn u32_at(slot: &[u8], at: usize) -> u32 {
+    slot.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |bytes| u32::from_ne_bytes(*bytes))
+}
+
 /// The position of the frame in a slot; `None` if the header is invalid.
+#[inline(always)]
 fn place(slot: &[u8]) -> Option<Place> {
-    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
     let start = usize::from(u16::from_ne_bytes([slot[12], slot[13]]));
-    let (length, captured) = (u32_at(4) as usize, u32_at(8) as usize);
+    let (length, captured) = (u32_at(slot, 4) as usize, u32_at(slot, 8) as usize);
     let whole = captured >= 14 && start >= HEAD + TAG && start + captured <= slot.len();
     whole.then_some(Place { length, start, captured })
 }
 
 /// Puts back a VLAN tag that the kernel removed. Returns the new start of the frame and the additional bytes.
+#[cold]
 fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
     if status & TP_STATUS_VLAN_VALID == 0 {
         return (start, 0);
@@ -189,8 +200,11 @@ fn put_tag_back(status: u32, slot: &mut [u8], start: usize) -> (usize, usize) {
 
 /// When the kernel received or sent the frame of a slot.
 fn stamp(slot: &[u8]) -> u64 {
-    let u32_at = |at: usize| u32::from_ne_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
-    u64::from(u32_at(16)) * 1_000_000_000 + u64::from(u32_at(20))
+    unix_ns([u32_at(slot, 16), u32_at(slot, 20)])
+}
+
+const fn unix_ns([seconds, nanoseconds]: [u32; 2]) -> u64 {
+    seconds as u64 * 1_000_000_000 + nanoseconds as u64
 }
 
 /// Passes the content of a slot that this process owns to `take`.
@@ -205,6 +219,7 @@ fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
 }
 
 /// Returns the frame of a slot that this process owns, with its VLAN tag put back if the kernel removed it.
+#[inline(always)]
 fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken {
     if slot[PACKET_TYPE] == PACKET_OUTGOING {
         return Taken::Outgoing;
@@ -212,7 +227,8 @@ fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken 
     let Some(Place { length, start, captured }) = place(slot).filter(|place| place.captured == place.length) else {
         return Taken::Truncated;
     };
-    let (start, tag) = put_tag_back(status, slot, start);
+    let has_tag = status & TP_STATUS_VLAN_VALID != 0;
+    let (start, tag) = if has_tag { put_tag_back(status, slot, start) } else { (start, 0) };
     take(&slot[start..start + length.min(captured) + tag]);
     Taken::Frame
 }

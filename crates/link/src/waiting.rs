@@ -1,10 +1,11 @@
 //! Waiting for a frame or a time, the earlier of both: sleeping, spinning, or spinning first and then sleeping.
 //!
 //! Input: the sockets of a thread and a time. Output: whether a frame has arrived. Spinning responds within a fraction
-//! of a microsecond and occupies a processor; sleeping costs tens of microseconds per wake-up. The hybrid mode spins
-//! for the usual round trip time of frames.
+//! of a microsecond and occupies a processor; sleeping costs tens of microseconds per wake-up. The hybrid mode
+//! sleeps for most of the usual round trip time of frames ([`UsualReturn`]) and spins for the rest.
 
 use std::hint::spin_loop;
+use std::time::Duration;
 
 use crate::kernel;
 use crate::monotonic::{now_ns, timespec};
@@ -22,22 +23,67 @@ const LOOKS_PER_CLOCK: u32 = 16;
 /// # Panics
 /// With more than [`MAX_SOCKETS`] sockets.
 pub fn wait(sockets: &[&PacketSocket], until_ns: u64, mode: ReceiveMode) -> bool {
-    assert!(sockets.len() <= MAX_SOCKETS, "at most {MAX_SOCKETS} sockets are waited for at once");
+    wait_from(sockets, now_ns(), until_ns, mode)
+}
+
+/// As [`wait`], with the time that was read just before.
+///
+/// # Panics
+/// With more than [`MAX_SOCKETS`] sockets.
+#[inline(always)]
+pub fn wait_from(sockets: &[&PacketSocket], now: u64, until_ns: u64, mode: ReceiveMode) -> bool {
     match mode {
-        ReceiveMode::Blocking => sleep(sockets, until_ns),
+        ReceiveMode::Blocking => sleep(sockets, now, until_ns),
         ReceiveMode::BusyPoll => spin(sockets, until_ns),
-        ReceiveMode::Hybrid { spin: limit } => {
-            let limit = u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
-            let spin_until = now_ns().saturating_add(limit);
-            if spin_until >= until_ns {
-                spin(sockets, until_ns)
-            } else {
-                spin(sockets, spin_until) || sleep(sockets, until_ns)
-            }
-        }
+        ReceiveMode::Hybrid { spin: limit } => spin_and_sleep(sockets, now, until_ns, limit),
     }
 }
 
+fn spin_and_sleep(sockets: &[&PacketSocket], now: u64, until_ns: u64, limit: Duration) -> bool {
+    let spin_until = now.saturating_add(u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX));
+    if spin_until >= until_ns {
+        spin(sockets, until_ns)
+    } else {
+        spin(sockets, spin_until) || sleep(sockets, spin_until, until_ns)
+    }
+}
+
+/// How long frames usually take to return, for hybrid waits.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct UsualReturn {
+    ns: u64,
+}
+
+impl UsualReturn {
+    /// A sleep ends this long before the frame is expected: timers of a host are late by tens of microseconds.
+    const LEAD_NS: u64 = 50_000;
+    /// A longer return counts by this fraction, so that one late frame is not waited for in the next cycles.
+    const LONGER_BY: u64 = 16;
+
+    /// As [`wait_from`] with [`ReceiveMode::Hybrid`] of this limit, for the first frame after one was sent at about
+    /// `now`: asleep until it is nearly due.
+    pub fn wait(&mut self, sockets: &[&PacketSocket], now: u64, until_ns: u64, limit: Duration) -> bool {
+        let due = now.saturating_add(self.ns.saturating_sub(Self::LEAD_NS)).min(until_ns);
+        let mut found = false;
+        let mut woken = now;
+        if due > now {
+            found = sleep(sockets, now, due);
+            woken = now_ns();
+        }
+        found = found || spin_and_sleep(sockets, woken, until_ns, limit);
+        if found {
+            self.learn(now_ns().saturating_sub(now));
+        }
+        found
+    }
+
+    fn learn(&mut self, took_ns: u64) {
+        let longer = took_ns.saturating_sub(self.ns) / Self::LONGER_BY;
+        self.ns = took_ns.min(self.ns + longer);
+    }
+}
+
+#[inline(always)]
 fn any(sockets: &[&PacketSocket]) -> bool {
     sockets.iter().any(|socket| socket.has_frame())
 }
@@ -56,28 +102,60 @@ fn spin(sockets: &[&PacketSocket], until_ns: u64) -> bool {
     }
 }
 
-fn sleep(sockets: &[&PacketSocket], until_ns: u64) -> bool {
-    let mut polled = [libc::pollfd { fd: -1, events: libc::POLLIN, revents: 0 }; MAX_SOCKETS];
-    for (place, socket) in polled.iter_mut().zip(sockets) {
-        place.fd = socket.fd();
+#[inline(always)]
+fn sleep(sockets: &[&PacketSocket], now: u64, until_ns: u64) -> bool {
+    let place = |socket: &PacketSocket| libc::pollfd { fd: socket.fd(), events: libc::POLLIN, revents: 0 };
+    // Most have one socket or two: no places for more are filled then.
+    match sockets {
+        [alone] => sleep_on(sockets, &mut [place(alone)], now, until_ns),
+        [main, redundant] => sleep_on(sockets, &mut [place(main), place(redundant)], now, until_ns),
+        many => {
+            assert!(many.len() <= MAX_SOCKETS, "at most {MAX_SOCKETS} sockets are waited for at once");
+            let mut polled = [libc::pollfd { fd: -1, events: libc::POLLIN, revents: 0 }; MAX_SOCKETS];
+            polled.iter_mut().zip(many).for_each(|(to, socket)| *to = place(socket));
+            sleep_on(sockets, &mut polled[..many.len()], now, until_ns)
+        }
     }
+}
+
+#[inline(always)]
+fn sleep_on(sockets: &[&PacketSocket], polled: &mut [libc::pollfd], mut now: u64, until_ns: u64) -> bool {
     loop {
         if any(sockets) {
             return true;
         }
-        let now = now_ns();
         if now >= until_ns {
             return false;
         }
-        let timeout = timespec(until_ns - now);
-        // SAFETY: the pointer refers to as many live entries as sockets are passed; the signal mask stays unchanged.
-        unsafe { libc::ppoll(polled.as_mut_ptr(), sockets.len() as libc::nfds_t, &timeout, std::ptr::null()) };
-        for (place, socket) in polled.iter().zip(sockets) {
-            if place.revents & libc::POLLERR != 0 {
-                // The interface went down. Clearing the error allows the next poll to sleep until the interface is
-                // back.
-                kernel::clear_error(&socket.fd());
+        if kernel::poll(polled, timespec(until_ns - now)) {
+            if any(sockets) {
+                return true;
+            }
+            for (place, socket) in polled.iter().zip(sockets) {
+                if place.revents & libc::POLLERR != 0 {
+                    // The interface went down. Clearing the error allows the next poll to sleep until the interface is
+                    // back.
+                    kernel::clear_error(&socket.fd());
+                }
             }
         }
+        now = now_ns();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: links
+    #[test]
+    fn the_usual_return_follows_early_frames_at_once_and_late_ones_slowly() {
+        let mut usual = UsualReturn::default();
+        (0..200).for_each(|_| usual.learn(400_000));
+        assert!((390_000..=400_000).contains(&usual.ns), "{}", usual.ns);
+        usual.learn(2_000_000);
+        assert!(usual.ns <= 500_000, "one late frame: {}", usual.ns);
+        usual.learn(300_000);
+        assert_eq!(usual.ns, 300_000);
     }
 }

@@ -73,17 +73,23 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time, and when
     /// the look for frames began that was the last one.
+    #[inline(always)]
     fn wait_for_cycle(&mut self) -> (Instant, Instant) {
         loop {
+            // Read once per wait.
             let looked_at = self.links.now();
-            self.receive();
-            let now = self.links.now();
+            self.take_in(looked_at);
+            let mut now = looked_at;
+            if H::SHARES_LINKS {
+                self.acyclic.work(&mut self.links, &self.window);
+                now = self.links.now();
+            }
             if self.cyclic.begins(now) {
                 return (now, looked_at);
             }
             let wake = self.cyclic.wake(now).min(self.acyclic.wake());
             if H::SHARES_LINKS || self.cyclic.exchange.awaits_copies() {
-                self.links.wait(wake.max(now));
+                self.links.wait_from(now, wake.max(now));
             } else {
                 self.links.sleep(wake);
             }
@@ -93,22 +99,30 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Takes in all frames that have arrived, and lets the acyclic half work if it does so here. The first step of a
     /// cycle that the application runs itself; more often does no harm.
     pub fn receive(&mut self) {
-        let Application { links, acyclic, cyclic, window } = self;
+        self.take_in(self.links.now());
+        self.acyclic.work(&mut self.links, &self.window);
+    }
+
+    /// Takes in all frames that have arrived.
+    #[inline(always)]
+    fn take_in(&mut self, now: Instant) {
+        let Application { links, acyclic, cyclic, .. } = self;
         loop {
-            let now = links.now();
             let mut left_at = None;
-            let any = links.receive(&mut |link, frame| match class_of(frame) {
-                Some(Class::Acyclic) if H::SHARES_LINKS => acyclic.receive(link, frame, now),
-                _ => left_at = cyclic.receive(link, frame, now),
+            let any = links.receive(&mut |link, frame| {
+                if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
+                    acyclic.receive(link, frame, now);
+                } else {
+                    left_at = cyclic.receive(link, frame, now);
+                }
             });
             if !any {
                 break;
             }
             if let Some(left_at) = left_at {
-                cyclic.note_round_trip(left_at, links.received_at().unwrap_or(now));
+                cyclic.note_round_trip(left_at, links.received_at(left_at, now).unwrap_or(now));
             }
         }
-        acyclic.work(links, window);
     }
 
     /// Judges a domain by what was received. A step of a cycle that the application runs itself.
@@ -178,7 +192,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// How well the cycles keep to their grid.
     pub fn pace(&self) -> Pace {
-        self.cyclic.pace
+        self.cyclic.pace.shown()
     }
 
     /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface, whenever the

@@ -1,6 +1,7 @@
 //! The cyclic half as the runtime runs it: when a cycle begins, which domains are due in it, what is counted.
 //!
-//! Nothing here waits, allocates or locks.
+//! Nothing here waits, allocates or locks. What each cycle calls is inlined on purpose: its calls alone would take a
+//! tenth of its instructions (bin `socket_cycle`).
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,12 +15,12 @@ use ringcat_engine::time::Instant;
 
 use crate::links::Links;
 use crate::news::News;
-use crate::pace::{Pace, Trigger};
+use crate::pace::{PaceNs, Trigger};
 use crate::process_data::{ProcessData, Rate};
 use crate::window::{Half, SHORTEST, Window};
 
 /// A cycle is late when it begins this part of its period after its time.
-const LATE_FRACTION: u32 = 10;
+const LATE_FRACTION: u64 = 10;
 /// Between two looks whether a pause has ended.
 const PAUSE_LOOK: Duration = Duration::from_micros(20);
 /// Period of an application without domains.
@@ -29,10 +30,12 @@ const IDLE_PERIOD: Duration = Duration::from_millis(1);
 pub(crate) struct Cyclic {
     pub exchange: Exchange,
     pub directory: Directory,
-    pub pace: Pace,
+    pub pace: PaceNs,
     pub news: Arc<News>,
     rates: Vec<Rate>,
-    period: Duration,
+    period_ns: u64,
+    /// A cycle is late when it begins so long after its time.
+    late_ns: u64,
     trigger: Trigger,
     /// Moves the grid after the reference clock, with [`Trigger::ReferenceClock`].
     follower: Option<Follower>,
@@ -50,6 +53,8 @@ pub(crate) struct Cyclic {
     /// A cycle was due and waits because the acyclic half has asked for a pause.
     held: bool,
     window: Arc<Window>,
+    /// Disturbances that the news include.
+    published: u64,
 }
 
 impl Cyclic {
@@ -61,14 +66,16 @@ impl Cyclic {
             status: DomainStatus::default(),
         };
         let next_cycle = now + period;
+        let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         window.expect_cycle(next_cycle);
         Cyclic {
             exchange: active.exchange,
             directory: active.directory,
-            pace: Pace::default(),
+            pace: PaceNs::default(),
             news: Arc::new(News::new(periods.len())),
             rates: periods.iter().map(rate).collect(),
-            period,
+            period_ns,
+            late_ns: period_ns / LATE_FRACTION,
             trigger: Trigger::default(),
             follower: None,
             followed: Instant::NEVER,
@@ -79,13 +86,14 @@ impl Cyclic {
             under_way: active.under_way.into(),
             held: false,
             window,
+            published: 0,
         }
     }
 
     pub fn set_trigger(&mut self, trigger: Trigger) {
         self.trigger = trigger;
         self.follower = match trigger {
-            Trigger::ReferenceClock { phase_ns } => Some(Follower::new(self.period.as_nanos() as u64, phase_ns)),
+            Trigger::ReferenceClock { phase_ns } => Some(Follower::new(self.period_ns, phase_ns)),
             Trigger::Time | Trigger::FramesReturned { .. } => None,
         };
     }
@@ -101,29 +109,39 @@ impl Cyclic {
     }
 
     /// Takes in a frame of the cyclic class or of an unknown sender. When it left, if it is a copy that was waited for.
+    #[inline(always)]
     pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) -> Option<Instant> {
         let taken = self.exchange.receive(link, frame, now) == Received::Taken;
         taken.then(|| self.exchange.taken_left_at())
     }
 
     /// Notes when a copy arrived at the interface that had left then.
+    #[inline(always)]
     pub fn note_round_trip(&self, left_at: Instant, received_at: Instant) {
-        self.news.round_trips().record(received_at.since(left_at));
+        self.news.round_trips().record_ns(received_at.0.saturating_sub(left_at.0));
     }
 
     /// Whether a cycle begins now. One that is due waits where the acyclic half has asked for a pause.
+    #[inline(always)]
     pub fn begins(&mut self, now: Instant) -> bool {
         let is_due = now >= self.next_cycle || (self.may_begin_early() && now >= self.earliest);
+        is_due && !self.is_held_back(now)
+    }
+
+    /// Whether the cycle that is due has to wait.
+    #[inline(always)]
+    fn is_held_back(&mut self, now: Instant) -> bool {
         let pause_until = self.exchange.pause_until();
-        let is_paused = is_due && now < pause_until;
+        let is_paused = now < pause_until;
         if is_paused {
             self.held = true;
             self.window.expect_cycle(pause_until);
         }
-        is_due && !is_paused
+        is_paused
     }
 
     /// When to look again whether a cycle begins, unless a frame arrives before.
+    #[inline(always)]
     pub fn wake(&self, now: Instant) -> Instant {
         if now < self.exchange.pause_until() {
             // A pause may end earlier than was asked for.
@@ -132,57 +150,74 @@ impl Cyclic {
         if self.may_begin_early() { self.earliest.min(self.next_cycle) } else { self.next_cycle }
     }
 
+    #[inline(always)]
     fn may_begin_early(&self) -> bool {
         matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
     /// A cycle begins: notes how late it is, judges what is due. All frames were taken in that had arrived at
     /// `looked_at`; only what was overdue by then is given up, however long this thread was held up since.
+    #[inline(always)]
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
         self.keep_pace(now);
         for (number, rate) in self.rates.iter_mut().enumerate() {
-            if self.cycle.is_multiple_of(rate.divider) {
+            if rate.is_due(self.cycle) {
                 rate.status = self.exchange.process(DomainId(number), looked_at);
             }
         }
     }
 
     /// Notes how late the cycle is, and when the next one begins; leaves out those whose time has passed meanwhile.
+    #[inline(always)]
     fn keep_pace(&mut self, now: Instant) {
         let is_held = core::mem::take(&mut self.held);
-        let delay = now.since(self.next_cycle);
+        let delay = now.0.saturating_sub(self.next_cycle.0);
         self.pace.cycles += 1;
         if is_held {
             self.pace.paused += 1;
+            self.pace.disturbances += 1;
             self.pass_over(now, delay);
             return;
         }
         self.pace.last_delay = delay;
-        self.pace.longest_delay = self.pace.longest_delay.max(delay);
-        self.pace.late += u64::from(delay > self.period / LATE_FRACTION);
-        self.news.wake_ups().record(delay);
+        if delay > self.pace.longest_delay || delay > self.late_ns {
+            self.note_late(delay);
+        }
+        self.news.wake_ups().record_ns(delay);
         self.pace.skipped += self.pass_over(now, delay);
     }
 
+    /// Notes that the cycle is late, or later than any before.
+    #[cold]
+    fn note_late(&mut self, delay: u64) {
+        self.pace.disturbances += 1;
+        self.pace.longest_delay = self.pace.longest_delay.max(delay);
+        self.pace.late += u64::from(delay > self.late_ns);
+    }
+
     /// Notes when the next cycle begins; returns how many are left out because their time has passed.
-    fn pass_over(&mut self, now: Instant, delay: Duration) -> u64 {
-        let passed_over = (delay.as_nanos() / self.period.as_nanos()) as u64;
+    #[inline(always)]
+    fn pass_over(&mut self, now: Instant, delay: u64) -> u64 {
+        let passed_over = if delay < self.period_ns { 0 } else { delay / self.period_ns };
         match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => {
-                let periods = (self.period.as_nanos() as u64).saturating_mul(passed_over + 1);
-                self.next_cycle += Duration::from_nanos(periods);
-                self.follow_reference();
+                let periods = self.period_ns.saturating_mul(passed_over + 1);
+                self.next_cycle = Instant(self.next_cycle.0.saturating_add(periods));
+                if self.follower.is_some() {
+                    self.follow_reference();
+                }
             }
             Trigger::FramesReturned { at_least } => {
                 self.earliest = now + at_least;
-                self.next_cycle = now + self.period * self.under_way;
+                self.next_cycle = Instant(now.0.saturating_add(self.period_ns.saturating_mul(self.under_way.into())));
             }
         }
         passed_over
     }
 
     /// Moves the next cycle after the reference clock, once for each reading of it.
+    #[cold]
     fn follow_reference(&mut self) {
         let Some(follower) = &mut self.follower else { return };
         let Some(reading) = self.exchange.reference_time().filter(|reading| reading.sent_at != self.followed) else {
@@ -216,9 +251,10 @@ impl Cyclic {
     }
 
     /// The cycle ends: what is due is sent.
+    #[inline(always)]
     pub fn end(&mut self, now: Instant, links: &mut impl Links) {
         for (number, rate) in self.rates.iter().enumerate() {
-            if self.cycle.is_multiple_of(rate.divider) {
+            if rate.is_due(self.cycle) {
                 self.exchange.queue(DomainId(number), now);
             }
         }
@@ -235,6 +271,7 @@ impl Cyclic {
     }
 
     /// Sends what was queued; the next cycle's frames leave at `next`.
+    #[inline(always)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
         let Cyclic { exchange, window, .. } = self;
         exchange.send(now, &mut |link, frame| {
@@ -260,15 +297,22 @@ impl Cyclic {
     /// period later.
     pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
         self.pace.cycles += 1;
-        self.next_cycle = now + self.period;
+        self.next_cycle = Instant(now.0.saturating_add(self.period_ns));
         self.earliest = self.next_cycle;
         self.send(now, self.next_cycle, links);
         self.publish();
     }
 
-    fn publish(&self) {
+    #[inline(always)]
+    fn publish(&mut self) {
         self.news.publish_spread(self.exchange.clock_spread_ns());
-        self.news.publish(&self.pace, self.exchange.counters(), self.exchange.ring(), &self.rates);
+        self.news.publish_cycle(&self.pace, self.exchange.counters(), self.exchange.ring());
+        self.news.publish_rates(&self.rates);
+        let disturbances = self.exchange.disturbances() + self.pace.disturbances;
+        if disturbances != self.published || self.news.is_restart_wanted() {
+            self.published = disturbances;
+            self.news.publish_rest(&self.pace, self.exchange.counters());
+        }
     }
 
     /// Publishes the address of another sender on this wire.

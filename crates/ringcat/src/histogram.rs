@@ -15,8 +15,7 @@ const BUCKETS: usize = 62 * FINE;
 /// Counts of times by their length. The one thread that records needs no read-modify-write for it.
 #[derive(Debug)]
 pub struct Histogram {
-    buckets: Box<[AtomicU64]>,
-    count: AtomicU64,
+    buckets: Box<[AtomicU64; BUCKETS]>,
     shortest_ns: AtomicU64,
     longest_ns: AtomicU64,
 }
@@ -24,8 +23,7 @@ pub struct Histogram {
 impl Default for Histogram {
     fn default() -> Histogram {
         Histogram {
-            buckets: (0..BUCKETS).map(|_| AtomicU64::new(0)).collect(),
-            count: AtomicU64::new(0),
+            buckets: Box::new([const { AtomicU64::new(0) }; BUCKETS]),
             shortest_ns: AtomicU64::new(u64::MAX),
             longest_ns: AtomicU64::new(0),
         }
@@ -43,18 +41,27 @@ fn set(word: &AtomicU64, value: u64) {
 impl Histogram {
     /// Counts a time. For one thread only.
     pub fn record(&self, time: Duration) {
-        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.record_ns(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
+    }
+
+    /// As [`Histogram::record`], in nanoseconds.
+    // The sum of the buckets is the count: readers add them up, so that recording need not.
+    #[inline(always)]
+    pub(crate) fn record_ns(&self, ns: u64) {
         if let Some(bucket) = self.buckets.get(bucket_of(ns)) {
             set(bucket, get(bucket) + 1);
         }
-        set(&self.count, get(&self.count) + 1);
-        set(&self.shortest_ns, get(&self.shortest_ns).min(ns));
-        set(&self.longest_ns, get(&self.longest_ns).max(ns));
+        if ns < get(&self.shortest_ns) {
+            set(&self.shortest_ns, ns);
+        }
+        if ns > get(&self.longest_ns) {
+            set(&self.longest_ns, ns);
+        }
     }
 
     /// Forgets everything. For the thread that records.
     pub fn clear(&self) {
-        for word in self.buckets.iter().chain([&self.count, &self.longest_ns]) {
+        for word in self.buckets.iter().chain([&self.longest_ns]) {
             set(word, 0);
         }
         set(&self.shortest_ns, u64::MAX);
@@ -62,7 +69,7 @@ impl Histogram {
 
     /// How many times were counted.
     pub fn count(&self) -> u64 {
-        get(&self.count)
+        self.buckets.iter().map(get).sum()
     }
 
     /// The shortest.
@@ -101,6 +108,7 @@ impl fmt::Display for Histogram {
 }
 
 /// Below `FINE` one bucket per nanosecond, from there on `FINE` buckets per doubling.
+#[inline(always)]
 fn bucket_of(ns: u64) -> usize {
     if ns < FINE as u64 {
         return ns as usize;

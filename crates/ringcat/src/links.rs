@@ -22,8 +22,9 @@ pub trait Links {
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
 
     /// When the frame that was handed out last arrived at the interface, where these links know that better than by the
-    /// time at which it was taken. Without a system call.
-    fn received_at(&self) -> Option<Instant> {
+    /// time at which it was taken. It left at `sent_at`, and was taken at about `now`: a time that is not between them
+    /// is determined anew. Without a system call.
+    fn received_at(&mut self, _sent_at: Instant, _now: Instant) -> Option<Instant> {
         None
     }
 
@@ -34,6 +35,11 @@ pub trait Links {
 
     /// Waits until a frame has arrived or the time has come.
     fn wait(&mut self, until: Instant);
+
+    /// As [`Links::wait`]; `now` was read just before, so these links need not read it again.
+    fn wait_from(&mut self, _now: Instant, until: Instant) {
+        self.wait(until);
+    }
 
     /// Waits until the time has come. No frame is expected: one that arrives all the same may end the wait or not.
     fn sleep(&mut self, until: Instant) {

@@ -12,7 +12,7 @@ use ringcat_engine::ring::RingState;
 use ringcat_wire::frame::MacAddress;
 
 use crate::histogram::Histogram;
-use crate::pace::Pace;
+use crate::pace::{Pace, PaceNs};
 use crate::process_data::Rate;
 
 /// News of the cyclic half.
@@ -42,9 +42,14 @@ fn zeros<const N: usize>() -> [AtomicU64; N] {
     [const { AtomicU64::new(0) }; N]
 }
 
+#[inline]
+fn set(word: &AtomicU64, value: u64) {
+    word.store(value, Ordering::Relaxed);
+}
+
 fn store(to: &[AtomicU64], values: &[u64]) {
     for (word, value) in to.iter().zip(values) {
-        word.store(*value, Ordering::Relaxed);
+        set(word, *value);
     }
 }
 
@@ -164,23 +169,42 @@ impl News {
         self.phase.store((error_ns << 1) as u64 | u64::from(is_locked), Ordering::Relaxed);
     }
 
+    #[inline(always)]
     pub(crate) fn publish_spread(&self, spread_ns: Option<u32>) {
         self.spread.store(spread_ns.map_or(0, |ns| u64::from(ns) + 1), Ordering::Relaxed);
     }
 
-    pub(crate) fn publish(&self, pace: &Pace, counters: &CyclicCounters, ring: RingState, rates: &[Rate]) {
+    /// What changes in each cycle.
+    #[inline(always)]
+    pub(crate) fn publish_cycle(&self, pace: &PaceNs, counters: &CyclicCounters, ring: RingState) {
         let ring = match ring {
             RingState::Unknown => 0,
             RingState::Closed => 1,
             RingState::Open => 2,
         };
-        self.ring.store(ring, Ordering::Relaxed);
-        let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        let delays = [ns(pace.last_delay), ns(pace.longest_delay)];
-        store(&self.pace, &[pace.cycles, pace.late, pace.skipped, pace.paused, delays[0], delays[1]]);
+        set(&self.ring, ring);
+        let [cycles, .., last_delay, _] = &self.pace;
+        set(cycles, pace.cycles);
+        set(last_delay, pace.last_delay);
+        let [sent, bytes, received, ..] = &self.counters;
+        set(sent, counters.sent);
+        set(bytes, counters.bytes);
+        set(received, counters.received);
+    }
+
+    /// Whether histograms are to begin anew.
+    #[inline(always)]
+    pub(crate) fn is_restart_wanted(&self) -> bool {
+        self.restart.load(Ordering::Relaxed)
+    }
+
+    /// What changes where a cycle was disturbed.
+    #[cold]
+    pub(crate) fn publish_rest(&self, pace: &PaceNs, counters: &CyclicCounters) {
+        let PaceNs { cycles, late, skipped, paused, last_delay, longest_delay, disturbances: _ } = *pace;
+        store(&self.pace, &[cycles, late, skipped, paused, last_delay, longest_delay]);
         store(&self.counters, &counters.to_words());
-        self.publish_rates(rates);
-        if self.restart.load(Ordering::Relaxed) {
+        if self.is_restart_wanted() {
             self.restart.store(false, Ordering::Relaxed);
             self.round_trips.clear();
             self.wake_ups.clear();
@@ -188,16 +212,16 @@ impl News {
         }
     }
 
-    fn publish_rates(&self, rates: &[Rate]) {
-        for (words, rate) in self.domains.iter().zip(rates) {
-            let state = match rate.status.state {
+    #[inline(always)]
+    pub(crate) fn publish_rates(&self, rates: &[Rate]) {
+        for ([sum, state], rate) in self.domains.iter().zip(rates) {
+            let kind = match rate.status.state {
                 DomainState::Zero => 0,
                 DomainState::Incomplete => 1,
                 DomainState::Complete => 2,
             };
-            let counted = u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32;
-            let returned = u64::from(rate.status.returned) << 7;
-            store(words, &[counted, state | returned | rate.status.skipped << 8]);
+            set(sum, u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32);
+            set(state, kind | u64::from(rate.status.returned) << 7 | rate.status.skipped << 8);
         }
     }
 }

@@ -23,6 +23,27 @@ pub enum Trigger {
     },
 }
 
+/// [`Pace`] in whole nanoseconds, as the cycles count it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PaceNs {
+    pub cycles: u64,
+    pub late: u64,
+    pub skipped: u64,
+    pub paused: u64,
+    pub last_delay: u64,
+    pub longest_delay: u64,
+    /// How often anything was changed but `cycles` and `last_delay`.
+    pub disturbances: u64,
+}
+
+impl PaceNs {
+    pub const fn shown(&self) -> Pace {
+        let PaceNs { cycles, late, skipped, paused, last_delay, longest_delay, disturbances: _ } = *self;
+        let [last_delay, longest_delay] = [Duration::from_nanos(last_delay), Duration::from_nanos(longest_delay)];
+        Pace { cycles, late, skipped, paused, last_delay, longest_delay }
+    }
+}
+
 /// How well the cycles keep to their times. None of it is the wire's fault.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]

@@ -3,15 +3,22 @@
 //! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or
 //! one after the other. A link that goes down swallows frames and works again as soon as it is back.
 
+use std::time::Duration;
+
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::interface;
-use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, monotonic};
+use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, UsualReturn, monotonic};
 use ringcat_wire::frame::MacAddress;
 
 pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
 
 use crate::links::Links;
+
+/// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on the wire at once
+/// ([`ringcat_engine::ring::MAX_IN_FLIGHT`]).
+const RING_FRAMES: u32 = 128;
+const _: () = assert!(RING_FRAMES as usize > ringcat_engine::ring::MAX_IN_FLIGHT);
 
 /// One or two network interfaces.
 #[derive(Debug)]
@@ -21,6 +28,10 @@ pub struct PacketLinks {
     /// Where the last frame was taken from.
     taken_from: Link,
     mode: ReceiveMode,
+    /// How long frames take, for hybrid waits.
+    usual: UsualReturn,
+    /// A frame was sent since the last wait.
+    has_sent: bool,
     /// Polls the carriers; not for the cyclic half, which goes by what comes back.
     carriers: Option<CarrierWatch>,
     /// Names of both interfaces.
@@ -71,7 +82,9 @@ impl PacketLinks {
         mode: ReceiveMode,
         filter: ClassFilter,
     ) -> Result<PacketLinks, LinkError> {
-        let options = PacketOptions { receive: mode, filter, ..PacketOptions::default() };
+        let classes = if filter == ClassFilter::All { 2 } else { 1 };
+        let ring_frames = RING_FRAMES * classes;
+        let options = PacketOptions { receive: mode, filter, ring_frames, ..PacketOptions::default() };
         let names = [Some(main.to_owned()), redundant.map(str::to_owned)];
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
         let main = PacketSocket::open(main, &options)?;
@@ -80,10 +93,20 @@ impl PacketLinks {
             redundant,
             taken_from: Link::Main,
             mode,
+            usual: UsualReturn::default(),
+            has_sent: false,
             carriers: None,
             names,
             disconnected: [false; 2],
         })
+    }
+
+    /// A hybrid wait for the first frame that comes back.
+    fn wait_as_usual(&mut self, now: Instant, until: Instant, spin: Duration) {
+        match &self.redundant {
+            Some(redundant) => self.usual.wait(&[&self.main, redundant], now.0, until.0, spin),
+            None => self.usual.wait(&[&self.main], now.0, until.0, spin),
+        };
     }
 
     fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
@@ -102,6 +125,7 @@ impl PacketLinks {
 }
 
 impl Links for PacketLinks {
+    #[inline(always)]
     fn now(&self) -> Instant {
         Instant(monotonic::now_ns())
     }
@@ -110,7 +134,9 @@ impl Links for PacketLinks {
         (MacAddress(self.main.mac()), self.redundant.as_ref().map(|socket| MacAddress(socket.mac())))
     }
 
+    #[inline(always)]
     fn send(&mut self, link: Link, frame: &[u8]) {
+        self.has_sent = true;
         match link {
             Link::Main => self.main.send(frame),
             // The socket counts what it could not send; the engine notices by what does not come back.
@@ -118,22 +144,30 @@ impl Links for PacketLinks {
         };
     }
 
+    #[inline(always)]
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        if self.main.receive(&mut |frame| take(Link::Main, frame)) {
-            self.taken_from = Link::Main;
-            return true;
+        // One call of `take`, so that it is inlined. Frames that are left out are behind it the next time.
+        loop {
+            let (link, socket) = match &mut self.redundant {
+                _ if self.main.has_frame() => (Link::Main, &mut self.main),
+                Some(redundant) if redundant.has_frame() => (Link::Redundant, redundant),
+                _ => return false,
+            };
+            self.taken_from = link;
+            if socket.receive(&mut |frame| take(link, frame)) {
+                return true;
+            }
         }
-        self.taken_from = Link::Redundant;
-        self.redundant.as_mut().is_some_and(|socket| socket.receive(&mut |frame| take(Link::Redundant, frame)))
     }
 
     /// The kernel's receive time.
-    fn received_at(&self) -> Option<Instant> {
+    #[inline(always)]
+    fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {
         let socket = match self.taken_from {
-            Link::Main => Some(&self.main),
-            Link::Redundant => self.redundant.as_ref(),
+            Link::Main => Some(&mut self.main),
+            Link::Redundant => self.redundant.as_mut(),
         };
-        socket.map(|socket| Instant(socket.received_at_ns()))
+        socket.map(|socket| Instant(socket.received_at_ns(sent_at.0, now.0)))
     }
 
     fn carrier(&self, link: Link) -> Option<bool> {
@@ -142,12 +176,25 @@ impl Links for PacketLinks {
     }
 
     fn wait(&mut self, until: Instant) {
+        self.wait_from(self.now(), until);
+    }
+
+    #[inline(always)]
+    fn wait_from(&mut self, now: Instant, until: Instant) {
+        let is_first = core::mem::take(&mut self.has_sent);
+        if let ReceiveMode::Hybrid { spin } = self.mode
+            && is_first
+        {
+            self.wait_as_usual(now, until, spin);
+            return;
+        }
         match &self.redundant {
-            Some(redundant) => ringcat_link::wait(&[&self.main, redundant], until.0, self.mode),
-            None => ringcat_link::wait(&[&self.main], until.0, self.mode),
+            Some(redundant) => ringcat_link::wait_from(&[&self.main, redundant], now.0, until.0, self.mode),
+            None => ringcat_link::wait_from(&[&self.main], now.0, until.0, self.mode),
         };
     }
 
+    #[inline(always)]
     fn sleep(&mut self, until: Instant) {
         match self.mode {
             // A processor that is spun on stays awake and answers at once.

@@ -19,6 +19,14 @@ pub(crate) struct Rate {
     pub status: DomainStatus,
 }
 
+impl Rate {
+    /// Whether the domain is due in a cycle. Most have the shortest period: no division then.
+    #[inline(always)]
+    pub fn is_due(&self, cycle: u64) -> bool {
+        self.divider == 1 || cycle.is_multiple_of(self.divider)
+    }
+}
+
 /// The images of all domains, and the states of domains and inputs.
 #[derive(Debug)]
 pub struct ProcessData<'a> {
@@ -47,7 +55,7 @@ impl ProcessData<'_> {
 
     /// Whether a domain is due in this cycle.
     pub fn is_due(&self, domain: DomainId) -> bool {
-        self.rates.get(domain.0).is_some_and(|rate| self.cycle.is_multiple_of(rate.divider))
+        self.rates.get(domain.0).is_some_and(|rate| rate.is_due(self.cycle))
     }
 
     /// Value of an entry, zero-extended; [`ProcessData::get`] knows its type.

@@ -5,8 +5,8 @@
 //! bus behind it.
 
 use std::future::Future;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -54,6 +54,8 @@ type Request = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
 #[derive(Debug, Default)]
 struct Published {
     settled: AtomicBool,
+    /// Events that wait to be fetched.
+    waiting: AtomicUsize,
     rest: Mutex<Rest>,
 }
 
@@ -92,7 +94,7 @@ impl SupervisorThread {
         L: Links + Send + 'static,
     {
         let (requests, incoming) = channel();
-        let (outgoing, events) = sync_channel(EVENTS);
+        let (outgoing, events) = channel();
         let published = Arc::new(Published::default());
         let window = Arc::new(Window::new(options.acyclic_bytes));
         let options = options.clone();
@@ -300,7 +302,9 @@ impl SupervisorThread {
 
     /// Takes the oldest event.
     pub fn pop_event(&self) -> Option<TimedEvent> {
-        self.0.events.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok()
+        let event = self.0.events.lock().unwrap_or_else(PoisonError::into_inner).try_recv().ok()?;
+        self.0.published.waiting.fetch_sub(1, Ordering::AcqRel);
+        Some(event)
     }
 
     /// Counters of everything but process data, at most some milliseconds old.
@@ -378,7 +382,7 @@ struct Worker<L> {
     window: Arc<Window>,
     asked: Vec<Request>,
     tasks: Vec<Task>,
-    events: SyncSender<TimedEvent>,
+    events: Sender<TimedEvent>,
     events_dropped: u64,
     failures: Failures,
     published: Arc<Published>,
@@ -438,7 +442,10 @@ impl<L: Links> Worker<L> {
         while let Some(event) = self.engine.pop_event(now) {
             self.failures.observe(&event);
             any |= !matches!(event.event, Event::Skipped { .. } | Event::Domain { .. });
-            if self.events.try_send(event).is_err() {
+            // A bounded channel would keep memory for as many from the beginning.
+            let has_room = self.published.waiting.fetch_add(1, Ordering::AcqRel) < EVENTS;
+            if !has_room || self.events.send(event).is_err() {
+                self.published.waiting.fetch_sub(1, Ordering::AcqRel);
                 self.events_dropped += 1;
             }
         }

@@ -65,8 +65,8 @@ impl<L: Links> Links for Tee<L> {
         })
     }
 
-    fn received_at(&self) -> Option<Instant> {
-        self.links.received_at()
+    fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {
+        self.links.received_at(sent_at, now)
     }
 
     fn carrier(&self, link: Link) -> Option<bool> {
@@ -75,6 +75,10 @@ impl<L: Links> Links for Tee<L> {
 
     fn wait(&mut self, until: Instant) {
         self.links.wait(until);
+    }
+
+    fn wait_from(&mut self, now: Instant, until: Instant) {
+        self.links.wait_from(now, until);
     }
 
     fn sleep(&mut self, until: Instant) {

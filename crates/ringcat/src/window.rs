@@ -70,11 +70,13 @@ impl Window {
     }
 
     /// Says when cyclic frames leave next.
+    #[inline(always)]
     pub fn expect_cycle(&self, at: Instant) {
         self.next_cycle.store(at.0, Ordering::Relaxed);
     }
 
     /// Notes a frame of `length` bytes without FCS that leaves now, or as soon as the interface is free.
+    #[inline(always)]
     pub fn occupy(&self, half: Half, now: Instant, length: usize) {
         let until = self.free_at(now).0.saturating_add(wire_time_ns(length));
         self.free[half as usize].store(until, Ordering::Relaxed);
@@ -92,6 +94,7 @@ impl Window {
         if of.load(Ordering::Relaxed) == next { spent.load(Ordering::Relaxed) } else { 0 }
     }
 
+    #[inline(always)]
     fn free_at(&self, now: Instant) -> Instant {
         let [cyclic, acyclic] = &self.free;
         Instant(now.0.max(cyclic.load(Ordering::Relaxed)).max(acyclic.load(Ordering::Relaxed)))

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::env;
 use std::fs;
 use std::io::{self, Error, ErrorKind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Cost of a run of a program.
@@ -85,7 +85,7 @@ pub fn is_installed() -> bool {
 /// # Errors
 /// Valgrind or the program fails, or the output cannot be read.
 pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
-    profile(&[], arguments, Command::new("valgrind"))
+    profile(Command::new("valgrind"), &[], &env::current_exe()?, arguments)
 }
 
 /// As [`profile_self`], but counts only within functions of this name; `*` matches any text.
@@ -93,26 +93,34 @@ pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
 /// # Errors
 /// As [`profile_self`].
 pub fn profile_self_within(function: &str, arguments: &[String]) -> io::Result<Profile> {
-    profile(&[format!("--toggle-collect={function}")], arguments, Command::new("valgrind"))
+    profile_program_within(Command::new("valgrind"), &[function], &env::current_exe()?, arguments)
 }
 
-/// As [`profile_self_within`], with a command that runs valgrind elsewhere.
+/// As [`profile_self_within`], of any program, within several functions that do not call each other, and with a command
+/// that runs valgrind elsewhere.
 ///
 /// # Errors
 /// As [`profile_self`].
-pub fn profile_elsewhere_within(valgrind: Command, function: &str, arguments: &[String]) -> io::Result<Profile> {
-    profile(&[format!("--toggle-collect={function}")], arguments, valgrind)
+pub fn profile_program_within(
+    valgrind: Command,
+    functions: &[&str],
+    program: &Path,
+    arguments: &[String],
+) -> io::Result<Profile> {
+    let options: Vec<String> = functions.iter().map(|function| format!("--toggle-collect={function}")).collect();
+    profile(valgrind, &options, program, arguments)
 }
 
-fn profile(options: &[String], arguments: &[String], mut valgrind: Command) -> io::Result<Profile> {
-    let directory = Directory::new(&arguments.join("-"))?;
+fn profile(mut valgrind: Command, options: &[String], program: &Path, arguments: &[String]) -> io::Result<Profile> {
+    let directory = Directory::new(&arguments.join("-").replace('/', "-"))?;
     let out = directory.0.join("callgrind.out");
     let status = valgrind
         .args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--compress-pos=no", "--dump-instr=yes"])
         .args(options)
         .arg(format!("--callgrind-out-file={}", out.display()))
-        .arg(env::current_exe()?)
+        .arg(program)
         .args(arguments)
+        .stdin(Stdio::null())
         .stdout(Stdio::null())
         .status()?;
     if !status.success() {

@@ -23,7 +23,7 @@ use ringcat::{
     AcyclicHalf, AlState, Application, DomainId, LastOutputs, MainDevice, Options, ProcessData, SupervisorThread,
     automatic, realtime,
 };
-use scenarios::callgrind::{Profile, is_installed, profile_elsewhere_within};
+use scenarios::callgrind::{Profile, is_installed, profile_program_within};
 use scenarios::cpu_time::process_cpu_time;
 use scenarios::figures::{Figures, verdict};
 use scenarios::namespaces::{Namespaces, Server};
@@ -49,14 +49,18 @@ const SHOWN: usize = 14;
 /// The function within which callgrind counts.
 const WITHIN: &str = "*measured_cycle*";
 
-/// Maximum instructions of a cycle with two threads, by the number of servos; SOEM in C takes 890 and 1,333 (issue 16).
-const BARS: [(usize, f64); 2] = [(1, 890.0), (50, 1000.0)];
-/// Goal with one servo.
-const AIM: f64 = 800.0;
-/// Maximum CPU time with 50 servos at 1 kHz, in percent of a processor.
-const CPU_BARS: [(&str, f64); 2] = [("block", 8.0), ("hybrid", 15.0)];
-/// Maximum resident memory with 50 servos.
-const MEMORY_BAR_MB: f64 = 5.0;
+/// SOEM's functions that send and receive a cycle's process data, and half of the cycles that they are called for.
+const SOEM_FUNCTIONS: [&str; 2] = ["ecx_main_send_processdata", "ecx_receive_processdata_group"];
+const SOEM_CYCLES: u64 = 200;
+
+/// Maximum instructions of a cycle with two threads, by the number of servos, and the goals of issue 16: SOEM in C takes
+/// 890 and 1,333.
+const BARS: [(usize, f64, f64); 2] = [(1, 1_180.0, 890.0), (50, 1_600.0, 1_000.0)];
+/// Maximum CPU time with 50 servos at 1 kHz, in percent of a processor, and the goals of issue 16. A machine that does
+/// other work at the same time makes each wake-up longer: the bars leave room for that.
+const CPU_BARS: [(&str, f64, f64); 2] = [("block", 12.0, 8.0), ("hybrid", 20.0, 15.0)];
+/// Maximum resident memory with 50 servos, and the goal.
+const MEMORY_BAR_MB: (f64, f64) = (5.9, 5.0);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -234,7 +238,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
     let mut figures = Figures::new("user-side instructions per cycle on a packet socket, blocking receive");
     println!("  a cycle: wait, receive, evaluate, copy, work, pack, send, publish, sleep; clocks by vDSO not included");
     let mut profiles = Vec::new();
-    for (servos, bar) in BARS {
+    for (servos, bar, goal) in BARS {
         let hop_ns = RESIDENCE_NS / servos as u64;
         for threads in ["two", "one"] {
             let _simulator = simulate(namespaces, servos, hop_ns)?;
@@ -242,19 +246,11 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
             let per_cycle = profile.instructions as f64 / COUNTED as f64;
             let name = format!("{servos} servo{}, {threads} thread{}", s(servos), s(usize::from(threads == "two") + 1));
             if threads == "two" {
-                figures.at_most(&name, per_cycle, bar, "instructions");
-                if servos == 1 {
-                    figures.show("   aimed at", format!("{AIM} instructions"));
-                }
+                figures.at_most_towards(&name, per_cycle, bar, goal, "instructions");
             } else {
                 figures.show(&name, format!("{per_cycle:.0} instructions"));
             }
-            for (what, calls) in [
-                ("clock reads", "clock_gettime"),
-                ("waits for a frame (ppoll)", "ppoll"),
-                ("sleeps (clock_nanosleep)", "clock_nanosleep"),
-                ("sends", "send"),
-            ] {
+            for (what, calls) in [("clock reads", "clock_gettime"), ("system calls: wait, send, sleep", "syscall")] {
                 let is = |name: &str| name.split('@').next() == Some(calls);
                 let calls = profile.entries.iter().filter(|(name, _)| is(name)).map(|(_, count)| count).sum::<u64>();
                 let calls = calls as f64 / COUNTED as f64;
@@ -263,6 +259,11 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
             if threads == "two" {
                 profiles.push((name, profile));
             }
+        }
+        let _simulator = simulate(namespaces, servos, hop_ns)?;
+        if let Some(per_cycle) = soem(namespaces, servos)? {
+            let name = format!("{servos} servo{}, SOEM (pysoem): send and receive alone, no sleep", s(servos));
+            figures.show(&name, format!("{per_cycle:.0} instructions"));
         }
     }
     let met = figures.print();
@@ -276,7 +277,21 @@ fn s(count: usize) -> &'static str {
 
 fn profile(namespaces: &Namespaces, threads: &str) -> Tried<Profile> {
     let arguments = ["run", threads, "block", &PERIOD_US.to_string(), &COUNTED.to_string()].map(str::to_owned);
-    profile_elsewhere_within(namespaces.near("valgrind"), WITHIN, &arguments).map_err(said)
+    let program = std::env::current_exe().map_err(said)?;
+    profile_program_within(namespaces.near("valgrind"), &[WITHIN], &program, &arguments).map_err(said)
+}
+
+/// Instructions of SOEM's two functions of a cycle, as pysoem calls them, Python left out; `None` without pysoem. They
+/// have no sleep until the next cycle, and publish nothing.
+fn soem(namespaces: &Namespaces, servos: usize) -> Tried<Option<f64>> {
+    let Ok(python) = std::env::var("RINGCAT_PYTHON") else { return Ok(None) };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_client.py");
+    let arguments = ["-B", script, "near0", &servos.to_string(), &SOEM_CYCLES.to_string()].map(str::to_owned);
+    let valgrind = namespaces.near("valgrind");
+    let profile =
+        profile_program_within(valgrind, &SOEM_FUNCTIONS, &PathBuf::from(python), &arguments).map_err(said)?;
+    let cycles = profile.entries.get(SOEM_FUNCTIONS[1]).copied().unwrap_or_default();
+    Ok((cycles > 0).then(|| profile.instructions as f64 / cycles as f64))
 }
 
 /// Instructions per cycle by function, and by source file; inlined code counts for its own file.
@@ -321,14 +336,17 @@ fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
             word.and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| format!("no \"{name}\" in {told:?}"))
         };
         let name = format!("receive {mode}, {} of {CPU_CYCLES} cycles disturbed", value("disturbed")?);
-        match CPU_BARS.iter().find(|(bar, _)| *bar == mode) {
-            Some((_, bar)) => figures.at_most(&name, value("cpu percent")?, *bar, "% of a processor"),
+        match CPU_BARS.iter().find(|(bar, ..)| *bar == mode) {
+            Some((_, bar, goal)) => {
+                figures.at_most_towards(&name, value("cpu percent")?, *bar, *goal, "% of a processor");
+            }
             None => figures.show(&name, format!("{} % of a processor", value("cpu percent")?)),
         }
         if mode == "block" {
             let parts = told.lines().filter(|line| line.starts_with("of it")).map(str::to_owned);
             memory = parts.collect();
-            figures.at_most("resident memory", value("resident")? / 1024.0, MEMORY_BAR_MB, "MB");
+            let (bar, goal) = MEMORY_BAR_MB;
+            figures.at_most_towards("resident memory", value("resident")? / 1024.0, bar, goal, "MB");
         }
     }
     let met = figures.print();
