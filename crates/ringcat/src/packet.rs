@@ -15,8 +15,8 @@ pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
 
 use crate::links::Links;
 
-/// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on the wire at once
-/// ([`ringcat_engine::ring::MAX_IN_FLIGHT`]).
+/// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on
+/// the wire at once ([`ringcat_engine::ring::MAX_IN_FLIGHT`]).
 const RING_FRAMES: u32 = 128;
 const _: () = assert!(RING_FRAMES as usize > ringcat_engine::ring::MAX_IN_FLIGHT);
 

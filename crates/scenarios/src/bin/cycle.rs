@@ -22,8 +22,8 @@ use scenarios::figures::{Figures, verdict};
 
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
-/// Maximum instructions of a cycle with one SubDevice on one link, 1 % above what is measured with LWR and LRD, and the goal
-/// (issue 16; its limit of 650 holds for all others).
+/// Maximum instructions of a cycle with one SubDevice on one link, 1 % above what is measured with LWR and LRD, and the
+/// goal (issue 16; its limit of 650 holds for all others).
 const BAR: f64 = 667.0;
 const AIM: f64 = 500.0;
 /// Maximum cost of 50 SubDevices, as a multiple of one SubDevice with as many bytes.
