@@ -52,7 +52,8 @@ pub(super) fn junction(event: &Event, names: &Names) -> Option<String> {
              declare their connections (--junction strict)"
         ),
         Event::JunctionUnknown { rings } => format!(
-            "unknown rings behind junctions: {rings}. Their breaks are reported as crossed lines until the next scan"
+            "{rings} rings behind junctions closed that are not known: their breaks are reported as crossed lines \
+             until the next scan"
         ),
         Event::JunctionsBlocked { blocked: true, breaks: 0 } => {
             "no frame comes back: two rings behind junctions broke at once, or the first SubDevice failed. Each ring \
