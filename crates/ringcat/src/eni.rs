@@ -1,7 +1,7 @@
 //! Networks from an ENI (EtherCAT Network Information, ETG.2100): the file says what is configured, the engine how.
 //!
 //! `ringcat-config` reads the file; [`EniImage`] is its process image at run time; [`segment`] makes a simulated
-//! segment of it, for those who want to try it without hardware. `docs/eni.md` has it all.
+//! segment of it, to try it without hardware. See `docs/eni.md`.
 
 mod cables;
 mod file;

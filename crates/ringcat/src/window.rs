@@ -167,7 +167,7 @@ mod tests {
 
     // covers: threads
     #[test]
-    fn a_cyclic_half_that_has_fallen_silent_keeps_nobody_from_the_wire() {
+    fn a_silent_cyclic_half_does_not_block_acyclic_frames() {
         let window = Window::default();
         window.expect_cycle(Instant(MS));
         assert_eq!(window.bytes(Instant(MS + SILENCE_NS)), 0);

@@ -1,8 +1,8 @@
 //! Cables and their effect on a frame (issue 2, part 3; protocol 11.4).
 //!
 //! A cable has two legs, one for each direction. A leg has its far end, its propagation delay, the start of its signal,
-//! and the faults for the next frames. This module determines the delivery of a frame at the time at which its last bit is
-//! due at the far end; the network assigns senders and receivers.
+//! and the faults for the next frames. This module determines the delivery of a frame at the time at which its last bit
+//! is due at the far end; the network assigns senders and receivers.
 
 use core::fmt;
 use core::time::Duration;

@@ -178,9 +178,9 @@ fn in_a_cut_ring_both_copies_make_one_answer() {
 #[test]
 fn a_missing_subdevice_keeps_its_last_inputs_and_the_others_are_new_at_once() {
     let mut ring = Ring::new();
-    for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
+    for (answering, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
         let [mut main, redundant] = ring.send();
-        meet(&mut main, who, base);
+        meet(&mut main, answering, base);
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
         ring.judge();
@@ -195,10 +195,10 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
     for missing in 0..3 {
         let mut ring = Ring::new();
         let there: Vec<usize> = (0..3).filter(|subdevice| *subdevice != missing).collect();
-        for (who, base) in [(&[0, 1, 2][..], 0x10), (&there, 0x20)] {
-            ring.board.set_taking_part(missing, who.len() == 3);
+        for (answering, base) in [(&[0, 1, 2][..], 0x10), (&there, 0x20)] {
+            ring.board.set_taking_part(missing, answering.len() == 3);
             let [mut main, redundant] = ring.send();
-            meet(&mut main, who, base);
+            meet(&mut main, answering, base);
             ring.receive(Link::Redundant, &main);
             ring.receive(Link::Main, &redundant);
             ring.judge();
@@ -217,11 +217,11 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
 #[test]
 fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
     let mut ring = Ring::new();
-    for (who, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
+    for (answering, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
         // The engine still assumes that 2 is absent and 1 present.
-        ring.board.set_taking_part(2, who.len() == 3);
+        ring.board.set_taking_part(2, answering.len() == 3);
         let [mut main, redundant] = ring.send();
-        meet(&mut main, who, base);
+        meet(&mut main, answering, base);
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
         ring.judge();

@@ -123,7 +123,7 @@ mod tests {
 
     // covers: eni-run
     #[test]
-    fn what_somebody_writes_becomes_bits_where_it_fits() {
+    fn a_written_value_becomes_bits_if_it_fits() {
         let bits = |name: &str, text: &str, length| VariableType::named(name).parse(text, length);
         assert_eq!(bits("BOOL", "true", 1), Some(1));
         assert_eq!(bits("INT", "-2", 16), Some(0xFFFE));

@@ -348,7 +348,7 @@ fn what_cannot_be_passed_on_is_answered_with_an_error_reply() {
 
 // covers: gateway
 #[test]
-fn a_client_that_leaves_in_a_transfer_loses_it_and_nobody_waits_for_that() {
+fn a_client_that_leaves_during_a_transfer_loses_only_that_transfer() {
     let bench = Bench::new(8);
     let (mut leaving, mut pausing, mut patient) = (bench.tcp(), bench.udp(), bench.tcp());
     leaving.begin_upload();

@@ -40,7 +40,7 @@ fn outputs(network: &Network) -> Vec<Vec<u8>> {
 
 // covers: stop
 #[test]
-fn an_orderly_stop_zeroes_outputs_and_takes_everybody_to_init() {
+fn an_orderly_stop_zeroes_outputs_and_sets_all_to_init() {
     let application = in_op();
     let before = application.acyclic_counters();
     let mut main_device = application.stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");

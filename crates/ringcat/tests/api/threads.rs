@@ -37,7 +37,7 @@ fn until(what: &str, mut holds: impl FnMut() -> bool) {
 
 // covers: threads
 #[test]
-fn two_threads_bring_everybody_to_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
+fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     let (cyclic, acyclic) = SharedSegment::halves(network());
     let plant = cyclic.plant();
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
@@ -120,7 +120,7 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
 /// each question, however idle the machine is.
 // covers: threads
 #[test]
-fn who_asks_one_thing_after_the_other_does_not_wait_a_millisecond_for_each() -> Result<(), Error> {
+fn consecutive_requests_do_not_wait_a_millisecond_each() -> Result<(), Error> {
     const QUESTIONS: u32 = 20;
     let (_cyclic, acyclic) = SharedSegment::halves(network());
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;

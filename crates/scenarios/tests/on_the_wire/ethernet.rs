@@ -185,7 +185,7 @@ fn two_eoe_devices_serve_ping_and_downloads_bridged_and_routed() {
     );
     assert!(errors.contains("network interface eoe0s1 leads to SubDevice 1"), "{errors}");
     assert!(errors.contains("eoe0a7: no carrier, its SubDevice is away"), "{errors}");
-    assert_eq!(errors.matches("eoe0s1: somebody removed it; it is made anew").count(), 1, "{errors}");
+    assert_eq!(errors.matches("eoe0s1: removed by another program; it is made again").count(), 1, "{errors}");
     assert!(output.contains("stopped: outputs zero"), "{output}{errors}");
     let links = bench.links_main();
     assert!(INTERFACES.iter().all(|name| line(&links, name).is_none()), "{links}");

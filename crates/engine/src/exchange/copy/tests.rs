@@ -84,9 +84,9 @@ fn a_stale_source_is_refused_its_target_holds_the_last_value_or_is_zero() {
     let hold = CopyRule::new(entry(0, INPUTS, 8), entry(1, 0, 8));
     let zero = CopyRule { when_stale: WhenStale::Zero, ..CopyRule::new(entry(0, INPUTS + 8, 8), entry(1, 8, 8)) };
     let older = CopyRule { max_age: 2, ..CopyRule::new(entry(0, INPUTS + 16, 8), entry(1, 16, 8)) };
-    let whom =
+    let to_outputs =
         CopyRule { max_age: 2, when_stale: WhenStale::Zero, ..CopyRule::new(entry(0, INPUTS, 8), entry(0, 0, 8)) };
-    exchange.set_copies(&[hold, zero, older, whom]).unwrap();
+    exchange.set_copies(&[hold, zero, older, to_outputs]).unwrap();
     cycle(&mut exchange, &mut now, [Some(&[1, 2, 3]), Some(&[])]);
     let fresh = cycle(&mut exchange, &mut now, [None, Some(&[])]);
     assert_eq!((&fresh[1][..3], fresh[0][0]), (&[1, 2, 3][..], 1));

@@ -193,7 +193,7 @@ fn names_fit(world: &World, mark: Mark) -> bool {
         }
         Event::BreakLocated { cable } | Event::RingClosed { place: Some(cable), .. } => {
             let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(SubDeviceId(it)), stations[it]));
-            let occupants = timed.occupants.map(|who| who.map(|who| (who.declared, who.station)));
+            let occupants = timed.occupants.map(|both| both.map(|occupant| (occupant.declared, occupant.station)));
             occupants == cable.positions().map(|node| expected(node?))
         }
         _ => true,
