@@ -68,7 +68,7 @@ fn a_local_ring_break_and_repair_are_reported_in_both_junction_modes() {
             }
         }
         let (output, errors) = run.interrupt();
-        let learned = output.matches("ring behind a junction: from SubDevice 4").count();
+        let learned = output.matches("ring behind a junction found: its closing cable is from SubDevice 4").count();
         assert_eq!(learned, usize::from(mode == "automatic"), "{mode}: {output}{errors}");
         for (cable, ends) in &BROKEN {
             for words in ["Line break between", "Line is fixed between"] {
