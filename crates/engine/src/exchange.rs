@@ -7,8 +7,8 @@
 //! A flight (one round trip of a frame) ends when its working counters are as expected, when all its copies are
 //! received, or at its deadline. Inputs are delivered as copies arrive, per SubDevice: see `place`.
 //!
-//! Each step has a short way for what mostly happens: one frame per cycle on one link that comes back with the results of
-//! the one before. It is inlined on purpose, all else is not (bins `cycle`, `socket_cycle`).
+//! Each step has a fast path for the usual cycle: one frame on one link that returns with the results of the frame
+//! before. Only the fast path is inlined (bins `cycle`, `socket_cycle`).
 
 mod access;
 mod clocks;
@@ -25,6 +25,7 @@ mod place;
 mod presence;
 mod template;
 mod usual;
+mod words;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;

@@ -194,8 +194,8 @@ pub fn poll(polled: &mut [libc::pollfd], mut timeout: libc::timespec) -> bool {
     let (places, count, mask) = (polled.as_mut_ptr(), polled.len(), std::ptr::null::<libc::sigset_t>());
     let timeout = std::ptr::from_mut(&mut timeout);
     #[cfg(target_pointer_width = "64")]
-    // SAFETY: the pointer refers to `count` live entries; the kernel may write the remaining time to the live timeout; the
-    // signal mask stays as it is.
+    // SAFETY: the pointer refers to `count` live entries; the kernel may write the remaining time to the live timeout;
+    // the signal mask is not changed.
     let ready = unsafe { libc::syscall(libc::SYS_ppoll, places, count, timeout, mask, 8usize) };
     #[cfg(not(target_pointer_width = "64"))]
     // SAFETY: as above.

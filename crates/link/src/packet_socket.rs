@@ -201,8 +201,8 @@ impl PacketSocket {
         }
     }
 
-    /// When the kernel received the last frame returned, on the monotonic clock: between these two times. A stamp outside
-    /// shows that the Unix clock was set; its offset is read again then. No system call.
+    /// Time at which the kernel received the last returned frame, on the monotonic clock: between these two times. A
+    /// stamp outside shows that the Unix clock was set; its offset is read again then. No system call.
     #[inline(always)]
     pub fn received_at_ns(&mut self, after_ns: u64, before_ns: u64) -> u64 {
         let stamp = self.ring.stamp_unix_ns();

@@ -11,7 +11,6 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use ringcat_wire::address::Wkc;
-use ringcat_wire::datagram::{CIRCULATING, OVERHEAD};
 
 use super::clocks::{Places, Seen};
 use super::counters::Tally;
@@ -20,8 +19,9 @@ use super::place::Place;
 use super::presence::Presence;
 use super::template::Template;
 use super::usual::Usual;
+use super::words::{Header, header_at, supervision_at, u16_at};
 use crate::board::{Board, Supervision};
-use crate::layout::{PlannedFrame, SUPERVISION_LEN};
+use crate::layout::PlannedFrame;
 use crate::link::Link;
 use crate::ring::{Arrivals, Class, FrameCopy, Identity, Sequence};
 use crate::time::Instant;
@@ -38,16 +38,6 @@ pub(crate) enum Step {
     /// Its content is not what was sent.
     Corrupt,
 }
-
-/// The parts of a datagram's first eight bytes that no controller changes (protocol 1.5): command, Idx, length, M bit.
-#[derive(Debug)]
-struct Header {
-    at: usize,
-    sent: u64,
-}
-
-/// Address and C bit are not part of [`Header`].
-pub(super) const HEADER_MASK: u64 = 0x0000_0000_0000_FFFF | !(CIRCULATING as u64) << 48;
 
 /// Stage of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,7 +117,7 @@ impl CyclicFrame {
     ) -> CyclicFrame {
         let Template { bytes, headers, places, presence, clocks, supervision_at } =
             Template::new(identity, planned, first);
-        let usual = || usual_of(bytes.len(), &headers, &places, supervision_at);
+        let usual = || Usual::new(bytes.len(), &headers, places.iter().map(|place| place.wkc_at), supervision_at);
         CyclicFrame {
             usual: [usual(), usual()],
             all_links,
@@ -503,40 +493,4 @@ impl CyclicFrame {
     pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
         self.places.iter().any(|place| place.outputs.holds(&bytes))
     }
-}
-
-/// The [`Header`] of the datagram at an offset; zero for bytes beyond the end.
-fn header_at(bytes: &[u8], at: usize) -> u64 {
-    word_at(bytes, at) & HEADER_MASK
-}
-
-/// Eight bytes; beyond the end, zero.
-#[inline(always)]
-pub(super) fn word_at(bytes: &[u8], at: usize) -> u64 {
-    let word = bytes.get(at..at + size_of::<u64>()).and_then(<[u8]>::first_chunk);
-    word.map_or(0, |word| u64::from_le_bytes(*word))
-}
-
-/// Places of a frame that show what SubDevices did with it.
-fn usual_of(length: usize, headers: &[usize], places: &[Place], supervision: Option<usize>) -> Usual {
-    Usual::new(length, headers, places.iter().map(|place| place.wkc_at), supervision)
-}
-
-/// Result of the supervision datagram of a copy, packed.
-fn supervision_at(bytes: &[u8], at: usize, sent_on: Link) -> u64 {
-    let datagram = bytes.get(at..).and_then(<[u8]>::first_chunk::<{ OVERHEAD + SUPERVISION_LEN }>);
-    let Some(&[.., irq_low, irq_high, al_low, _, wkc_low, wkc_high]) = datagram else { return 0 };
-    let mut seen = Supervision { irq: u16::from_le_bytes([irq_low, irq_high]), ..Supervision::default() };
-    seen.al_status[sent_on.index()] = al_low;
-    let wkc = Wkc(u16::from_le_bytes([wkc_low, wkc_high]));
-    match sent_on {
-        Link::Main => seen.main = wkc,
-        Link::Redundant => seen.redundant = wkc,
-    }
-    seen.pack()
-}
-
-/// Two bytes; beyond the end, zero.
-fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |bytes| u16::from_le_bytes(*bytes))
 }

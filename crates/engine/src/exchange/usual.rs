@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::datagram::{OVERHEAD, WKC_LEN};
 
-use super::flight::{HEADER_MASK, word_at};
+use super::words::{HEADER_MASK, word_at};
 use crate::layout::SUPERVISION_LEN;
 
 /// Eight bytes of a frame, of which some count.

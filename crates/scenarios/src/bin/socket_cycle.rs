@@ -53,8 +53,8 @@ const WITHIN: &str = "*measured_cycle*";
 const SOEM_FUNCTIONS: [&str; 2] = ["ecx_main_send_processdata", "ecx_receive_processdata_group"];
 const SOEM_CYCLES: u64 = 200;
 
-/// Maximum instructions of a cycle with two threads, by the number of servos, and the goals of issue 16: SOEM in C takes
-/// 890 and 1,333.
+/// Maximum instructions of a cycle with two threads, by the number of servos, and the goals of issue 16: SOEM in C
+/// takes 890 and 1,333.
 const BARS: [(usize, f64, f64); 2] = [(1, 1_180.0, 890.0), (50, 1_600.0, 1_000.0)];
 /// Maximum CPU time with 50 servos at 1 kHz, in percent of a processor, and the goals of issue 16. A machine that does
 /// other work at the same time makes each wake-up longer: the bars leave room for that.
