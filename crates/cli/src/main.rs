@@ -65,7 +65,7 @@ fn first_steps() -> String {
 
 /// RingCAT: an EtherCAT MainDevice for Linux.
 #[derive(Debug, Parser)]
-#[command(version, about = "RingCAT: an EtherCAT MainDevice for Linux", after_help = first_steps())]
+#[command(name = "ringcat", version, about = "RingCAT: an EtherCAT MainDevice for Linux", after_help = first_steps())]
 #[command(max_term_width = 100)]
 struct Arguments {
     /// Print JSON for programs, one object per line
@@ -163,11 +163,21 @@ fn explain(error: &clap::Error) -> ExitCode {
     if std::env::args_os().any(|argument| argument == "--json") {
         output::switch_to_json(None);
     }
-    let text = error.to_string();
-    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let first = lines.next().unwrap_or_default();
-    let message = first.strip_prefix("error: ").unwrap_or(first);
-    conclude_error_told(message, lines.map(str::to_owned).collect())
+    let (message, details) = message_of(&error.to_string());
+    conclude_error_told(&message, details)
+}
+
+/// The message of an error of the command line, and its further lines. What a first line that ends with a colon
+/// announces, such as the options that are missing, is part of the message.
+fn message_of(text: &str) -> (String, Vec<String>) {
+    let mut lines = text.lines();
+    let first = lines.by_ref().map(str::trim).find(|line| !line.is_empty()).unwrap_or_default();
+    let mut message = first.strip_prefix("error: ").unwrap_or(first).to_owned();
+    if message.ends_with(':') {
+        let announced: Vec<&str> = lines.by_ref().map(str::trim).take_while(|line| !line.is_empty()).collect();
+        message = format!("{message} {}", announced.join(", "));
+    }
+    (message, lines.map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect())
 }
 
 #[cfg(test)]
@@ -179,6 +189,20 @@ mod tests {
     /// All commands, those of `bench` too.
     fn commands(of: &clap::Command) -> Vec<&clap::Command> {
         of.get_subcommands().flat_map(|command| std::iter::once(command).chain(commands(command))).collect()
+    }
+
+    #[test]
+    fn the_version_has_the_name_of_the_program() {
+        assert_eq!(Arguments::command().render_version(), format!("ringcat {}\n", env!("CARGO_PKG_VERSION")));
+    }
+
+    #[test]
+    fn the_message_about_the_command_line_names_each_missing_option() {
+        let message = |line: &[&str]| message_of(&Arguments::try_parse_from(line).unwrap_err().to_string());
+        let (text, details) = message(&["ringcat", "capture"]);
+        assert_eq!(text, "the following required arguments were not provided: --main <IF>, --out <FILE.pcapng>");
+        assert!(details[0].starts_with("Usage: ringcat capture"), "{details:?}");
+        assert_eq!(message(&["ringcat", "scan", "--bogus"]).0, "unexpected argument '--bogus' found");
     }
 
     // covers: run

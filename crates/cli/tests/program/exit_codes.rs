@@ -35,7 +35,7 @@ const FILES: [(&str, &str); 7] = [
 const SITUATIONS: [(&str, Output, i32, &str); 46] = [
     // The command line.
     ("nonsense", Read, 2, "unrecognized subcommand 'nonsense'"),
-    ("scan", Read, 2, "the following required arguments were not provided:"),
+    ("scan", Read, 2, "the following required arguments were not provided: --main <IF>"),
     ("run --main lo --cycle 1us", Read, 2, "invalid value '1us' for '--cycle <TIME>': expected 10us to 1s"),
     ("run --main lo --cycle 100s", Read, 2, "invalid value '100s' for '--cycle <TIME>': expected 10us to 1s"),
     ("run --main lo --cycle 0ms", Read, 2, "invalid value '0ms' for '--cycle <TIME>': expected more than zero"),
@@ -57,7 +57,7 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         "invalid value 'last' for '--reference <CLOCK>': expected first, sync or",
     ),
     ("demo --cycle-us 10", Read, 2, "invalid value '10' for '--cycle-us <US>': 10 is not in 50..=1000000"),
-    ("sim --main lo", Read, 2, "the following required arguments were not provided:"),
+    ("sim --main lo", Read, 2, "the following required arguments were not provided: --segment <FILE.toml>"),
     // One interface given twice.
     ("run --main lo --redundant lo", Read, 2, "--main and --redundant name one interface, lo"),
     ("scan --main lo --redundant lo", Read, 2, "--main and --redundant name one interface, lo"),
