@@ -1,7 +1,7 @@
 //! Short runs of random segments under random faults, each from its seed: nothing panics, nothing hangs, and after the
 //! end of the faults all SubDevices are in OP and all domains complete.
 //!
-//! `SEED=17 cargo test -p scenarios --test virtual_time explorer::environment -- --nocapture` runs one seed,
+//! `SEED=17 cargo test -p scenarios --test virtual_time explorer::seeds -- --nocapture` runs one seed,
 //! `SEED=1000..2000` many.
 
 use std::ops::Range;
