@@ -168,6 +168,24 @@ pub use ringcat_wire::mailbox::soe::Idn;
 pub use ringcat_wire::register::LoopControl;
 pub use ringcat_wire::source_address::MacCodec;
 
+pub use ringcat_engine::config::SyncManagerOverride;
+pub use ringcat_engine::event::history::Incident;
+pub use ringcat_engine::exchange::Exchange;
+pub use ringcat_engine::info::{ControllerInfo, InfoWarning, PdoInfo};
+pub use ringcat_engine::layout::LayoutError;
+pub use ringcat_engine::mail::eoe::EthernetStatus;
+pub use ringcat_engine::mail::stream::Overflow;
+pub use ringcat_engine::mail::{Conversation, Lane, MailCounters};
+pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice};
+pub use ringcat_engine::plan::{PlanFault, PlanProblem, PlanWarning, SmPlan};
+pub use ringcat_engine::procedures::al_state::StateError;
+pub use ringcat_engine::procedures::clocks::NotLocked;
+pub use ringcat_engine::procedures::configure::SetupError;
+pub use ringcat_engine::procedures::sii::program::SiiProgramError;
+pub use ringcat_engine::topology::Topology;
+#[cfg(feature = "packet")]
+pub use ringcat_link::recorder::Tap;
+
 #[cfg(feature = "eni")]
 pub use ringcat_config as config;
 #[cfg(feature = "packet")]

@@ -27,6 +27,8 @@ use crate::segment::start::Start;
 use crate::segment::{Observation, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
+pub use crate::segment::setup::SetupError;
+
 pub use error::{ConfigureError, StartupError};
 pub use register_error::{RegisterError, RegisterFailure, WrongValue};
 
