@@ -1,4 +1,4 @@
-//! From posted words and observations to events, without a bus.
+//! Tests from posted words and observations to events, without a bus.
 
 mod clocks;
 
@@ -38,10 +38,10 @@ const BEHIND: u8 = 0x59;
 
 const OP: Shown = (AlStatus { state: 8, error: false, identification: false, reserved: 0 }, AlStatusCode(0));
 
-/// A change that comes so long after another one is reported at once.
+/// A change this long after the previous one is reported at once.
 const QUIET: Duration = Duration::from_millis(50);
 
-/// A closed ring of so many SubDevices, all of them members and in OP.
+/// A closed ring of `n` SubDevices, all of them members in OP.
 struct Ring {
     segment: Segment,
     words: Words,
@@ -109,7 +109,7 @@ impl Ring {
         for member in &mut ring.segment.members {
             member.phase = Phase::Settled(AlState::Op);
         }
-        // Counts are known once they were the same several times; the first looks at all are no news.
+        // Counts become valid after several equal results; the first scans give no events.
         for _ in 0..6 {
             ring.cycle();
             ring.look(&vec![PASS; count]);
@@ -121,7 +121,7 @@ impl Ring {
         self.segment.observe(seen, self.now).0
     }
 
-    /// A cycle later.
+    /// The next cycle.
     fn cycle(&mut self) -> Vec<Effect> {
         self.now += Duration::from_millis(1);
         if let Some((number, _)) = &mut self.words.supervision {
@@ -132,7 +132,7 @@ impl Ring {
         self.observe(Observation::Words(words))
     }
 
-    /// A round of looks, in which all are in OP; 0 for one that is silent.
+    /// A round of scans with all in OP; 0 for a silent SubDevice.
     fn look(&mut self, high: &[u8]) -> Vec<Effect> {
         let (status, code) = OP;
         let looks: Vec<Look> = high
@@ -214,7 +214,7 @@ fn a_cut_cable_is_told_in_the_cycle_that_shows_it_and_its_place_by_the_next_look
 fn counts_of_the_closed_ring_are_not_taken_for_those_of_the_open_one() {
     let mut ring = Ring::closed(8);
     ring.now += QUIET;
-    // A frame without a supervision datagram has shown the cut; results of before it come in, one after the other.
+    // A frame without a supervision datagram has shown the cut; results from before the cut arrive one after the other.
     ring.counts(8, 0, RingState::Open);
     ring.words.ring.returned = None;
     for _ in 0..4 {

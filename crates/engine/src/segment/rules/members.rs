@@ -1,4 +1,5 @@
-//! What becomes of the declared SubDevices: each is a machine of its own, so that a hundred come back at once.
+//! State changes of the declared SubDevices: each is a state machine of its own, so that a hundred recover at the same
+//! time.
 
 use alloc::format;
 use alloc::rc::Rc;
@@ -24,26 +25,25 @@ use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::time::Instant;
 
-/// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been
+/// Consecutive scans without an answer after which a SubDevice is lost: at the moment of a cut a copy may have been
 /// processed by none.
 const SILENT_LOOKS: u8 = 2;
-/// Pause before a silent SubDevice is looked at again.
+/// Pause before a silent SubDevice is read again.
 const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
-/// Rounds in a row in which looks do not come back though process data does, or the other way round, before it is tried
+/// Consecutive rounds in which scans do not return though process data does, or the reverse, before it is tested
 /// whether frames hold too many datagrams.
 const BLIND_ROUNDS: u8 = 2;
 
 impl Segment {
-    /// Takes in a round of looks.
+    /// Processes a complete round of scans.
     pub(in crate::segment) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
         let Looked { asked, looks, before, unassigned, counted } = *looked;
         self.attention.round = Round::default();
         if asked.isolations != self.slot.isolations() {
-            // Some were out of reach on purpose meanwhile.
+            // Some SubDevices were put out of reach on purpose during the round.
             return self.attention.again_in(SECOND_LOOK_PAUSE, now);
         }
-        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way
-        // round.
+        // Either scan frames do not return though SubDevices process those of the exchange, or the reverse.
         let is_blind = match counted {
             Some(counted) if counted != Wkc(0) => looks.contains(&Look::Unknown),
             Some(_) | None => answers(looks) > 0,
@@ -53,14 +53,14 @@ impl Segment {
         let Some(counted) = counted else { return };
         let others = unassigned.iter().filter(|(_, look)| look.is_answer()).count();
         let (counted, answering) = (usize::from(counted.0), answers(looks) + others);
-        // When the count and the answers agree, a silent SubDevice is certainly not there.
+        // If the count agrees with the answers, a silent SubDevice is certainly absent.
         let needed = if counted == answering { 1 } else { SILENT_LOOKS };
         let is_certain = self.judge(looks, before, needed, now, effects);
         if needed == 1 {
             self.unassigned.retain(|it| !unassigned.contains(&(it.station, Look::Silent)));
         }
         if !is_certain {
-            // Certainty soon, and then again only when something changes.
+            // One quick repetition, and then the next scan only when something changes.
             self.attention.again_in(SECOND_LOOK_PAUSE, now);
         }
         let reported: RingState = self.attention.reported();
@@ -77,7 +77,7 @@ impl Segment {
         };
     }
 
-    /// Draws conclusions from what each member said. True where it is known of all whether they are there.
+    /// Derives member states from the answers. True if it is known of all whether they are present.
     fn judge(&mut self, looks: &[Look], before: &[Phase], needed: u8, now: Instant, effects: &mut Effects) -> bool {
         let mut certain = true;
         for (index, look) in looks.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Segment {
                         certain = false;
                     }
                 }
-                // It has got there since: what it said is not what it says now.
+                // The member reached this state after the answer was read: the answer is outdated.
                 (Look::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
                     member.silent = 0;
                     self.attention.again_in(SECOND_LOOK_PAUSE, now);
@@ -126,7 +126,7 @@ impl Segment {
                 effects.report(Event::StateError { subdevice: SubDeviceId(index), requested: None, status, code });
                 self.start(index, Start::Unknown, Some((status, code)), Check::None, effects);
             }
-            // Its station address answers again: it has come back, if it is the same one.
+            // Its station address answers again: it has come back, if it is the same SubDevice.
             Phase::Absent => {
                 member.suspended = false;
                 match member.mistaken.pause(now) {
@@ -137,8 +137,8 @@ impl Segment {
         }
     }
 
-    /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others:
-    /// whether they are lost is seen later, whose inputs are new is seen now.
+    /// As soon as all SubDevices that the cyclic datagram counts have answered, process data no longer waits for the
+    /// others. Whether the others are lost follows later; which inputs are fresh is known now.
     pub(in crate::segment) fn observe_part_of_looks(
         &mut self,
         asked: Asked,
@@ -160,7 +160,7 @@ impl Segment {
         }
     }
 
-    /// A member no longer answers. What was under way for it ends.
+    /// A member no longer answers. Procedures under way for it end.
     pub(in crate::segment) fn lose(&mut self, index: usize, effects: &mut Effects) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.attempt = member.attempt.wrapping_add(1);
@@ -172,12 +172,12 @@ impl Segment {
         let is_excused = !member.exchanges(member.target);
         self.board.set_taking_part(index, false);
         self.board.set_unproven(index, false);
-        // One that was on its way to process data is missed from now on.
+        // A member that was on its way to process data counts as missing from now on.
         self.board.set_excused(index, is_excused);
         effects.0.push(Effect::SuspendMailbox { index });
     }
 
-    /// Starts the configuration of a member that answers. `told`: its error that was told.
+    /// Starts the configuration of a member that answers. `told`: its error that was reported.
     pub(in crate::segment) fn start(
         &mut self,
         index: usize,
@@ -200,7 +200,7 @@ impl Segment {
         }
     }
 
-    /// What answers at a lost member's address is that member.
+    /// The SubDevice that answers at a lost member's address is that member.
     pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
         if let Some(member) = self.current(index, attempt) {
             member.mistaken = Mistaken::default();
@@ -208,8 +208,8 @@ impl Segment {
         }
     }
 
-    /// What answers at a lost member's address is not known to be that member. It has lost the address, and the next
-    /// look finds it without one; unless it keeps the address.
+    /// The SubDevice that answers at a lost member's address is not identified as that member. Its address has been
+    /// taken away, and the next scan finds it without one, unless that failed.
     pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32, now: Instant, effects: &mut Effects) {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Absent;
@@ -227,7 +227,7 @@ impl Segment {
         }
     }
 
-    /// A member has reached the state to which it was to be brought.
+    /// A member has reached its requested state.
     pub(in crate::segment) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Settled(state);
@@ -236,7 +236,7 @@ impl Segment {
         effects.report(Event::StateReached { subdevice: SubDeviceId(index), state });
     }
 
-    /// A member is to be brought to another state.
+    /// A member gets another target state.
     pub(in crate::segment) fn request(&mut self, index: usize, state: AlState) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.target = state;
@@ -246,7 +246,7 @@ impl Segment {
             Phase::Settled(is) if is == state => {}
             Phase::Settled(_) | Phase::Configuring => {
                 member.begin_attempt();
-                // On the way up it is excused until it is there.
+                // On the way up its missing answers are excused until it has joined.
                 if !exchanges {
                     self.board.set_excused(index, true);
                 }
@@ -254,7 +254,7 @@ impl Segment {
         }
     }
 
-    /// A member has refused a state, and keeps the one that it was to have before.
+    /// A member has refused a state, and keeps its previous target.
     pub(in crate::segment) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
         let Some(member) = self.current(index, attempt) else { return };
         member.target = before;
@@ -262,7 +262,7 @@ impl Segment {
         self.board.set_excused(index, is_excused);
     }
 
-    /// What a member does in process data from now on.
+    /// How a member takes part in process data from now on.
     pub(in crate::segment) fn observe_process_data(
         &mut self,
         index: usize,
@@ -278,7 +278,7 @@ impl Segment {
                 self.board.set_taking_part(index, false);
                 self.board.set_unproven(index, false);
             }
-            // SyncManagers for OP only are still off.
+            // SyncManagers that are active in OP only are still off.
             ProcessDataStep::Mapped => {
                 member.mapping = member.mapping.wrapping_add(1);
                 let is_op_only = member.setup.as_ref().is_some_and(|setup| setup.plan.is_op_only());
@@ -296,14 +296,14 @@ impl Segment {
         }
     }
 
-    /// A member was seen to give all inputs of a mapping. One that is over proves nothing of the next.
+    /// A member has delivered all inputs of a mapping. The proof of an earlier mapping is ignored.
     pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
         if self.members.get(index).is_some_and(|member| member.mapping == mapping) {
             self.board.set_unproven(index, false);
         }
     }
 
-    /// A member's registers do not hold its configuration any more.
+    /// A member's registers no longer hold its configuration.
     pub(in crate::segment) fn observe_undone(
         &mut self,
         index: usize,
@@ -315,7 +315,7 @@ impl Segment {
             return;
         }
         effects.failed(index, reason.to_string());
-        // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
+        // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier session.
         self.start(index, Start::Doubtful, None, Check::Identity, effects);
     }
 
@@ -328,20 +328,20 @@ impl Segment {
                 member.take_setup(index, setup, effects);
                 member.info = Some(info.clone());
             }
-            // As before.
+            // The same error as before.
             Err(_) if member.unfit.is_some() => {}
             Err(error) => effects.failed(index, error.to_string()),
         }
     }
 
-    /// Members that are there will be configured later: what answers meanwhile has not come back.
+    /// Present members will be configured later: an answer meanwhile is not a return.
     pub(in crate::segment) fn delay_all(&mut self) {
         for member in self.members.iter_mut().filter(|member| member.is_there()) {
             member.phase = Phase::Configuring;
         }
     }
 
-    /// What has happened to members is counted from 0 again.
+    /// Resets the incident counters of all members.
     pub(in crate::segment) fn forget_incidents(&mut self) {
         self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
     }
@@ -352,15 +352,15 @@ impl Segment {
         }
     }
 
-    /// The member whose attempt of that number is under way.
+    /// The member, if this attempt is the current one.
     pub(in crate::segment) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
         self.members.get_mut(index).filter(|member| member.attempt == attempt)
     }
 }
 
 impl Member {
-    /// Takes its configuration. What could not be followed at the activation has no place in the process image: without
-    /// outputs no SubDevice that has some goes to OP, so it is brought to SAFEOP only.
+    /// Stores its configuration. A configuration that could not be planned at the activation has no place in the
+    /// process image: a SubDevice with outputs must not go to OP without them, so its target is SAFEOP.
     pub(in crate::segment) fn take_setup(&mut self, index: usize, setup: Setup, effects: &mut Effects) {
         if self.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
             let has_outputs = setup.plan.mapped_areas().any(|(_, area)| area.direction == Direction::Outputs);
