@@ -1,7 +1,7 @@
-//! Reading the error counters of all ports in the background, and telling of cables whose errors rise.
+//! Reads the error counters of all ports in the background, and reports cables whose errors rise.
 //!
-//! Once a second, a few SubDevices at a time. A cut damages the frame that is under way: only errors that come in
-//! numbers, or second after second, are worth a word.
+//! Once a second, a few SubDevices at a time. A cut damages the frame that is on the wire: only many errors at once, or
+//! errors in consecutive seconds, are reported.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -19,23 +19,23 @@ use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 use crate::topology::PortOf;
 
-/// Pause between two looks.
+/// Interval of the readings.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Damaged frames between two looks that are reported at once; fewer when there were some before, too.
+/// Damaged frames between two readings that are reported at once; fewer if there were some at the previous reading too.
 const MANY: u64 = 3;
-/// The same cable is reported again after this time at the earliest.
+/// Minimum time between two reports of the same cable.
 const AGAIN: Duration = Duration::from_secs(10);
-/// Counters end at 255: from here on they are cleared.
+/// Counters saturate at 255: from this value on they are cleared.
 const FULL: u8 = 128;
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
     let count = segment.view().members.len();
     let mut last = vec![None; count];
     let mut asked = segment.view().asked();
     let mut watched = watch_all(&segment);
     let mut at_node = by_node(&watched);
-    // Others look once a second, too: not all at once.
+    // Shifted by half a period against other procedures that run once a second.
     bus.sleep(PAUSE / 2).await;
     loop {
         bus.sleep(PAUSE).await;
@@ -55,7 +55,7 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
                 last[index] = Some(ErrorCounters::default());
             }
         }
-        // Where it was cabled anew just now, the next look begins anew.
+        // If the cabling was replaced just now, the next reading starts with the new one.
         if segment.view().asked().cabling != asked.cabling {
             continue;
         }
@@ -109,14 +109,14 @@ async fn clear(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), B
     Ok(())
 }
 
-/// A cable and what its ends have counted lately.
+/// A cable and the recent errors at its ends.
 struct Watched {
     cable: Cable,
-    /// Since the last look.
+    /// Since the last reading.
     fresh: CableErrors,
     /// Since its last report.
     untold: CableErrors,
-    /// There were damaged frames at the look before, too.
+    /// There were damaged frames at the previous reading too.
     continues: bool,
     told_at: Option<Instant>,
 }
@@ -127,7 +127,7 @@ impl Watched {
         Watched { cable, fresh, untold, continues: false, told_at: None }
     }
 
-    /// Takes in the counters of a SubDevice, if it is at one of the ends.
+    /// Adds the counters of a SubDevice, if it is at one of the ends.
     fn take(&mut self, node: usize, before: Option<&ErrorCounters>, now: &ErrorCounters) {
         let ends = [self.cable.near, self.cable.far];
         for PortOf { port, .. } in ends.into_iter().flatten().filter(|end| end.node == node) {
@@ -136,7 +136,7 @@ impl Watched {
         }
     }
 
-    /// Ends a look: what is new, and an event where it is worth one.
+    /// Ends a reading: returns the new errors, and an event if they are to be reported.
     fn close(&mut self, now: Instant) -> (CableErrors, Option<Event>) {
         let fresh = core::mem::take(&mut self.fresh);
         self.untold = self.untold.plus(fresh);
@@ -192,7 +192,8 @@ mod tests {
         watched.take(5, Some(&counters(0)), &counters(100));
         let (fresh, event) = watched.close(Instant(0) + Duration::from_secs(14));
         assert_eq!(fresh.invalid_frames, 100);
-        // 6 and 241 that came within ten seconds of the first event, 2 after the counters were cleared, and these.
+        // 6 and 241 that were counted within ten seconds after the first event, 2 after the counters were cleared, and
+        // these.
         let errors = CableErrors { invalid_frames: 349, lost_links: 0 };
         assert_eq!(event, Some(Event::CableErrors { cable: CABLE, errors }));
     }

@@ -1,21 +1,21 @@
-//! How often a state that changes is reported: each change at once, as long as changes are rare.
+//! Limits the reports of a changing state: each change is reported at once, as long as changes are rare.
 //!
-//! A change that follows another one closely is reported when the state has held for a moment. A cable that changes too
-//! often for long is reported only when it has been steady for a second: a loose plug bounces for hours.
+//! A change closely after another one is reported when the state has been stable for a moment. If a cable changes too
+//! often for a long time, it is reported only after a stable second: a loose plug bounces for hours.
 
 use core::time::Duration;
 
 use crate::time::Instant;
 
-/// A change that comes so long after the one before is reported at once.
+/// A change this long after the previous one is reported at once.
 const QUIET: Duration = Duration::from_millis(20);
-/// One that comes earlier is reported when it has held for so long.
+/// An earlier change is reported after it was stable for this time.
 const HOLD: Duration = Duration::from_millis(3);
-/// A state that changes too often is reported when it has held for so long.
+/// A state that changes too often is reported after it was stable for this time.
 const STEADY: Duration = Duration::from_secs(1);
 /// Changes that may be reported in a row.
 const BUDGET: u32 = 32;
-/// One more may be reported each time this has passed: four a second in the long run.
+/// One more may be reported each time this has passed: four a second on average.
 const REFILL: Duration = Duration::from_millis(250);
 
 /// Decides when a change is reported.
@@ -41,14 +41,14 @@ impl Default for Damper {
 }
 
 impl Damper {
-    /// The state changed since the last look. At the edge of a cut frames of one cycle may show both states: that is
-    /// one change.
+    /// The state changed since the last evaluation. At the moment of a cut frames of one cycle may show both states:
+    /// that is one change.
     pub(crate) fn changed(&mut self, now: Instant) {
         self.is_prompt = self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
         self.changed_at = Some(now);
     }
 
-    /// Whether the state as it is may be told.
+    /// Whether the present state may be reported.
     pub(crate) fn may_tell(&mut self, now: Instant) -> bool {
         let held = self.changed_at.map_or(Duration::MAX, |at| now.since(at));
         if self.is_unsteady {
@@ -57,7 +57,7 @@ impl Damper {
         self.is_prompt || held >= HOLD
     }
 
-    /// It is reported. True where from now on it changes too often to be reported each time.
+    /// Counts a report. True if from now on the state changes too often to be reported each time.
     pub(crate) fn tell(&mut self, now: Instant) -> bool {
         let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
         if refills > 0 {
@@ -79,8 +79,8 @@ impl Damper {
 mod tests {
     use super::*;
 
-    /// Looks every 500 us at a state that flips every `half_period`; returns how often it was reported, and how often
-    /// that it is unsteady.
+    /// Evaluates every 500 us a state that flips every `half_period`; returns how often it was reported, and how often
+    /// as unsteady.
     fn flap(half_period: Duration, lasts: Duration) -> (u32, u32) {
         let (mut damper, mut told_state, mut told, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
         let mut now = Instant(0);

@@ -1,4 +1,4 @@
-//! Clocks: from what was measured, written and read to events, references and the next measurement.
+//! Clocks: from measured, written and read values to events, references and the next measurement.
 
 use crate::board::clocks::References;
 use crate::clocks::Delays;
@@ -7,7 +7,7 @@ use crate::segment::clocks::{Answer, ClockObservation, Difference, Due, Measured
 
 use super::*;
 
-/// A closed ring of so many clocks, 100 ns apart, that are set up.
+/// A closed ring of `count` clocks, 100 ns apart, that are set up.
 fn set_up(count: usize) -> Ring {
     let mut ring = declared(count);
     let measured = measured(count, 100);
@@ -99,7 +99,7 @@ fn a_link_is_followed_when_two_answers_show_it_and_both_links_have_references_th
     assert_eq!(ring.answers(&split), []);
     assert_eq!(ring.references().redundant, None, "answers of both states are possible");
     assert_eq!(ring.answers(&split), []);
-    // What counted from the first clock counts from the third one there.
+    // Delays that had the first clock as origin have the third one there.
     assert_eq!((ring.segment.clocks().due(), ring.references()), (Due::Delays, References::default()));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Redundant]);
     ring.clocks(ClockObservation::DelaysWritten(Link::Redundant));
@@ -123,7 +123,7 @@ fn delays_that_could_not_be_written_are_written_after_the_next_measurement() {
     let now = measured(3, 300);
     ring.clocks(ClockObservation::MeasuredAgain(&now));
     assert_eq!(ring.references(), References::default(), "no time is distributed meanwhile");
-    // The bus fails before they are written; the next measurement shows the same delays.
+    // The bus fails before they are written; the next measurement gives the same delays.
     ring.clocks(ClockObservation::MeasuredAgain(&now));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Main]);
     ring.clocks(ClockObservation::DelaysWritten(Link::Main));
