@@ -1,4 +1,4 @@
-//! Looking at all declared SubDevices: which answer, in which state, with which ports.
+//! Scans all declared SubDevices: which answer, in which state, with which ports.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -14,11 +14,11 @@ use super::shared_segment::SharedSegment;
 use crate::segment::Look;
 use crate::supervisor::{Bus, BusError, TURN, TURN_PAUSE};
 
-/// Between two reports of what looks have brought so far: most answers are there by then.
+/// Interval of intermediate results of a scan: most answers arrive within the first.
 const STEP: Duration = Duration::from_micros(300);
 
-/// Looks at all members: a few at a time while `is_calm`, at once otherwise. What there is after each step is shown to
-/// `so_far`, because looks at SubDevices that are not there take longer.
+/// Scans all members: a few at a time while `is_calm`, all at once otherwise. Intermediate results are passed to
+/// `so_far`, because reads of absent SubDevices take longer.
 pub(super) async fn look_at_all(
     bus: &Bus,
     segment: &SharedSegment,
@@ -49,7 +49,7 @@ pub(super) async fn look_at_all(
     looks.take()
 }
 
-/// Looks at all without a declaration, by their addresses.
+/// Scans all SubDevices without a declaration, by their addresses.
 pub(super) async fn look_at_unassigned(bus: &Bus, segment: &SharedSegment) -> Vec<(StationAddress, Look)> {
     let stations: Vec<StationAddress> = segment.view().unassigned.iter().map(|it| it.station).collect();
     bus.gather(stations, |bus, station| async move { (station, look_at(&bus, station).await) }).await

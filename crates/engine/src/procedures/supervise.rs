@@ -1,8 +1,8 @@
-//! Supervision after activation: what the cyclic half posts is handed to the model of the segment, and rounds of looks
-//! that it calls for are made.
+//! Supervision after activation: passes the words of the cyclic half to the model of the segment, and runs the rounds
+//! of scans that the model requests.
 //!
 //! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
-//! of their event requests. As long as it does not change, nothing is asked of the bus but one look per second.
+//! of their event requests. While it does not change, the bus is only used for one scan per second.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -18,14 +18,14 @@ use crate::segment::member::Phase;
 use crate::segment::{Look, Looked, Observation};
 use crate::supervisor::Bus;
 
-/// Pause before what may be missed is looked at again.
+/// Pause before SubDevices that did not answer are read again.
 const PAUSE: Duration = Duration::from_micros(500);
-/// Pause before SubDevices of which it was not found out where they are are looked at again.
+/// Pause before SubDevices whose positions could not be determined are read again.
 const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
-/// Pause between two searches for SubDevices that answer and are not known.
+/// Pause between two searches for unknown SubDevices.
 const SEARCH_PAUSE: Duration = Duration::from_millis(10);
 
-/// Hands over what is posted, whenever it changes or the model wants to look. Runs for ever.
+/// Passes posted words to the model, whenever they change or the model requests it. Runs until the MainDevice stops.
 pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
     loop {
         let posted = bus.posted();
@@ -35,7 +35,7 @@ pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// One round of looks, and what has to be done on the bus because of it.
+/// One round of scans, and the procedures on the bus that follow from it.
 pub(super) async fn look_round(bus: Bus, segment: SharedSegment, routine: bool, search: Search) {
     look(&bus, &segment, routine).await;
     let round = segment.view().round();
@@ -69,11 +69,11 @@ async fn follow_up(bus: &Bus, segment: &SharedSegment, search: &Search) {
     if round.is_certain && segment.view().has_local_rings() {
         note_controls(bus, segment).await;
     }
-    // Which others are there must be known before the place of any is.
+    // The other SubDevices must be known before any place can be determined.
     let mut is_complete = round.is_complete;
     if round.finds_others {
         is_complete = search.run(bus, segment).await;
-        // Clears the requests of those that are not looked at.
+        // Clears the ECAT events of SubDevices that are not scanned.
         if bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
             segment.observe(Observation::LookAgainIn(PAUSE));
         }

@@ -1,24 +1,24 @@
-//! Which absent SubDevices the unassigned SubDevices between two known ones are.
+//! Identifies unassigned SubDevices between two known ones as absent SubDevices.
 //!
-//! Both are in the order of the segment, and that order decides: of several alike the first on the main side is the
-//! first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours. Serial
-//! numbers decide before order does.
+//! Both are in the order of the segment, and this order decides: of several of the same type the first on the main side
+//! is the first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours.
+//! Serial numbers have priority over order.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// How well an unassigned SubDevice fits an absent SubDevice.
+/// How well an unassigned SubDevice matches an absent one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fit {
-    /// It is not that one.
+    /// It is another one.
     No,
-    /// Its SII cannot be read: it may be that one, and keeps the place.
+    /// Its SII cannot be read: it may be the absent one, and occupies its place.
     Unreadable,
-    /// It could be that one, which has never been there.
+    /// It may be the absent one, which was never seen.
     NeverSeen,
-    /// It could be that one.
+    /// It may be the absent one.
     Seen,
-    /// It has the serial number of that one.
+    /// It has the serial number of the absent one.
     Serial,
 }
 
@@ -33,8 +33,8 @@ impl Fit {
     }
 }
 
-/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` tells of an unassigned and an absent one how
-/// well they fit; `from_main` whether an unassigned one answers on the main link.
+/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` returns how well an unassigned and an absent
+/// one match; `from_main` is true for an unassigned one that answers on the main link.
 pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usize) -> Fit) -> Vec<Option<usize>> {
     let mut assigned = vec![None; from_main.len()];
     for (candidate, slot) in assigned.iter_mut().enumerate() {
@@ -42,8 +42,8 @@ pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usiz
     }
     let open: Vec<usize> = (0..assigned.len()).filter(|candidate| assigned[*candidate].is_none()).collect();
     let places: Vec<usize> = (0..absent).filter(|place| !assigned.contains(&Some(*place))).collect();
-    // The best sum of scores; the lower half of the word prefers places near the side that an unassigned one answers
-    // from.
+    // Maximises the sum of scores; the lower half of the word prefers places near the side on which the unassigned
+    // SubDevice answers.
     let value = |one: usize, other: usize| {
         let (candidate, place) = (open[one], places[other]);
         let near = if from_main[candidate] { places.len() - other } else { other + 1 };

@@ -1,4 +1,4 @@
-//! One event per break of the ring, when its neighbours have noticed it, and those of rings behind junctions.
+//! Reports each break of the ring once, when its neighbours have detected it, and breaks of rings behind junctions.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -17,15 +17,15 @@ use crate::segment::model::Segment;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 
-/// Looks for the place of a break: its neighbours may notice the lost link later than frames do.
+/// Scans for the place of a break: its neighbours may detect the lost link later than frames show it.
 const LOOKS: u8 = 25;
-/// Pause between two of them, and between the first few.
+/// Pause between two of these scans, and between the first few.
 const PAUSE: Duration = Duration::from_millis(10);
 const FIRST_LOOKS: u8 = 5;
 const FIRST_PAUSE: Duration = Duration::from_millis(1);
 
 impl Segment {
-    /// What members said about their ports, by their position in the cabling.
+    /// Port states of members, by their position in the cabling.
     pub(in crate::segment) fn by_position(&self, looks: &[Look]) -> Vec<Option<NodeStatus>> {
         let mut by_position = vec![None; self.cabling.topology.nodes.len()];
         for (member, look) in self.members.iter().zip(looks) {
@@ -38,8 +38,7 @@ impl Segment {
         by_position
     }
 
-    /// Reports breaks that have a place now. `reported` is the state of the ring that had been reported when the looks
-    /// began.
+    /// Reports breaks that are located now. `reported` is the reported state of the ring when the scans began.
     pub(in crate::segment) fn observe_breaks(
         &mut self,
         looks: &[Look],
@@ -50,12 +49,12 @@ impl Segment {
         if core::mem::replace(&mut self.breaks.state, reported) != reported {
             self.breaks.looks = LOOKS;
         }
-        // While all were looked at, the ring may have closed.
+        // The ring may have closed during the scans.
         if reported != RingState::Open || self.ring.reported() != RingState::Open {
             return;
         }
         let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
-        // An interface's cable is reported together with the ring.
+        // A break at an interface's cable is reported together with the ring.
         match self.ring.status.place {
             None => self.breaks.told.clear(),
             Some(place) if !self.breaks.told.contains(&place) => self.breaks.told = vec![place],
@@ -68,7 +67,7 @@ impl Segment {
                 effects.report(Event::BreakLocated { cable: *cable });
             }
         }
-        // The last one that is mended closes the ring.
+        // The repair of the last broken cable is reported as the closing of the ring.
         let mended = |cable: &Cable| !broken.contains(cable) && is_broken(&by_position, cable) == Some(false);
         while let Some(at) = self.breaks.told.iter().position(mended).filter(|_| self.breaks.told.len() > 1) {
             self.breaks.told.remove(at);
@@ -92,7 +91,7 @@ impl Segment {
         ends.map(|(near, far)| Cable { near, far }).into_iter().collect()
     }
 
-    /// Events of rings behind junctions, from what SubDevices said about their ports, by position.
+    /// Reports events of rings behind junctions from port states of SubDevices, by position.
     pub(in crate::segment) fn observe_local_rings(
         &mut self,
         status: &[Option<NodeStatus>],
@@ -109,7 +108,7 @@ impl Segment {
         self.local_rings.complete_cabling(&mut self.cabling);
     }
 
-    /// Rings have been looked into; positions are those of the cabling that was asked about.
+    /// Rings have been examined; positions are those of the cabling of that version.
     pub(in crate::segment) fn observe_isolated(
         &mut self,
         asked: Asked,

@@ -1,4 +1,4 @@
-//! What follows from each observation.
+//! Dispatch of observations.
 
 use crate::ring_status::CableErrors;
 use crate::segment::asked::Asked;
@@ -9,7 +9,7 @@ use crate::segment::ring::{Cabled, Words};
 use crate::time::Instant;
 
 impl Segment {
-    /// Takes in what was seen. What follows is to be carried out in its order.
+    /// Processes an observation. The effects must be executed in their order.
     pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
         let mut effects = Effects::default();
         self.take(seen, now, &mut effects);
@@ -17,7 +17,7 @@ impl Segment {
         effects
     }
 
-    /// What follows from each observation.
+    /// Processes an observation.
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
             Observation::Words(words) => self.observe_words(&words, now, effects),
@@ -82,7 +82,7 @@ impl Segment {
     }
 
     fn observe_cable_errors(&mut self, asked: Asked, fresh: &[CableErrors]) {
-        // Where it was cabled anew since, these are of other cables.
+        // If the cabling was replaced since, the counts belong to other cables.
         if asked.cabling != self.cabling.version {
             return;
         }
