@@ -1,13 +1,12 @@
-//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and what
-//! follows from observations.
+//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and the effects
+//! of observations.
 //!
 //! A pure machine: [`Segment::observe`] takes one [`Observation`] and returns the [`Effects`]: events to report,
-//! procedures to start. Nothing else changes it. It sends nothing and waits for nothing; procedures do that, and report
-//! what they found as observations. What the cyclic half must know is posted to the board within `observe`, before
-//! anything else follows.
+//! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
+//! as observations. Words for the cyclic half are posted to the board within `observe`, before any effect is executed.
 //!
-//! A scan takes time, and the segment changes meanwhile. So findings carry the versions that they are about ([`Asked`],
-//! the number of an attempt), and findings that are out of date are refused.
+//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Asked`], the
+//! number of an attempt), and outdated results are refused.
 
 mod asked;
 mod attention;

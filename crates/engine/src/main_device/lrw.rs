@@ -1,4 +1,4 @@
-//! Where LRW may be used: never over several SubDevices on two links (protocol 9.2.2, CR-16).
+//! Checks the use of LRW: never over several SubDevices on two links (protocol 9.2.2, CR-16).
 
 use alloc::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::domain::DomainId;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
 
-/// The policy with datagrams that a configuration file names.
+/// The policy together with datagrams of a configuration file.
 pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -> Result<LrwPolicy, ActivateError> {
     if links == LinkSet::Single || named.is_empty() {
         return Ok(policy);

@@ -1,4 +1,4 @@
-//! Starting the procedures that the model of the segment asks for. The only place at which they are started.
+//! Starts the procedures that the model of the segment requests. They are started only here.
 
 use super::cabling::examine;
 use super::clocks::compensate_drift;
@@ -12,7 +12,7 @@ use super::unassigned::{Search, read_unassigned};
 use crate::segment::effect::Task;
 use crate::supervisor::Bus;
 
-/// Starts what is asked for. Runs for ever.
+/// Starts requested procedures. Runs until the MainDevice stops.
 pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
     let search = Search::default();
     loop {

@@ -1,10 +1,10 @@
-//! The versions that a read was about: its findings are out of date when these have changed.
+//! The versions of the model when a procedure starts: its results are outdated when these have changed.
 
-/// The versions that findings are about.
+/// Versions of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Asked {
-    /// Positions mean places in this cabling.
+    /// Version of the cabling to which positions belong.
     pub cabling: u32,
-    /// So often SubDevices had been put out of reach on purpose.
+    /// Number of times that SubDevices had been put out of reach on purpose.
     pub isolations: u32,
 }

@@ -1,17 +1,17 @@
-//! What a look at one SubDevice has shown.
+//! Result of a read of one SubDevice in a scan.
 
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::DlStatus;
 
-/// What a SubDevice said.
+/// Result of the read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Look {
-    /// Its frames were lost: nothing is known.
+    /// Its frames were lost: no information.
     #[default]
     Unknown,
-    /// Frames came back, it did not answer.
+    /// Frames returned without its answer.
     Silent,
-    /// Several answered: another SubDevice has its address too.
+    /// Several answered: another SubDevice has the same address.
     Doubled,
     /// It answered.
     Answer {
@@ -19,7 +19,7 @@ pub enum Look {
         status: AlStatus,
         /// AL status code.
         code: AlStatusCode,
-        /// Its ports.
+        /// Its port states.
         dl_status: DlStatus,
     },
 }
@@ -31,7 +31,7 @@ impl Look {
     }
 }
 
-/// How many answered.
+/// Number of answers.
 pub(super) fn answers(looks: &[Look]) -> usize {
     looks.iter().filter(|look| look.is_answer()).count()
 }

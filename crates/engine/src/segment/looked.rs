@@ -1,4 +1,4 @@
-//! What a round of looks has shown.
+//! Result of a round of scans.
 
 use ringcat_wire::address::{StationAddress, Wkc};
 
@@ -6,16 +6,16 @@ use super::asked::Asked;
 use super::look::Look;
 use super::member::Phase;
 
-/// What a round of looks has shown.
+/// Result of a round of scans.
 #[derive(Clone, Copy, Debug)]
 pub struct Looked<'a> {
-    /// What it was about.
+    /// Version of the model at the start of the round.
     pub asked: Asked,
     /// By member.
     pub looks: &'a [Look],
-    /// How far each member was when the round began.
+    /// Phase of each member when the round began.
     pub before: &'a [Phase],
-    /// Of those without a declaration, by station address.
+    /// SubDevices without a declaration, by station address.
     pub unassigned: &'a [(StationAddress, Look)],
     /// SubDevices that the latest supervision result counts; `None` before the first.
     pub counted: Option<Wkc>,

@@ -1,4 +1,4 @@
-//! Orders to junctions about their ports.
+//! Port commands to junctions.
 
 use alloc::vec::Vec;
 
@@ -15,12 +15,12 @@ impl Segment {
         heads.filter_map(|head| self.station_of(head)).collect()
     }
 
-    /// The order that a junction has; that of a scan where it is not known.
+    /// The port control of a junction; that of a scan if it is unknown.
     pub fn control_of(&self, junction: StationAddress) -> DlControl {
         self.port_control(junction).map_or_else(DlControl::default, |told| told.control)
     }
 
-    /// What is known of a junction's ports.
+    /// The known port control of a junction.
     pub fn port_control(&self, junction: StationAddress) -> Option<&PortControl> {
         self.port_controls.iter().find(|told| told.station == junction)
     }
@@ -35,7 +35,7 @@ impl Segment {
         told.under_way = told.under_way.saturating_sub(1);
     }
 
-    /// A control was read, when there had been so many orders.
+    /// A port control was read, after this number of commands.
     pub(in crate::segment) fn note_control(&mut self, station: StationAddress, orders: u32, control: DlControl) {
         let told = self.entry(station);
         if told.orders == orders && told.under_way == 0 {
