@@ -178,7 +178,7 @@ impl MainDevice {
     /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower
     /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
-        let led = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
+        let to_stop = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
         // The procedure that would have enabled it again has ended.
@@ -195,7 +195,7 @@ impl MainDevice {
         *self.stopped.borrow_mut() = None;
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
         self.supervisor.spawn(async move {
-            let result = stop(&bus, led, state, limit).await;
+            let result = stop(&bus, to_stop, state, limit).await;
             *slot.borrow_mut() = Some(result);
         });
     }

@@ -5,10 +5,9 @@
 //! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
 //! as observations. Words for the cyclic half are posted to the board within `observe`, before any effect is executed.
 //!
-//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Asked`], the
+//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`], the
 //! number of an attempt), and outdated results are refused.
 
-mod asked;
 mod attention;
 mod breaks;
 mod cabling;
@@ -20,22 +19,23 @@ pub mod disturbance;
 pub mod effect;
 mod hot_connect;
 mod local_rings;
-mod look;
-mod looked;
 mod matching;
 pub mod member;
 mod model;
 mod observation;
 mod owners;
 mod port_control;
+mod reading;
 pub mod retrace;
 mod ring;
+mod round_result;
 mod rules;
 mod seen;
 pub mod setup;
 mod silence;
 pub mod start;
 pub mod unassigned;
+mod versions;
 pub mod view;
 
 pub use cabling::{Cabling, stations_by_position};
@@ -43,13 +43,13 @@ pub use choices::Choices;
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use local_rings::is_down;
-pub use look::Look;
-pub use looked::Looked;
 pub use model::{Known, Segment};
 pub use observation::{Observation, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
+pub use reading::Reading;
 pub use ring::Words;
+pub use round_result::RoundResult;
 pub use seen::Seen;
 
 #[cfg(test)]

@@ -127,7 +127,7 @@ impl MainDevice {
     /// activation, when a normal scan does the same.
     pub fn force_topology_change(&mut self) -> bool {
         if let Some(segment) = &self.segment {
-            segment.observe(Observation::LookAgain);
+            segment.observe(Observation::ScanAgain);
         }
         self.segment.is_some()
     }

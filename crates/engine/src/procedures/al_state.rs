@@ -152,7 +152,7 @@ pub async fn request(
 ) -> Result<(), StateError> {
     bus.fpwr(station, map::AL_CONTROL, &AlControl::new(state).encode()).await?;
     let until = bus.now() + limit;
-    let (mut pause, mut looks) = (FIRST_PAUSE, 0_u32);
+    let (mut pause, mut readings) = (FIRST_PAUSE, 0_u32);
     loop {
         let (status, code) = read_status(bus, station).await?;
         if status.error {
@@ -165,8 +165,8 @@ pub async fn request(
         if bus.now() >= until {
             return Err(StateError::Timeout { requested: state, status, limit });
         }
-        looks += 1;
-        if looks > 2 {
+        readings += 1;
+        if readings > 2 {
             pause = (pause * 3 / 2).min(LONGEST_PAUSE);
         }
         bus.sleep(pause).await;

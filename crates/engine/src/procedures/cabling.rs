@@ -51,7 +51,7 @@ pub(super) trait Known {
     /// All of these are identified.
     fn are_known(&self, stations: &[StationAddress]) -> bool;
     /// Ports were read: this cleared the ECAT events of ports that changed before.
-    fn note_look(&self);
+    fn note_port_scan(&self);
     /// Clocks are being measured; the receive times must be those of the measurement's frame.
     fn are_measuring(&self) -> bool;
     /// A more urgent disturbance waits until the redundant link is up.
@@ -67,25 +67,30 @@ pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
         false => None,
     };
     let in_control = turn.is_some();
-    let told = segment.view().told_crossings().clone();
-    let found = cabling(&bus, &segment, in_control, &told).await;
+    let reported = segment.view().reported_crossings().clone();
+    let found = cabling(&bus, &segment, in_control, &reported).await;
     drop(turn);
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
-/// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `told` is the result
+/// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `reported` is the result
 /// reported before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down during the
 /// scan; if it cannot be, that is reported, and the ring is scanned as it is.
-pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, told: &LineCheck) -> Option<LineCheck> {
+pub(super) async fn cabling(
+    bus: &Bus,
+    known: &impl Known,
+    in_control: bool,
+    reported: &LineCheck,
+) -> Option<LineCheck> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
-        return look_often(bus, known, told).await;
+        return scan_until_confirmed(bus, known, reported).await;
     }
     if !in_control {
-        return look_often(bus, known, told).await;
+        return scan_until_confirmed(bus, known, reported).await;
     }
     wait_for(bus, known, RingState::Open).await;
-    let found = look_often(bus, known, told).await;
+    let found = scan_until_confirmed(bus, known, reported).await;
     bus.force_disconnect(Link::Redundant, false).await;
     wait_for(bus, known, RingState::Closed).await;
     // A carrier that is still missing would be reported as lost. The links are polled less often than frames arrive.
@@ -117,7 +122,7 @@ pub(super) async fn stays_closed(bus: &Bus) -> bool {
 }
 
 /// Scans until a result equals the reported one, or two in a row are equal.
-async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<LineCheck> {
+async fn scan_until_confirmed(bus: &Bus, known: &impl Known, reported: &LineCheck) -> Option<LineCheck> {
     let mut before = None;
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
@@ -130,9 +135,9 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<L
             before = None;
             continue;
         }
-        let found = look(bus, known).await.ok().flatten();
-        known.note_look();
-        if found.as_ref().is_some_and(|found| found.says_the_same_as(told) || before.as_ref() == Some(found)) {
+        let found = scan_once(bus, known).await.ok().flatten();
+        known.note_port_scan();
+        if found.as_ref().is_some_and(|found| found.adds_nothing_to(reported) || before.as_ref() == Some(found)) {
             return found;
         }
         before = found;
@@ -153,7 +158,7 @@ async fn ports_of(bus: &Bus, stations: &[StationAddress]) -> Result<Option<Vec<D
 }
 
 /// One scan; `None` if something changed meanwhile.
-async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusError> {
+async fn scan_once(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusError> {
     let closed_before = bus.ring() == RingState::Closed;
     let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
     let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
@@ -209,8 +214,8 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusErr
 }
 
 impl Known for SharedSegment {
-    fn note_look(&self) {
-        self.observe(Observation::LookAgain);
+    fn note_port_scan(&self) {
+        self.observe(Observation::ScanAgain);
     }
 
     fn are_measuring(&self) -> bool {

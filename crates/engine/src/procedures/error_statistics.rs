@@ -129,7 +129,7 @@ impl ErrorStatistics {
     }
 
     /// Another procedure has read the error counters.
-    pub(crate) fn heard(&self, subdevice: usize, counters: &ErrorCounters) {
+    pub(crate) fn note_reading(&self, subdevice: usize, counters: &ErrorCounters) {
         self.with(subdevice, |statistics| statistics.count(*counters));
     }
 
@@ -154,7 +154,7 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn what_is_kept_goes_on_where_registers_were_cleared() {
+    fn totals_continue_after_registers_were_cleared() {
         let mut statistics = Statistics::default();
         assert!(statistics.is_clean());
         let mut reading = |invalid: u8, lost: u8, watchdog: u8| {

@@ -32,7 +32,7 @@ const FULL: u8 = 128;
 pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
     let count = segment.view().members.len();
     let mut last = vec![None; count];
-    let mut asked = segment.view().asked();
+    let mut versions = segment.view().versions();
     let mut watched = watch_all(&segment);
     let mut at_node = by_node(&watched);
     // Shifted by half a period against other procedures that run once a second.
@@ -40,13 +40,13 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
     loop {
         bus.sleep(PAUSE).await;
         for (index, counters) in bus.gather_in_turns(present(&segment), read).await.into_iter().flatten() {
-            if segment.view().asked().cabling != asked.cabling {
-                asked = segment.view().asked();
+            if segment.view().versions().cabling != versions.cabling {
+                versions = segment.view().versions();
                 watched = watch_all(&segment);
                 at_node = by_node(&watched);
             }
             let before = last[index].replace(counters);
-            segment.statistics.heard(index, &counters);
+            segment.statistics.note_reading(index, &counters);
             let Some(node) = segment.view().members.get(index).and_then(|member| member.node) else { continue };
             for at in at_node.get(node).into_iter().flatten() {
                 watched[*at].take(node, before.as_ref(), &counters);
@@ -56,13 +56,13 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
             }
         }
         // If the cabling was replaced just now, the next reading starts with the new one.
-        if segment.view().asked().cabling != asked.cabling {
+        if segment.view().versions().cabling != versions.cabling {
             continue;
         }
         let now = bus.now();
         let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
             watched.iter_mut().map(|watched| watched.close(now)).unzip();
-        segment.observe(Observation::CableErrors { asked, fresh: &fresh });
+        segment.observe(Observation::CableErrors { versions, fresh: &fresh });
         events.into_iter().flatten().for_each(|event| bus.report(event));
     }
 }
@@ -175,20 +175,20 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn one_damaged_frame_is_no_event_but_many_or_lasting_ones_are() {
+    fn one_damaged_frame_is_not_reported_but_many_or_repeated_ones_are() {
         let mut watched = Watched::new(CABLE);
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         for (second, count) in [0, 1, 1, 2, 3, 3, 9, 250, 2, 2].into_iter().enumerate() {
-            let before = told.len();
+            let before = events.len();
             let last = if second == 0 { 0 } else { [0, 1, 1, 2, 3, 3, 9, 250, 2, 2][second - 1] };
             watched.take(5, Some(&counters(last)), &counters(count));
             watched.take(3, Some(&counters(last)), &counters(count));
             let (_, event) = watched.close(Instant(0) + Duration::from_secs(second as u64));
-            told.extend(event);
-            assert_eq!(told.len() - before, usize::from(second == 4), "second {second}");
+            events.extend(event);
+            assert_eq!(events.len() - before, usize::from(second == 4), "second {second}");
         }
         let errors = CableErrors { invalid_frames: 3, lost_links: 0 };
-        assert_eq!(told, [Event::CableErrors { cable: CABLE, errors }]);
+        assert_eq!(events, [Event::CableErrors { cable: CABLE, errors }]);
         watched.take(5, Some(&counters(0)), &counters(100));
         let (fresh, event) = watched.close(Instant(0) + Duration::from_secs(14));
         assert_eq!(fresh.invalid_frames, 100);

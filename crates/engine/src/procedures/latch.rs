@@ -37,10 +37,10 @@ pub(super) enum Pauses {
     Forbidden,
 }
 
-/// Latches a frame that is alone on the wire in all clocks. Copies on the link `deaf` do not return.
-pub(super) async fn latch(bus: &Bus, pauses: Pauses, deaf: Option<Link>) -> Result<Latches, BusError> {
+/// Latches a frame that is alone on the wire in all clocks. Copies on the link `no_return` do not return.
+pub(super) async fn latch(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
-    let met = send(bus, pauses, deaf).await?;
+    let met = send(bus, pauses, no_return).await?;
     Ok(Latches { met, _turn })
 }
 
@@ -54,13 +54,13 @@ pub(super) async fn latch_anyway(bus: &Bus) -> Result<Latches, BusError> {
     Ok(Latches { met, _turn })
 }
 
-async fn send(bus: &Bus, pauses: Pauses, deaf: Option<Link>) -> Result<Wkc, BusError> {
+async fn send(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Wkc, BusError> {
     let (mut failures, mut is_pausing) = (0, false);
     loop {
         if is_pausing {
             bus.ask_for_pause(PAUSE);
         }
-        let reply = bus.alone(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4], deaf).await;
+        let reply = bus.alone(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4], no_return).await;
         if is_pausing {
             bus.ask_for_pause(Duration::ZERO);
         }

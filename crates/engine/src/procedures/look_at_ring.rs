@@ -48,11 +48,11 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     };
     let counts = (counted.main.0, counted.redundant.0);
     let positions = (0..counted.wkc().0).map(Position);
-    let looks = bus.gather_in_turns(positions.collect(), look_at).await;
-    let mut statuses = Vec::with_capacity(looks.len());
+    let readings = bus.gather_in_turns(positions.collect(), look_at).await;
+    let mut statuses = Vec::with_capacity(readings.len());
     let (mut stations, mut states, mut counters) = (Vec::new(), Vec::new(), Vec::new());
-    for look in looks {
-        let (station, status, state, counted) = match look {
+    for reading in readings {
+        let (station, status, state, counted) = match reading {
             Ok(seen) => seen,
             Err(error) => {
                 explain(&bus).await?;

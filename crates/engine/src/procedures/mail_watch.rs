@@ -46,11 +46,11 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
             }
         }
         // If some do not answer, it is unknown which: all are polled until the supervision has found and repaired them.
-        if !look_together(&bus, &mapped).await {
+        if !poll_together(&bus, &mapped).await {
             others.extend(mapped);
         }
         alone = u32::try_from(others.len()).unwrap_or(u32::MAX);
-        bus.gather_in_turns(others, look).await;
+        bus.gather_in_turns(others, poll).await;
     }
 }
 
@@ -67,7 +67,7 @@ fn open_mailboxes(segment: &SharedSegment) -> Vec<Open> {
 }
 
 /// One read for all; false if not all answered.
-async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
+async fn poll_together(bus: &Bus, mapped: &[Open]) -> bool {
     let Some(last) = mapped.iter().map(|open| open.index).max() else { return true };
     let expected = Wkc(mapped.len() as u16);
     let (target, data) = (Target::Logical(BITS_AT), vec![0; last / 8 + 1]);
@@ -81,7 +81,7 @@ async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
 }
 
 /// The supervision handles a SubDevice that does not answer.
-async fn look(bus: Bus, open: Open) {
+async fn poll(bus: Bus, open: Open) {
     if bus.has_stray_mail(open.station) {
         open.mailbox.mail_available();
         return;

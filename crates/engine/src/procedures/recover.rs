@@ -35,24 +35,24 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// Reads of a SubDevice that did not answer once, before it is lost: at the moment of a cut a frame may have been
 /// processed by none.
-const LOOKS: usize = 3;
+const SCANS: usize = 3;
 /// Pause between two of these reads, and before the first repetition of a configuration that failed because of the bus.
-const LOOK_PAUSE: Duration = Duration::from_millis(3);
+const READ_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, repeatedly until it succeeds or the SubDevice no longer answers. `told`: its
+/// Brings a SubDevice to its target state, repeatedly until it succeeds or the SubDevice no longer answers. `reported`: its
 /// error that is reported and still present.
 pub(super) async fn keep_up(
     bus: &Bus,
     segment: &SharedSegment,
     (index, attempt): (usize, u32),
     start: Start,
-    told: Option<Shown>,
+    reported: Option<Shown>,
 ) {
-    let (mut start, mut told) = (start, told);
+    let (mut start, mut reported) = (start, reported);
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        let result = try_once(bus, segment, index, start, &mut told).await;
+        let result = try_once(bus, segment, index, start, &mut reported).await;
         // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
@@ -64,7 +64,7 @@ pub(super) async fn keep_up(
                 }
                 // A single failure may be due to a cut elsewhere, not to this SubDevice.
                 if !core::mem::replace(&mut disturbed, true) {
-                    bus.sleep(LOOK_PAUSE).await;
+                    bus.sleep(READ_PAUSE).await;
                     continue;
                 }
                 frame_limit::explain(bus, segment).await;
@@ -109,9 +109,9 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 /// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.
 async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
     let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return false };
-    for _ in 0..LOOKS {
+    for _ in 0..SCANS {
         match al_state::read_status(bus, station).await {
-            Err(BusError::Wkc { .. }) => bus.sleep(LOOK_PAUSE).await,
+            Err(BusError::Wkc { .. }) => bus.sleep(READ_PAUSE).await,
             Ok(_) | Err(_) => return true,
         }
     }
@@ -160,12 +160,12 @@ async fn try_once(
     segment: &SharedSegment,
     index: usize,
     start: Start,
-    told: &mut Option<Shown>,
+    reported: &mut Option<Shown>,
 ) -> Result<AlState, ConfigureError> {
     let bring_up = bring_up(bus, segment, index)?;
-    let quickly = start == Start::Unknown && quick(&bring_up, told).await?;
+    let quickly = start == Start::Unknown && quick(&bring_up, reported).await?;
     // The full start begins with an acknowledgement: an error after it is new.
-    let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *told = None) };
+    let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *reported = None) };
     // An attempt that ended on the way to PREOP, this or an earlier one, leaves the EEPROM assigned to the PDI.
     let is_left = match &result {
         Ok(()) => quickly && bring_up.target == AlState::PreOp,
@@ -179,7 +179,7 @@ async fn try_once(
 
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: after an acknowledgement it may go back to
 /// OP. Its error is reported, unless it is the error reported before.
-async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
+async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<bool, ConfigureError> {
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
@@ -200,12 +200,12 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     bring_up.join();
     mailbox.resume();
     if status.error {
-        if told.replace((status, code)) != Some((status, code)) {
+        if reported.replace((status, code)) != Some((status, code)) {
             bus.report(Event::StateError { subdevice: SubDeviceId(*index), requested: None, status, code });
         }
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
-    *told = None;
+    *reported = None;
     bring_up.op().await?;
     Ok(true)
 }
@@ -217,12 +217,12 @@ pub(super) async fn bring_up_member(
     segment: SharedSegment,
     (index, attempt): (usize, u32),
     from: Start,
-    told: Option<Shown>,
+    reported: Option<Shown>,
     check: Check,
 ) {
     let procedure = async {
         if check == Check::None {
-            return keep_up(&bus, &segment, (index, attempt), from, told).await;
+            return keep_up(&bus, &segment, (index, attempt), from, reported).await;
         }
         if !is_the_member(&bus, &segment, (index, attempt), check).await {
             return;
@@ -230,7 +230,7 @@ pub(super) async fn bring_up_member(
         if segment.view().members[index].unfit.is_some() {
             read_again(&bus, &segment, index).await;
         }
-        keep_up(&bus, &segment, (index, attempt), from, told).await;
+        keep_up(&bus, &segment, (index, attempt), from, reported).await;
     };
     while_current(&segment, index, attempt, procedure).await;
 }

@@ -23,7 +23,7 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_millis(1);
 /// Consecutive reads without an answer after which a SubDevice is absent: at the moment of a cut a copy may have been
 /// processed by none.
-const SILENT_LOOKS: u8 = 3;
+const SILENT_READS: u8 = 3;
 /// Pause between two of these reads: the ends of a cable may detect late that it is cut.
 const SILENT_PAUSE: Duration = Duration::from_millis(10);
 /// Time from a request until it is repeated if the SubDevice shows an error: applications take milliseconds to clear
@@ -94,24 +94,24 @@ impl From<BusError> for StopError {
 }
 
 /// A SubDevice to be stopped: its index in the declaration, if it was declared, and its station address.
-pub(crate) type Led = (Option<usize>, StationAddress);
+pub(crate) type ToStop = (Option<usize>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
-pub(crate) fn all_known(segment: &Segment) -> Vec<Led> {
+pub(crate) fn all_known(segment: &Segment) -> Vec<ToStop> {
     let members = segment.members.iter().enumerate().map(|(index, member)| (Some(index), member.station));
     members.chain(segment.unassigned.iter().map(|it| (None, it.station))).collect()
 }
 
 /// Brings SubDevices to a state below their present one. SubDevices in a lower state stay there, and so do those in
 /// BOOT unless INIT is requested. If no address is known, only INIT is requested, by broadcast.
-pub(crate) async fn stop(bus: &Bus, led: Vec<Led>, state: AlState, limit: Duration) -> Result<(), StopError> {
+pub(crate) async fn stop(bus: &Bus, to_stop: Vec<ToStop>, state: AlState, limit: Duration) -> Result<(), StopError> {
     let until = bus.now() + limit;
     if state == AlState::Init {
         bus.bwr(map::AL_CONTROL, &AlControl::with_acknowledge(state).encode()).await?;
     }
-    let stations = led.iter().map(|(_, station)| *station);
-    let ends = bus.gather(stations, |bus, station| async move { lead(&bus, station, state, until).await }).await;
-    let mut late = led.iter().zip(&ends).filter_map(|((subdevice, station), end)| match end {
+    let stations = to_stop.iter().map(|(_, station)| *station);
+    let ends = bus.gather(stations, |bus, station| async move { bring_down(&bus, station, state, until).await }).await;
+    let mut late = to_stop.iter().zip(&ends).filter_map(|((subdevice, station), end)| match end {
         End::Late(status, code) => Some((*subdevice, *station, *status, *code)),
         End::There | End::Silent | End::Failed(_) => None,
     });
@@ -142,7 +142,7 @@ enum End {
 }
 
 /// Brings one SubDevice down, and clears its error.
-async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant) -> End {
+async fn bring_down(bus: &Bus, station: StationAddress, state: AlState, until: Instant) -> End {
     let (mut silent, mut next, mut reason) = (0, None, AlStatusCode(0));
     loop {
         match read_status(bus, station).await {
@@ -165,7 +165,7 @@ async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant
             }
             Err(BusError::Wkc { got: Wkc(0), .. }) => {
                 silent += 1;
-                if silent >= SILENT_LOOKS {
+                if silent >= SILENT_READS {
                     return End::Silent;
                 }
                 bus.sleep(SILENT_PAUSE).await;

@@ -10,18 +10,18 @@ use core::time::Duration;
 use ringcat_wire::register::{DlStatus, map};
 
 use super::frame_limit;
-use super::inspect::{look_at_all, look_at_unassigned};
+use super::inspect::{read_all_unassigned, read_members};
 use super::junction::note_controls;
 use super::shared_segment::SharedSegment;
 use super::unassigned::{self, Search};
 use crate::segment::member::Phase;
-use crate::segment::{Look, Looked, Observation};
+use crate::segment::{Observation, Reading, RoundResult};
 use crate::supervisor::Bus;
 
 /// Pause before SubDevices that did not answer are read again.
 const PAUSE: Duration = Duration::from_micros(500);
 /// Pause before SubDevices whose positions could not be determined are read again.
-const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
+const REPEAT_PAUSE: Duration = Duration::from_millis(2);
 /// Pause between two searches for unknown SubDevices.
 const SEARCH_PAUSE: Duration = Duration::from_millis(10);
 
@@ -30,14 +30,14 @@ pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
     loop {
         let posted = bus.posted();
         segment.observe(Observation::Words(segment.words()));
-        let wake = segment.view().next_look();
+        let wake = segment.view().next_evaluation();
         segment.until_news(posted, wake).await;
     }
 }
 
 /// One round of scans, and the procedures on the bus that follow from it.
-pub(super) async fn look_round(bus: Bus, segment: SharedSegment, routine: bool, search: Search) {
-    look(&bus, &segment, routine).await;
+pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool, search: Search) {
+    scan_all(&bus, &segment, routine).await;
     let round = segment.view().round();
     if round.is_blind {
         frame_limit::explain(&bus, &segment).await;
@@ -49,19 +49,20 @@ pub(super) async fn look_round(bus: Bus, segment: SharedSegment, routine: bool, 
     segment.observe(Observation::RoundEnded(number));
 }
 
-async fn look(bus: &Bus, segment: &SharedSegment, routine: bool) {
-    let asked = segment.view().asked();
+async fn scan_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
+    let versions = segment.view().versions();
     let before: Vec<Phase> = segment.view().members.iter().map(|member| member.phase).collect();
-    let unassigned = look_at_unassigned(bus, segment).await;
-    let others = unassigned.iter().filter(|(_, look)| look.is_answer()).count();
+    let unassigned = read_all_unassigned(bus, segment).await;
+    let others = unassigned.iter().filter(|(_, scan_all)| scan_all.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
     let counted = || segment.board.supervision().map(|(_, seen)| seen.total());
-    let so_far = |looks: &[Look]| {
-        segment.observe(Observation::PartOfLooks { asked, looks, others, counted: counted() });
+    let so_far = |readings: &[Reading]| {
+        segment.observe(Observation::PartOfRound { versions, readings, others, counted: counted() });
     };
-    let looks = look_at_all(bus, segment, is_calm, so_far).await;
-    let looked = Looked { asked, looks: &looks, before: &before, unassigned: &unassigned, counted: counted() };
-    segment.observe(Observation::Looks(looked));
+    let readings = read_members(bus, segment, is_calm, so_far).await;
+    let round_result =
+        RoundResult { versions, readings: &readings, before: &before, unassigned: &unassigned, counted: counted() };
+    segment.observe(Observation::Round(round_result));
 }
 
 async fn follow_up(bus: &Bus, segment: &SharedSegment, search: &Search) {
@@ -75,11 +76,11 @@ async fn follow_up(bus: &Bus, segment: &SharedSegment, search: &Search) {
         is_complete = search.run(bus, segment).await;
         // Clears the ECAT events of SubDevices that are not scanned.
         if bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
-            segment.observe(Observation::LookAgainIn(PAUSE));
+            segment.observe(Observation::ScanAgainIn(PAUSE));
         }
-        segment.observe(Observation::LookAgainIn(SEARCH_PAUSE));
+        segment.observe(Observation::ScanAgainIn(SEARCH_PAUSE));
     }
     if round.is_certain && is_complete && !unassigned::admit_all(bus, segment).await {
-        segment.observe(Observation::LookAgainIn(SECOND_LOOK_PAUSE));
+        segment.observe(Observation::ScanAgainIn(REPEAT_PAUSE));
     }
 }

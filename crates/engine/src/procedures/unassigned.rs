@@ -119,8 +119,8 @@ pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: S
         bus_failures = if failed_on_bus { bus_failures + 1 } else { 0 };
         let is_patient = failed_on_bus && bus_failures < BUS_PATIENCE;
         let is_read = result.is_ok();
-        let told = |error: ScanError| (!is_patient).then(|| error.to_string());
-        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(told) });
+        let reason = |error: ScanError| (!is_patient).then(|| error.to_string());
+        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(reason) });
         if is_read {
             return;
         }
@@ -141,8 +141,8 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) 
 ///
 /// False if their positions could not be determined.
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
-    let Some(told) = find_places(bus, segment).await else { return false };
-    let Matches { matched, held } = segment.view().match_all(&told, bus.now());
+    let Some(identified) = find_places(bus, segment).await else { return false };
+    let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
     for (station, index) in held {
         segment.observe(Observation::Held { station, index });
     }
@@ -173,12 +173,12 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
         return None;
     }
     segment.observe(Observation::Places(&seen));
-    if !segment.view().asks_for_cables() {
+    if !segment.view().needs_cables() {
         return Some(Vec::new());
     }
     let ports = ports_of(bus, &seen).await.ok()??;
-    let told = segment.view().told_by_cables(&seen, &ports);
-    Some(told)
+    let identified = segment.view().identified_by_cables(&seen, &ports);
+    Some(identified)
 }
 
 /// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.

@@ -53,7 +53,7 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
     let mut remedies = alloc::vec![Remedy::default(); segment.view().members.len()];
     loop {
         bus.sleep(PAUSE).await;
-        let all = bus.gather_in_turns(settled(&segment), look).await;
+        let all = bus.gather_in_turns(settled(&segment), check).await;
         let mut wrong = Vec::new();
         for found in all.into_iter().flatten() {
             match found {
@@ -62,7 +62,7 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
             }
         }
         // A single difference may be due to a change under way.
-        for found in bus.gather(wrong, look).await.into_iter().flatten() {
+        for found in bus.gather(wrong, check).await.into_iter().flatten() {
             if let Found::Wrong(suspect, reason) = found {
                 let remedy = &mut remedies[suspect.index];
                 if remedy.reason != reason {
@@ -93,7 +93,7 @@ fn settled(segment: &SharedSegment) -> Vec<Suspect> {
 }
 
 /// `None` if it does not answer, which the supervision handles.
-async fn look(bus: Bus, suspect: Suspect) -> Option<Found> {
+async fn check(bus: Bus, suspect: Suspect) -> Option<Found> {
     let mut wrong = None;
     for held in &suspect.registers {
         let got = bus.fprd(suspect.station, held.register, held.bytes.len()).await.ok()?;

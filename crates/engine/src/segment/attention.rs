@@ -55,7 +55,7 @@ pub(super) struct Attention {
     next_routine: Instant,
     /// Earliest time of the next round.
     earliest: Instant,
-    is_looking: bool,
+    is_scanning: bool,
     /// Result of the last round.
     pub round: Round,
     /// Consecutive rounds in which scans were lost though frames returned, or the reverse.
@@ -76,7 +76,7 @@ impl Default for Attention {
             is_awaited: false,
             next_routine: Instant::default(),
             earliest: Instant::default(),
-            is_looking: false,
+            is_scanning: false,
             round: Round::default(),
             blind: 0,
             wake: Instant::default(),
@@ -121,7 +121,7 @@ impl Attention {
     ) -> Instant {
         // A missing answer has no meaning while SubDevices are out of reach on purpose; the end of this state is an
         // observation.
-        if self.is_looking || disturbance == Some(Disturbance::IsolateRings) {
+        if self.is_scanning || disturbance == Some(Disturbance::IsolateRings) {
             return Instant::NEVER;
         }
         if now < self.earliest {
@@ -132,8 +132,8 @@ impl Attention {
         if !changed && now < self.next_routine {
             return if missed.is_some() { self.next_routine.min(now + PAUSE) } else { self.next_routine };
         }
-        effects.start(Task::Look { routine: !changed && !self.is_awaited });
-        (self.is_looking, self.is_awaited, self.is_wanted) = (true, false, false);
+        effects.start(Task::Scan { routine: !changed && !self.is_awaited });
+        (self.is_scanning, self.is_awaited, self.is_wanted) = (true, false, false);
         self.seen = words.supervision.map_or(self.seen, |(_, supervision)| supervision);
         self.ring = words.ring;
         self.reported = reported;
@@ -159,7 +159,7 @@ impl Attention {
 
     /// A round has ended; `number` is the latest result's.
     pub fn end(&mut self, number: Option<u32>, now: Instant) {
-        self.is_looking = false;
+        self.is_scanning = false;
         self.checked = number.unwrap_or(0);
         self.earliest = now + PAUSE;
     }

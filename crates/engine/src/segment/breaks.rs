@@ -15,9 +15,9 @@ pub(super) struct Breaks {
     /// The state of the ring at the last evaluation.
     pub state: RingState,
     /// Remaining scans for a place.
-    pub looks: u8,
+    pub readings: u8,
     /// Broken cables of the open ring that were reported.
-    pub told: Vec<Cable>,
+    pub reported: Vec<Cable>,
 }
 
 /// The cables of the ring that no longer have communication, in its order. Branches are excluded: SubDevices behind a

@@ -44,9 +44,11 @@ pub struct LineCheck {
 
 impl LineCheck {
     /// Whether it neither adds to the reported result nor withdraws from it.
-    pub fn says_the_same_as(&self, told: &LineCheck) -> bool {
+    pub fn adds_nothing_to(&self, reported: &LineCheck) -> bool {
         let crossed = |check: &LineCheck| check.crossings.iter().map(Crossing::station).collect::<BTreeSet<_>>();
-        crossed(self) == crossed(told) && self.swapped == told.swapped && self.unknown_rings <= told.unknown_rings
+        crossed(self) == crossed(reported)
+            && self.swapped == reported.swapped
+            && self.unknown_rings <= reported.unknown_rings
     }
 
     /// The reported result that is still valid, combined with the new one. A closed ring withdraws nothing that an open
@@ -100,14 +102,14 @@ pub(super) struct Crossings {
     /// State of the search.
     pub search: Search,
     /// Reported crossings.
-    pub told: LineCheck,
+    pub reported: LineCheck,
 }
 
 impl Crossings {
     /// Crossings that the scan reported are not reported again.
     pub fn new(cabling: &Cabling, members: &[Member], choices: Choices) -> Crossings {
         let topology = &cabling.topology;
-        let told = topology.findings.iter().filter_map(|finding| match *finding {
+        let reported = topology.findings.iter().filter_map(|finding| match *finding {
             Finding::CrossedLine { node, entry_port } => {
                 let member = members.iter().find(|member| member.node == Some(node))?;
                 let subdevice = Some((member.station, Position(node as u16)));
@@ -115,16 +117,16 @@ impl Crossings {
             }
             _ => None,
         });
-        let mut told = LineCheck { crossings: told.collect(), ..LineCheck::default() };
+        let mut reported = LineCheck { crossings: reported.collect(), ..LineCheck::default() };
         if topology.is_assumed() {
-            told.crossings.push(Crossing { subdevice: None, entry_port: None });
+            reported.crossings.push(Crossing { subdevice: None, entry_port: None });
         }
-        told.swapped = is_swapped(topology);
+        reported.swapped = is_swapped(topology);
         let junctions = choices.junctions != JunctionMode::Disabled || !topology.local_rings.is_empty();
-        Crossings { junctions, ports: Vec::new(), search: Search::Idle, told }
+        Crossings { junctions, ports: Vec::new(), search: Search::Idle, reported }
     }
 
-    pub fn told(&self) -> &LineCheck {
-        &self.told
+    pub fn reported(&self) -> &LineCheck {
+        &self.reported
     }
 }

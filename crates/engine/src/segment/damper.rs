@@ -49,7 +49,7 @@ impl Damper {
     }
 
     /// Whether the present state may be reported.
-    pub(crate) fn may_tell(&mut self, now: Instant) -> bool {
+    pub(crate) fn may_report(&mut self, now: Instant) -> bool {
         let held = self.changed_at.map_or(Duration::MAX, |at| now.since(at));
         if self.is_unsteady {
             return held >= STEADY;
@@ -82,7 +82,7 @@ mod tests {
     /// Evaluates every 500 us a state that flips every `half_period`; returns how often it was reported, and how often
     /// as unsteady.
     fn flap(half_period: Duration, lasts: Duration) -> (u32, u32) {
-        let (mut damper, mut told_state, mut told, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
+        let (mut damper, mut reported_state, mut reported, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
         let mut now = Instant(0);
         while now < Instant(0) + lasts {
             now += Duration::from_micros(500);
@@ -91,55 +91,55 @@ mod tests {
                 damper.changed(now);
                 flips = due;
             }
-            if told_state != flips % 2 && damper.may_tell(now) {
-                told_state = flips % 2;
-                told += 1;
+            if reported_state != flips % 2 && damper.may_report(now) {
+                reported_state = flips % 2;
+                reported += 1;
                 unsteady += u32::from(damper.tell(now));
             }
         }
-        (told, unsteady)
+        (reported, unsteady)
     }
 
     #[test]
-    fn changes_that_are_rare_are_told_each_and_at_once() {
+    fn rare_changes_are_each_reported_at_once() {
         assert_eq!(flap(Duration::from_millis(300), Duration::from_secs(60)), (200, 0));
         let mut damper = Damper::default();
         damper.changed(Instant(5));
-        assert!(damper.may_tell(Instant(5)));
+        assert!(damper.may_report(Instant(5)));
     }
 
     // covers: ring-flap
     #[test]
-    fn flapping_at_any_rate_is_told_a_bounded_number_of_times() {
+    fn flapping_at_any_rate_is_reported_a_bounded_number_of_times() {
         let lasts = Duration::from_secs(60);
         for micros in [1, 10, 100, 700, 3_000, 15_000, 25_000, 60_000, 150_000, 240_000, 1_000_000] {
-            let (told, unsteady) = flap(Duration::from_micros(micros), lasts);
+            let (reported, unsteady) = flap(Duration::from_micros(micros), lasts);
             let most = BUDGET + (lasts.as_nanos() / REFILL.as_nanos()) as u32;
-            assert!(told <= most, "{told} of {most} with a half period of {micros} us");
+            assert!(reported <= most, "{reported} of {most} with a half period of {micros} us");
             assert!(unsteady <= 1, "{unsteady}");
         }
-        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "back again before anybody looked");
-        assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then told no more until it is steady");
+        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "back again before anybody round_result");
+        assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then no report until it is steady");
     }
 
     #[test]
-    fn what_was_unsteady_is_told_when_it_has_been_steady_for_a_second() {
+    fn an_unsteady_state_is_reported_after_a_stable_second() {
         let mut damper = Damper::default();
         let mut now = Instant(0);
         let mut became = 0;
         for _ in 0..1000 {
             now += Duration::from_millis(30);
             damper.changed(now);
-            if damper.may_tell(now) {
+            if damper.may_report(now) {
                 became += u32::from(damper.tell(now));
             }
         }
         assert_eq!(became, 1);
-        assert!(damper.is_unsteady(now) && !damper.may_tell(now + Duration::from_millis(999)));
+        assert!(damper.is_unsteady(now) && !damper.may_report(now + Duration::from_millis(999)));
         now += STEADY;
-        assert!(!damper.is_unsteady(now) && damper.may_tell(now));
-        assert!(!damper.tell(now), "some are told again");
+        assert!(!damper.is_unsteady(now) && damper.may_report(now));
+        assert!(!damper.tell(now), "some are reported again");
         damper.changed(now + STEADY);
-        assert!(damper.may_tell(now + STEADY));
+        assert!(damper.may_report(now + STEADY));
     }
 }

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn one_is_under_way_at_a_time_and_the_most_urgent_one_is_next() {
+    fn one_disturbance_runs_at_a_time_and_the_most_urgent_is_next() {
         let mut slot = Slot::default();
         want(&mut slot, [OpenByLink, OpenByPort, IsolateRings]);
         assert_eq!((slot.running(), slot.isolations()), (Some(OpenByLink), 0));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disturbance_that_is_not_wanted_any_more_is_not_granted() {
+    fn a_withdrawn_disturbance_is_not_granted() {
         let mut slot = Slot::default();
         want(&mut slot, [IsolateRings, OpenByPort]);
         slot.end(1);
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn two_of_a_kind_are_under_way_one_after_the_other() {
+    fn two_disturbances_of_a_kind_run_one_after_the_other() {
         let mut slot = Slot::default();
         want(&mut slot, [Rescan, Rescan]);
         assert!(slot.is_granted(0) && !slot.is_granted(1));

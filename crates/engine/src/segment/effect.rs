@@ -50,7 +50,7 @@ pub enum Check {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
     /// Scans all SubDevices.
-    Look {
+    Scan {
         /// Nothing has changed: a few SubDevices at a time.
         routine: bool,
     },
@@ -63,7 +63,7 @@ pub enum Task {
         /// State of its registers.
         from: Start,
         /// Its error that is reported and still present.
-        told: Option<Shown>,
+        reported: Option<Shown>,
         /// The check before it.
         check: Check,
     },

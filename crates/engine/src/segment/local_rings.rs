@@ -74,12 +74,12 @@ impl LocalRings {
     fn go_over(&mut self, new: LocalRings, status: &[Option<NodeStatus>]) {
         let before = core::mem::replace(self, new);
         let places = &self.places;
-        let told = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
+        let reported = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
             let head = before.places.end(closing.head);
             ring.iter().filter(|watched| watched.reported).map(move |watched| (watched, head))
         });
-        for (told, head) in told {
-            let ends = before.places.ends(&told.cable);
+        for (reported, head) in reported {
+            let ends = before.places.ends(&reported.cable);
             let rank = |watched: &Watched, is_of_ring: bool| {
                 let shares = places.ends(&watched.cable).iter().flatten().any(|end| ends.contains(&Some(*end)));
                 match (is_down(&watched.cable, status) == Some(true), shares, is_of_ring) {
@@ -97,7 +97,7 @@ impl LocalRings {
                 .filter(|(watched, _)| !watched.reported)
                 .filter_map(|(watched, is_of_ring)| Some((rank(watched, is_of_ring)?, watched)));
             if let Some((_, watched)) = ranked.min_by_key(|(rank, _)| *rank) {
-                (watched.reported, watched.whole_since) = (true, told.whole_since);
+                (watched.reported, watched.whole_since) = (true, reported.whole_since);
             }
         }
         self.broken = self.rings.iter().flatten().filter(|watched| watched.reported).count();
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_that_was_broken_at_the_scan_is_known_as_a_whole_once_it_is_whole() {
+    fn a_ring_broken_at_the_scan_is_completely_known_once_it_is_whole() {
         let mut watch = watch(CUT_1_2);
         assert_eq!(seen(&mut watch, 0, CUT_1_2), [event(None, at(2, 0), true, 1)]);
         assert_eq!(seen(&mut watch, 10, WHOLE), []);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_member_without_power_is_two_breaks_and_silence_is_none() {
+    fn a_member_without_power_is_two_breaks_and_a_missing_answer_is_none() {
         let mut watch = watch(WHOLE);
         let mut status: Vec<Option<NodeStatus>> = nodes([&[0, 1, 3], &[0], &[], &[1]]).into_iter().map(Some).collect();
         status[2] = None;

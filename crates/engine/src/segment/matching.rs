@@ -83,40 +83,40 @@ mod tests {
     }
 
     #[test]
-    fn subdevices_alike_keep_the_order_of_the_segment() {
+    fn subdevices_of_one_type_keep_the_order_of_the_segment() {
         assert_eq!(assigned(&[true, true], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[false, false], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, false], &[[Seen; 3]; 2]), [Some(0), Some(2)]);
     }
 
     #[test]
-    fn fewer_than_are_absent_are_next_to_the_neighbours_they_answer_through() {
+    fn fewer_subdevices_than_absent_members_match_the_nearest_places() {
         assert_eq!(assigned(&[true], &[[Seen; 3]]), [Some(0)]);
         assert_eq!(assigned(&[false], &[[Seen; 3]]), [Some(2)]);
         assert_eq!(assigned(&[false, false], &[[Seen; 3]; 2]), [Some(1), Some(2)]);
     }
 
     #[test]
-    fn one_that_was_there_before_is_preferred_to_one_that_never_was() {
+    fn a_member_seen_before_is_preferred_to_a_member_never_seen() {
         assert_eq!(assigned(&[true], &[[NeverSeen, Seen]]), [Some(1)]);
         assert_eq!(assigned(&[true, true], &[[NeverSeen, Seen]; 2]), [Some(0), Some(1)], "both are there now");
         assert_eq!(assigned(&[true], &[[NeverSeen, No]]), [Some(0)]);
     }
 
     #[test]
-    fn a_serial_number_decides_before_order_does() {
+    fn serial_numbers_have_priority_over_order() {
         assert_eq!(assigned(&[true], &[[Seen, Serial]]), [Some(1)]);
         assert_eq!(assigned(&[true, true], &[[Seen, Serial], [Seen, Seen]]), [Some(1), Some(0)]);
     }
 
     #[test]
-    fn an_unreadable_one_keeps_its_place_unless_a_readable_one_needs_it() {
+    fn an_unreadable_subdevice_keeps_its_place_unless_a_readable_one_matches() {
         assert_eq!(assigned(&[true, true], &[[Unreadable; 2], [Seen; 2]]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, true], &[[Unreadable], [Seen]]), [None, Some(0)]);
     }
 
     #[test]
-    fn one_that_fits_nowhere_is_no_member() {
+    fn a_subdevice_that_matches_nowhere_is_no_member() {
         assert_eq!(assigned(&[true, true], &[[No, No], [No, Seen]]), [None, Some(1)]);
         assert_eq!(assigned::<0>(&[true], &[[]]), [None]);
     }

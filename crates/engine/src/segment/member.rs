@@ -88,7 +88,7 @@ impl Mistaken {
     }
 
     /// It keeps the address: to be reported now.
-    pub fn is_to_tell(&self) -> bool {
+    pub fn is_due(&self) -> bool {
         self.times == PATIENCE
     }
 }

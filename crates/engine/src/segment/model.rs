@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::asked::Asked;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cabling::Cabling;
@@ -20,6 +19,7 @@ use super::port_control::{BlockedPort, PortControl};
 use super::ring::{Ring, Words};
 use super::silence::Silence;
 use super::unassigned::UnassignedSubDevice;
+use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
 use crate::declared::SubDeviceId;
@@ -103,7 +103,7 @@ impl Segment {
     }
 
     /// Time of the next evaluation if no words are posted before.
-    pub fn next_look(&self) -> Instant {
+    pub fn next_evaluation(&self) -> Instant {
         self.attention.wake
     }
 
@@ -144,8 +144,8 @@ impl Segment {
     }
 
     /// The version of the model, for a procedure that starts now.
-    pub fn asked(&self) -> Asked {
-        Asked { cabling: self.cabling.version, isolations: self.slot.isolations() }
+    pub fn versions(&self) -> Versions {
+        Versions { cabling: self.cabling.version, isolations: self.slot.isolations() }
     }
 
     /// The last round of scans.
@@ -159,8 +159,8 @@ impl Segment {
     }
 
     /// Crossed lines as reported.
-    pub fn told_crossings(&self) -> &LineCheck {
-        self.crossings.told()
+    pub fn reported_crossings(&self) -> &LineCheck {
+        self.crossings.reported()
     }
 
     /// How often the cabling of a rescan was taken over.

@@ -9,16 +9,16 @@ use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
-use super::asked::Asked;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
-use super::look::Look;
-use super::looked::Looked;
 use super::port_control::BlockedPort;
+use super::reading::Reading;
 use super::ring::Words;
+use super::round_result::RoundResult;
 use super::seen::Seen;
 use super::start::Start;
+use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
 use crate::ring_status::CableErrors;
@@ -45,24 +45,24 @@ pub enum Observation<'a> {
     /// Words posted by the exchange, and carriers of the links.
     Words(Words),
     /// Intermediate result of a round of scans. `others`: answers of SubDevices without a declaration.
-    PartOfLooks {
+    PartOfRound {
         /// Version of the model at the request.
-        asked: Asked,
+        versions: Versions,
         /// By member.
-        looks: &'a [Look],
+        readings: &'a [Reading],
         /// Answers of SubDevices without a declaration.
         others: usize,
         /// SubDevices that the latest supervision result counts.
         counted: Option<Wkc>,
     },
     /// A round of looks is complete.
-    Looks(Looked<'a>),
+    Round(RoundResult<'a>),
     /// All effects of a round of scans are completed. With the number of the latest supervision result.
     RoundEnded(Option<u32>),
     /// Another round is requested.
-    LookAgain,
+    ScanAgain,
     /// Another round is requested after a pause.
-    LookAgainIn(Duration),
+    ScanAgainIn(Duration),
 
     /// The configuration of all present members may begin.
     Started(Start),
@@ -220,7 +220,7 @@ pub enum Observation<'a> {
     /// Cables have counted errors since the last reading. By number in the cabling of that version.
     CableErrors {
         /// Version of the model at the request.
-        asked: Asked,
+        versions: Versions,
         /// The new errors.
         fresh: &'a [CableErrors],
     },
@@ -235,7 +235,7 @@ pub enum Observation<'a> {
     /// An examination of rings behind junctions has ended without changes.
     Isolated {
         /// Version of the model at the request.
-        asked: Asked,
+        versions: Versions,
         /// Port states of the SubDevices, by position.
         found: &'a [Option<NodeStatus>],
         /// Words posted at that time.
@@ -249,7 +249,7 @@ pub enum Observation<'a> {
         control: DlControl,
     },
     /// The junction has got the command.
-    PortsTold(StationAddress),
+    PortsWritten(StationAddress),
     /// The port control of a junction was read, after this number of commands.
     PortsRead {
         /// The junction.

@@ -142,7 +142,7 @@ impl Ring {
             if carriers[at] == self.told_carriers[at] {
                 continue;
             }
-            if !self.cables[at].may_tell(now) {
+            if !self.cables[at].may_report(now) {
                 again = Some(now + PAUSE);
                 continue;
             }
@@ -168,8 +168,8 @@ impl Ring {
             self.ways.changed(now);
             self.dead_way = word.dead_way;
         }
-        let is_settled = self.tell_ring(words, cabled, now, effects);
-        let is_told = self.tell_redundancy(word, now, effects);
+        let is_settled = self.report_ring(words, cabled, now, effects);
+        let is_told = self.report_redundancy(word, now, effects);
         self.status.state = word.state;
         self.status.changes = word.changes;
         self.status.unsteady = self.damper.is_unsteady(now);
@@ -177,7 +177,7 @@ impl Ring {
     }
 
     /// True if the state was reported with steady counts.
-    fn tell_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+    fn report_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
         let word = words.ring;
         let Some((number, supervision)) = words.supervision else { return true };
         let counts = (supervision.main.0, supervision.redundant.0);
@@ -189,7 +189,7 @@ impl Ring {
             self.settling = 0;
             return self.steady == supervision.total().0;
         }
-        if !self.damper.may_tell(now) {
+        if !self.damper.may_report(now) {
             return false;
         }
         let Some((main, redundant)) = self.counts(word, number, supervision) else { return false };
@@ -271,7 +271,7 @@ impl Ring {
     }
 
     /// True if the present state was reported.
-    fn tell_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
+    fn report_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
         let before = self.status.redundancy;
         let cause = match (self.reported, word.dead_way) {
             (RingState::Open, _) => Some(RedundancyLoss::Open),
@@ -286,7 +286,7 @@ impl Ring {
         };
         let by_way = matches!(cause, Some(RedundancyLoss::OneWay(_)))
             || matches!(before, Redundancy::Lost { cause: RedundancyLoss::OneWay(_), .. });
-        if is_told || (by_way && !self.ways.may_tell(now)) {
+        if is_told || (by_way && !self.ways.may_report(now)) {
             return is_told;
         }
         let was_lost = matches!(before, Redundancy::Lost { .. });

@@ -35,7 +35,7 @@ const LATCHED_LEN: usize = 32;
 /// Attempts in total to repeat a latch of which a datagram was lost.
 const MOST_FAILURES: u32 = 16;
 /// Attempts to survey a segment that changes during the survey.
-const LOOKS: u32 = 3;
+const SCANS: u32 = 3;
 /// Maximum wait for other disturbances before rings are opened.
 const LIMIT: Duration = Duration::from_secs(5);
 /// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
@@ -56,7 +56,7 @@ struct Survey {
     /// Latched values since which no port has changed: usable as a measurement.
     latched: Option<Vec<Option<Latched>>>,
     /// The link on which copies do not return while the ring is opened.
-    deaf: Option<Link>,
+    no_return: Option<Link>,
     /// No branch is closed.
     is_whole: bool,
 }
@@ -74,7 +74,7 @@ pub(super) enum Opening {
 
 /// Runs a measurement.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
-    let mut survey = look(bus, segment).await?;
+    let mut survey = survey(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
@@ -92,18 +92,18 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
     let is_open_question = is_open(&measured);
     // Opening changes ports, which triggers another measurement: a ring whose opening gave no result is not opened
     // again.
-    let is_in_vain = segment.view().clocks().opened_in_vain.as_ref() == Some(&survey.wiring);
-    if !is_open_question || opening != Opening::Nothing || rings.is_empty() || is_in_vain {
+    let gave_no_result = segment.view().clocks().opened_without_result.as_ref() == Some(&survey.wiring);
+    if !is_open_question || opening != Opening::Nothing || rings.is_empty() || gave_no_result {
         let is_still_open = is_open_question && !rings.is_empty();
         let in_vain = is_still_open.then_some(survey.wiring);
-        segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+        segment.observe_clocks(ClockObservation::OpenedWithoutResult(in_vain));
         return exact(measured);
     }
     let survey = Survey { latched: None, ..survey.clone() };
     measure_open(bus, segment, &survey, &rings, &[]).await?;
     measured = take(bus, segment, &survey).await?;
     let in_vain = is_open(&measured).then_some(survey.wiring);
-    segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+    segment.observe_clocks(ClockObservation::OpenedWithoutResult(in_vain));
     exact(measured)
 }
 
@@ -146,7 +146,7 @@ async fn measure_open(
             open.latched = None;
             open.is_whole = branches.is_empty();
             // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
-            open.deaf = survey.is_closed.then_some(Link::Redundant);
+            open.no_return = survey.is_closed.then_some(Link::Redundant);
             take(bus, segment, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
@@ -209,13 +209,13 @@ impl Survey {
     }
 }
 
-async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
-    for _ in 0..LOOKS {
-        let looked = look_once(bus, segment).await;
+async fn survey(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
+    for _ in 0..SCANS {
+        let round_result = survey_once(bus, segment).await;
         // The ECAT events of ports that changed before have been read and cleared by this survey, so another scan is
         // needed.
-        segment.observe(Observation::LookAgain);
-        match looked {
+        segment.observe(Observation::ScanAgain);
+        match round_result {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
             Err(error) => return Err(error.to_string()),
@@ -225,7 +225,7 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
 }
 
 /// `None` while the segment changes.
-async fn look_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
+async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
     let Some(before) = view(bus).await? else { return Ok(None) };
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     // Receive times show the port at which frames enter a SubDevice.
@@ -267,7 +267,7 @@ async fn look_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>,
         wiring,
         is_closed,
         latched: Some(latched),
-        deaf: None,
+        no_return: None,
         is_whole: true,
     }))
 }
@@ -284,7 +284,7 @@ async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Mea
     let count = count + measurements.count();
     let mut failures = 0;
     while measurements.count() < count {
-        match latch(bus, segment, &survey.stations, survey.deaf).await {
+        match latch(bus, segment, &survey.stations, survey.no_return).await {
             Ok(latched) => measurements.add(latched),
             Err(error @ (BusError::Busy { .. } | BusError::Disturbed { .. })) => return Err(error.to_string()),
             Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
@@ -360,24 +360,24 @@ async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[Station
     false
 }
 
-/// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `deaf` do not
+/// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `no_return` do not
 /// return.
 pub(super) async fn latch(
     bus: &Bus,
     segment: &SharedSegment,
     stations: &[StationAddress],
-    deaf: Option<Link>,
+    no_return: Option<Link>,
 ) -> Result<Vec<Option<Latched>>, BusError> {
-    let (asked, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
+    let (versions, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
         let view = segment.view();
         let clocks = view.clocks();
         let lacks = |station| clocks.node_at(station).is_some_and(|node| !node.has_clock);
-        let asked = stations.iter().map(|station| (*station, !lacks(*station)));
-        (asked.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
+        let versions = stations.iter().map(|station| (*station, !lacks(*station)));
+        (versions.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
     };
-    let latches = frames::latch(bus, pauses, deaf).await?;
-    let read = bus.gather(asked, |bus, (station, asked)| async move {
-        if !asked {
+    let latches = frames::latch(bus, pauses, no_return).await?;
+    let read = bus.gather(versions, |bus, (station, versions)| async move {
+        if !versions {
             return Ok(None);
         }
         let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {

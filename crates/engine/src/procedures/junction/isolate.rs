@@ -99,17 +99,17 @@ impl Ring {
 /// waits for the end of any other disturbance, which has its own limit.
 pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
     let Some(turn) = segment.disturb_while(Disturbance::IsolateRings, Segment::is_blocked).await else { return };
-    let asked = segment.view().asked();
-    let found = look_inside(&bus, &segment).await;
+    let versions = segment.view().versions();
+    let found = examine_rings(&bus, &segment).await;
     // Frames sent before the last loop opened may still be on the wire.
     bus.sleep(PAUSE).await;
     drop(turn);
-    segment.observe(Observation::Isolated { asked, found: &found, words: segment.words() });
+    segment.observe(Observation::Isolated { versions, found: &found, words: segment.words() });
 }
 
 /// Returns the port states of members, by position. Empty if the examination is impossible: there is only one ring, or
 /// a junction is not declared.
-async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
+async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
     let (rings, count) = {
         let view = segment.view();
         let topology = &view.cabling.topology;

@@ -23,7 +23,7 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 /// Consecutive negative results that are required.
 const TRIES: usize = 2;
 /// Scans until all SubDevices answer.
-const LOOKS: u8 = 5;
+const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// The number of a closing cable that is not where it was declared, and the evidence. Every SubDevice has the station
@@ -36,9 +36,9 @@ pub(crate) async fn refute(
 ) -> Option<(usize, ClosingEvidence)> {
     let mut last = None;
     for _ in 0..TRIES {
-        let nodes = look(bus, scanned).await?;
+        let nodes = present_ports(bus, scanned).await?;
         last = Some(attempt(bus, &nodes, main_count, closings).await?);
-        if look(bus, scanned).await? != nodes {
+        if present_ports(bus, scanned).await? != nodes {
             return None;
         }
     }
@@ -83,9 +83,9 @@ async fn attempt(
 }
 
 /// Present port states; `None` if not all SubDevices answer.
-async fn look(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
+async fn present_ports(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
     // After frames of a link were lost for a while, the bus does not wait for that link until one has returned.
-    for _ in 0..LOOKS {
+    for _ in 0..SCANS {
         if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.len()) {
             break;
         }

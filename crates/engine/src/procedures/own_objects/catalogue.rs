@@ -311,7 +311,7 @@ mod tests {
 
     // covers: 10.2, own-objects
     #[test]
-    fn every_index_that_is_listed_is_an_object_and_no_other_is() {
+    fn exactly_the_listed_indices_are_objects() {
         for declared in [0, 3, MAX_MODULES + 100] {
             let listed: Vec<u16> = Object::indices(declared).collect();
             assert!(listed.is_sorted_by(|one, next| one < next));

@@ -17,19 +17,19 @@ const DEVICE_TYPE: SdoAddress = SdoAddress::new(0x1000, 0);
 const ROOM: usize = 4;
 
 /// A SubDevice, and the requested entries.
-pub(super) struct Asked<W> {
+pub(super) struct Requested<W> {
     /// The mailbox, if the SubDevice supports CoE.
     mailbox: Option<Mailbox>,
     wants: W,
 }
 
-impl<W: Fn(u8) -> bool> Asked<W> {
+impl<W: Fn(u8) -> bool> Requested<W> {
     /// `wants` returns whether a subindex is requested; others are not read.
-    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Asked<W> {
+    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Requested<W> {
         let view = segment.view();
         let info = view.members.get(index).and_then(|member| member.info.as_ref());
         let speaks = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
-        Asked { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
+        Requested { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
     }
 
     /// The value read; `None` also without an answer.

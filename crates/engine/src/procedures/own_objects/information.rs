@@ -125,7 +125,7 @@ mod tests {
 
     // covers: 6.3
     #[test]
-    fn the_list_comes_in_fragments_and_is_whole() {
+    fn the_list_is_complete_in_fragments() {
         let messages = ask(InformationOpcode::ListRequest, &ListType::All.code().to_le_bytes(), 64);
         let mut data = Vec::new();
         for (number, message) in messages.iter().enumerate() {

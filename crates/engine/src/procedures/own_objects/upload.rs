@@ -79,7 +79,7 @@ mod tests {
 
     // covers: 6.3, own-objects
     #[test]
-    fn a_value_of_any_length_arrives_whole_and_a_wrong_toggle_ends_it() {
+    fn values_of_any_length_are_complete_and_a_wrong_toggle_aborts() {
         let room = 32;
         for length in 0..200_usize {
             let data: Vec<u8> = (0..length).map(|byte| byte as u8).collect();

@@ -40,7 +40,7 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
 }
 
 impl Known for Scan {
-    fn note_look(&self) {}
+    fn note_port_scan(&self) {}
 
     fn are_measuring(&self) -> bool {
         false

@@ -92,7 +92,7 @@ pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<u
     if opened.is_err() {
         segment.observe(Observation::Blocked(&blocked));
     }
-    segment.observe(Observation::LookAgain);
+    segment.observe(Observation::ScanAgain);
     opened.map(|()| blocked.len())
 }
 

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn two_read_and_when_they_agree_others_are_spared() {
+    fn after_two_equal_contents_further_subdevices_use_the_cache() {
         let cache = SiiCache::new(true);
         let claims = [1, 2].map(|station| claim(&cache, &area(1), station).expect("two may read"));
         assert!(claim(&cache, &area(1), 3).is_none(), "two do");
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn one_subdevice_does_not_confirm_itself_and_two_that_differ_are_both_read() {
+    fn one_subdevice_does_not_confirm_itself_and_differing_ones_are_both_read() {
         let cache = SiiCache::new(true);
         for _ in 0..3 {
             claim(&cache, &area(1), 1).expect("one is not enough").settle(Vec::new(), contents(&area(1)));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_quickest_eeprom_is_the_guess_for_others() {
+    fn the_fastest_eeprom_is_the_estimate_for_others() {
         let cache = SiiCache::new(true);
         cache.teach(Some(Duration::from_micros(550)));
         cache.teach(Some(Duration::from_millis(5)));

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn one_slow_command_is_no_rule() {
+    fn one_slow_command_changes_nothing() {
         let mut pace = Pace::default();
         command(&mut pace, us(60_000));
         assert_eq!(pace.first(), us(50));

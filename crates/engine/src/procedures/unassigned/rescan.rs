@@ -92,7 +92,7 @@ impl Rescan {
 /// Scans until the segment is stable and all are identified, or until the limit; then returns the last result. Moves
 /// are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
-    let (rescan, _) = look_until(bus, segment, limit).await?;
+    let (rescan, _) = scan_until(bus, segment, limit).await?;
     report_moved(bus, &rescan);
     Ok(rescan)
 }
@@ -118,7 +118,7 @@ async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> 
     if !segment.view().is_whole(&segment.words()) {
         return false;
     }
-    let Ok((rescan, true)) = look_until(bus, segment, limit).await else { return false };
+    let Ok((rescan, true)) = scan_until(bus, segment, limit).await else { return false };
     report_moved(bus, &rescan);
     true
 }
@@ -130,19 +130,19 @@ fn report_moved(bus: &Bus, rescan: &Rescan) {
 }
 
 /// Also returns whether the cabling was taken over.
-async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
+async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
     let until = bus.now() + limit;
-    segment.observe(Observation::LookAgain);
+    segment.observe(Observation::ScanAgain);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
-        let looked = match segment.disturb(Disturbance::Rescan, LIMIT).await {
-            Some(_turn) => look(bus, segment).await,
+        let round_result = match segment.disturb(Disturbance::Rescan, LIMIT).await {
+            Some(_turn) => scan_once(bus, segment).await,
             None => Ok(None),
         };
         // This scan has cleared the ECAT events of ports that changed before.
-        segment.observe(Observation::LookAgain);
+        segment.observe(Observation::ScanAgain);
         let is_last = bus.now() >= until;
-        match looked {
+        match round_result {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
                 let is_adopted = rescan.is_complete() && adopt(segment, &rescan);
                 return Ok((rescan, is_adopted));
@@ -166,7 +166,7 @@ fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
 }
 
 /// One scan; `None` while the segment changes.
-async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusError> {
+async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusError> {
     let Some(seen) = view(bus).await? else { return Ok(None) };
     let Some(ports) = ports_of(bus, &seen).await? else { return Ok(None) };
     let access = segment.view();

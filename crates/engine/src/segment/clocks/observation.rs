@@ -22,7 +22,7 @@ pub enum ClockObservation<'a> {
     /// Cable times from latched receive times.
     Cables(Cables),
     /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
-    OpenedInVain(Option<Wiring>),
+    OpenedWithoutResult(Option<Wiring>),
     /// The delays of all clocks, for their set-up.
     Measured(&'a Measured),
     /// Local times latched by one frame, by index, and the system time that they are to show.

@@ -42,7 +42,7 @@ pub struct Clocks {
     /// Measurements so far.
     pub(in crate::segment) measured: u32,
     /// Rings with these cables were opened, and the cable times are still unknown.
-    pub opened_in_vain: Option<Wiring>,
+    pub opened_without_result: Option<Wiring>,
     /// System time of the reference clock at host time zero.
     pub epoch: u64,
 }
@@ -66,8 +66,8 @@ impl Clocks {
         };
         let config = config.unwrap_or_default();
         let epoch = config.epoch;
-        let (reference, cables, measured, opened_in_vain) = (None, Cables::default(), 0, None);
-        Clocks { config, life, nodes, reference, cables, measured, opened_in_vain, epoch }
+        let (reference, cables, measured, opened_without_result) = (None, Cables::default(), 0, None);
+        Clocks { config, life, nodes, reference, cables, measured, opened_without_result, epoch }
     }
 
     /// Whether distributed clocks are declared.

@@ -9,16 +9,16 @@ use ringcat_wire::register::DlStatus;
 use crate::event::Event;
 use crate::ring::RingState;
 use crate::ring_status::Cable;
-use crate::segment::asked::Asked;
 use crate::segment::breaks::{is_broken, locate_breaks};
 use crate::segment::effect::Effects;
-use crate::segment::look::Look;
 use crate::segment::model::Segment;
+use crate::segment::reading::Reading;
+use crate::segment::versions::Versions;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 
 /// Scans for the place of a break: its neighbours may detect the lost link later than frames show it.
-const LOOKS: u8 = 25;
+const SCANS: u8 = 25;
 /// Pause between two of these scans, and between the first few.
 const PAUSE: Duration = Duration::from_millis(10);
 const FIRST_LOOKS: u8 = 5;
@@ -26,10 +26,10 @@ const FIRST_PAUSE: Duration = Duration::from_millis(1);
 
 impl Segment {
     /// Port states of members, by their position in the cabling.
-    pub(in crate::segment) fn by_position(&self, looks: &[Look]) -> Vec<Option<NodeStatus>> {
+    pub(in crate::segment) fn by_position(&self, readings: &[Reading]) -> Vec<Option<NodeStatus>> {
         let mut by_position = vec![None; self.cabling.topology.nodes.len()];
-        for (member, look) in self.members.iter().zip(looks) {
-            let (Some(node), Look::Answer { dl_status, .. }) = (member.node, look) else { continue };
+        for (member, reading) in self.members.iter().zip(readings) {
+            let (Some(node), Reading::Answer { dl_status, .. }) = (member.node, reading) else { continue };
             let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
             if let Some(slot) = by_position.get_mut(node) {
                 *slot = Some(NodeStatus { dl_status: *dl_status, receive_times: None, ports });
@@ -41,42 +41,42 @@ impl Segment {
     /// Reports breaks that are located now. `reported` is the reported state of the ring when the scans began.
     pub(in crate::segment) fn observe_breaks(
         &mut self,
-        looks: &[Look],
+        readings: &[Reading],
         reported: RingState,
         now: Instant,
         effects: &mut Effects,
     ) {
         if core::mem::replace(&mut self.breaks.state, reported) != reported {
-            self.breaks.looks = LOOKS;
+            self.breaks.readings = SCANS;
         }
         // The ring may have closed during the scans.
         if reported != RingState::Open || self.ring.reported() != RingState::Open {
             return;
         }
-        let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
+        let by_position: Vec<_> = self.by_position(readings).iter().map(|it| it.map(|node| node.dl_status)).collect();
         // A break at an interface's cable is reported together with the ring.
         match self.ring.status.place {
-            None => self.breaks.told.clear(),
-            Some(place) if !self.breaks.told.contains(&place) => self.breaks.told = vec![place],
+            None => self.breaks.reported.clear(),
+            Some(place) if !self.breaks.reported.contains(&place) => self.breaks.reported = vec![place],
             Some(_) => {}
         }
         let broken = self.broken_cables(&by_position);
         for cable in &broken {
-            if !self.breaks.told.contains(cable) {
-                self.breaks.told.push(*cable);
+            if !self.breaks.reported.contains(cable) {
+                self.breaks.reported.push(*cable);
                 effects.report(Event::BreakLocated { cable: *cable });
             }
         }
         // The repair of the last broken cable is reported as the closing of the ring.
         let mended = |cable: &Cable| !broken.contains(cable) && is_broken(&by_position, cable) == Some(false);
-        while let Some(at) = self.breaks.told.iter().position(mended).filter(|_| self.breaks.told.len() > 1) {
-            self.breaks.told.remove(at);
+        while let Some(at) = self.breaks.reported.iter().position(mended).filter(|_| self.breaks.reported.len() > 1) {
+            self.breaks.reported.remove(at);
         }
-        let place = self.breaks.told.first().copied();
+        let place = self.breaks.reported.first().copied();
         self.ring.status.place = place;
-        if place.is_none() && self.breaks.looks > 0 {
-            let is_first = LOOKS - self.breaks.looks < FIRST_LOOKS;
-            self.breaks.looks -= 1;
+        if place.is_none() && self.breaks.readings > 0 {
+            let is_first = SCANS - self.breaks.readings < FIRST_LOOKS;
+            self.breaks.readings -= 1;
             self.attention.again_in(if is_first { FIRST_PAUSE } else { PAUSE }, now);
         }
     }
@@ -111,12 +111,12 @@ impl Segment {
     /// Rings have been examined; positions are those of the cabling of that version.
     pub(in crate::segment) fn observe_isolated(
         &mut self,
-        asked: Asked,
+        versions: Versions,
         found: &[Option<NodeStatus>],
         now: Instant,
         effects: &mut Effects,
     ) {
-        if asked.cabling == self.cabling.version {
+        if versions.cabling == self.cabling.version {
             self.observe_local_rings(found, now, effects);
         }
     }

@@ -27,7 +27,7 @@ impl Segment {
             ClockObservation::SegmentChanged => self.doubt(now),
             ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
             ClockObservation::Cables(cables) => self.clocks.cables = cables,
-            ClockObservation::OpenedInVain(wiring) => self.clocks.opened_in_vain = wiring,
+            ClockObservation::OpenedWithoutResult(wiring) => self.clocks.opened_without_result = wiring,
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
             ClockObservation::SetUp => self.observe_set_up(effects),

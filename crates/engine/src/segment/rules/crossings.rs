@@ -12,19 +12,19 @@ use crate::event::Event;
 use crate::segment::crossings::{Crossing, LineCheck, PORT_BITS, Search};
 use crate::segment::disturbance::Disturbance;
 use crate::segment::effect::{Effects, Task};
-use crate::segment::look::Look;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
+use crate::segment::reading::Reading;
 use crate::segment::unassigned::UnassignedSubDevice;
 
 impl Segment {
     /// Processes port states of all members; after a change of ports the segment is scanned.
-    pub(in crate::segment) fn observe_ports(&mut self, looks: &[Look], effects: &mut Effects) {
-        let ports = |look: &Look| match look {
-            Look::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
-            Look::Unknown | Look::Silent | Look::Doubled => None,
+    pub(in crate::segment) fn observe_ports(&mut self, readings: &[Reading], effects: &mut Effects) {
+        let ports = |reading: &Reading| match reading {
+            Reading::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
+            Reading::Unknown | Reading::Silent | Reading::Doubled => None,
         };
-        let now: Vec<Option<u16>> = looks.iter().map(ports).collect();
+        let now: Vec<Option<u16>> = readings.iter().map(ports).collect();
         // A silent SubDevice that is not lost yet will answer or be lost soon.
         let phase = |index: usize| self.members.get(index).map_or(Phase::Absent, |member| member.phase);
         let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && phase(index) != Phase::Absent;
@@ -56,26 +56,26 @@ impl Segment {
         self.attention.want();
         self.crossings.search = if found.is_none() && !in_control { Search::Again } else { Search::Idle };
         let Some(found) = found else { return };
-        self.tell_crossings(&found, effects);
-        let told = core::mem::take(&mut self.crossings.told);
-        if self.crossings.junctions && found.unknown_rings > told.unknown_rings {
+        self.report_crossings(&found, effects);
+        let reported = core::mem::take(&mut self.crossings.reported);
+        if self.crossings.junctions && found.unknown_rings > reported.unknown_rings {
             effects.report(Event::JunctionUnknown { rings: found.unknown_rings });
         }
-        self.crossings.told = told.and(found);
+        self.crossings.reported = reported.and(found);
     }
 
-    fn tell_crossings(&self, found: &LineCheck, effects: &mut Effects) {
-        let told = &self.crossings.told;
+    fn report_crossings(&self, found: &LineCheck, effects: &mut Effects) {
+        let reported = &self.crossings.reported;
         if found.swapped {
-            if !told.swapped {
+            if !reported.swapped {
                 effects.report(Event::InterfacesSwapped);
             }
             return;
         }
         let is_told = |new: &Crossing| match new.station() {
-            Some(station) => told.crossings.iter().any(|old| old.station() == Some(station)),
+            Some(station) => reported.crossings.iter().any(|old| old.station() == Some(station)),
             // The place may be known from when the ring was open.
-            None => !told.crossings.is_empty(),
+            None => !reported.crossings.is_empty(),
         };
         for Crossing { subdevice, entry_port } in found.crossings.iter().filter(|new| !is_told(new)).copied() {
             let position = subdevice.map(|(station, now)| {

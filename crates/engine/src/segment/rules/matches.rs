@@ -20,13 +20,13 @@ use crate::time::Instant;
 
 impl Segment {
     /// Matches all unassigned SubDevices with absent members. To be called when it is known of all members whether they
-    /// are present: otherwise a SubDevice might be taken for another member of the same type. `told`: matches proven by
+    /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches proven by
     /// cables.
-    pub fn match_all(&self, told: &[(StationAddress, usize)], now: Instant) -> Matches {
+    pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned = self.unassigned.clone();
         unassigned.sort_by_key(|it| it.position);
         let mut matched = group_matching::members(self, &mut unassigned, now);
-        let by_cable = |it: &UnassignedSubDevice| told.iter().find(|(station, _)| *station == it.station);
+        let by_cable = |it: &UnassignedSubDevice| identified.iter().find(|(station, _)| *station == it.station);
         for (it, index) in unassigned.iter().filter_map(|it| Some((it, by_cable(it)?.1))) {
             matched.push((it.clone(), Some(index)));
         }
@@ -37,7 +37,7 @@ impl Segment {
                 continue;
             }
             let mut absent = self.absent_between(gap[0].between);
-            absent.retain(|index| told.iter().all(|(_, other)| other != index));
+            absent.retain(|index| identified.iter().all(|(_, other)| other != index));
             let from_main: Vec<bool> = gap.iter().map(|it| it.from_main).collect();
             let fit = |candidate: usize, place: usize| fit(self, &gap[candidate], absent[place]);
             for (it, place) in gap.iter().zip(assign(&from_main, absent.len(), fit)) {

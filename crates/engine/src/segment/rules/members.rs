@@ -13,64 +13,69 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::ring::RingState;
-use crate::segment::asked::Asked;
 use crate::segment::attention::Round;
 use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
-use crate::segment::look::{Look, answers};
-use crate::segment::looked::Looked;
 use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
 use crate::segment::observation::ProcessDataStep;
+use crate::segment::reading::{Reading, answers};
+use crate::segment::round_result::RoundResult;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
+use crate::segment::versions::Versions;
 use crate::time::Instant;
 
 /// Consecutive scans without an answer after which a SubDevice is lost: at the moment of a cut a copy may have been
 /// processed by none.
-const SILENT_LOOKS: u8 = 2;
+const SILENT_READS: u8 = 2;
 /// Pause before a silent SubDevice is read again.
-const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
+const REPEAT_PAUSE: Duration = Duration::from_millis(2);
 /// Consecutive rounds in which scans do not return though process data does, or the reverse, before it is tested
 /// whether frames hold too many datagrams.
 const BLIND_ROUNDS: u8 = 2;
 
 impl Segment {
     /// Processes a complete round of scans.
-    pub(in crate::segment) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
-        let Looked { asked, looks, before, unassigned, counted } = *looked;
+    pub(in crate::segment) fn observe_round(
+        &mut self,
+        round_result: &RoundResult<'_>,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let RoundResult { versions, readings, before, unassigned, counted } = *round_result;
         self.attention.round = Round::default();
-        if asked.isolations != self.slot.isolations() {
+        if versions.isolations != self.slot.isolations() {
             // Some SubDevices were put out of reach on purpose during the round.
-            return self.attention.again_in(SECOND_LOOK_PAUSE, now);
+            return self.attention.again_in(REPEAT_PAUSE, now);
         }
         // Either scan frames do not return though SubDevices process those of the exchange, or the reverse.
         let is_blind = match counted {
-            Some(counted) if counted != Wkc(0) => looks.contains(&Look::Unknown),
-            Some(_) | None => answers(looks) > 0,
+            Some(counted) if counted != Wkc(0) => readings.contains(&Reading::Unknown),
+            Some(_) | None => answers(readings) > 0,
         };
         self.attention.blind = if is_blind { self.attention.blind.saturating_add(1) } else { 0 };
         self.attention.round.is_blind = self.attention.blind == BLIND_ROUNDS;
         let Some(counted) = counted else { return };
-        let others = unassigned.iter().filter(|(_, look)| look.is_answer()).count();
-        let (counted, answering) = (usize::from(counted.0), answers(looks) + others);
+        let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
+        let (counted, answering) = (usize::from(counted.0), answers(readings) + others);
         // If the count agrees with the answers, a silent SubDevice is certainly absent.
-        let needed = if counted == answering { 1 } else { SILENT_LOOKS };
-        let is_certain = self.judge(looks, before, needed, now, effects);
+        let needed = if counted == answering { 1 } else { SILENT_READS };
+        let is_certain = self.judge(readings, before, needed, now, effects);
         if needed == 1 {
-            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Look::Silent)));
+            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Reading::Silent)));
         }
         if !is_certain {
             // One quick repetition, and then the next scan only when something changes.
-            self.attention.again_in(SECOND_LOOK_PAUSE, now);
+            self.attention.again_in(REPEAT_PAUSE, now);
         }
         let reported: RingState = self.attention.reported();
-        self.observe_breaks(looks, reported, now, effects);
-        let status = self.by_position(looks);
+        self.observe_breaks(readings, reported, now, effects);
+        let status = self.by_position(readings);
         self.observe_local_rings(&status, now, effects);
-        self.observe_ports(looks, effects);
+        self.observe_ports(readings, effects);
         self.attention.round = Round {
             is_certain,
-            finds_others: counted > answering && !looks.contains(&Look::Unknown),
+            finds_others: counted > answering && !readings.contains(&Reading::Unknown),
             is_complete: counted <= answering,
             is_blind: self.attention.round.is_blind,
             counts: true,
@@ -78,17 +83,24 @@ impl Segment {
     }
 
     /// Derives member states from the answers. True if it is known of all whether they are present.
-    fn judge(&mut self, looks: &[Look], before: &[Phase], needed: u8, now: Instant, effects: &mut Effects) -> bool {
+    fn judge(
+        &mut self,
+        readings: &[Reading],
+        before: &[Phase],
+        needed: u8,
+        now: Instant,
+        effects: &mut Effects,
+    ) -> bool {
         let mut certain = true;
-        for (index, look) in looks.iter().enumerate() {
+        for (index, reading) in readings.iter().enumerate() {
             let Some(member) = self.members.get_mut(index) else { continue };
-            match (look, member.phase) {
-                (Look::Unknown | Look::Doubled, _) => certain = false,
-                (Look::Silent, Phase::Absent) => {
-                    (member.silent, member.mistaken) = (SILENT_LOOKS, Mistaken::default());
+            match (reading, member.phase) {
+                (Reading::Unknown | Reading::Doubled, _) => certain = false,
+                (Reading::Silent, Phase::Absent) => {
+                    (member.silent, member.mistaken) = (SILENT_READS, Mistaken::default());
                 }
-                (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
-                    member.silent = (member.silent + 1).min(SILENT_LOOKS);
+                (Reading::Silent, Phase::Configuring | Phase::Settled(_)) => {
+                    member.silent = (member.silent + 1).min(SILENT_READS);
                     if member.silent >= needed {
                         self.lose(index, effects);
                     } else {
@@ -96,13 +108,13 @@ impl Segment {
                     }
                 }
                 // The member reached this state after the answer was read: the answer is outdated.
-                (Look::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
+                (Reading::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
                     member.silent = 0;
-                    self.attention.again_in(SECOND_LOOK_PAUSE, now);
+                    self.attention.again_in(REPEAT_PAUSE, now);
                 }
-                (Look::Answer { status, code, .. }, phase) => {
+                (Reading::Answer { status, code, .. }, phase) => {
                     member.silent = 0;
-                    self.heard(index, phase, (*status, *code), now, effects);
+                    self.observe_answer(index, phase, (*status, *code), now, effects);
                 }
             }
         }
@@ -110,7 +122,14 @@ impl Segment {
     }
 
     /// A member answered.
-    fn heard(&mut self, index: usize, phase: Phase, (status, code): Shown, now: Instant, effects: &mut Effects) {
+    fn observe_answer(
+        &mut self,
+        index: usize,
+        phase: Phase,
+        (status, code): Shown,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
         let member = &mut self.members[index];
         match phase {
             Phase::Configuring => {}
@@ -139,20 +158,20 @@ impl Segment {
 
     /// As soon as all SubDevices that the cyclic datagram counts have answered, process data no longer waits for the
     /// others. Whether the others are lost follows later; which inputs are fresh is known now.
-    pub(in crate::segment) fn observe_part_of_looks(
+    pub(in crate::segment) fn observe_part_of_round(
         &mut self,
-        asked: Asked,
-        looks: &[Look],
+        versions: Versions,
+        readings: &[Reading],
         others: usize,
         counted: Option<Wkc>,
     ) {
-        if asked.isolations != self.slot.isolations()
-            || counted.map(|counted| usize::from(counted.0)) != Some(answers(looks) + others)
+        if versions.isolations != self.slot.isolations()
+            || counted.map(|counted| usize::from(counted.0)) != Some(answers(readings) + others)
         {
             return;
         }
-        for (index, look) in looks.iter().enumerate() {
-            let Some(member) = self.members.get_mut(index).filter(|_| !look.is_answer()) else { continue };
+        for (index, reading) in readings.iter().enumerate() {
+            let Some(member) = self.members.get_mut(index).filter(|_| !reading.is_answer()) else { continue };
             if matches!(member.phase, Phase::Settled(_)) && self.board.takes_part(index) {
                 self.board.set_taking_part(index, false);
                 member.suspended = true;
@@ -177,18 +196,18 @@ impl Segment {
         effects.0.push(Effect::SuspendMailbox { index });
     }
 
-    /// Starts the configuration of a member that answers. `told`: its error that was reported.
+    /// Starts the configuration of a member that answers. `reported`: its error that was reported.
     pub(in crate::segment) fn start(
         &mut self,
         index: usize,
         from: Start,
-        told: Option<Shown>,
+        reported: Option<Shown>,
         check: Check,
         effects: &mut Effects,
     ) {
         let Some(member) = self.members.get_mut(index) else { return };
         let attempt = member.begin_attempt();
-        effects.start(Task::BringUp { index, attempt, from, told, check });
+        effects.start(Task::BringUp { index, attempt, from, reported, check });
     }
 
     /// Starts the configuration of all members that were found.
@@ -214,7 +233,7 @@ impl Segment {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Absent;
         let (pause, station) = (member.mistaken.again(now), member.station);
-        if member.mistaken.is_to_tell() {
+        if member.mistaken.is_due() {
             let reason = format!(
                 "what answers at its station address {:#06x} is not known to be it, and does not give up the address",
                 station.0

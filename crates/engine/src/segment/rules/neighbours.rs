@@ -25,8 +25,8 @@ type End = Option<PortOf>;
 
 impl Segment {
     /// An unassigned SubDevice matches several absent members, or one of them without proof by order: then ports have
-    /// to be read ([`Segment::told_by_cables`]).
-    pub fn asks_for_cables(&self) -> bool {
+    /// to be read ([`Segment::identified_by_cables`]).
+    pub fn needs_cables(&self) -> bool {
         self.unassigned.iter().any(|it| {
             let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();
             match fits[..] {
@@ -38,10 +38,10 @@ impl Segment {
     }
 
     /// Unassigned SubDevices with the members that they are, as far as the cables show. `ports` by position.
-    pub fn told_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
+    pub fn identified_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
         let owners = self.owners(&view.stations);
         let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
-        Look { segment: self, view, nodes: self.nodes(view, ports) }.told(owners)
+        Present { segment: self, view, nodes: self.nodes(view, ports) }.identified(owners)
     }
 
     /// Port states of all SubDevices, with their port kinds if known. By position.
@@ -74,13 +74,13 @@ impl Segment {
 }
 
 /// The segment as it is now.
-struct Look<'a> {
+struct Present<'a> {
     segment: &'a Segment,
     view: &'a View,
     nodes: Vec<NodeStatus>,
 }
 
-impl Look<'_> {
+impl Present<'_> {
     fn unassigned_at(&self, at: usize) -> Option<&UnassignedSubDevice> {
         self.segment.unassigned.iter().find(|it| self.view.position(it.station) == Some(at))
     }
@@ -92,7 +92,7 @@ impl Look<'_> {
         (self.segment.absent().any(|it| it == index) && self.segment.may_be(unassigned, index)).then_some(index)
     }
 
-    fn told(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
+    fn identified(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
         let count = members.len();
         if self.is_as_before(&members) {
             let unassigned = (0..count).filter(|at| members[*at].is_none());
@@ -105,7 +105,7 @@ impl Look<'_> {
             return Vec::new();
         }
         let (before, now) = (ends(before), self.ends(&now));
-        let mut told = Vec::new();
+        let mut identified = Vec::new();
         loop {
             let found = self.next_to(&members, &before, &now);
             let is_sure = |(at, index): &(usize, usize)| {
@@ -113,11 +113,11 @@ impl Look<'_> {
             };
             let sure: Vec<(usize, usize)> = found.iter().copied().filter(is_sure).collect();
             if sure.is_empty() {
-                return told;
+                return identified;
             }
             for (at, index) in sure {
                 members[at] = Some(index);
-                told.push((self.view.stations[at], index));
+                identified.push((self.view.stations[at], index));
             }
         }
     }

@@ -5,7 +5,7 @@ use ringcat_wire::register::DlStatus;
 
 /// Result of the read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Look {
+pub enum Reading {
     /// Its frames were lost: no information.
     #[default]
     Unknown,
@@ -24,14 +24,14 @@ pub enum Look {
     },
 }
 
-impl Look {
+impl Reading {
     /// It answered.
     pub const fn is_answer(&self) -> bool {
-        matches!(self, Look::Answer { .. })
+        matches!(self, Reading::Answer { .. })
     }
 }
 
 /// Number of answers.
-pub(super) fn answers(looks: &[Look]) -> usize {
-    looks.iter().filter(|look| look.is_answer()).count()
+pub(super) fn answers(readings: &[Reading]) -> usize {
+    readings.iter().filter(|reading| reading.is_answer()).count()
 }

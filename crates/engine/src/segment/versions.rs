@@ -2,7 +2,7 @@
 
 /// Versions of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct Versions {
     /// Version of the cabling to which positions belong.
     pub cabling: u32,
     /// Number of times that SubDevices had been put out of reach on purpose.

@@ -2,21 +2,21 @@
 
 use ringcat_wire::address::{StationAddress, Wkc};
 
-use super::asked::Asked;
-use super::look::Look;
 use super::member::Phase;
+use super::reading::Reading;
+use super::versions::Versions;
 
 /// Result of a round of scans.
 #[derive(Clone, Copy, Debug)]
-pub struct Looked<'a> {
+pub struct RoundResult<'a> {
     /// Version of the model at the start of the round.
-    pub asked: Asked,
+    pub versions: Versions,
     /// By member.
-    pub looks: &'a [Look],
+    pub readings: &'a [Reading],
     /// Phase of each member when the round began.
     pub before: &'a [Phase],
     /// SubDevices without a declaration, by station address.
-    pub unassigned: &'a [(StationAddress, Look)],
+    pub unassigned: &'a [(StationAddress, Reading)],
     /// SubDevices that the latest supervision result counts; `None` before the first.
     pub counted: Option<Wkc>,
 }
