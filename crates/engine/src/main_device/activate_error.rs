@@ -177,7 +177,7 @@ impl fmt::Display for ActivateError {
                 list(subdevices)
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
-                write!(f, "domain {domain}: LRW was versions for, declaration {subdevice} does not know it")
+                write!(f, "domain {domain}: LRW is configured, but declaration {subdevice} does not support it")
             }
             ActivateError::Layout(error) => error.fmt(f),
             ActivateError::NoClock { subdevice, has_clock: false } => {

@@ -65,13 +65,13 @@ impl MainDevice {
         }
         let stations = if self.options.links() == LinkSet::Ring { self.stations_by_position() } else { Vec::new() };
         let by_station = |datagram: RawDatagram| {
-            let versions = datagram.target;
-            let Target::Position(Position(position), register) = versions else { return (datagram, versions) };
+            let original = datagram.target;
+            let Target::Position(Position(position), register) = original else { return (datagram, original) };
             match (with_station(datagram.command), stations.get(usize::from(position))) {
                 (Some(command), Some(station)) => {
-                    (RawDatagram { command, target: Target::Station(*station, register), ..datagram }, versions)
+                    (RawDatagram { command, target: Target::Station(*station, register), ..datagram }, original)
                 }
-                _ => (datagram, versions),
+                _ => (datagram, original),
             }
         };
         datagrams.iter().try_for_each(|datagram| self.check_lrw_of(datagram))?;
@@ -142,10 +142,10 @@ const fn with_station(command: Command) -> Option<Command> {
     }
 }
 
-async fn send(bus: Bus, (datagram, versions): (RawDatagram, Target)) -> Result<Reply, BusError> {
+async fn send(bus: Bus, (datagram, original): (RawDatagram, Target)) -> Result<Reply, BusError> {
     let RawDatagram { command, target, data, resend } = datagram;
-    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.with_target(versions))?;
+    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.with_target(original))?;
     // FMMUs written by the application are not known here.
     let is_split = command == Command::Lrw && reply.main != Wkc(0) && reply.redundant != Wkc(0);
-    if is_split { Err(BusError::Split { target: versions }) } else { Ok(reply) }
+    if is_split { Err(BusError::Split { target: original }) } else { Ok(reply) }
 }

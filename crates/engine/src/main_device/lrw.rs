@@ -30,8 +30,8 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
     let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
     let rules =
         Rules { links: LinkSet::Single, supervision: false, lrw, witnesses: &[], session: 0, max_datagrams: None };
-    let versions = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
-    for (domain, planned) in versions.domains.iter().enumerate() {
+    let wanted = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
+    for (domain, planned) in wanted.domains.iter().enumerate() {
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
         if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {
             return Err(ActivateError::LrwOnTwoLinks {

@@ -45,7 +45,7 @@ impl Requests {
         self.all.borrow().iter().for_each(AcyclicSide::end);
     }
 
-    fn versions(&self) -> Vec<(AcyclicSide, Order)> {
+    fn ordered(&self) -> Vec<(AcyclicSide, Order)> {
         let mut all = self.all.borrow_mut();
         all.retain(|served| !served.is_abandoned());
         all.iter().filter_map(|served| Some((served.clone(), served.take()?))).collect()
@@ -64,7 +64,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
         if requests.any_cancelled() {
             cancelled.notify();
         }
-        for (served, order) in requests.versions() {
+        for (served, order) in requests.ordered() {
             let station = segment.view().members.get(order.subdevice).map(|member| member.station);
             let member = station.zip(segment.mailbox(order.subdevice));
             match member {

@@ -63,7 +63,7 @@ impl Search {
         let found = find(bus, segment).await;
         drop(turn);
         let (complete, reason) = match found {
-            Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
+            Ok(complete) => (complete, "SubDevices answer that cannot be distinguished".into()),
             Err(error) => (false, error.to_string()),
         };
         if complete {

@@ -99,7 +99,7 @@ async fn check(bus: Bus, suspect: Suspect) -> Option<Found> {
         let got = bus.fprd(suspect.station, held.register, held.bytes.len()).await.ok()?;
         if !held.is_in(&got) {
             wrong.get_or_insert_with(|| {
-                format!("{} were written, something else is there: {}", held.name(), held.differences(&got))
+                format!("{} were written, but other values were read: {}", held.name(), held.differences(&got))
             });
         }
     }

@@ -118,7 +118,7 @@ mod tests {
             assert!(reported <= most, "{reported} of {most} with a half period of {micros} us");
             assert!(unsteady <= 1, "{unsteady}");
         }
-        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "back again before anybody round_result");
+        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "the state was restored before an evaluation");
         assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then no report until it is steady");
     }
 

@@ -95,24 +95,22 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
     let gave_no_result = segment.view().clocks().opened_without_result.as_ref() == Some(&survey.wiring);
     if !is_open_question || opening != Opening::Nothing || rings.is_empty() || gave_no_result {
         let is_still_open = is_open_question && !rings.is_empty();
-        let in_vain = is_still_open.then_some(survey.wiring);
-        segment.observe_clocks(ClockObservation::OpenedWithoutResult(in_vain));
+        let without_result = is_still_open.then_some(survey.wiring);
+        segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
         return exact(measured);
     }
     let survey = Survey { latched: None, ..survey.clone() };
     measure_open(bus, segment, &survey, &rings, &[]).await?;
     measured = take(bus, segment, &survey).await?;
-    let in_vain = is_open(&measured).then_some(survey.wiring);
-    segment.observe_clocks(ClockObservation::OpenedWithoutResult(in_vain));
+    let without_result = is_open(&measured).then_some(survey.wiring);
+    segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
     exact(measured)
 }
 
 /// An error if times contradict each other.
 fn exact(measured: Measured) -> Result<Measured, String> {
     if measured.delays.is_contradictory {
-        return Err(
-            "cables of a ring do not take as long together as each by itself, although it was opened".to_string()
-        );
+        return Err("the cable times of a ring contradict each other, although it was opened".to_string());
     }
     Ok(measured)
 }
@@ -211,11 +209,11 @@ impl Survey {
 
 async fn survey(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
     for _ in 0..SCANS {
-        let round_result = survey_once(bus, segment).await;
+        let surveyed = survey_once(bus, segment).await;
         // The ECAT events of ports that changed before have been read and cleared by this survey, so another scan is
         // needed.
         segment.observe(Observation::ScanAgain);
-        match round_result {
+        match surveyed {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
             Err(error) => return Err(error.to_string()),
@@ -368,16 +366,16 @@ pub(super) async fn latch(
     stations: &[StationAddress],
     no_return: Option<Link>,
 ) -> Result<Vec<Option<Latched>>, BusError> {
-    let (versions, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
+    let (targets, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
         let view = segment.view();
         let clocks = view.clocks();
         let lacks = |station| clocks.node_at(station).is_some_and(|node| !node.has_clock);
-        let versions = stations.iter().map(|station| (*station, !lacks(*station)));
-        (versions.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
+        let targets = stations.iter().map(|station| (*station, !lacks(*station)));
+        (targets.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
     };
     let latches = frames::latch(bus, pauses, no_return).await?;
-    let read = bus.gather(versions, |bus, (station, versions)| async move {
-        if !versions {
+    let read = bus.gather(targets, |bus, (station, has_clock)| async move {
+        if !has_clock {
             return Ok(None);
         }
         let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {

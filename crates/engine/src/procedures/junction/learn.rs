@@ -134,14 +134,14 @@ pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Re
 async fn answering(bus: &Bus, count: usize) -> Result<Vec<bool>, BusError> {
     // If no frame returns at all, this detects it faster.
     bus.brd(map::TYPE, 1).await?;
-    let versions = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
+    let ports = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
         match bus.fprd(station(at), map::TYPE, 1).await {
             Ok(_) => Ok(true),
             Err(BusError::Wkc { .. }) => Ok(false),
             Err(error) => Err(error),
         }
     });
-    versions.await.into_iter().collect()
+    ports.await.into_iter().collect()
 }
 
 fn closed(control: DlControl, port: u8) -> DlControl {

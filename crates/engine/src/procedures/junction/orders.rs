@@ -55,13 +55,13 @@ pub(crate) fn ordering(
 /// Reads the port control of the junctions of all local rings, while they answer. With only one ring it is never
 /// needed.
 pub(in super::super) async fn note_controls(bus: &Bus, segment: &SharedSegment) {
-    let versions: Vec<(StationAddress, u32)> = {
+    let before: Vec<(StationAddress, u32)> = {
         let view = segment.view();
         let junctions = if view.cabling.topology.local_rings.len() > 1 { view.junctions() } else { Vec::new() };
         let orders = |station| view.port_control(station).map_or(0, |entry| entry.orders);
         junctions.into_iter().map(|station| (station, orders(station))).collect()
     };
-    let read = bus.gather(versions, |bus, (station, orders)| async move {
+    let read = bus.gather(before, |bus, (station, orders)| async move {
         let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await.ok()?);
         // Temporary settings are our own.
         (!control.temporary).then_some((station, orders, control))

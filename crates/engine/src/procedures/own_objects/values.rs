@@ -122,9 +122,9 @@ async fn dl_status(bus: &Bus, segment: &SharedSegment, index: usize) -> Option<[
 
 async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted: Option<u8>) -> Values {
     let status = dl_status(bus, segment, index).await.map(|bytes| DlStatus::decode(&bytes));
-    let versions = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
-    let device_type = versions.device_type(4).await;
-    let has_history = versions.has_history(40).await;
+    let requested = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let device_type = requested.device_type(4).await;
+    let has_history = requested.has_history(40).await;
     let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let (expected, info) = (&member.config.expected, member.info.as_ref());
@@ -237,8 +237,8 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
     let kept = &segment.statistics;
     let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, kept, index, station)).await;
     let registers = registers.unwrap_or_default();
-    let versions = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
-    let has_news = versions.has_news(19).await;
+    let requested = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let has_news = requested.has_news(19).await;
     let counted = counted.ok().or_else(|| kept.find(index)).unwrap_or_default();
     let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };

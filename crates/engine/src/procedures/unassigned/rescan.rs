@@ -135,14 +135,14 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
     segment.observe(Observation::ScanAgain);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
-        let round_result = match segment.disturb(Disturbance::Rescan, LIMIT).await {
+        let scanned = match segment.disturb(Disturbance::Rescan, LIMIT).await {
             Some(_turn) => scan_once(bus, segment).await,
             None => Ok(None),
         };
         // This scan has cleared the ECAT events of ports that changed before.
         segment.observe(Observation::ScanAgain);
         let is_last = bus.now() >= until;
-        match round_result {
+        match scanned {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
                 let is_adopted = rescan.is_complete() && adopt(segment, &rescan);
                 return Ok((rescan, is_adopted));
