@@ -5,8 +5,8 @@
 //! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
 //! as observations. Words for the cyclic half are posted to the board within `observe`, before any effect is executed.
 //!
-//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`], the
-//! number of an attempt), and outdated results are refused.
+//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`],
+//! the number of an attempt), and outdated results are refused.
 
 mod attention;
 mod breaks;

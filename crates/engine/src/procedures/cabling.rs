@@ -4,7 +4,7 @@
 //! Unknown rings behind junctions are reported too: an application with junction redundancy must know that one of them
 //! is not monitored.
 //!
-//! One scan is no proof: cables that are cut and healed within milliseconds, and lost frames, make a straight ring look
+//! One scan is no proof: cables that are cut and healed within milliseconds, and lost frames, make a straight ring seem
 //! crossed. So a scan counts only if the segment was the same before and after it, and a new finding is reported only
 //! if the next scan shows the same.
 //!
@@ -73,9 +73,9 @@ pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
-/// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `reported` is the result
-/// reported before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down during the
-/// scan; if it cannot be, that is reported, and the ring is scanned as it is.
+/// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `reported` is the
+/// result reported before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down during
+/// the scan; if it cannot be, that is reported, and the ring is scanned as it is.
 pub(super) async fn cabling(
     bus: &Bus,
     known: &impl Known,

@@ -124,7 +124,7 @@ impl BringUp<'_> {
         self.command_mail(Transition::Ip).await
     }
 
-    /// Mailboxes of the boot loader, EEPROM assigned as before, BOOT.
+    /// Mailboxes of the boot loader, EEPROM to the PDI (the boot loader keeps it), BOOT.
     async fn boot(&self) -> Result<(), ConfigureError> {
         let (Some(layout), [_, send]) = (self.setup.plan.bootstrap_layout(), &self.setup.plan.bootstrap[..]) else {
             return Err(ConfigureError::NoBoot);

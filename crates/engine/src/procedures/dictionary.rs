@@ -59,7 +59,7 @@ pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
                 }
             }
             Err(reason) => {
-                let what = alloc::format!("its dictionary does not tell its PDOs: {reason}");
+                let what = alloc::format!("the PDOs in its dictionary cannot be read: {reason}");
                 bus.report(Event::SiiOddity { position, what });
             }
         }

@@ -39,8 +39,8 @@ const SCANS: usize = 3;
 /// Pause between two of these reads, and before the first repetition of a configuration that failed because of the bus.
 const READ_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, repeatedly until it succeeds or the SubDevice no longer answers. `reported`: its
-/// error that is reported and still present.
+/// Brings a SubDevice to its target state, repeatedly until it succeeds or the SubDevice no longer answers. `reported`:
+/// its error that is reported and still present.
 pub(super) async fn keep_up(
     bus: &Bus,
     segment: &SharedSegment,

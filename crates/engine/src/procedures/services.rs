@@ -44,7 +44,7 @@ pub enum ServiceError {
         /// The SubDevice.
         subdevice: SubDeviceId,
     },
-    /// Nothing is active yet.
+    /// No declaration is active yet.
     NotActive,
     /// The segment was not stable for long enough.
     Unsteady,
@@ -75,10 +75,10 @@ impl fmt::Display for ServiceError {
             ServiceError::Sii(error) => error.fmt(f),
             ServiceError::Port { port } => write!(f, "there is no port {port}, only 0 to 3"),
             ServiceError::OnTheLink { subdevice } => {
-                write!(f, "SubDevice {subdevice} hangs on the main link: there is no port before it")
+                write!(f, "SubDevice {subdevice} is connected to the main link: there is no port before it")
             }
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
-            ServiceError::Unsteady => f.write_str("the segment changes all the time"),
+            ServiceError::Unsteady => f.write_str("the segment changes repeatedly"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
             ServiceError::LrwOnTwoLinks { logical, length, subdevices: [one, other] } => write!(
                 f,

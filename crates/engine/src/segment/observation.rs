@@ -55,7 +55,7 @@ pub enum Observation<'a> {
         /// SubDevices that the latest supervision result counts.
         counted: Option<Wkc>,
     },
-    /// A round of looks is complete.
+    /// A round of scans is complete.
     Round(RoundResult<'a>),
     /// All effects of a round of scans are completed. With the number of the latest supervision result.
     RoundEnded(Option<u32>),

@@ -219,7 +219,7 @@ async fn survey(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
             Err(error) => return Err(error.to_string()),
         }
     }
-    Err("SubDevices come and go".to_string())
+    Err("SubDevices were added or lost repeatedly".to_string())
 }
 
 /// `None` while the segment changes.
@@ -358,8 +358,8 @@ async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[Station
     false
 }
 
-/// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `no_return` do not
-/// return.
+/// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `no_return` do
+/// not return.
 pub(super) async fn latch(
     bus: &Bus,
     segment: &SharedSegment,

@@ -27,7 +27,7 @@ impl fmt::Display for NotLocked {
             f.write_str("its propagation delay is not known, ")?;
             return match hidden.fork {
                 Some(fork) => write!(f, "since the fork at position {fork} has no clock"),
-                None => f.write_str("since it is not known what lies between it and the reference clock"),
+                None => f.write_str("since the SubDevices between it and the reference clock are unknown"),
             };
         }
         match self.other {

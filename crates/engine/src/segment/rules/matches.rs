@@ -20,8 +20,8 @@ use crate::time::Instant;
 
 impl Segment {
     /// Matches all unassigned SubDevices with absent members. To be called when it is known of all members whether they
-    /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches proven by
-    /// cables.
+    /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches
+    /// proven by cables.
     pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned = self.unassigned.clone();
         unassigned.sort_by_key(|it| it.position);

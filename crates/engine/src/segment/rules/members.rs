@@ -235,7 +235,7 @@ impl Segment {
         let (pause, station) = (member.mistaken.again(now), member.station);
         if member.mistaken.is_due() {
             let reason = format!(
-                "what answers at its station address {:#06x} is not known to be it, and does not give up the address",
+                "the SubDevice at its station address {:#06x} is another one or unknown, and does not give up the address",
                 station.0
             );
             effects.failed(index, reason);
@@ -384,8 +384,7 @@ impl Member {
         if self.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
             let has_outputs = setup.plan.mapped_areas().any(|(_, area)| area.direction == Direction::Outputs);
             let mut what =
-                "its SII can be followed now: it has no place in the process image before the next activation"
-                    .to_string();
+                "its SII can be used now: it has no place in the process image before the next activation".to_string();
             if has_outputs && self.target == AlState::Op {
                 self.target = AlState::SafeOp;
                 what.push_str(", and stays in SAFEOP without outputs");

@@ -18,9 +18,9 @@ const BLOCKED: Duration = Duration::from_millis(20);
 const BLOCKED_CYCLES: u64 = 3;
 
 impl Segment {
-    /// Reports that no frame returns while a local ring is open, or from one cycle to the next if two rings may have
-    /// broken at once, and starts their examination; reports when frames return again. Returns the time of the next
-    /// check.
+    /// Reports that no frame returns while a local ring is open, or if there are several local rings of which two may
+    /// have broken at the same time, and starts their examination; reports when frames return again. Returns the time
+    /// of the next check.
     pub(in crate::segment) fn observe_silence(
         &mut self,
         words: &Words,
