@@ -235,7 +235,7 @@ impl Segment {
         let (pause, station) = (member.mistaken.again(now), member.station);
         if member.mistaken.is_due() {
             let reason = format!(
-                "the SubDevice at its station address {:#06x} is another one or unknown, and does not give up the address",
+                "the SubDevice at its address {:#06x} is another one or unknown, and does not give up the address",
                 station.0
             );
             effects.failed(index, reason);
