@@ -53,7 +53,7 @@ async fn scan_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     let versions = segment.view().versions();
     let before: Vec<Phase> = segment.view().members.iter().map(|member| member.phase).collect();
     let unassigned = read_all_unassigned(bus, segment).await;
-    let others = unassigned.iter().filter(|(_, scan_all)| scan_all.is_answer()).count();
+    let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
     let counted = || segment.board.supervision().map(|(_, seen)| seen.total());
     let so_far = |readings: &[Reading]| {

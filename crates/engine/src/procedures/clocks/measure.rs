@@ -74,7 +74,7 @@ pub(super) enum Opening {
 
 /// Runs a measurement.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
-    let mut survey = survey(bus, segment).await?;
+    let mut survey = survey_segment(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
@@ -207,7 +207,7 @@ impl Survey {
     }
 }
 
-async fn survey(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
+async fn survey_segment(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
     for _ in 0..SCANS {
         let surveyed = survey_once(bus, segment).await;
         // The ECAT events of ports that changed before have been read and cleared by this survey, so another scan is
