@@ -1,8 +1,8 @@
-//! The MainDevice: scan, activation, and the two halves that come out of it.
+//! The MainDevice: scan, activation, and its two halves.
 //!
 //! [`MainDevice::new`] starts with the acyclic half alone. A scan runs as its first procedure. [`MainDevice::activate`]
 //! takes the application's declaration, lays out process data, starts the configuration of all SubDevices and the
-//! supervision, and hands out the [`Exchange`](crate::exchange::Exchange) for the application's cyclic thread.
+//! supervision, and returns the [`Exchange`](crate::exchange::Exchange) for the application's cyclic thread.
 
 mod activate;
 mod activate_error;
@@ -76,7 +76,7 @@ type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
 pub struct MainDevice {
     options: Options,
     supervisor: Supervisor,
-    /// What supervisors before this one have counted.
+    /// Counts of earlier supervisors.
     counted: AcyclicCounters,
     /// Activations so far.
     activations: u32,
@@ -94,13 +94,13 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
-    /// Ethernet of declared SubDevices, where it was asked for.
+    /// Ethernet of declared SubDevices, if a port was requested.
     ports: Vec<Option<EthernetPort>>,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
-    /// What such a client finds at address 0.
+    /// The objects that a gateway client reads at address 0.
     own_objects: OwnObjects,
-    /// A link that was taken down on order.
+    /// A link that was taken down by command.
     disconnected: Option<Link>,
 }
 
@@ -167,7 +167,7 @@ impl MainDevice {
         self.scan.borrow().clone()
     }
 
-    /// What the last scan found; empty before it has ended well.
+    /// SubDevices of the last scan; empty before a successful scan.
     pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
         match &*self.scan.borrow() {
             Some(Ok(scan)) => scan.subdevices.clone(),
@@ -175,13 +175,13 @@ impl MainDevice {
         }
     }
 
-    /// Ends supervision and all other procedures, and takes all SubDevices down to a state; those in a lower one stay
-    /// there. The exchange must not send any more. Afterwards a new scan may start.
+    /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower
+    /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
-        let led = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
+        let to_stop = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
-        // The procedure that would have brought it back is gone.
+        // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
         self.scanning.set(false);
         self.requests.end();
@@ -195,7 +195,7 @@ impl MainDevice {
         *self.stopped.borrow_mut() = None;
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
         self.supervisor.spawn(async move {
-            let result = stop(&bus, led, state, limit).await;
+            let result = stop(&bus, to_stop, state, limit).await;
             *slot.borrow_mut() = Some(result);
         });
     }
@@ -210,13 +210,13 @@ impl MainDevice {
         self.supervisor.events_dropped() + self.cyclic_events.as_ref().map_or(0, Consumer::dropped)
     }
 
-    /// How far each declared SubDevice is.
+    /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
         let Some(segment) = &self.segment else { return Vec::new() };
         segment.view().members.iter().map(|member| member.phase.into()).collect()
     }
 
-    /// What is known about each clock of the segment, by position; empty without distributed clocks.
+    /// Status of each clock of the segment, by position; empty without distributed clocks.
     pub fn clocks(&self) -> Vec<ClockStatus> {
         self.segment.as_ref().map_or(Vec::new(), |segment| segment.view().clocks().status())
     }
@@ -249,7 +249,7 @@ impl MainDevice {
         access.members.iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
-    /// How far each hot connect group is, by its number.
+    /// The present state of each hot connect group, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
         let Some(segment) = &self.segment else { return Vec::new() };
         let counts = counts(&segment.view().members);
@@ -265,12 +265,12 @@ impl MainDevice {
         CyclicEvent::unpack(words).map(|event| TimedEvent::new(now, event.event()))
     }
 
-    /// Takes in a frame of the acyclic half.
+    /// Receives a frame of the acyclic half.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
         self.supervisor.receive(arrived_on, bytes, now)
     }
 
-    /// Lets procedures go on.
+    /// Runs procedures whose replies, deadlines or signals have arrived.
     pub fn poll(&mut self, now: Instant) {
         self.supervisor.poll(now);
     }
@@ -280,12 +280,12 @@ impl MainDevice {
         self.supervisor.transmit(now, budget, transmit)
     }
 
-    /// When [`MainDevice::poll`] has something to do at the latest.
+    /// The latest time of the next call of [`MainDevice::poll`].
     pub fn next_deadline(&self) -> Option<Instant> {
         self.supervisor.next_deadline()
     }
 
-    /// What is asked of the link layer; see [`Supervisor::take_link_order`].
+    /// Command to the link layer; see [`Supervisor::take_link_order`].
     pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
         let order = self.supervisor.take_link_order()?;
         let (link, disconnect) = order;
@@ -293,7 +293,7 @@ impl MainDevice {
         Some(order)
     }
 
-    /// Whether it was done; see [`Supervisor::answer_link_order`].
+    /// Result of that command; see [`Supervisor::answer_link_order`].
     pub fn answer_link_order(&mut self, done: bool) {
         self.supervisor.answer_link_order(done);
     }
@@ -308,7 +308,7 @@ impl MainDevice {
         self.counted.plus(self.supervisor.counters())
     }
 
-    /// What is under way in the acyclic half.
+    /// Datagrams and procedures under way in the acyclic half.
     pub fn under_way(&self) -> UnderWay {
         self.supervisor.under_way()
     }
@@ -323,12 +323,12 @@ impl MainDevice {
         self.supervisor.spawn(procedure);
     }
 
-    /// What the links tell of their carriers, by [`Link::index`]; `None` where they do not. To be called now and then.
+    /// Carrier state of the links, by [`Link::index`]; `None` if a link does not report it. To be called regularly.
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
         self.supervisor.set_carriers(carriers);
     }
 
-    /// The ring and both links. What comes from frames needs the supervision datagram.
+    /// State of the ring and of both links. Values derived from frames need the supervision datagram.
     pub fn ring_status(&self) -> RingStatus {
         let mut status = match &self.segment {
             Some(segment) => segment.view().ring_status(),
@@ -346,7 +346,7 @@ impl MainDevice {
         status
     }
 
-    /// Every cable of the scan with what the ports at its ends have counted since activation, read once a second.
+    /// Every cable of the scan with the error counts of the ports at its ends since activation, read once a second.
     pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
         self.segment.as_ref().map(|segment| segment.view().cabling.cables.clone()).unwrap_or_default()
     }

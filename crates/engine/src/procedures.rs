@@ -1,6 +1,6 @@
-//! Procedures: async functions, each the whole story of a job, one file per job.
+//! Procedures: async functions, each with all steps of a job, one file per job.
 //!
-//! They see the bus through [`crate::supervisor::Bus`] and time through nothing else.
+//! They access the bus and the time only through [`crate::supervisor::Bus`].
 
 pub mod al_state;
 mod cabling;

@@ -1,15 +1,13 @@
-//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and what
-//! follows from observations.
+//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and the effects
+//! of observations.
 //!
 //! A pure machine: [`Segment::observe`] takes one [`Observation`] and returns the [`Effects`]: events to report,
-//! procedures to start. Nothing else changes it. It sends nothing and waits for nothing; procedures do that, and report
-//! what they found as observations. What the cyclic half must know is posted to the board within `observe`, before
-//! anything else follows.
+//! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
+//! as observations. Words for the cyclic half are posted to the board within `observe`, before any effect is executed.
 //!
-//! A scan takes time, and the segment changes meanwhile. So findings carry the versions that they are about ([`Asked`],
-//! the number of an attempt), and findings that are out of date are refused.
+//! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`],
+//! the number of an attempt), and outdated results are refused.
 
-mod asked;
 mod attention;
 mod breaks;
 mod cabling;
@@ -21,22 +19,23 @@ pub mod disturbance;
 pub mod effect;
 mod hot_connect;
 mod local_rings;
-mod look;
-mod looked;
 mod matching;
 pub mod member;
 mod model;
 mod observation;
 mod owners;
 mod port_control;
+mod reading;
 pub mod retrace;
 mod ring;
+mod round_result;
 mod rules;
 mod seen;
 pub mod setup;
 mod silence;
 pub mod start;
 pub mod unassigned;
+mod versions;
 pub mod view;
 
 pub use cabling::{Cabling, stations_by_position};
@@ -44,13 +43,13 @@ pub use choices::Choices;
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use local_rings::is_down;
-pub use look::Look;
-pub use looked::Looked;
 pub use model::{Known, Segment};
 pub use observation::{Observation, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
+pub use reading::Reading;
 pub use ring::Words;
+pub use round_result::RoundResult;
 pub use seen::Seen;
 
 #[cfg(test)]

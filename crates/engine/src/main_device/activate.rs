@@ -1,4 +1,4 @@
-//! The last step of a configuration: process data is laid out, both halves get what they need, procedures start.
+//! The last step of a configuration: lays out process data, creates both halves, starts procedures.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -41,11 +41,11 @@ use crate::segment::{Cabling, Choices, Known, Observation, Segment, stations_by_
 use crate::time::Instant;
 use crate::topology::Topology;
 
-/// Messages of the exchange that may wait until events are fetched.
+/// Events of the exchange that may wait to be fetched.
 const CYCLIC_EVENTS: usize = 1024;
 
 impl MainDevice {
-    /// Starts what was loaded.
+    /// Starts a loaded declaration.
     pub(super) fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
         let scan = match &*self.scan.borrow() {
             Some(Ok(scan)) => scan.clone(),
@@ -107,12 +107,12 @@ impl MainDevice {
         Choices {
             enhanced_line_crossed: self.options.enhanced_line_crossed,
             junctions: self.options.junctions,
-            // Without supervision it is not found out which unassigned SubDevices are members.
+            // Without supervision unassigned SubDevices are not identified as members.
             follow_groups: self.options.follow_groups && self.options.supervision,
         }
     }
 
-    /// The domains, and where their process data lies.
+    /// The domains, and the places of their process data.
     fn lay_out(
         &mut self,
         declaration: &Declaration,
@@ -134,18 +134,18 @@ impl MainDevice {
         Ok((specs, layout))
     }
 
-    /// Starts configuration, supervision and what else goes on while the MainDevice is active.
+    /// Starts configuration, supervision and all other procedures of an active MainDevice.
     fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
         self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
         let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         if with_clocks {
-            // A SubDevice that answers while clocks are measured has not come back: its configuration begins
+            // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
             // afterwards.
             segment.observe(Observation::Delayed);
             let (bus, segment) = (bus.clone(), segment.clone());
-            // Receive times are latched before other frames are on the way (protocol 7.1).
+            // Receive times are latched before other frames are sent (protocol 7.1).
             self.supervisor.spawn(async move {
                 clocks::begin(&bus, &segment).await;
                 segment.observe(Observation::Started(start));
@@ -170,8 +170,8 @@ impl MainDevice {
         self.segment = Some(segment);
     }
 
-    /// Number of a session that begins now: another one than before, and hardly that of a program that ran here a while
-    /// ago.
+    /// Number of a new session: differs from the previous one, and most probably from that of a program that ran here
+    /// recently.
     fn next_session(&mut self, now: Instant) -> u32 {
         /// About four seconds.
         const STEP_BITS: u32 = 32;
@@ -180,7 +180,7 @@ impl MainDevice {
     }
 }
 
-/// Clocks of all SubDevices that were scanned.
+/// Clocks of all SubDevices of the scan.
 fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> Clocks {
     let member = |info: &SubDeviceInfo| {
         let index = members.iter().position(|member| member.station == info.station)?;

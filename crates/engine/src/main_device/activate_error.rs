@@ -1,4 +1,4 @@
-//! Why a declaration is not activated, in types and in words.
+//! Why a declaration cannot be activated: types and messages.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -23,31 +23,31 @@ pub enum ActivateError {
     NoScan,
     /// The MainDevice is active.
     Active,
-    /// A declared SubDevice is not there, or another one is.
+    /// A declared SubDevice is missing, or has another identity.
     Config {
         /// Index in the declaration.
         subdevice: SubDeviceId,
-        /// What is wrong.
+        /// The error.
         error: ConfigError,
     },
     /// A SubDevice cannot be configured as declared.
     Setup {
         /// Index in the declaration.
         subdevice: SubDeviceId,
-        /// What is wrong.
+        /// The error.
         error: SetupError,
     },
     /// A scan is running.
     Scanning,
-    /// Nothing was loaded that could be applied.
+    /// There is no loaded declaration to apply.
     NotLoaded,
     /// A connection of a local ring does not fit.
     Junction(JunctionError),
-    /// A SubDevice is to stay in a state that process data and mailbox do not lead to.
+    /// The declared target state cannot be held with process data and mailbox.
     Target {
         /// Index in the declaration.
         subdevice: SubDeviceId,
-        /// The state that was declared.
+        /// The declared state.
         target: AlState,
     },
     /// The head of a hot connect group has neither alias nor identification.
@@ -73,12 +73,12 @@ pub enum ActivateError {
         /// The shortest period.
         shortest: Duration,
     },
-    /// There is no domain, and a SubDevice has process data: it would reach OP without ever exchanging any.
+    /// There is no domain, and a SubDevice has process data: it would reach OP without exchanging any.
     NoDomain {
         /// Index in the declaration.
         subdevice: SubDeviceId,
     },
-    /// SYNC0 does not go with the cycle: it would come at another time of each cycle.
+    /// SYNC0 does not fit the cycle: its pulse would come at another time in each cycle.
     SyncCycle {
         /// Index in the declaration.
         subdevice: SubDeviceId,
@@ -91,11 +91,11 @@ pub enum ActivateError {
     UnderWay {
         /// Number of the domain.
         domain: DomainId,
-        /// What was declared.
+        /// The declared number.
         under_way: u8,
     },
-    /// LRW was asked for on two links. When the ring breaks, half of its SubDevices would be met by one copy and half
-    /// by the other (protocol CR-16, 9.2.2).
+    /// LRW is configured with two links. When the ring opens, one copy would be processed by some of its SubDevices and
+    /// the other copy by the rest (protocol CR-16, 9.2.2).
     LrwOnTwoLinks {
         /// Number of the domain.
         domain: DomainId,
@@ -108,14 +108,14 @@ pub enum ActivateError {
     },
     /// A configuration file names an LRW over several SubDevices, and there are two links (protocol CR-16, 9.2.2).
     NamedLrwOnTwoLinks(ExplicitLrw),
-    /// LRW was asked for, and a SubDevice does not know it.
+    /// LRW is configured, and a SubDevice does not support it.
     LrwUnknown {
         /// Number of the domain.
         domain: DomainId,
         /// Index in the declaration.
         subdevice: SubDeviceId,
     },
-    /// Process data does not fit.
+    /// Process data does not fit into frames or images.
     Layout(LayoutError),
     /// SYNC signals are declared for a SubDevice, but no distributed clocks, or it has no clock.
     NoClock {
@@ -128,7 +128,7 @@ pub enum ActivateError {
     UnknownMember {
         /// Number of the domain.
         domain: DomainId,
-        /// Index that was given.
+        /// The index.
         subdevice: SubDeviceId,
     },
 }
@@ -177,7 +177,7 @@ impl fmt::Display for ActivateError {
                 list(subdevices)
             ),
             ActivateError::LrwUnknown { domain, subdevice } => {
-                write!(f, "domain {domain}: LRW was asked for, declaration {subdevice} does not know it")
+                write!(f, "domain {domain}: LRW is configured, but declaration {subdevice} does not support it")
             }
             ActivateError::Layout(error) => error.fmt(f),
             ActivateError::NoClock { subdevice, has_clock: false } => {
@@ -198,7 +198,7 @@ fn list(subdevices: &[SubDeviceId]) -> impl fmt::Debug + '_ {
     core::fmt::from_fn(move |f| f.debug_list().entries(subdevices.iter().map(|subdevice| subdevice.0)).finish())
 }
 
-/// Microseconds, with a fraction where there is one.
+/// Microseconds, with a fraction if there is one.
 fn in_us(time: Duration) -> impl fmt::Display {
     let ns = time.as_nanos();
     core::fmt::from_fn(move |f| match ns % 1_000 {

@@ -1,4 +1,4 @@
-//! What activation hands out.
+//! Result of the activation.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -6,15 +6,15 @@ use core::time::Duration;
 use super::areas::Directory;
 use crate::exchange::Exchange;
 
-/// What activation hands out.
+/// Result of the activation.
 #[derive(Debug)]
 pub struct Active {
     /// The cyclic half.
     pub exchange: Exchange,
-    /// Where PDO entries lie.
+    /// Places of PDO entries.
     pub directory: Directory,
-    /// Periods of the domains. There is at least one domain, if only for supervision.
+    /// Periods of the domains. There is at least one domain, possibly only for supervision.
     pub periods: Vec<Duration>,
-    /// Most cycles of a domain that may be under way at once.
+    /// Maximum number of cycles of a domain under way at once.
     pub under_way: u8,
 }

@@ -1,4 +1,4 @@
-//! Where the process data of the declared SubDevices lies, and which PDO entries it has.
+//! Areas of the process data of the declared SubDevices, and their PDO entries.
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -14,17 +14,17 @@ use crate::layout::{Layout, PlacedArea};
 use crate::plan::{MappedEntry, SubDevicePlan};
 use crate::segment::setup::{SetupError, declared_areas, planned_areas};
 
-/// Where the PDO entries of all declared SubDevices lie in the domains' images.
+/// Places of the PDO entries of all declared SubDevices in the domains' images.
 #[derive(Clone, Debug, Default)]
 pub struct Directory {
     subdevices: Vec<Vec<AreaEntries>>,
-    /// What each SubDevice adds to the working counters of all domains.
+    /// Share of each SubDevice in the working counters of all domains.
     contributions: Vec<u32>,
     /// Bits of outputs by domain, in order and without gaps inside a range.
     outputs: Vec<(DomainId, Range<u64>)>,
 }
 
-/// An area with the entries in it.
+/// An area with its entries.
 #[derive(Clone, Debug)]
 pub struct AreaEntries {
     /// The domain.
@@ -33,7 +33,7 @@ pub struct AreaEntries {
     pub placed: PlacedArea,
     /// Direction.
     pub direction: Direction,
-    /// Index, subindex, place; gaps are left out.
+    /// Index, subindex, place; without gaps.
     pub entries: Vec<(u16, u8, Entry)>,
 }
 
@@ -82,7 +82,7 @@ impl Directory {
         self.subdevices.len()
     }
 
-    /// What a SubDevice adds to the working counters of its domains when it takes part.
+    /// The share of a SubDevice in the working counters of its domains.
     pub fn contribution(&self, subdevice: SubDeviceId) -> u32 {
         self.contributions.get(subdevice.0).copied().unwrap_or(0)
     }
@@ -92,39 +92,39 @@ impl Directory {
         self.subdevices.get(subdevice.0).map_or(&[], Vec::as_slice)
     }
 
-    /// The place of a PDO entry; the first one where it is mapped more than once.
+    /// The place of a PDO entry; the first one if it is mapped more than once.
     pub fn entry(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Option<Entry> {
         let entries = self.areas(subdevice).iter().flat_map(|area| &area.entries);
         entries.into_iter().find(|(i, s, _)| (*i, *s) == (index, sub_index)).map(|(_, _, entry)| *entry)
     }
 }
 
-/// Process data of a declared SubDevice: planned from what it is, or from the declaration while it is not there or its
-/// SII cannot be used.
+/// Process data of a declared SubDevice: planned from its SII, or from the declaration if it is absent or its SII
+/// cannot be used.
 pub(super) enum Areas {
-    /// Planned; `None` where its target state exchanges nothing.
+    /// Planned; `None` if no process data is exchanged in its target state.
     Planned(Option<SubDevicePlan>),
     Declared(Declared),
 }
 
-/// What a declaration fixes by itself.
+/// Data fixed by the declaration alone.
 pub(super) struct Declared {
     areas: Vec<(u8, Direction, u16)>,
     config: Box<SubDeviceConfig>,
-    /// LRW reaches it.
+    /// It supports LRW.
     lrw: bool,
-    /// Why it is not planned though it is there.
+    /// Why it is not planned although it is present.
     unfit: Option<SetupError>,
 }
 
 impl Declared {
-    /// Of one that is not there: LRW may not reach it.
+    /// For an absent SubDevice: it may not support LRW.
     pub fn absent(config: &SubDeviceConfig) -> Declared {
         let areas = declared_areas(config).unwrap_or_default();
         Declared { areas, config: Box::new(config.clone()), lrw: false, unfit: None }
     }
 
-    /// Of one that is there and cannot be set up.
+    /// For a present SubDevice that cannot be set up.
     pub fn unfit(config: &SubDeviceConfig, info: &SubDeviceInfo, error: SetupError) -> Declared {
         Declared { lrw: info.lrw_supported(), unfit: Some(error), ..Declared::absent(config) }
     }
@@ -138,7 +138,7 @@ impl Areas {
         }
     }
 
-    /// Why a SubDevice that is there is not planned.
+    /// Why a present SubDevice is not planned.
     pub(super) fn unfit(&self) -> Option<&SetupError> {
         match self {
             Areas::Planned(_) => None,

@@ -1,8 +1,8 @@
-//! Datagrams of the application's own.
+//! Datagrams of the application.
 //!
-//! On two links positions are those of the last scan (CR-09). Increments would follow the way of the frames, which a
-//! break, a crossed SubDevice or a branch behind the way on makes another one; and at an edge, while a frame is out,
-//! it is not known which. So the SubDevice that the scan found at a position is addressed by its station address since.
+//! With two links positions are those of the last scan (CR-09). Auto-increment addresses would follow the path of the
+//! frames, which changes with a break, a crossed SubDevice or a branch; while the ring opens or closes, the path of a
+//! frame is unknown. So a position is replaced by the station address of the SubDevice that the scan found there.
 
 use alloc::vec::Vec;
 
@@ -20,30 +20,30 @@ use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError, Reply};
 
-/// Datagrams of the application that are taken at once.
+/// Maximum number of the application's datagrams per call.
 pub const MAX_DATAGRAMS: usize = 1024;
 
-/// A datagram of the application's own.
+/// A datagram of the application.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RawDatagram {
     /// The command.
     pub command: Command,
-    /// The address, as the command wants it. With two links a position is that of the last scan, or of a rescan
-    /// since then of which the cabling was taken over, wherever a break is and whichever SubDevice is missing or came
-    /// in between: it leaves with the station address of the SubDevice that was found there. A SubDevice that lost its
-    /// power answers to it again when it was given its address back, one that is not declared only after another look
-    /// of this kind. Other positions, and all with one link, count SubDevices as frames meet them.
+    /// The address, as the command requires. With two links a position is that of the last scan, or of a later rescan
+    /// whose cabling was taken over, regardless of breaks and of SubDevices that are missing or were added: the
+    /// datagram is sent with the station address of the SubDevice that was found there. A SubDevice that lost its power
+    /// answers again when its address was assigned again, an undeclared one only after another rescan. Other positions,
+    /// and all with one link, count SubDevices in the order in which frames pass them.
     pub target: Target,
-    /// What is sent; for reads, zeros.
+    /// The data to send; for reads, zeros.
     pub data: Vec<u8>,
-    /// Whether it may be sent again when its frame is lost.
+    /// Whether it may be sent again if its frame is lost.
     pub resend: bool,
 }
 
 impl MainDevice {
-    /// Starts to send datagrams of the application's own, at once, in one frame where they fit. Each brings its answer,
-    /// whatever its working counter. An LRW over process data of several SubDevices is refused with two links, and all
-    /// others with it.
+    /// Starts to send datagrams of the application together, in one frame if they fit. Each gets its reply, whatever
+    /// the working counter. With two links an LRW over process data of several SubDevices is refused, together with all
+    /// other datagrams of the call.
     pub fn start_datagrams(
         &mut self,
         datagrams: Vec<RawDatagram>,
@@ -58,28 +58,27 @@ impl MainDevice {
         })
     }
 
-    /// How each of them leaves, and its original address.
+    /// The datagrams as sent, and their original addresses.
     fn addressed(&self, datagrams: Vec<RawDatagram>) -> Result<Vec<(RawDatagram, Target)>, ServiceError> {
         if datagrams.len() > MAX_DATAGRAMS {
             return Err(ServiceError::TooMany { got: datagrams.len(), limit: MAX_DATAGRAMS });
         }
         let stations = if self.options.links() == LinkSet::Ring { self.stations_by_position() } else { Vec::new() };
         let by_station = |datagram: RawDatagram| {
-            let asked = datagram.target;
-            let Target::Position(Position(position), register) = asked else { return (datagram, asked) };
+            let original = datagram.target;
+            let Target::Position(Position(position), register) = original else { return (datagram, original) };
             match (with_station(datagram.command), stations.get(usize::from(position))) {
                 (Some(command), Some(station)) => {
-                    (RawDatagram { command, target: Target::Station(*station, register), ..datagram }, asked)
+                    (RawDatagram { command, target: Target::Station(*station, register), ..datagram }, original)
                 }
-                _ => (datagram, asked),
+                _ => (datagram, original),
             }
         };
         datagrams.iter().try_for_each(|datagram| self.check_lrw_of(datagram))?;
         Ok(datagrams.into_iter().map(by_station).collect())
     }
 
-    /// The station addresses of those that the last scan found, or the rescan of which the cabling was taken over, by
-    /// position.
+    /// The station addresses of the last scan, or of the rescan whose cabling was taken over, by position.
     fn stations_by_position(&self) -> Vec<StationAddress> {
         match (&self.segment, &*self.scan.borrow()) {
             (Some(segment), _) => segment.view().cabling.stations.clone(),
@@ -104,7 +103,7 @@ impl MainDevice {
     }
 }
 
-/// Notes what a datagram tells junctions to do about their ports.
+/// Port commands to junctions in a datagram.
 fn orders(segment: Option<&SharedSegment>, datagram: &RawDatagram) -> Vec<UnderWay> {
     use Command::{Aprw, Apwr, Brw, Bwr, Fprw, Fpwr};
     let Some(known) = segment.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
@@ -120,7 +119,7 @@ fn orders(segment: Option<&SharedSegment>, datagram: &RawDatagram) -> Vec<UnderW
     stations.into_iter().filter_map(|station| ordering(segment, station, register, &datagram.data)).collect()
 }
 
-/// Two SubDevices of which process data lies in a range of logical addresses, if there are as many.
+/// Two SubDevices with process data in a range of logical addresses, if there are two.
 fn covered(layout: &Layout, logical: LogicalAddress, length: usize) -> Option<[usize; 2]> {
     let (begin, end) = (u64::from(logical.0), u64::from(logical.0) + length as u64);
     let areas = layout.domains.iter().flat_map(|domain| &domain.areas).filter(|placed| {
@@ -132,7 +131,7 @@ fn covered(layout: &Layout, logical: LogicalAddress, length: usize) -> Option<[u
     subdevices.find(|other| *other != one).map(|other| [one, other])
 }
 
-/// The command that does the same by station address.
+/// The command with the same effect by station address.
 const fn with_station(command: Command) -> Option<Command> {
     match command {
         Command::Aprd => Some(Command::Fprd),
@@ -143,10 +142,10 @@ const fn with_station(command: Command) -> Option<Command> {
     }
 }
 
-async fn send(bus: Bus, (datagram, asked): (RawDatagram, Target)) -> Result<Reply, BusError> {
+async fn send(bus: Bus, (datagram, original): (RawDatagram, Target)) -> Result<Reply, BusError> {
     let RawDatagram { command, target, data, resend } = datagram;
-    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.with_target(asked))?;
-    // FMMUs that the application wrote itself are not known here.
+    let reply = bus.datagram(command, target, data, resend).await.map_err(|error| error.with_target(original))?;
+    // FMMUs written by the application are not known here.
     let is_split = command == Command::Lrw && reply.main != Wkc(0) && reply.redundant != Wkc(0);
-    if is_split { Err(BusError::Split { target: asked }) } else { Ok(reply) }
+    if is_split { Err(BusError::Split { target: original }) } else { Ok(reply) }
 }

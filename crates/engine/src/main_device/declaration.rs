@@ -1,4 +1,4 @@
-//! What the application declares: SubDevices, domains, clocks.
+//! The declaration of the application: SubDevices, domains, clocks.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -10,20 +10,20 @@ use crate::config::{ClockConfig, Group, SubDeviceConfig};
 use crate::declared::{GroupId, SubDeviceId};
 use crate::layout::LrwPolicy;
 
-/// Cycles of a domain that may be under way at once, at the most.
+/// Maximum number of cycles of a domain under way at once.
 pub const MAX_UNDER_WAY: u8 = 4;
 
 /// A domain as the application declares it.
 #[derive(Clone, Debug)]
 pub struct DomainConfig {
-    /// How often the application will exchange it.
+    /// Interval at which the application will exchange it.
     pub period: Duration,
-    /// How many of its cycles may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 where frames come back within a
-    /// period, more where their way through segment and host takes longer. What it costs: inputs are as old as that
-    /// way, so up to as many periods, the answer to an input leaves as many cycles later, a lost cycle is noticed as
-    /// much later (or when the next one comes back), and each cycle under way has buffers of its own.
+    /// Number of its cycles that may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 if frames return within a period,
+    /// more if their way through segment and host takes longer. The cost: inputs are up to as many periods old, the
+    /// answer to an input is sent as many cycles later, a lost cycle is detected as much later (or when the next one
+    /// returns), and each cycle under way has buffers of its own.
     pub under_way: u8,
-    /// What belongs to it.
+    /// Its members.
     pub members: Vec<DomainMember>,
 }
 
@@ -34,7 +34,7 @@ impl DomainConfig {
     }
 }
 
-/// A SubDevice's part in a domain.
+/// Process data of a SubDevice in a domain.
 #[derive(Clone, Debug)]
 pub struct DomainMember {
     /// Index of the SubDevice in the declaration.
@@ -43,27 +43,27 @@ pub struct DomainMember {
     pub sync_managers: Option<Vec<u8>>,
 }
 
-/// What the application declares.
+/// The declaration of the application.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Declaration {
-    /// The SubDevices that are expected.
+    /// The expected SubDevices.
     pub subdevices: Vec<SubDeviceConfig>,
     /// The domains.
     pub domains: Vec<DomainConfig>,
-    /// Where LRW is used.
+    /// Use of LRW.
     pub lrw: LrwPolicy,
-    /// Datagrams with LRW that a configuration file names. With two links one over several SubDevices is refused, and
-    /// where each has one SubDevice the policy is [`LrwPolicy::PerSubDevice`]; with one link they change nothing.
+    /// LRW datagrams of a configuration file. With two links an LRW over several SubDevices is refused; if each covers
+    /// one SubDevice the policy is [`LrwPolicy::PerSubDevice`]. With one link they have no effect.
     pub explicit_lrw: Vec<ExplicitLrw>,
-    /// Distributed clocks; `None` leaves them alone.
+    /// Distributed clocks; with `None` no clock register is set up.
     pub clocks: Option<ClockConfig>,
-    /// SubDevices that must answer for the activation.
+    /// SubDevices that must be present for the activation.
     pub required: Required,
 }
 
-/// SubDevices that must answer, with the expected identity, for an activation. An event reports any other; it is left
-/// alone and may come later.
+/// SubDevices that must answer, with the expected identity, for an activation. Each other absent SubDevice is reported
+/// by an event, and is configured when it comes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Required {
     /// All that are declared, optional or not.
@@ -76,7 +76,8 @@ pub enum Required {
 }
 
 impl Declaration {
-    /// The same, with so many cycles of every domain under way at once (see [`DomainConfig::under_way`]).
+    /// The same declaration, with this number of cycles of every domain under way at once (see
+    /// [`DomainConfig::under_way`]).
     #[must_use]
     pub fn with_under_way(mut self, cycles: u8) -> Declaration {
         for domain in &mut self.domains {
@@ -95,10 +96,10 @@ impl Declaration {
     }
 }
 
-/// A datagram with LRW as a configuration file names it. What leaves is laid out by the MainDevice.
+/// An LRW datagram of a configuration file. The MainDevice lays out its own datagrams.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExplicitLrw {
-    /// How the author of the file finds it: its frame, its place in it, its comment.
+    /// Its designation in the file: frame, place in the frame, comment.
     pub name: String,
     /// Its logical address in the file.
     pub logical: LogicalAddress,

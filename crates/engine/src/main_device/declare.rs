@@ -1,4 +1,4 @@
-//! A declaration, put together step by step.
+//! Builds a declaration step by step.
 
 use alloc::vec;
 use core::time::Duration;
@@ -21,8 +21,8 @@ impl Declaration {
         self.add_to(DomainId(0), config)
     }
 
-    /// Adds a SubDevice; all its process data belongs to this domain. Where there is no such domain, the SubDevice is
-    /// in none.
+    /// Adds a SubDevice; all its process data belongs to this domain. If there is no such domain, the SubDevice is in
+    /// none.
     pub fn add_to(&mut self, domain: DomainId, config: SubDeviceConfig) -> SubDeviceId {
         let subdevice = self.subdevices.len();
         self.subdevices.push(config);
@@ -32,7 +32,7 @@ impl Declaration {
         SubDeviceId(subdevice)
     }
 
-    /// Adds a SubDevice to no domain; [`Declaration::assign`] puts single SyncManagers into domains.
+    /// Adds a SubDevice to no domain; [`Declaration::assign`] assigns single SyncManagers to domains.
     pub fn add_without_domain(&mut self, config: SubDeviceConfig) -> SubDeviceId {
         self.subdevices.push(config);
         SubDeviceId(self.subdevices.len() - 1)
@@ -44,7 +44,7 @@ impl Declaration {
         DomainId(self.domains.len() - 1)
     }
 
-    /// Puts the process data of one SyncManager into a domain. Where there is no such domain, nothing happens.
+    /// Assigns the process data of one SyncManager to a domain. Without such a domain, nothing happens.
     pub fn assign(&mut self, domain: DomainId, subdevice: SubDeviceId, sync_manager: u8) {
         if let Some(domain) = self.domains.get_mut(domain.0) {
             let sync_managers = Some(vec![sync_manager]);
@@ -52,28 +52,28 @@ impl Declaration {
         }
     }
 
-    /// The same, with distributed clocks that are kept together.
+    /// The same declaration, with distributed clocks.
     #[must_use]
     pub fn with_clocks(mut self, clocks: ClockConfig) -> Declaration {
         self.clocks = Some(clocks);
         self
     }
 
-    /// The same, with distributed clocks or without any.
+    /// The same declaration, with or without distributed clocks.
     #[must_use]
     pub fn with_optional_clocks(mut self, clocks: Option<ClockConfig>) -> Declaration {
         self.clocks = clocks;
         self
     }
 
-    /// The same, with this use of LRW.
+    /// The same declaration, with this use of LRW.
     #[must_use]
     pub fn with_lrw(mut self, lrw: LrwPolicy) -> Declaration {
         self.lrw = lrw;
         self
     }
 
-    /// The same; these SubDevices must be there for the activation.
+    /// The same declaration; these SubDevices must be present for the activation.
     #[must_use]
     pub fn with_required(mut self, required: Required) -> Declaration {
         self.required = required;

@@ -9,7 +9,7 @@ use super::MainDevice;
 use crate::declared::SubDeviceId;
 use crate::mail::eoe::EthernetPort;
 
-/// A SubDevice through which Ethernet frames may pass.
+/// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EthernetSubDevice {
     /// Index in the declaration.
@@ -21,8 +21,8 @@ pub struct EthernetSubDevice {
 }
 
 impl MainDevice {
-    /// Declared SubDevices that have been seen and whose SII offers EoE, whether they answer now or not; none
-    /// before activation.
+    /// Declared SubDevices that were seen and whose SII offers EoE, whether they answer now or not; none before
+    /// activation.
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
         let Some(segment) = &self.segment else { return Vec::new() };
         let access = segment.view();
@@ -37,8 +37,8 @@ impl MainDevice {
             .collect()
     }
 
-    /// The Ethernet of a declared SubDevice. Its port is opened when it is asked for first and lasts until the
-    /// MainDevice stops; `None` where no SubDevice is declared, or this mailbox has a port already.
+    /// The Ethernet of a declared SubDevice. Its port is opened at the first call and lasts until the MainDevice stops;
+    /// `None` if no SubDevice is declared, or this mailbox has a port already.
     pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
         let mailbox = self.segment.as_ref()?.mailbox(subdevice)?;
         while self.ports.len() <= subdevice {

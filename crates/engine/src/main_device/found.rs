@@ -1,4 +1,4 @@
-//! Single SubDevices of the scan and of the declaration, without a copy of all of them.
+//! Access to single SubDevices of the scan and of the declaration, without a copy of all.
 
 use ringcat_wire::address::StationAddress;
 
@@ -7,7 +7,7 @@ use super::states::SubDeviceState;
 use crate::info::SubDeviceInfo;
 
 impl MainDevice {
-    /// How many SubDevices the last scan found; `None` before one has ended well.
+    /// Number of SubDevices of the last scan; `None` before a successful scan.
     pub fn scanned_count(&self) -> Option<usize> {
         match &*self.scan.borrow() {
             Some(Ok(scan)) => Some(scan.subdevices.len()),
@@ -15,7 +15,7 @@ impl MainDevice {
         }
     }
 
-    /// What the last scan found at this station address.
+    /// Data of the SubDevice with this station address in the last scan.
     pub fn info_at(&self, station: StationAddress) -> Option<SubDeviceInfo> {
         match &*self.scan.borrow() {
             Some(Ok(scan)) => scan.subdevices.iter().find(|info| info.station == station).cloned(),
@@ -23,8 +23,8 @@ impl MainDevice {
         }
     }
 
-    /// The declared SubDevices that are not in their target states, by their indices in the declaration. Optional ones
-    /// that do not answer are left out.
+    /// The declared SubDevices that are not in their target states, by their indices in the declaration, without absent
+    /// optional ones.
     pub fn unsettled(&self) -> alloc::vec::Vec<(usize, SubDeviceState)> {
         let Some(segment) = &self.segment else { return alloc::vec::Vec::new() };
         let access = segment.view();

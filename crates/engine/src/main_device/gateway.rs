@@ -15,9 +15,9 @@ use crate::procedures::shared_segment::SharedSegment;
 const OWN_ADDRESS: u16 = 0;
 
 impl MainDevice {
-    /// Takes a message of a client, EtherCAT header of type 5 included; its answers come out of
-    /// [`MainDevice::pop_relayed`]. Any bytes are allowed. The address is the station address of a declared SubDevice,
-    /// or 0 for the objects of the MainDevice itself (docs/mailbox-gateway.md).
+    /// Takes a message of a client, EtherCAT header of type 5 included; [`MainDevice::pop_relayed`] returns its
+    /// answers. Any bytes are allowed. The address is the station address of a declared SubDevice, or 0 for the objects
+    /// of the MainDevice itself (docs/mailbox-gateway.md).
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
         let (segment, scan, acyclic) = (self.segment.clone(), self.scan.clone(), self.counters());
@@ -44,7 +44,7 @@ impl MainDevice {
         self.gateway_queue.as_ref()?.pop()
     }
 
-    /// A client has gone: what it asked for is forgotten, and a transfer of it is ended.
+    /// A client has disconnected: its requests are removed, and its transfer is ended.
     pub fn forget_client(&mut self, client: u64) {
         self.own_objects.forget(client);
         if let Some(gateway_queue) = &self.gateway_queue {
@@ -52,7 +52,7 @@ impl MainDevice {
         }
     }
 
-    /// What clients' messages came to.
+    /// Counters of the results of clients' messages.
     pub fn relay_counters(&self) -> RelayCounters {
         self.gateway_queue.as_ref().map(GatewayQueue::counters).unwrap_or_default()
     }

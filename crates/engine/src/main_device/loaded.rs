@@ -1,4 +1,4 @@
-//! What was loaded and is not applied yet: a declaration, and connections of local rings held against a scan.
+//! A loaded declaration that is not applied yet, and connections of local rings compared with a scan.
 
 use alloc::vec::Vec;
 
@@ -16,7 +16,7 @@ use crate::segment::member::Member;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
-/// What was loaded and is not applied yet.
+/// A loaded declaration that is not applied yet.
 #[derive(Clone, Debug)]
 pub(super) struct Loaded {
     pub declaration: Declaration,
@@ -24,7 +24,7 @@ pub(super) struct Loaded {
 }
 
 impl Loaded {
-    /// The topology with the local rings that were declared, if any were; otherwise that of the scan.
+    /// The topology with the declared local rings, if any; otherwise that of the scan.
     pub(super) fn topology(
         &self,
         bus: &Bus,
@@ -51,14 +51,14 @@ impl Loaded {
         let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(node_status).collect();
         let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
         if mode == JunctionMode::Strict {
-            // The scan has kept it back.
+            // The scan has not reported it.
             report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() }, false);
         }
         Ok(topology)
     }
 
-    /// Both ends of the closing cables of the rings that were declared, if any were, wherever their SubDevices are;
-    /// otherwise of those of the topology.
+    /// Both ends of the closing cables of the declared rings, if any, at the present positions of their SubDevices;
+    /// otherwise those of the topology.
     pub(super) fn closings(
         &self,
         topology: &Topology,
@@ -76,7 +76,7 @@ impl Loaded {
     }
 }
 
-/// Where a declared connection is in the segment; otherwise which of its SubDevices is optional and does not answer.
+/// The place of a declared connection in the segment; otherwise the optional SubDevice of it that does not answer.
 pub(super) fn closing(
     connection: &JunctionConnection,
     found: &[Option<SubDeviceInfo>],

@@ -1,4 +1,4 @@
-//! Where LRW may be used: never over several SubDevices on two links (protocol 9.2.2, CR-16).
+//! Checks the use of LRW: never over several SubDevices on two links (protocol 9.2.2, CR-16).
 
 use alloc::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::domain::DomainId;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
 
-/// The policy with datagrams that a configuration file names.
+/// The policy together with datagrams of a configuration file.
 pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -> Result<LrwPolicy, ActivateError> {
     if links == LinkSet::Single || named.is_empty() {
         return Ok(policy);
@@ -30,8 +30,8 @@ pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) ->
     let specs: Vec<DomainSpec> = specs.iter().map(|spec| DomainSpec { lrw: true, ..spec.clone() }).collect();
     let rules =
         Rules { links: LinkSet::Single, supervision: false, lrw, witnesses: &[], session: 0, max_datagrams: None };
-    let asked = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
-    for (domain, planned) in asked.domains.iter().enumerate() {
+    let wanted = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
+    for (domain, planned) in wanted.domains.iter().enumerate() {
         let datagrams = planned.frames.iter().flat_map(|frame| &frame.datagrams);
         if let Some(datagram) = datagrams.clone().find(|datagram| datagram.command == Command::Lrw) {
             return Err(ActivateError::LrwOnTwoLinks {

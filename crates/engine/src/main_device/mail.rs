@@ -1,4 +1,4 @@
-//! Mailbox services of the MainDevice, started and asked for their results later.
+//! Mailbox services of the MainDevice. Each starts a procedure; its result is fetched later.
 
 use alloc::vec::Vec;
 use core::future::Future;
@@ -16,8 +16,8 @@ use crate::procedures::visit::visit;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 
 impl MainDevice {
-    /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, and
-    /// to be used once [`MainDevice::start_visit`] has brought it to PREOP. `None` where there is no such one.
+    /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, to
+    /// be used after [`MainDevice::start_visit`] has brought it to PREOP. `None` if there is no such SubDevice.
     pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
         match &self.segment {
             Some(segment) => segment.mailbox(subdevice),
@@ -47,9 +47,10 @@ impl MainDevice {
         })
     }
 
-    /// Once active: starts to bring one SubDevice to a state, BOOT among them, while the others go on. Its whole
-    /// configuration is written again on the way up. The state is kept: a SubDevice that loses its power comes back to
-    /// it, one that does not answer goes there when it comes. One that refuses is brought back to the state before.
+    /// Once active: starts to bring one SubDevice to a state, BOOT included, while process data of the others
+    /// continues. Its whole configuration is written again on the way up. The state is kept: a SubDevice that loses its
+    /// power is brought back to it, an absent SubDevice is brought to it when it comes. If it refuses, it is brought
+    /// back to the previous state.
     ///
     /// Without process data its working counters are not expected, and its inputs are not fresh.
     pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
@@ -69,7 +70,7 @@ impl MainDevice {
     }
 
     /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
-    /// MainDevice is active. It may be created before or after activation; dropped, it is forgotten.
+    /// MainDevice is active. It may be created before or after activation; it ends when it is dropped.
     pub fn create_sdo_request(&mut self, subdevice: usize, size: usize) -> SdoRequest {
         let (request, served) = SdoRequest::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
@@ -98,12 +99,12 @@ impl MainDevice {
         handler
     }
 
-    /// Starts work of the application's own: any async function over a [`Mailbox`] or the bus.
+    /// Starts a procedure of the application: any async function over a [`Mailbox`] or the bus.
     pub fn start<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> Pending<T> {
         Pending::start(&self.supervisor.bus(), work)
     }
 
-    /// Starts to read an object of at most `limit` bytes.
+    /// Starts a read of an object of at most `limit` bytes.
     pub fn start_sdo_upload(
         &mut self,
         subdevice: usize,
@@ -120,7 +121,7 @@ impl MainDevice {
         })
     }
 
-    /// Starts to write an object.
+    /// Starts a write of an object.
     pub fn start_sdo_download(
         &mut self,
         subdevice: usize,

@@ -10,7 +10,7 @@ use crate::link::LinkSet;
 use crate::procedures::dictionary::ReadPdos;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 
-/// What a MainDevice needs to know before it sends its first frame.
+/// Configuration of a MainDevice that is needed before the first frame.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Options {
@@ -22,24 +22,25 @@ pub struct Options {
     pub codec: MacCodec,
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
-    /// Whose dictionaries are asked for PDOs after a scan.
+    /// Dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
-    /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
+    /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
+    /// automatically.
     pub supervision: bool,
-    /// For so long the number of SubDevices must not change at the beginning of a scan.
+    /// Time for which the number of SubDevices must be unchanged at the beginning of a scan.
     pub settle: Duration,
-    /// So long a scan waits for the first SubDevice.
+    /// Maximum wait of a scan for the first SubDevice.
     pub patience: Duration,
-    /// What becomes of rings behind junctions. A connection that is added makes it strict.
+    /// Handling of rings behind junctions. An added connection makes it strict.
     pub junctions: JunctionMode,
-    /// Whether the cabling is looked at anew, as by a rescan, when a hot connect group has joined or left, and as soon
-    /// as nothing is broken. Positions, places of breaks and errors of cables are then those of the segment as it is;
-    /// otherwise a group has none until a rescan is asked for.
+    /// Whether the cabling is scanned again, as by a rescan, when a hot connect group has joined or left, and as soon
+    /// as nothing is broken. Positions, places of breaks and errors of cables then follow the present segment;
+    /// otherwise a group has no position until a rescan is requested.
     pub follow_groups: bool,
-    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
+    /// Whether the redundant link may be taken down for a moment to locate a crossed line.
     pub enhanced_line_crossed: bool,
-    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. For segments behind gateways, and
-    /// simulators, that take fewer (often 15). Less than [`MIN_DATAGRAMS_PER_FRAME`] counts as that.
+    /// Maximum number of datagrams in a frame, cyclic and acyclic; `None`: as many as fit. For segments behind
+    /// gateways, and simulators, with a limit (often 15). Values below [`MIN_DATAGRAMS_PER_FRAME`] are raised to it.
     pub max_datagrams_per_frame: Option<u16>,
 }
 
@@ -62,12 +63,12 @@ impl Options {
         }
     }
 
-    /// Datagrams that a frame may hold.
+    /// Maximum number of datagrams in a frame.
     pub(super) fn most_datagrams(&self) -> Option<usize> {
         self.max_datagrams_per_frame.map(|most| usize::from(most.max(MIN_DATAGRAMS_PER_FRAME)))
     }
 
-    /// Which links these are.
+    /// The links in use.
     pub(super) fn links(&self) -> LinkSet {
         if self.redundant.is_some() { LinkSet::Ring } else { LinkSet::Single }
     }

@@ -1,4 +1,4 @@
-//! Work that was started and whose result is asked for later.
+//! A procedure whose result is fetched later.
 
 use alloc::rc::Rc;
 use core::cell::{Cell, RefCell};
@@ -15,14 +15,15 @@ struct Slot<T> {
     signal: Signal,
 }
 
-/// Work under way. Dropped, it is given up: an SDO transfer is aborted, mail of others is not touched.
+/// A procedure under way. When it is dropped the procedure is cancelled: an SDO transfer is aborted, other mail is not
+/// affected.
 pub struct Pending<T> {
     slot: Rc<Slot<T>>,
     running: Rc<Cell<bool>>,
 }
 
 impl<T: 'static> Pending<T> {
-    /// Starts work.
+    /// Starts a procedure.
     pub(super) fn start(bus: &Bus, work: impl Future<Output = T> + 'static) -> Pending<T> {
         let slot = Rc::new(Slot { result: RefCell::new(None), given_up: Cell::new(false), signal: bus.signal() });
         let running = Rc::new(Cell::new(true));
@@ -44,7 +45,7 @@ impl<T: 'static> Pending<T> {
     }
 }
 
-/// Says that the work has ended, also where its task was thrown away.
+/// Marks the procedure as ended, also if its task is dropped.
 struct Running(Rc<Cell<bool>>);
 
 impl Drop for Running {
@@ -54,17 +55,17 @@ impl Drop for Running {
 }
 
 impl<T> Pending<T> {
-    /// The result, once; `None` while the work goes on, and after it was taken.
+    /// The result, once; `None` while the procedure runs, and after the result was taken.
     pub fn take(&mut self) -> Option<T> {
         self.slot.result.borrow_mut().take()
     }
 
-    /// The result, for another procedure of the same MainDevice that waits for it.
+    /// Waits for the result, in another procedure of the same MainDevice.
     pub async fn ended(self) -> T {
         self.slot.signal.until(|| self.slot.result.borrow_mut().take()).await
     }
 
-    /// Whether the work goes on. Work that a stop of the MainDevice has ended has no result.
+    /// Whether the procedure runs. A procedure that was ended by a stop of the MainDevice has no result.
     pub fn is_running(&self) -> bool {
         self.running.get()
     }

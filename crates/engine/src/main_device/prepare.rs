@@ -1,4 +1,4 @@
-//! What the application declares, held against what the scan found, and turned into domains and members.
+//! Compares the declaration with the scan, and builds domains and members from it.
 
 use alloc::borrow::ToOwned;
 use alloc::format;
@@ -34,7 +34,7 @@ use crate::supervisor::Bus;
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 
-/// By declaration the SubDevice that was found, and the undeclared ones.
+/// By declaration the SubDevice found, and the undeclared SubDevices.
 type Matched = (Vec<Option<SubDeviceInfo>>, Vec<UnassignedSubDevice>);
 
 /// Matches SubDevices with the declaration.
@@ -69,7 +69,7 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
     Ok((found, unassigned.collect()))
 }
 
-/// SYNC signals need a clock, and clocks that are kept together.
+/// SYNC signals need a clock, and clocks that are synchronized.
 pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceInfo>]) -> Result<(), ActivateError> {
     for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
         let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
@@ -100,7 +100,7 @@ pub(super) fn plan_all(
         .map(|(subdevice, (config, info))| match info {
             Some(info) => match plan(config, info) {
                 Ok(plan) => Ok(Areas::Planned(exchanges(config.target).then_some(plan))),
-                // A bad EEPROM is a matter of its SubDevice alone.
+                // A bad EEPROM fails only its own SubDevice.
                 Err(error) if error.fault == PlanFault::Sii => {
                     Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
                 }
@@ -113,8 +113,8 @@ pub(super) fn plan_all(
         .collect()
 }
 
-/// How each SubDevice shows whether its inputs came. Of one that is not there it is not known whether it has an FMMU to
-/// spare.
+/// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
+/// free FMMU.
 pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec<Witness> {
     let pairs = plans.iter().zip(found).enumerate();
     let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<SubDeviceInfo>))| match (areas, info) {
@@ -124,7 +124,7 @@ pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec
     pairs.map(witness).collect()
 }
 
-/// What needs no SubDevice to be found wrong.
+/// Checks of the declaration that need no SubDevice.
 pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
     if let Some(subdevice) = boot {
@@ -150,7 +150,7 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     check_sync_cycles(declaration, shortest)
 }
 
-/// SYNC0 comes as often as cycles, or a whole number of times more or less often. A single pulse goes with everything.
+/// The SYNC0 period must equal the cycle, or be a whole multiple or fraction of it. A single pulse fits every cycle.
 fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), ActivateError> {
     let period_ns = period.as_nanos();
     for (subdevice, config) in declaration.subdevices.iter().enumerate() {
@@ -225,7 +225,7 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
     declaration
 }
 
-/// What SubDevices may not follow, and optional ones for which the process image has no place.
+/// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
 pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
     for (subdevice, member) in members.iter().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
@@ -244,7 +244,7 @@ pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
     }
 }
 
-/// Period of a SubDevice's outputs and time of its watchdog, where the watchdog is the shorter one.
+/// Period of a SubDevice's outputs and time of its watchdog, if the watchdog is shorter.
 fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option<(Duration, Duration)> {
     let plan = &member.setup.as_ref()?.plan;
     let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
@@ -275,7 +275,7 @@ pub(super) fn members(
             )),
             Some(_) | None => None,
         };
-        // One that is not there yet gets an address behind those of the scan.
+        // An absent SubDevice gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
         let mut member = Member::new(config, info, station, setup);

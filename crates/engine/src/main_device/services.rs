@@ -1,4 +1,4 @@
-//! Services of the MainDevice besides the mailbox protocols, started and asked for their results later.
+//! Services of the MainDevice besides the mailbox protocols. Each starts a procedure; its result is fetched later.
 //!
 //! SubDevices are named by their index in the declaration, before activation by their position in the last scan.
 
@@ -21,7 +21,7 @@ use crate::segment::Observation;
 use crate::supervisor::Bus;
 
 impl MainDevice {
-    /// Station address of a SubDevice, by which it is reached on the bus.
+    /// Station address of a SubDevice.
     pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
         match (&self.segment, &*self.scan.borrow()) {
             (Some(segment), _) => segment.view().members.get(subdevice).map(|member| member.station),
@@ -54,7 +54,7 @@ impl MainDevice {
         })
     }
 
-    /// Starts to read `length` bytes of registers or memory.
+    /// Starts a read of `length` bytes of registers or memory.
     pub fn start_register_read(
         &mut self,
         subdevice: usize,
@@ -67,7 +67,7 @@ impl MainDevice {
         )
     }
 
-    /// Starts to write registers or memory. A datagram whose frame is lost is sent again: a register may be written
+    /// Starts a write of registers or memory. A datagram of a lost frame is sent again: a register may be written
     /// twice.
     pub fn start_register_write(
         &mut self,
@@ -81,7 +81,7 @@ impl MainDevice {
         })
     }
 
-    /// Starts to ask what a port does about its loop.
+    /// Starts a read of the loop control of a port.
     pub fn start_port_read(&mut self, subdevice: usize, port: u8) -> Pending<Result<LoopControl, ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
     }
@@ -99,8 +99,8 @@ impl MainDevice {
         })
     }
 
-    /// Starts to cut a declared SubDevice off, by closing the ports of its neighbours. In a line those behind it go
-    /// with it.
+    /// Starts to cut off a declared SubDevice, by closing the ports of its neighbours. In a line the SubDevices behind
+    /// it are cut off too.
     pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
         let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move {
@@ -118,40 +118,39 @@ impl MainDevice {
         })
     }
 
-    /// Starts to reset a SubDevice controller. A declared SubDevice is lost and found again, and configured anew.
+    /// Starts a reset of a SubDevice controller. A declared SubDevice is lost, found again and configured again.
     pub fn start_reset(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { reset::reset_controller(&bus, station).await })
     }
 
-    /// Has supervision scan all SubDevices now, and search for new ones, as if the segment had changed. False before
-    /// activation: there a scan looks.
+    /// Makes supervision scan all SubDevices now, and search for new ones, as if the segment had changed. False before
+    /// activation, when a normal scan does the same.
     pub fn force_topology_change(&mut self) -> bool {
         if let Some(segment) = &self.segment {
-            segment.observe(Observation::LookAgain);
+            segment.observe(Observation::ScanAgain);
         }
         self.segment.is_some()
     }
 
-    /// Starts a scan of the whole segment while process data goes on: which SubDevice is at which place now, which are
-    /// new, have moved or are missing. New ones are read, but left alone. It lasts until the segment holds still and
-    /// all are identified, for so long at most; then the result is what is known.
+    /// Starts a scan of the whole segment while process data continues: the position of each SubDevice, and which are
+    /// new, have moved or are missing. New ones are read, but not configured. It lasts until the segment is stable and
+    /// all are identified, or until `limit`; then the result contains what is known.
     ///
-    /// Places of breaks, errors of cables and positions in events go by the new cabling from then on, rings behind
-    /// junctions included, unless it is not whole: while the ring of two links is open, or a mandatory SubDevice does
-    /// not answer, they go by the cabling of before.
+    /// From then on places of breaks, errors of cables and positions in events follow the new cabling, rings behind
+    /// junctions included. Exception: while the ring of two links is open, or a mandatory SubDevice does not answer,
+    /// they follow the previous cabling.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move { rescan(&bus, &segment.ok_or(ServiceError::NotActive)?, limit).await })
     }
 
-    /// Starts to read an EEPROM, as large as it says that it is.
+    /// Starts a read of a whole EEPROM; the SII contains its size.
     pub fn start_sii_read(&mut self, subdevice: usize) -> Pending<Result<Vec<u8>, ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { program::read_all(&bus, station).await })
     }
 
-    /// Starts to write an EEPROM: each word that is not right already, and read back. What is no SII image is refused
-    /// unless `force` says so. What a SubDevice does with it, it does after its next start or
-    /// [`MainDevice::start_sii_reload`].
+    /// Starts a write of an EEPROM: each word that differs is written and read back. Without `force` only an SII image
+    /// is accepted. The SubDevice uses it after its next start or [`MainDevice::start_sii_reload`].
     pub fn start_sii_write(
         &mut self,
         subdevice: usize,
@@ -166,8 +165,8 @@ impl MainDevice {
         })
     }
 
-    /// Starts to write the alias into the EEPROM, with the checksum that belongs to it. One that is wrong already is
-    /// made right only with `force`. The alias counts from the SubDevice's next start on.
+    /// Starts a write of the alias into the EEPROM, with the new checksum. A checksum that is wrong before is corrected
+    /// only with `force`. The alias is valid from the next start of the SubDevice on.
     pub fn start_alias_write(
         &mut self,
         subdevice: usize,
@@ -182,13 +181,13 @@ impl MainDevice {
         })
     }
 
-    /// Starts to have a controller load its configuration from the EEPROM again.
+    /// Starts a reload of a controller's configuration from the EEPROM.
     pub fn start_sii_reload(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { program::reload(&bus, station).await })
     }
 
-    /// Sets how often the error counters of all declared SubDevices are read in the background; `None`, as at the
-    /// beginning, is never.
+    /// Sets the interval at which the error counters of all declared SubDevices are read in the background; `None` (the
+    /// initial value) is never.
     pub fn set_statistics_period(&mut self, period: Option<Duration>) {
         self.statistics_period = period;
         if let Some(book) = &self.statistics {
@@ -196,12 +195,12 @@ impl MainDevice {
         }
     }
 
-    /// What a declared SubDevice has counted, as far as it was read. `None` before activation.
+    /// Error counts of a declared SubDevice as of the last reading. `None` before activation.
     pub fn statistics(&self, subdevice: usize) -> Option<Statistics> {
         self.statistics.as_ref()?.find(subdevice)
     }
 
-    /// Starts to read the error counters of a declared SubDevice now.
+    /// Starts a read of the error counters of a declared SubDevice.
     pub fn start_statistics_read(&mut self, subdevice: usize) -> Pending<Result<Statistics, ServiceError>> {
         let book = self.statistics.clone();
         self.start_on(subdevice, move |bus, station| async move {
@@ -210,7 +209,7 @@ impl MainDevice {
         })
     }
 
-    /// Starts to clear the error counters of a declared SubDevice, and what was kept of them.
+    /// Starts to clear the error counters of a declared SubDevice, and their totals.
     pub fn start_statistics_clear(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
         let book = self.statistics.clone();
         self.start_on(subdevice, move |bus, station| async move {

@@ -1,10 +1,10 @@
-//! How far declared SubDevices and hot connect groups are, for the application.
+//! States of declared SubDevices and hot connect groups, for the application.
 
 use ringcat_wire::al::AlState;
 
 use crate::segment::member::Phase;
 
-/// How far a declared SubDevice is.
+/// State of a declared SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SubDeviceState {
     /// It does not answer.
@@ -15,19 +15,19 @@ pub enum SubDeviceState {
     Settled(AlState),
 }
 
-/// How far a hot connect group is.
+/// State of a hot connect group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroupState {
     /// SubDevices of it that answer.
     pub present: usize,
-    /// Those in the states that were declared.
+    /// SubDevices of it in their declared states.
     pub settled: usize,
-    /// All that belong to it.
+    /// All SubDevices of it.
     pub members: usize,
 }
 
 impl GroupState {
-    /// All of them are in the states that were declared.
+    /// All of them are in their declared states.
     pub const fn has_joined(&self) -> bool {
         self.settled == self.members
     }

@@ -1,6 +1,6 @@
-//! Configuration in steps: load what the application declares, add connections of local rings, apply (JR-05).
+//! Configuration in steps: load a declaration, add connections of local rings, apply (JR-05).
 //!
-//! [`MainDevice::activate`] is all of it at once, for applications that have nothing to add.
+//! [`MainDevice::activate`] does all at once, for applications without connections to add.
 
 use alloc::vec::Vec;
 
@@ -19,11 +19,10 @@ use crate::procedures::scan::node_status;
 use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
-    /// First step: takes a declaration. It takes the place of one that was loaded before, with all that was added to
-    /// it.
+    /// First step: loads a declaration. It replaces a previously loaded one, with all added connections.
     ///
     /// # Errors
-    /// [`ActivateError::Active`], and what is wrong with the declaration by itself.
+    /// [`ActivateError::Active`], and errors in the declaration alone.
     pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
         if self.segment.is_some() {
             return Err(ActivateError::Active);
@@ -33,11 +32,11 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Second step, as often as needed: adds the connection of a local ring. The mode is strict then, whatever the
-    /// options say. Nothing is added with an error.
+    /// Second step, as often as needed: adds the connection of a local ring. The mode is then strict, whatever the
+    /// options are. After an error nothing is added.
     ///
     /// # Errors
-    /// [`JunctionError`]: nothing is loaded, or what is wrong with the connection (JR-06).
+    /// [`JunctionError`]: nothing is loaded, or the connection is wrong (JR-06).
     pub fn add_junction_connection(&mut self, connection: JunctionConnection) -> Result<(), JunctionError> {
         let loaded = self.loaded.as_mut().ok_or(JunctionError::NotLoaded)?;
         connection.check(&loaded.connections, loaded.declaration.subdevices.len())?;
@@ -45,11 +44,12 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Before the last step, where connections were added: tries whether the rings close where they are said to, which
-    /// takes some frames, and about two seconds where one does not. A ring whose closing cable is open at both ends, or
-    /// whose SubDevices are not all there, is believed. What [`MainDevice::apply`] finds by itself is left to it.
+    /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
+    /// frames, and about two seconds if a ring does not close there. A ring whose closing cable is open at both ends,
+    /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
+    /// are not checked here.
     ///
-    /// The result is [`JunctionError::NotThere`] where one does not.
+    /// The result is [`JunctionError::NotThere`] if a ring does not close as declared.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let declared = self.declared_closings().unwrap_or_default();
@@ -68,7 +68,7 @@ impl MainDevice {
         })
     }
 
-    /// What was declared of rings, where it is in what was scanned; `None` where nothing can be said of that.
+    /// The declared rings at their positions in the scan; `None` if these cannot be determined.
     fn declared_closings(&self) -> Option<DeclaredClosings> {
         let loaded = self.loaded.as_ref().filter(|_| self.segment.is_none())?;
         let scan = self.scan.borrow().as_ref()?.as_ref().ok()?.clone();
@@ -86,11 +86,11 @@ impl MainDevice {
         })
     }
 
-    /// Last step: lays out process data, starts configuration and supervision, and hands out the cyclic half. What was
-    /// loaded stays so if it cannot be applied: after another scan, or with another connection, it may be.
+    /// Last step: lays out process data, starts configuration and supervision, and returns the cyclic half. If it fails
+    /// the declaration stays loaded, and may be applied after another scan or with another connection.
     ///
     /// # Errors
-    /// [`ActivateError`]: nothing is loaded or scanned, or what does not fit what was found.
+    /// [`ActivateError`]: nothing is loaded or scanned, or the declaration does not fit the scan.
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
         if self.segment.is_some() {
             return Err(ActivateError::Active);
@@ -101,8 +101,8 @@ impl MainDevice {
         Ok(active)
     }
 
-    /// Lays out process data, starts configuration and supervision, and hands out the cyclic half: [`MainDevice::load`]
-    /// and [`MainDevice::apply`], with nothing in between.
+    /// Lays out process data, starts configuration and supervision, and returns the cyclic half: [`MainDevice::load`]
+    /// and [`MainDevice::apply`] in one call.
     pub fn activate(&mut self, declaration: Declaration) -> Result<Active, ActivateError> {
         self.load(declaration)?;
         let result = self.apply();
@@ -111,7 +111,7 @@ impl MainDevice {
     }
 }
 
-/// Rings that were declared and whose SubDevices are there, among those that were scanned.
+/// Declared rings whose SubDevices are present, with the SubDevices of the scan.
 #[derive(Default)]
 struct DeclaredClosings {
     closings: Vec<(JunctionConnection, Closing)>,

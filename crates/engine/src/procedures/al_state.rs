@@ -1,4 +1,4 @@
-//! Requesting a state of a SubDevice and waiting for it (protocol 5.3).
+//! Requests a state of a SubDevice and waits for it (protocol 5.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -9,15 +9,15 @@ use ringcat_wire::register::{EscConfiguration, map};
 
 use crate::supervisor::{Bus, BusError};
 
-/// First two pauses between looks at AL status; later ones grow by a half, so that a change that takes milliseconds is
-/// seen soon and one that takes seconds costs few datagrams.
+/// First two pauses between reads of AL status. Later pauses grow by half: a change that takes milliseconds is detected
+/// soon, and a change that takes seconds costs few datagrams.
 const FIRST_PAUSE: Duration = Duration::from_micros(500);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(10);
 /// How long a SubDevice may take to clear its error bit after the acknowledgement.
 const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
 
-/// How long a SubDevice may take to give its identification.
+/// How long a SubDevice may take to return its identification.
 const IDENTIFICATION_LIMIT: Duration = Duration::from_millis(50);
 
 /// Why a SubDevice is not in the requested state.
@@ -28,20 +28,20 @@ pub enum StateError {
     Bus(BusError),
     /// The SubDevice refused.
     Refused {
-        /// What was asked for.
+        /// The requested state.
         requested: AlState,
-        /// What AL status says.
+        /// The AL status.
         status: AlStatus,
-        /// Why.
+        /// The AL status code.
         code: AlStatusCode,
     },
-    /// The SubDevice did not get there in time.
+    /// The SubDevice did not reach the state in time.
     Timeout {
-        /// What was asked for.
+        /// The requested state.
         requested: AlState,
-        /// What AL status said last.
+        /// The last AL status.
         status: AlStatus,
-        /// How long was waited.
+        /// The time limit.
         limit: Duration,
     },
 }
@@ -81,14 +81,14 @@ pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus
     Ok(split_status(&bytes))
 }
 
-/// AL status (0x0130) and AL status code (0x0134) from the six bytes that hold both.
+/// AL status (0x0130) and AL status code (0x0134) from the six bytes that contain both.
 pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
     let [a, b, _, _, c, d] = *bytes;
     (AlStatus::decode(&[a, b]), AlStatusCode::decode(&[c, d]))
 }
 
-/// Asks a SubDevice for its explicit device identification, in any state without an error; `None` where it does not
-/// give it in time (protocol 5.3).
+/// Requests the explicit device identification of a SubDevice, in any state without an error; `None` if it does not
+/// return it in time (protocol 5.3).
 pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option<u16>, BusError> {
     let (status, _) = read_status(bus, station).await?;
     let Some(state) = status.al_state().filter(|_| !status.error) else { return Ok(None) };
@@ -112,8 +112,8 @@ pub async fn identification(bus: &Bus, station: StationAddress) -> Result<Option
     Ok(value)
 }
 
-/// Asks for a state, once. A SubDevice with an error gets the acknowledgement with it, unless it copies AL control into
-/// AL status.
+/// Requests a state once. If the SubDevice shows an error the request acknowledges it, unless the device copies AL
+/// control into AL status.
 pub(super) async fn ask(bus: &Bus, station: StationAddress, state: AlState, error: bool) -> Result<(), BusError> {
     let copies = error && {
         let bytes = bus.fprd_array(station, map::ESC_CONFIGURATION).await?;
@@ -123,8 +123,8 @@ pub(super) async fn ask(bus: &Bus, station: StationAddress, state: AlState, erro
     bus.fpwr(station, map::AL_CONTROL, &control.encode()).await
 }
 
-/// Clears an error by acknowledging it in the present state. Devices that copy AL control into AL status must not be
-/// acknowledged: for them the acknowledge bit is the error bit, and writing the bare state clears it.
+/// Clears an error by acknowledging it in the present state. Devices that copy AL control into AL status must not get
+/// the acknowledge bit, which is the error bit for them: writing the state without it clears the error.
 pub async fn acknowledge(bus: &Bus, station: StationAddress, emulated: bool) -> Result<AlStatus, StateError> {
     let (status, _) = read_status(bus, station).await?;
     let state = status.al_state().unwrap_or(AlState::Init);
@@ -142,7 +142,7 @@ pub async fn acknowledge(bus: &Bus, station: StationAddress, emulated: bool) -> 
     }
 }
 
-/// Requests a state and waits for it. A refusal is read with its code, and acknowledged.
+/// Requests a state and waits for it. After a refusal its code is read, and the error acknowledged.
 pub async fn request(
     bus: &Bus,
     station: StationAddress,
@@ -152,7 +152,7 @@ pub async fn request(
 ) -> Result<(), StateError> {
     bus.fpwr(station, map::AL_CONTROL, &AlControl::new(state).encode()).await?;
     let until = bus.now() + limit;
-    let (mut pause, mut looks) = (FIRST_PAUSE, 0_u32);
+    let (mut pause, mut readings) = (FIRST_PAUSE, 0_u32);
     loop {
         let (status, code) = read_status(bus, station).await?;
         if status.error {
@@ -165,8 +165,8 @@ pub async fn request(
         if bus.now() >= until {
             return Err(StateError::Timeout { requested: state, status, limit });
         }
-        looks += 1;
-        if looks > 2 {
+        readings += 1;
+        if readings > 2 {
             pause = (pause * 3 / 2).min(LONGEST_PAUSE);
         }
         bus.sleep(pause).await;

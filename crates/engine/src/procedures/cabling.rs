@@ -1,16 +1,16 @@
-//! Crossed lines in operation (protocol 9.5): whenever ports of SubDevices have changed, the segment is looked at anew
-//! and each SubDevice that frames enter at another port than 0 is reported, once.
+//! Crossed lines in operation (protocol 9.5): after each change of ports the segment is scanned again, and each
+//! SubDevice that frames enter at another port than 0 is reported once.
 //!
-//! More rings behind junctions than are known are reported too: an application that wants junction redundancy must know
-//! that one of them is not watched.
+//! Unknown rings behind junctions are reported too: an application with junction redundancy must know that one of them
+//! is not monitored.
 //!
-//! One look proves little: cables that are cut and healed within milliseconds, and frames that get lost meanwhile, make
-//! a straight ring look crossed. So a look counts only if the segment was the same before and behind it, and what it
-//! shows beyond what was reported is believed when the next one shows the same.
+//! One scan is no proof: cables that are cut and healed within milliseconds, and lost frames, make a straight ring seem
+//! crossed. So a scan counts only if the segment was the same before and after it, and a new finding is reported only
+//! if the next scan shows the same.
 //!
-//! In a closed ring that shows only that something is crossed (LC-02). In *enhanced* mode the redundant link is
-//! disconnected under control meanwhile: the segment is an open line then, and each crossing has its place (LC-03).
-//! That costs what a cut of that cable costs, and what mending it does; it is not told as a break.
+//! A closed ring shows only that a SubDevice is crossed (LC-02), not which. In *enhanced* mode the redundant link is
+//! disconnected on purpose during the scan: the segment is then an open line, and each crossing has a position (LC-03).
+//! This costs as many cycles as a cut of that cable and its repair; it is not reported as a break.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -30,65 +30,70 @@ use crate::segment::{Crossing, LineCheck, Observation, PORT_BITS, is_swapped, re
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, Finding, NodeStatus, rings_shown, with_longer_rings};
 
-/// From a change of ports until the segment is looked at: a plug that is pushed in bounces.
+/// Time from a change of ports to the scan: contacts of a plug bounce.
 const SETTLE: Duration = Duration::from_millis(5);
-/// Looks at a segment that changes meanwhile, or of which they show different things.
+/// Scans of a segment that changes during the scan, or while two scans differ.
 const ATTEMPTS: u8 = 5;
-/// Pause between two of them.
+/// Pause between two scans.
 const PAUSE: Duration = Duration::from_millis(10);
-/// Until both ends of a link have noticed that it went or came, and frames have shown it. Interfaces take seconds to
-/// find their partner again.
+/// Limit until both ends of a link have detected that it went down or up, and frames have shown it. Interfaces need
+/// seconds to establish a link.
 const LINK_LIMIT: Duration = Duration::from_secs(5);
-/// Pause between two looks for that.
+/// Interval of the check for it.
 const LINK_PAUSE: Duration = Duration::from_millis(1);
 
-/// What is known about SubDevices by their station addresses.
+/// Known data of SubDevices by their station addresses.
 pub(super) trait Known {
     /// Kinds of the ports.
     fn ports(&self, station: StationAddress) -> [PortKind; 4];
-    /// Closing cables of the local rings that are known, in a segment in which these are, by position.
+    /// Closing cables of the known local rings, in a segment with these SubDevices by position.
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing>;
     /// All of these are identified.
     fn are_known(&self, stations: &[StationAddress]) -> bool;
-    /// Ports were read: those that have changed in between have told it to this look.
-    fn note_look(&self);
-    /// Clocks are being measured, which need the receive times of their own frame.
+    /// Ports were read: this cleared the ECAT events of ports that changed before.
+    fn note_port_scan(&self);
+    /// Clocks are being measured; the receive times must be those of the measurement's frame.
     fn are_measuring(&self) -> bool;
-    /// The redundant link has to come up soon, since a more urgent disturbance waits for that.
+    /// A more urgent disturbance waits until the redundant link is up.
     fn is_outranked(&self) -> bool;
 }
 
-/// Looks at the segment after a change of ports, and hands what it shows to the model.
+/// Scans the segment after a change of ports, and passes the result to the model.
 pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
     bus.sleep(SETTLE).await;
-    // Only where the link is really taken down: a ring that breaks or closes meanwhile has to be told.
+    // Only if the link is really taken down: a ring that opens or closes during the scan has to be reported.
     let turn = match enhanced && stays_closed(&bus).await {
         true => segment.disturb(Disturbance::OpenByLink, LINK_LIMIT).await,
         false => None,
     };
     let in_control = turn.is_some();
-    let told = segment.view().told_crossings().clone();
-    let found = cabling(&bus, &segment, in_control, &told).await;
+    let reported = segment.view().reported_crossings().clone();
+    let found = cabling(&bus, &segment, in_control, &reported).await;
     drop(turn);
     segment.observe(Observation::LineChecked { found, in_control });
 }
 
-/// Crossed SubDevices, and rings that are not known; `None` where the segment changes too much to tell. `told` is what
-/// was reported of it before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down
-/// meanwhile; where it cannot be, that is reported, and the ring is looked at as it is.
-pub(super) async fn cabling(bus: &Bus, known: &impl Known, in_control: bool, told: &LineCheck) -> Option<LineCheck> {
+/// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `reported` is the
+/// result reported before. With `in_control`, for a ring that [`stays_closed`], the redundant link is taken down during
+/// the scan; if it cannot be, that is reported, and the ring is scanned as it is.
+pub(super) async fn cabling(
+    bus: &Bus,
+    known: &impl Known,
+    in_control: bool,
+    reported: &LineCheck,
+) -> Option<LineCheck> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
         bus.report(Event::CannotDisconnect { link: Link::Redundant });
-        return look_often(bus, known, told).await;
+        return scan_until_confirmed(bus, known, reported).await;
     }
     if !in_control {
-        return look_often(bus, known, told).await;
+        return scan_until_confirmed(bus, known, reported).await;
     }
     wait_for(bus, known, RingState::Open).await;
-    let found = look_often(bus, known, told).await;
+    let found = scan_until_confirmed(bus, known, reported).await;
     bus.force_disconnect(Link::Redundant, false).await;
     wait_for(bus, known, RingState::Closed).await;
-    // A carrier that is still missing would be reported as lost. The links read it less often than frames come.
+    // A carrier that is still missing would be reported as lost. The links are polled less often than frames arrive.
     let (until, signal) = (bus.now() + LINK_LIMIT, bus.signal());
     while bus.carriers().contains(&Some(false)) && bus.now() < until {
         bus.until_posted(bus.posted(), until, &signal, || false).await;
@@ -100,13 +105,13 @@ async fn wait_for(bus: &Bus, known: &impl Known, state: RingState) {
     let until = bus.now() + LINK_LIMIT;
     while bus.ring() != state && bus.now() < until && !known.is_outranked() {
         bus.sleep(LINK_PAUSE).await;
-        // Before activation nothing else shows it.
+        // Before activation no other frame shows it.
         let _ = bus.brd(map::TYPE, 1).await;
     }
 }
 
-/// Whether a ring of two links is closed, and still is a moment later, with the same SubDevices in the same places: a
-/// link that is taken down in a ring that breaks costs those in between.
+/// Whether a ring of two links is closed, and still is a moment later, with the same SubDevices in the same positions:
+/// taking a link down in a ring with a break would disconnect the SubDevices in between.
 pub(super) async fn stays_closed(bus: &Bus) -> bool {
     if bus.links() != LinkSet::Ring || bus.ring() != RingState::Closed {
         return false;
@@ -116,8 +121,8 @@ pub(super) async fn stays_closed(bus: &Bus) -> bool {
     matches!(view(bus).await, Ok(Some(after)) if after == before) && bus.ring() == RingState::Closed
 }
 
-/// Looks until one shows what was reported already, or two in a row show the same.
-async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<LineCheck> {
+/// Scans until a result equals the reported one, or two in a row are equal.
+async fn scan_until_confirmed(bus: &Bus, known: &impl Known, reported: &LineCheck) -> Option<LineCheck> {
     let mut before = None;
     for attempt in 0..ATTEMPTS {
         if attempt > 0 {
@@ -130,9 +135,9 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<L
             before = None;
             continue;
         }
-        let found = look(bus, known).await.ok().flatten();
-        known.note_look();
-        if found.as_ref().is_some_and(|found| found.says_the_same_as(told) || before.as_ref() == Some(found)) {
+        let found = scan_once(bus, known).await.ok().flatten();
+        known.note_port_scan();
+        if found.as_ref().is_some_and(|found| found.adds_nothing_to(reported) || before.as_ref() == Some(found)) {
             return found;
         }
         before = found;
@@ -140,7 +145,7 @@ async fn look_often(bus: &Bus, known: &impl Known, told: &LineCheck) -> Option<L
     None
 }
 
-/// What DL_STATUS says of all stations; `None` where one does not answer.
+/// DL_STATUS of all stations; `None` if a station does not answer.
 async fn ports_of(bus: &Bus, stations: &[StationAddress]) -> Result<Option<Vec<DlStatus>>, BusError> {
     let read = bus.gather(stations.to_vec(), |bus, station| async move {
         bus.fprd_array(station, map::DL_STATUS).await.map(|bytes| DlStatus::decode(&bytes))
@@ -152,14 +157,14 @@ async fn ports_of(bus: &Bus, stations: &[StationAddress]) -> Result<Option<Vec<D
     }
 }
 
-/// One look; `None` where something changed meanwhile.
-async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusError> {
+/// One scan; `None` if something changed meanwhile.
+async fn scan_once(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusError> {
     let closed_before = bus.ring() == RingState::Closed;
     let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
     let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
     let _latches = latch_anyway(bus).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
-        // Without a clock it does not answer.
+        // A SubDevice without a clock does not increment the WKC.
         match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
             Ok(bytes) => Ok(Some(DcReceiveTimes::decode(&bytes).ports.map(|time| time.0))),
             Err(BusError::Wkc { .. }) => Ok(None),
@@ -167,7 +172,7 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusErr
         }
     });
     let receive_times = read.await.into_iter().collect::<Result<Vec<_>, BusError>>()?;
-    // A cable that went or came meanwhile has moved frames, ports or SubDevices to another place.
+    // A cable that was cut or plugged in meanwhile has moved frames, ports or SubDevices.
     let bits = |ports: &[DlStatus]| ports.iter().map(|it| it.bits() & PORT_BITS).collect::<Vec<_>>();
     let same_ports = ports_of(bus, &before.stations).await?.is_some_and(|now| bits(&now) == bits(&ports));
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
@@ -192,12 +197,12 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusErr
             _ => None,
         })
         .collect();
-    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (LC-04).
+    // In a closed ring only branches on port 2 and crossed SubDevices process the redundant copy (LC-04).
     let on_redundant = before.counts.1.0 > 0;
     if found.is_empty() && is_closed && on_redundant {
         found.push(Crossing { subdevice: None, entry_port: None });
     }
-    // Odd ports and stubs of a broken ring would be counted wrongly.
+    // Unexpected ports and stubs of a broken ring would be counted wrongly.
     let is_plain = topology.findings.is_empty() && !on_redundant;
     let shown = if is_plain { rings_shown(&nodes, is_closed) } else { 0 };
     let swapped = bus.links() == LinkSet::Ring && is_swapped(&topology);
@@ -209,8 +214,8 @@ async fn look(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, BusErr
 }
 
 impl Known for SharedSegment {
-    fn note_look(&self) {
-        self.observe(Observation::LookAgain);
+    fn note_port_scan(&self) {
+        self.observe(Observation::ScanAgain);
     }
 
     fn are_measuring(&self) -> bool {

@@ -1,13 +1,13 @@
-//! Distributed clocks: set up, locked, watched (protocol 7).
+//! Distributed clocks: set-up, lock, supervision (protocol 7).
 //!
-//! * `measure`: how SubDevices are connected now, and how long frames take from clock to clock;
+//! * `measure`: the present connections of the SubDevices, and the times of frames from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `signals`: SYNC signals of one SubDevice;
 //! * `drift`: the static drift compensation;
 //! * `watch`: the set-up, the differences, the links of the references.
 //!
-//! They report what they measured, wrote and read to the model of the segment ([`crate::segment`]), which has the state
-//! of the clocks and says what follows.
+//! They pass measured, written and read values to the model of the segment ([`crate::segment`]), which contains the
+//! state of the clocks and decides the next step.
 
 mod changes;
 mod drift;

@@ -1,4 +1,4 @@
-//! Bringing one SubDevice from INIT to its target state with its whole configuration (protocol 5.2, order of IgH).
+//! Bring-up of one SubDevice from INIT to its target state with its whole configuration (protocol 5.2, order of IgH).
 
 mod compare;
 mod error;
@@ -32,10 +32,10 @@ pub use crate::segment::setup::SetupError;
 pub use error::{ConfigureError, StartupError};
 pub use register_error::{RegisterError, RegisterFailure, WrongValue};
 
-/// Cycles of the exchange that must have gone by before OP is requested, so that valid outputs are there (protocol
+/// Cycles of the exchange between the configuration and the request of OP, so that valid outputs are present (protocol
 /// 5.2). The first of them may have been queued without process data.
 const CYCLES_BEFORE_OP: u64 = 2;
-/// Pause between two looks at the cycle counter.
+/// Interval of the check of the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);
 
 /// One SubDevice's bring-up.
@@ -51,7 +51,7 @@ pub(super) struct BringUp<'a> {
 }
 
 impl BringUp<'_> {
-    /// The whole way. Process data counts on the SubDevice from SAFEOP on.
+    /// The full bring-up. The working counter expects the SubDevice from SAFEOP on.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.process_data(ProcessDataStep::Off);
         self.set_configured(false);
@@ -86,7 +86,7 @@ impl BringUp<'_> {
         Ok(al_state::request(self.bus, self.station, to, self.setup.emulated, limit).await?)
     }
 
-    /// The FMMUs go first: a SubDevice that leaves OP may take part in process data by halves on its way.
+    /// The FMMUs are cleared first: a SubDevice that leaves OP may process only part of its process data.
     async fn back_to_init(&self) -> Result<(), ConfigureError> {
         self.process_data(ProcessDataStep::Unmapped);
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
@@ -105,7 +105,7 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::sync_manager(index), &register.encode()).await
     }
 
-    /// Registers of IP, mailbox, EEPROM to the PDI for the time of the transition, PREOP, other commands of IP.
+    /// Commands of IP, mailbox, EEPROM to the PDI during the transition, PREOP, other commands of IP.
     async fn preop(&self) -> Result<(), ConfigureError> {
         self.command_registers(Transition::Ip).await?;
         for sync_manager in &self.setup.plan.mailbox {
@@ -126,7 +126,7 @@ impl BringUp<'_> {
         self.command_mail(Transition::Ip).await
     }
 
-    /// Mailboxes of the boot loader, which keeps the EEPROM, BOOT.
+    /// Mailboxes of the boot loader, EEPROM to the PDI (the boot loader keeps it), BOOT.
     async fn boot(&self) -> Result<(), ConfigureError> {
         let (Some(layout), [_, send]) = (self.setup.plan.bootstrap_layout(), &self.setup.plan.bootstrap[..]) else {
             return Err(ConfigureError::NoBoot);
@@ -141,7 +141,7 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// Maps the bit of a SyncManager that says whether there is mail; the other FMMUs follow on the way to SAFEOP.
+    /// Maps the mailbox-full bit of a SyncManager; the other FMMUs follow on the way to SAFEOP.
     async fn show_mail(&self, sync_manager: u8) -> Result<(), BusError> {
         let mail = self.setup.fmmus.iter().find(|(number, _)| Some(*number) == self.setup.mail_fmmu);
         let Some((number, register)) = mail else { return Ok(()) };
@@ -151,8 +151,8 @@ impl BringUp<'_> {
     }
 
     /// Commands of PS, PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (protocol 5.2).
-    /// From its FMMUs on a SubDevice may take outputs and give inputs, one before the other; what it adds to a working
-    /// counter is not counted on before it was seen to give its inputs, so that those of the others stay fresh
+    /// As soon as its FMMUs are set a SubDevice may process outputs and inputs, at different times. Its share of a
+    /// working counter is expected only after it has delivered its inputs, so that the inputs of the others stay fresh
     /// meanwhile.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
@@ -173,7 +173,7 @@ impl BringUp<'_> {
         self.map().await?;
         let reached = self.request(AlState::PreOp, AlState::SafeOp).await;
         if let Err(error) = &reached {
-            // Process data does not count on it until the next attempt.
+            // The working counter does not expect it until the next attempt.
             self.part().await?;
             self.explain(error).await;
         }
@@ -185,7 +185,7 @@ impl BringUp<'_> {
         Ok(())
     }
 
-    /// Maps process data, all of it at once with what shows whether the SubDevice processed a frame.
+    /// Maps process data in one frame, together with the FMMU that shows whether the SubDevice processed a frame.
     async fn map(&self) -> Result<(), BusError> {
         self.process_data(ProcessDataStep::Mapped);
         let fmmus = self.setup.fmmu_registers();
@@ -195,12 +195,12 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await
     }
 
-    /// Process data counts on it from now on, on its inputs as soon as they were seen.
+    /// The working counter expects the SubDevice from now on, its inputs as soon as they were proven.
     pub(super) fn join(&self) {
         self.process_data(ProcessDataStep::Joined);
     }
 
-    /// What the SubDevice does in process data from now on.
+    /// How the SubDevice takes part in process data from now on.
     fn process_data(&self, step: ProcessDataStep) {
         self.segment.observe(Observation::ProcessData { index: self.index, step });
     }
@@ -209,7 +209,7 @@ impl BringUp<'_> {
         self.segment.observe(Observation::Configured { index: self.index, is });
     }
 
-    /// The SYNC signals that are declared, or what is left of others.
+    /// Starts the declared SYNC signals, or clears earlier settings.
     async fn start_clock(&self) -> Result<(), ConfigureError> {
         if !self.segment.view().clocks().are_declared() {
             return Ok(());
@@ -232,7 +232,7 @@ impl BringUp<'_> {
             self.write_sync_manager(area.sync_manager, &area.register).await?;
         }
         if self.setup.plan.is_op_only() {
-            // They went when OP was left.
+            // The FMMUs were cleared when OP was left.
             self.map().await?;
             self.join();
         }

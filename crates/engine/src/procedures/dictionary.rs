@@ -1,8 +1,7 @@
-//! PDO assignment and mapping as the dictionaries of SubDevices have them, where SIIs say nothing or something else
-//! (protocol 4.5, 6.3).
+//! PDO assignment and mapping from the object dictionaries, if the SII has none or another one (protocol 4.5, 6.3).
 //!
-//! After a scan, SubDevices with CoE are brought to PREOP, asked, and sent back to INIT. What the dictionary says
-//! counts before the SII.
+//! After a scan, SubDevices with CoE are brought to PREOP, read, and sent back to INIT. The dictionary has priority
+//! over the SII.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -21,12 +20,12 @@ use crate::mail::coe::{SdoFailure, pdo};
 use crate::mail::{Limits, Mailbox};
 use crate::supervisor::Bus;
 
-/// How long one SubDevice may take to tell all its PDOs.
+/// Time limit for reading all PDOs of one SubDevice.
 const LIMIT: Duration = Duration::from_secs(3);
 /// Time limits of one request.
 const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
 
-/// Whose dictionaries are asked for PDOs after a scan.
+/// Dictionaries that are read for PDOs after a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReadPdos {
     /// None.
@@ -34,18 +33,18 @@ pub enum ReadPdos {
     /// Those of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
     #[default]
     Missing,
-    /// Those of all SubDevices with CoE. It costs each of them a way to PREOP and back.
+    /// Those of all SubDevices with CoE. Each is brought to PREOP and back.
     Always,
 }
 
-/// Asks the dictionaries, and changes what the scan says.
+/// Reads the dictionaries, and updates the scan.
 pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
     let wanted: Vec<SubDeviceInfo> = scan.subdevices.iter().filter(|info| is_wanted(info, which)).cloned().collect();
     let read = bus.gather(wanted, |bus, info| async move {
         let mailbox = Mailbox::new(&bus, info.position);
         let result = bus.within(LIMIT, assignments(&bus, &info, &mailbox)).await;
         let result = result.unwrap_or_else(|_| Err("it takes too long".to_string()));
-        // One that does not follow is dealt with when it is configured.
+        // A SubDevice that refuses is handled when it is configured.
         let _ = visit(&bus, &info, &mailbox, AlState::Init).await;
         (info.position, result)
     });
@@ -60,7 +59,7 @@ pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
                 }
             }
             Err(reason) => {
-                let what = alloc::format!("its dictionary does not tell its PDOs: {reason}");
+                let what = alloc::format!("the PDOs in its dictionary cannot be read: {reason}");
                 bus.report(Event::SiiOddity { position, what });
             }
         }
@@ -78,8 +77,8 @@ fn is_wanted(info: &SubDeviceInfo, which: ReadPdos) -> bool {
         }
 }
 
-/// Whether the SII gives a SyncManager that is in use no PDO. One without a length next to others with PDOs is not in
-/// use.
+/// Whether the SII assigns no PDO to a SyncManager that is in use. A SyncManager without a length beside others with
+/// PDOs is not in use.
 fn is_missing(info: &SubDeviceInfo, number: u8) -> bool {
     let in_use = |sii: &SiiSyncManager| info.pdos.is_empty() || (sii.is_enabled() && sii.length > 0);
     info.assigned_pdos(number).next().is_none() && info.sync_managers.get(usize::from(number)).is_some_and(in_use)
@@ -97,7 +96,7 @@ fn process_data(info: &SubDeviceInfo) -> impl Iterator<Item = (u8, Direction)> {
     })
 }
 
-/// What is assigned to a SyncManager.
+/// PDOs assigned to a SyncManager.
 struct Assignment {
     sync_manager: u8,
     direction: Direction,
@@ -110,7 +109,7 @@ async fn assignments(bus: &Bus, info: &SubDeviceInfo, mailbox: &Mailbox) -> Resu
     for (sync_manager, direction) in process_data(info) {
         match pdo::read_assignment(mailbox, sync_manager, LIMITS).await {
             Ok(pdos) => all.push(Assignment { sync_manager, direction, pdos }),
-            // There is no such list: the SII is all there is.
+            // There is no such object: only the SII counts.
             Err(error) if error.cause == SdoFailure::Aborted(AbortCode::OBJECT_DOES_NOT_EXIST) => {}
             Err(error) => return Err(error.to_string()),
         }
@@ -118,13 +117,13 @@ async fn assignments(bus: &Bus, info: &SubDeviceInfo, mailbox: &Mailbox) -> Resu
     Ok(all)
 }
 
-/// Takes an assignment over. The warning says that the SII has another one.
+/// Takes an assignment over. The warning reports that the SII has another one.
 fn merge(info: &mut SubDeviceInfo, assignment: Assignment) -> Option<InfoWarning> {
     let Assignment { sync_manager, direction, pdos } = assignment;
     let before: Vec<PdoInfo> = info.assigned_pdos(sync_manager).cloned().collect();
     let known: Vec<PdoInfo> = pdos.iter().filter_map(|pdo| info.pdo(pdo.index).cloned()).collect();
     let now: Vec<PdoInfo> = pdos.iter().map(|pdo| describe(pdo, sync_manager, direction, &known)).collect();
-    // The PDOs themselves, then what each of them maps.
+    // First the PDOs, then the entries of each.
     let mapped = |pdos: &[PdoInfo]| -> Vec<(u16, u16, u8, u8)> {
         let entries = |pdo: &PdoInfo| {
             let of = pdo.index;
@@ -149,7 +148,7 @@ fn merge(info: &mut SubDeviceInfo, assignment: Assignment) -> Option<InfoWarning
     warned.then_some(InfoWarning { category: Some(category), offset: None, problem })
 }
 
-/// A PDO as the dictionary has it, with the names of the SII.
+/// A PDO according to the dictionary, with the names of the SII.
 fn describe(read: &PdoMapping, sync_manager: u8, direction: Direction, known: &[PdoInfo]) -> PdoInfo {
     let known = known.iter().find(|pdo| pdo.index == read.index);
     let entry = |entry: &PdoEntry| {

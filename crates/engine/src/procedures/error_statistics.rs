@@ -1,7 +1,7 @@
-//! What SubDevices have counted of errors (protocol 2.5).
+//! Error counts of SubDevices (protocol 2.5).
 //!
-//! The registers stop at 255. What is kept here goes on: each reading adds what was counted since the last one. What
-//! else reads or clears them says so here (`error_watch`).
+//! The registers saturate at 255. The totals here continue: each reading adds the errors counted since the last one.
+//! Other procedures that read or clear the registers report it here (`error_watch`).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -17,20 +17,20 @@ use crate::time::Instant;
 /// Counters of the process data watchdog and of the PDI watchdog.
 pub(super) const WATCHDOGS: usize = 2;
 
-/// What a port has counted.
+/// Error counts of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortErrors {
-    /// Frames whose bad check sequence was seen here first.
+    /// Frames with a bad check sequence that this port detected first.
     pub invalid_frames: u64,
     /// RX_ER symbols.
     pub rx_errors: u64,
-    /// Bad frames that a controller before has marked.
+    /// Bad frames that an earlier controller has marked.
     pub forwarded: u64,
     /// Lost links.
     pub lost_links: u64,
 }
 
-/// What a SubDevice has counted since the beginning, or since its counters were cleared.
+/// Error counts of a SubDevice since the beginning, or since its counters were cleared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     /// Port 0..3.
@@ -47,14 +47,14 @@ pub struct Statistics {
     pub readings: u64,
     /// Time of the last reading.
     pub read_at: Option<Instant>,
-    /// The registers as they were read last.
+    /// The registers as of the last reading.
     pub registers: ErrorCounters,
-    /// Register WATCHDOG_COUNTER_PROCESS_DATA, and that of the PDI, as they were read last.
+    /// Registers WATCHDOG_COUNTER_PROCESS_DATA and WATCHDOG_COUNTER_PDI as of the last reading.
     pub watchdog_registers: [u8; WATCHDOGS],
 }
 
 impl Statistics {
-    /// Takes in a reading.
+    /// Adds a reading.
     pub(super) fn take(&mut self, now: Instant, counters: ErrorCounters, watchdogs: [u8; WATCHDOGS]) {
         self.count(counters);
         add(&mut self.watchdog_process_data, self.watchdog_registers[0], watchdogs[0]);
@@ -85,12 +85,12 @@ impl Statistics {
     }
 }
 
-/// A register that shows less than before was cleared meanwhile.
+/// A register with a smaller value than before was cleared meanwhile.
 fn add(total: &mut u64, before: u8, now: u8) {
     *total += u64::from(if now >= before { now - before } else { now });
 }
 
-/// The statistics of all declared SubDevices, and how often they are brought up to date.
+/// The statistics of all declared SubDevices, and the interval of their readings.
 #[derive(Clone)]
 pub struct ErrorStatistics {
     all: Rc<RefCell<Vec<Statistics>>>,
@@ -119,7 +119,7 @@ impl ErrorStatistics {
         self.period.get()
     }
 
-    /// Waits until the period is another one than this.
+    /// Waits until the interval differs from this one.
     pub(super) async fn until_period(&self, other_than: Option<Duration>) {
         self.changed.until(|| (self.period.get() != other_than).then_some(())).await;
     }
@@ -128,12 +128,12 @@ impl ErrorStatistics {
         self.all.borrow().get(subdevice).copied()
     }
 
-    /// The error counters were read elsewhere.
-    pub(crate) fn heard(&self, subdevice: usize, counters: &ErrorCounters) {
+    /// Another procedure has read the error counters.
+    pub(crate) fn note_reading(&self, subdevice: usize, counters: &ErrorCounters) {
         self.with(subdevice, |statistics| statistics.count(*counters));
     }
 
-    /// The counters of frames and links were cleared elsewhere.
+    /// Another procedure has cleared the counters of frames and links.
     pub(crate) fn cleared(&self, subdevice: usize) {
         self.with(subdevice, |statistics| {
             let ErrorCounters { epu, pdi, pdi_code, .. } = statistics.registers;
@@ -154,7 +154,7 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn what_is_kept_goes_on_where_registers_were_cleared() {
+    fn totals_continue_after_registers_were_cleared() {
         let mut statistics = Statistics::default();
         assert!(statistics.is_clean());
         let mut reading = |invalid: u8, lost: u8, watchdog: u8| {

@@ -1,7 +1,7 @@
-//! Reading the error counters of all ports in the background, and telling of cables whose errors rise.
+//! Reads the error counters of all ports in the background, and reports cables whose errors rise.
 //!
-//! Once a second, a few SubDevices at a time. A cut damages the frame that is under way: only errors that come in
-//! numbers, or second after second, are worth a word.
+//! Once a second, a few SubDevices at a time. A cut damages the frame that is on the wire: only many errors at once, or
+//! errors in consecutive seconds, are reported.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -19,34 +19,34 @@ use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 use crate::topology::PortOf;
 
-/// Pause between two looks.
+/// Interval of the readings.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Damaged frames between two looks that are reported at once; fewer when there were some before, too.
+/// Damaged frames between two readings that are reported at once; fewer if there were some at the previous reading too.
 const MANY: u64 = 3;
-/// The same cable is reported again after this time at the earliest.
+/// Minimum time between two reports of the same cable.
 const AGAIN: Duration = Duration::from_secs(10);
-/// Counters end at 255: from here on they are cleared.
+/// Counters saturate at 255: from this value on they are cleared.
 const FULL: u8 = 128;
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
     let count = segment.view().members.len();
     let mut last = vec![None; count];
-    let mut asked = segment.view().asked();
+    let mut versions = segment.view().versions();
     let mut watched = watch_all(&segment);
     let mut at_node = by_node(&watched);
-    // Others look once a second, too: not all at once.
+    // Shifted by half a period against other procedures that run once a second.
     bus.sleep(PAUSE / 2).await;
     loop {
         bus.sleep(PAUSE).await;
         for (index, counters) in bus.gather_in_turns(present(&segment), read).await.into_iter().flatten() {
-            if segment.view().asked().cabling != asked.cabling {
-                asked = segment.view().asked();
+            if segment.view().versions().cabling != versions.cabling {
+                versions = segment.view().versions();
                 watched = watch_all(&segment);
                 at_node = by_node(&watched);
             }
             let before = last[index].replace(counters);
-            segment.statistics.heard(index, &counters);
+            segment.statistics.note_reading(index, &counters);
             let Some(node) = segment.view().members.get(index).and_then(|member| member.node) else { continue };
             for at in at_node.get(node).into_iter().flatten() {
                 watched[*at].take(node, before.as_ref(), &counters);
@@ -55,14 +55,14 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
                 last[index] = Some(ErrorCounters::default());
             }
         }
-        // Where it was cabled anew just now, the next look begins anew.
-        if segment.view().asked().cabling != asked.cabling {
+        // If the cabling was replaced just now, the next reading starts with the new one.
+        if segment.view().versions().cabling != versions.cabling {
             continue;
         }
         let now = bus.now();
         let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
             watched.iter_mut().map(|watched| watched.close(now)).unzip();
-        segment.observe(Observation::CableErrors { asked, fresh: &fresh });
+        segment.observe(Observation::CableErrors { versions, fresh: &fresh });
         events.into_iter().flatten().for_each(|event| bus.report(event));
     }
 }
@@ -109,14 +109,14 @@ async fn clear(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), B
     Ok(())
 }
 
-/// A cable and what its ends have counted lately.
+/// A cable and the recent errors at its ends.
 struct Watched {
     cable: Cable,
-    /// Since the last look.
+    /// Since the last reading.
     fresh: CableErrors,
     /// Since its last report.
     untold: CableErrors,
-    /// There were damaged frames at the look before, too.
+    /// There were damaged frames at the previous reading too.
     continues: bool,
     told_at: Option<Instant>,
 }
@@ -127,7 +127,7 @@ impl Watched {
         Watched { cable, fresh, untold, continues: false, told_at: None }
     }
 
-    /// Takes in the counters of a SubDevice, if it is at one of the ends.
+    /// Adds the counters of a SubDevice, if it is at one of the ends.
     fn take(&mut self, node: usize, before: Option<&ErrorCounters>, now: &ErrorCounters) {
         let ends = [self.cable.near, self.cable.far];
         for PortOf { port, .. } in ends.into_iter().flatten().filter(|end| end.node == node) {
@@ -136,7 +136,7 @@ impl Watched {
         }
     }
 
-    /// Ends a look: what is new, and an event where it is worth one.
+    /// Ends a reading: returns the new errors, and an event if they are to be reported.
     fn close(&mut self, now: Instant) -> (CableErrors, Option<Event>) {
         let fresh = core::mem::take(&mut self.fresh);
         self.untold = self.untold.plus(fresh);
@@ -175,24 +175,25 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn one_damaged_frame_is_no_event_but_many_or_lasting_ones_are() {
+    fn one_damaged_frame_is_not_reported_but_many_or_repeated_ones_are() {
         let mut watched = Watched::new(CABLE);
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         for (second, count) in [0, 1, 1, 2, 3, 3, 9, 250, 2, 2].into_iter().enumerate() {
-            let before = told.len();
+            let before = events.len();
             let last = if second == 0 { 0 } else { [0, 1, 1, 2, 3, 3, 9, 250, 2, 2][second - 1] };
             watched.take(5, Some(&counters(last)), &counters(count));
             watched.take(3, Some(&counters(last)), &counters(count));
             let (_, event) = watched.close(Instant(0) + Duration::from_secs(second as u64));
-            told.extend(event);
-            assert_eq!(told.len() - before, usize::from(second == 4), "second {second}");
+            events.extend(event);
+            assert_eq!(events.len() - before, usize::from(second == 4), "second {second}");
         }
         let errors = CableErrors { invalid_frames: 3, lost_links: 0 };
-        assert_eq!(told, [Event::CableErrors { cable: CABLE, errors }]);
+        assert_eq!(events, [Event::CableErrors { cable: CABLE, errors }]);
         watched.take(5, Some(&counters(0)), &counters(100));
         let (fresh, event) = watched.close(Instant(0) + Duration::from_secs(14));
         assert_eq!(fresh.invalid_frames, 100);
-        // 6 and 241 that came within ten seconds of the first event, 2 after the counters were cleared, and these.
+        // 6 and 241 that were counted within ten seconds after the first event, 2 after the counters were cleared, and
+        // these.
         let errors = CableErrors { invalid_frames: 349, lost_links: 0 };
         assert_eq!(event, Some(Event::CableErrors { cable: CABLE, errors }));
     }

@@ -1,9 +1,10 @@
-//! How many datagrams a frame may hold on this segment: asked when frames do not bring back what they should.
+//! Determines how many datagrams a frame may contain on this segment, after frames returned without the expected
+//! result.
 //!
-//! EtherCAT knows no limit but the length of a frame, but some gateways and simulators process the first 15 datagrams
-//! only, or drop a frame that holds more. To procedures that looks like SubDevices that do not answer, so a failure of
-//! the bus is explained by trying: a frame of many reads of one byte, which any SubDevice answers, and then the number
-//! in the middle between one that works and one that does not.
+//! EtherCAT has no limit except the length of a frame, but some gateways and simulators process only the first 15
+//! datagrams, or drop a frame with more. To procedures this looks like absent SubDevices, so a failure of the bus is
+//! tested: first with a frame of many reads of one byte, which any SubDevice answers, and then by bisection between a
+//! number that works and one that does not.
 
 use core::time::Duration;
 
@@ -16,15 +17,15 @@ use crate::ring::FrameLimit;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// Most datagrams that are tried: a byte of data each, they nearly fill a frame.
+/// Largest number of datagrams tested: with a byte of data each, they nearly fill a frame.
 const MOST: usize = 110;
-/// A frame that is lost so often in a row is not lost by chance.
+/// A frame lost this often in a row is not lost by chance.
 const TRIES: u8 = 3;
 
-/// Between two trials in operation.
+/// Pause between two tests in operation.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// What came of a frame.
+/// Result of a frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Outcome {
     Answered,
@@ -32,8 +33,8 @@ enum Outcome {
     Lost,
 }
 
-/// The limit of the segment, where it is below what this MainDevice puts into a frame. `None` too where the segment
-/// does not answer a frame with one datagram.
+/// The limit of the segment, if it is below the number of datagrams that this MainDevice puts into a frame. `None` also
+/// if the segment does not answer a frame with one datagram.
 pub(super) async fn probe(bus: &Bus) -> Option<FrameLimit> {
     let mut too_many = bus.max_datagrams().min(MOST);
     if attempt(bus, 1).await != Outcome::Answered {
@@ -51,7 +52,7 @@ pub(super) async fn probe(bus: &Bus) -> Option<FrameLimit> {
             other => (too_many, outcome) = (middle, other),
         }
     }
-    // Nothing has changed meanwhile: a cable that was cut for a moment is no limit.
+    // Confirms that nothing has changed meanwhile: a cable that was cut for a moment is not a limit.
     let is_so = attempt(bus, answered).await == Outcome::Answered && attempt(bus, too_many).await == outcome;
     is_so.then_some(FrameLimit { datagrams: answered as u16, returns: outcome == Outcome::Unprocessed })
 }
@@ -74,13 +75,13 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
     Outcome::Lost
 }
 
-/// In operation: has the limit told, once, where there is one. Long frames delay a cycle, so it is tried now and then
-/// only, whatever else disturbs the segment.
+/// In operation: reports the limit once, if there is one. Long frames delay a cycle, so the test has a minimum
+/// interval, whatever else disturbs the segment.
 pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
     if bus.now() < segment.next_frame_trial() {
         return;
     }
-    // At once: the procedure that asks may end before it is answered.
+    // Set first: the calling procedure may end before the result arrives.
     segment.set_next_frame_trial(bus.now() + PAUSE);
     if let Some(limit) = probe(bus).await {
         segment.set_next_frame_trial(Instant::NEVER);

@@ -1,11 +1,10 @@
-//! Rings behind junctions (protocol 9.4): which there are ([`learn()`]), whether
-//! those that are declared are where they are said to be ([`refute()`]), where they are broken when nothing comes back
-//! ([`isolate`]), and the orders that their junctions have ([`orders`]). What becomes of them in operation is a matter
-//! of the model ([`crate::segment`]).
+//! Rings behind junctions (protocol 9.4): detection ([`learn()`]), test of declared rings ([`refute()`]), location of
+//! breaks when no frame returns ([`isolate`]), and the port commands of their junctions ([`orders`]). The model
+//! contains their state in operation ([`crate::segment`]).
 //!
-//! The controllers keep a local ring going by themselves; nothing here is needed for that. It is about knowledge: which
-//! may be entered from behind without being cabled wrongly, that a cable is broken, and when there must not be another
-//! one.
+//! The controllers switch a local ring over without the MainDevice. These procedures only find out: which SubDevices
+//! frames may enter from behind without wrong cabling, that a cable is broken, and that a second break would interrupt
+//! the ring.
 
 mod isolate;
 mod learn;

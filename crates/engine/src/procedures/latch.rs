@@ -1,8 +1,7 @@
-//! Receive times of one frame: all clocks latch it, and what they have latched is read (protocol 7.1).
+//! Receive times of one frame: all clocks latch it, and the latched times are read (protocol 7.1).
 //!
-//! Another frame that is on the wire meanwhile may spoil what is latched, and another one that latches overwrites it.
-//! So the frame is alone on the wire ([`Bus::alone`]), and its latches belong to one procedure until it has read them
-//! ([`Latches`]).
+//! Another frame on the wire may falsify the latched times, and a second latching frame overwrites them. So the frame
+//! is alone on the wire ([`Bus::alone`]), and its latches belong to one procedure until it has read them ([`Latches`]).
 
 use core::time::Duration;
 
@@ -16,37 +15,36 @@ use ringcat_wire::register::map;
 use crate::link::Link;
 use crate::supervisor::{Bus, BusError, Turn};
 
-/// Frames that were lost or disturbed before it is given up.
+/// Lost or disturbed frames before the procedure fails.
 const TRIES: u32 = 12;
-/// Of these, so many until the cyclic half is asked to pause: its frames leave as soon as the last ones are home.
+/// Lost or disturbed frames before the cyclic half is requested to pause: its frames may be sent back to back.
 const PATIENCE: u32 = 4;
-/// A pause of the cyclic half is asked for so long; it ends when the frame is home.
+/// Requested length of a pause of the cyclic half; it ends earlier when the frame has returned.
 const PAUSE: Duration = Duration::from_millis(3);
 
-/// A frame was latched; until this is dropped no other one is.
+/// A latched frame; no other frame is latched until this is dropped.
 pub(super) struct Latches {
-    /// How many SubDevices have latched it.
+    /// Number of SubDevices that latched it.
     pub met: Wkc,
-    /// Keeps others waiting.
+    /// Blocks other procedures.
     _turn: Turn,
 }
 
-/// Whether the cyclic half may be asked to pause where its frames are on the wire all the time.
+/// Whether the cyclic half may be requested to pause if its frames are on the wire all the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pauses {
     Allowed,
     Forbidden,
 }
 
-/// Lets all clocks latch a frame that is alone on the wire. Copies on the link that is `deaf` are known not to come
-/// home.
-pub(super) async fn latch(bus: &Bus, pauses: Pauses, deaf: Option<Link>) -> Result<Latches, BusError> {
+/// Latches a frame that is alone on the wire in all clocks. Copies on the link `no_return` do not return.
+pub(super) async fn latch(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
-    let met = send(bus, pauses, deaf).await?;
+    let met = send(bus, pauses, no_return).await?;
     Ok(Latches { met, _turn })
 }
 
-/// The same where it may be; elsewhere other frames may spoil some receive times.
+/// The same, alone if possible; otherwise other frames may falsify some receive times.
 pub(super) async fn latch_anyway(bus: &Bus) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
     let met = match send(bus, Pauses::Forbidden, None).await {
@@ -56,13 +54,13 @@ pub(super) async fn latch_anyway(bus: &Bus) -> Result<Latches, BusError> {
     Ok(Latches { met, _turn })
 }
 
-async fn send(bus: &Bus, pauses: Pauses, deaf: Option<Link>) -> Result<Wkc, BusError> {
+async fn send(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Wkc, BusError> {
     let (mut failures, mut is_pausing) = (0, false);
     loop {
         if is_pausing {
             bus.ask_for_pause(PAUSE);
         }
-        let reply = bus.alone(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4], deaf).await;
+        let reply = bus.alone(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4], no_return).await;
         if is_pausing {
             bus.ask_for_pause(Duration::ZERO);
         }

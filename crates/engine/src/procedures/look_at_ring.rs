@@ -1,5 +1,5 @@
-//! Examining a ring without changing anything: which SubDevices answer on which link, how they are cabled, what their
-//! ports have counted. Only reads, so that a segment which another MainDevice operates goes on.
+//! Examines a ring without changing it: which SubDevices answer on which link, their cabling, their error counters. It
+//! only reads, so a segment operated by another MainDevice is not disturbed.
 
 use alloc::vec::Vec;
 
@@ -14,31 +14,32 @@ use crate::ring_status::{Cable, CableErrors, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{NodeStatus, PortOf, Topology, ends_of_earlier_break};
 
-/// What was found.
+/// Result of an examination.
 #[derive(Clone, Debug)]
 pub struct RingLook {
     /// Closed or open.
     pub state: RingState,
     /// SubDevices on the main and on the redundant link.
     pub counts: (u16, u16),
-    /// Station addresses by position, as the MainDevice that operates the segment has given them; 0 where none has.
+    /// Station addresses by position, as assigned by the MainDevice that operates the segment; 0 if none is assigned.
     pub stations: Vec<StationAddress>,
     /// AL states by position.
     pub states: Vec<AlStatus>,
-    /// How they are cabled.
+    /// Their cabling.
     pub topology: Topology,
     /// Error counters by position.
     pub counters: Vec<ErrorCounters>,
-    /// Every cable with what the ports at its ends have counted since the counters were cleared. They end at 255.
+    /// Every cable with the error counts of the ports at its ends since the counters were cleared. The counters
+    /// saturate at 255.
     pub cables: Vec<(Cable, CableErrors)>,
-    /// Where the ring is broken.
+    /// The place of the break, if the ring is open.
     pub place: Option<Cable>,
 }
 
-/// Looks once. SubDevices are addressed by position, which needs no station addresses.
+/// Examines the ring once. SubDevices are addressed by position, which needs no station addresses.
 ///
 /// # Errors
-/// Frames that are lost again and again, no SubDevice that answers, or SubDevices that come or go meanwhile.
+/// Frames that are lost repeatedly, no answer of any SubDevice, or SubDevices that are added or lost meanwhile.
 pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     let counted = match bus.brd(map::TYPE, 1).await {
         Ok(counted) if counted.wkc().0 == 0 => return Err(ScanError::NoSubDevices),
@@ -47,11 +48,11 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     };
     let counts = (counted.main.0, counted.redundant.0);
     let positions = (0..counted.wkc().0).map(Position);
-    let looks = bus.gather_in_turns(positions.collect(), look_at).await;
-    let mut statuses = Vec::with_capacity(looks.len());
+    let readings = bus.gather_in_turns(positions.collect(), look_at).await;
+    let mut statuses = Vec::with_capacity(readings.len());
     let (mut stations, mut states, mut counters) = (Vec::new(), Vec::new(), Vec::new());
-    for look in looks {
-        let (station, status, state, counted) = match look {
+    for reading in readings {
+        let (station, status, state, counted) = match reading {
             Ok(seen) => seen,
             Err(error) => {
                 explain(&bus).await?;
@@ -108,7 +109,7 @@ fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
     bytes.first_chunk().copied().unwrap_or([0; N])
 }
 
-/// The cable without which the ring is open.
+/// The cable at which the ring is open.
 fn broken(topology: &Topology, links: LinkSet, state: RingState, dl_status: &[Option<DlStatus>]) -> Option<Cable> {
     if links != LinkSet::Ring || state != RingState::Open {
         return None;

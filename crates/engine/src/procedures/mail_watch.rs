@@ -1,8 +1,8 @@
-//! Finding SubDevices with mail that was not requested (protocol 6.1).
+//! Detects unsolicited mail of SubDevices (protocol 6.1).
 //!
-//! SubDevices whose SII offers it show the status bit of their send mailbox through an FMMU: each has a bit of its own
-//! in the logical address space, and all answer one read together. The others are asked one by one, so seldom that all
-//! of them together take a small part of the wire.
+//! SubDevices whose SII offers it map the status bit of their send mailbox through an FMMU: each has a bit of its own
+//! in the logical address space, and one read covers all. The others are polled one by one, at an interval at which all
+//! of them together use a small part of the bandwidth.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -20,20 +20,20 @@ use crate::supervisor::Bus;
 
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_millis(5);
-/// Time on the wire that one question may take on average; with its overhead one takes about 3 us.
+/// Average interval per polled mailbox; a poll takes about 3 us on the wire with its overhead.
 const TIME_EACH: Duration = Duration::from_micros(60);
 
-/// A mailbox that may be used.
+/// A mailbox in use.
 struct Open {
     index: usize,
     station: StationAddress,
-    /// Says whether there is mail.
+    /// Register with the mailbox-full bit.
     status: RegisterAddress,
     mailbox: Mailbox,
     mapped: bool,
 }
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     let mut alone = 0;
     loop {
@@ -45,12 +45,12 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
                 open.mailbox.mail_available();
             }
         }
-        // Where some do not answer, it is not known which: all are read, until they are found and mended.
-        if !look_together(&bus, &mapped).await {
+        // If some do not answer, it is unknown which: all are polled until the supervision has found and repaired them.
+        if !poll_together(&bus, &mapped).await {
             others.extend(mapped);
         }
         alone = u32::try_from(others.len()).unwrap_or(u32::MAX);
-        bus.gather_in_turns(others, look).await;
+        bus.gather_in_turns(others, poll).await;
     }
 }
 
@@ -66,8 +66,8 @@ fn open_mailboxes(segment: &SharedSegment) -> Vec<Open> {
         .collect()
 }
 
-/// One read for all; false where not all answered.
-async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
+/// One read for all; false if not all answered.
+async fn poll_together(bus: &Bus, mapped: &[Open]) -> bool {
     let Some(last) = mapped.iter().map(|open| open.index).max() else { return true };
     let expected = Wkc(mapped.len() as u16);
     let (target, data) = (Target::Logical(BITS_AT), vec![0; last / 8 + 1]);
@@ -80,8 +80,8 @@ async fn look_together(bus: &Bus, mapped: &[Open]) -> bool {
     reply.wkc() == expected
 }
 
-/// One that does not answer is the matter of the supervision.
-async fn look(bus: Bus, open: Open) {
+/// The supervision handles a SubDevice that does not answer.
+async fn poll(bus: Bus, open: Open) {
     if bus.has_stray_mail(open.station) {
         open.mailbox.mail_available();
         return;

@@ -1,7 +1,7 @@
 //! Objects of the MainDevice itself: what a client of the mailbox gateway reads at address 0 (protocol 10.1, 10.2).
 //!
-//! In go CoE messages of clients, out come the answers: SDOs and SDO information. Values are those of the moment: what
-//! a SubDevice has to say is asked of it when a client asks. Nothing of it is on the cyclic path.
+//! Inputs are CoE messages of clients, outputs the answers: SDOs and SDO information. Values are current: SubDevices
+//! are read when a client requests a value. Nothing of this is on the cyclic path.
 
 mod catalogue;
 mod detection;
@@ -32,14 +32,15 @@ use crate::mail::coe::SdoAddress;
 use crate::segment::Observation;
 use crate::supervisor::Bus;
 
-/// Bytes of a message to or from address 0, mailbox header included: a long list goes in segments.
+/// Bytes of a message to or from address 0, mailbox header included: a long list is sent in segments.
 const MAILBOX: usize = 512;
 const ROOM: usize = MAILBOX - Header::LEN;
 /// Clients that may have an upload in segments under way.
 const UPLOADS: usize = 64;
 
-/// All entries of an object one after the other, behind their number in 16 bits where it is asked for. Texts have their
-/// full length, and what is longer than a byte begins at an even offset: one that reads the descriptions knows where.
+/// All entries of an object in sequence, after their number in 16 bits if it is requested. Texts have their full
+/// length, and entries longer than a byte begin at an even offset, so a client can compute the offsets from the
+/// descriptions.
 fn whole(object: Object, values: &[(u8, Vec<u8>)], count: Option<u8>) -> Vec<u8> {
     let mut bytes: Vec<u8> = count.into_iter().flat_map(|count| [count, 0]).collect();
     for (sub_index, value) in values {
@@ -54,14 +55,14 @@ fn whole(object: Object, values: &[(u8, Vec<u8>)], count: Option<u8>) -> Vec<u8>
     bytes
 }
 
-/// Answers clients, and remembers what goes beyond one message.
+/// Answers clients, and stores uploads that need several messages.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct OwnObjects {
     shared: Rc<Shared>,
 }
 
 impl OwnObjects {
-    /// A client has gone.
+    /// A client has disconnected.
     pub(crate) fn forget(&self, client: u64) {
         self.shared.uploads.borrow_mut().remove(&client);
     }
@@ -84,7 +85,7 @@ impl OwnObjects {
         }
     }
 
-    /// The answer to an SDO request; none to an abort. A new transfer ends the one before.
+    /// The answer to an SDO request; none to an abort. A new transfer ends the previous one.
     async fn sdo(&self, seen: &Seen, client: u64, request: &SdoRequest<'_>) -> Option<Vec<u8>> {
         let upload = self.shared.uploads.borrow_mut().remove(&client);
         let (address, result) = match *request {
@@ -118,7 +119,7 @@ impl OwnObjects {
         let Some(upload) = upload else { return };
         let mut uploads = self.shared.uploads.borrow_mut();
         if uploads.len() >= UPLOADS {
-            // The client that came first has forgotten it, or asks again.
+            // The oldest upload is probably abandoned; its client can repeat the request.
             uploads.pop_first();
         }
         uploads.insert(client, upload);
@@ -185,7 +186,7 @@ impl OwnObjects {
         Ok(encode(&SdoResponse::DownloadDone { index, sub_index }))
     }
 
-    /// Clears what 0xAnnn and 0xF120 count.
+    /// Clears the counters of 0xAnnn and 0xF120.
     async fn reset(&self, seen: &Seen) {
         self.shared.forgotten.set(rates::lost(seen));
         let Some(segment) = &seen.segment else { return };
@@ -198,7 +199,7 @@ impl OwnObjects {
         let clear = move |bus: Bus, (subdevice, station)| {
             let statistics = statistics.clone();
             async move {
-                // One that is not there counts nothing.
+                // An absent SubDevice has no counters to clear.
                 let _ = statistics::clear(&bus, &statistics, subdevice, station).await;
             }
         };

@@ -1,4 +1,4 @@
-//! Finding out that a SubDevice whose FMMUs are set gives its inputs.
+//! Proves that a SubDevice whose FMMUs are set delivers its inputs.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -13,14 +13,14 @@ use crate::plan::AreaPlan;
 use crate::segment::Observation;
 use crate::supervisor::Bus;
 
-/// Pause between two looks whether inputs are there; it doubles up to the longest.
+/// Pause between two reads of the inputs; it doubles up to the longest.
 const PAUSE: Duration = Duration::from_millis(1);
-/// Longest pause between two looks.
+/// Longest pause between two reads.
 const LONGEST_PAUSE: Duration = Duration::from_millis(50);
-/// Inputs that are not there by then are reported.
+/// Time after which missing inputs are reported.
 const LATE: Duration = Duration::from_secs(1);
 
-/// Looks until a SubDevice gives all its inputs, which datagrams of its own show, or is gone.
+/// Reads with separate datagrams until a SubDevice has delivered all its inputs, or is lost.
 pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize, mapping: u32) {
     let known = segment.view().members.get(index).and_then(|member| Some((member.station, member.setup.clone()?)));
     let Some((station, setup)) = known else { return };

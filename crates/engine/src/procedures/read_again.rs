@@ -1,4 +1,4 @@
-//! Reading a member's SII once more: after a boot loader, or where one that could not be followed may have been mended.
+//! Reads a member's SII again: after a boot loader, or if an SII that could not be used may have been corrected.
 
 use alloc::string::ToString;
 
@@ -9,16 +9,16 @@ use crate::event::Event;
 use crate::segment::Observation;
 use crate::supervisor::Bus;
 
-/// Reads it. One that cannot be read leaves everything as it was.
+/// Reads the SII. If it cannot be read nothing changes.
 pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, index: usize) {
     let Some(known) = segment.view().members.get(index).and_then(|member| member.info.clone()) else { return };
     let read = async {
         sii::claim(bus, known.station).await?;
-        // What was read before says nothing about what is there now.
+        // Cached contents may be outdated.
         read_one(bus, known.position, known.station, &SiiCache::new(false)).await
     };
     match read.await {
-        // The reason was reported.
+        // The reason was reported before.
         Ok(info) if info.is_blank() => {}
         Ok(mut info) => {
             info.keep_read_online(&known);

@@ -1,4 +1,4 @@
-//! Starting the procedures that the model of the segment asks for. The only place at which they are started.
+//! Starts the procedures that the model of the segment requests. They are started only here.
 
 use super::cabling::examine;
 use super::clocks::compensate_drift;
@@ -6,21 +6,21 @@ use super::junction::isolate_rings;
 use super::presence::prove_inputs;
 use super::recover::bring_up_member;
 use super::shared_segment::SharedSegment;
-use super::supervise::look_round;
+use super::supervise::scan_round;
 use super::unassigned::rescan::follow_groups;
 use super::unassigned::{Search, read_unassigned};
 use crate::segment::effect::Task;
 use crate::supervisor::Bus;
 
-/// Starts what is asked for. Runs for ever.
+/// Starts requested procedures. Runs until the MainDevice stops.
 pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
     let search = Search::default();
     loop {
         let (own_bus, own) = (bus.clone(), segment.clone());
         match segment.next_task().await {
-            Task::Look { routine } => bus.spawn(look_round(own_bus, own, routine, search.clone())),
-            Task::BringUp { index, attempt, from, told, check } => {
-                bus.spawn(bring_up_member(own_bus, own, (index, attempt), from, told, check));
+            Task::Scan { routine } => bus.spawn(scan_round(own_bus, own, routine, search.clone())),
+            Task::BringUp { index, attempt, from, reported, check } => {
+                bus.spawn(bring_up_member(own_bus, own, (index, attempt), from, reported, check));
             }
             Task::ProveInputs { index, mapping } => bus.spawn(prove_inputs(own_bus, own, index, mapping)),
             Task::ReadUnassigned { station } => bus.spawn(read_unassigned(own_bus, own, station)),

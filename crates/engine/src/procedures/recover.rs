@@ -1,4 +1,5 @@
-//! Bringing SubDevices back: from an error, from power-off, or for the first time. The others go on meanwhile.
+//! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
+//! continues.
 
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
@@ -28,48 +29,48 @@ use crate::segment::start::Start;
 use crate::segment::{Observation, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
-/// Pause before the first new attempt to configure a SubDevice; it doubles with every failure.
+/// Pause before the first repeated attempt to configure a SubDevice; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Looks at a SubDevice that did not answer once, before it is lost: at the edge of a cut a frame may have been
+/// Reads of a SubDevice that did not answer once, before it is lost: at the moment of a cut a frame may have been
 /// processed by none.
-const LOOKS: usize = 3;
-/// Pause between two of them, and before a configuration that the bus disturbed is tried again for the first time.
-const LOOK_PAUSE: Duration = Duration::from_millis(3);
+const SCANS: usize = 3;
+/// Pause between two of these reads, and before the first repetition of a configuration that failed because of the bus.
+const READ_PAUSE: Duration = Duration::from_millis(3);
 
-/// Brings a SubDevice to its target state, again and again until it works or it no longer answers. `told`: its error
-/// that is reported and still holds.
+/// Brings a SubDevice to its target state, repeatedly until it succeeds or the SubDevice no longer answers. `reported`:
+/// its error that is reported and still present.
 pub(super) async fn keep_up(
     bus: &Bus,
     segment: &SharedSegment,
     (index, attempt): (usize, u32),
     start: Start,
-    told: Option<Shown>,
+    reported: Option<Shown>,
 ) {
-    let (mut start, mut told) = (start, told);
+    let (mut start, mut reported) = (start, reported);
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        let result = try_once(bus, segment, index, start, &mut told).await;
-        // A short way that did not lead there is followed by the whole one, and that by the short one.
+        let result = try_once(bus, segment, index, start, &mut reported).await;
+        // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
             Ok(state) => return segment.observe(Observation::Reached { index, attempt, state }),
             Err(error) if is_of_bus(&error) => {
                 if !is_there(bus, segment, index).await {
-                    // The supervision finds out more.
+                    // The supervision determines the cause.
                     return segment.observe(Observation::Unreachable { index, attempt });
                 }
-                // Once may be the edge of a cut, which is no matter of this SubDevice.
+                // A single failure may be due to a cut elsewhere, not to this SubDevice.
                 if !core::mem::replace(&mut disturbed, true) {
-                    bus.sleep(LOOK_PAUSE).await;
+                    bus.sleep(READ_PAUSE).await;
                     continue;
                 }
                 frame_limit::explain(bus, segment).await;
                 bus.report(failure(index, &error));
             }
-            // Another try brings nothing new before its EEPROM is another one, which is read when it comes back.
+            // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back.
             Err(error @ ConfigureError::Unfit(_)) => return bus.report(failure(index, &error)),
             Err(error) => bus.report(failure(index, &error)),
         }
@@ -78,7 +79,7 @@ pub(super) async fn keep_up(
     }
 }
 
-/// The frames are to blame, not what the SubDevice said.
+/// The error is due to frames, not to the SubDevice.
 pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     match error {
         ConfigureError::Bus(_) => true,
@@ -105,12 +106,12 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     }
 }
 
-/// Whether a SubDevice answers. While frames get lost nothing is known, and it counts as there.
+/// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.
 async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
     let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return false };
-    for _ in 0..LOOKS {
+    for _ in 0..SCANS {
         match al_state::read_status(bus, station).await {
-            Err(BusError::Wkc { .. }) => bus.sleep(LOOK_PAUSE).await,
+            Err(BusError::Wkc { .. }) => bus.sleep(READ_PAUSE).await,
             Ok(_) | Err(_) => return true,
         }
     }
@@ -149,7 +150,7 @@ pub(super) fn bring_up<'a>(
     })
 }
 
-/// Why there is nothing to write to a SubDevice.
+/// Why there is no configuration for a SubDevice.
 pub(super) fn no_setup(member: &Member) -> ConfigureError {
     member.unfit.clone().map_or(ConfigureError::NoSetup, ConfigureError::Unfit)
 }
@@ -159,13 +160,13 @@ async fn try_once(
     segment: &SharedSegment,
     index: usize,
     start: Start,
-    told: &mut Option<Shown>,
+    reported: &mut Option<Shown>,
 ) -> Result<AlState, ConfigureError> {
     let bring_up = bring_up(bus, segment, index)?;
-    let quickly = start == Start::Unknown && quick(&bring_up, told).await?;
-    // The whole way begins with an acknowledgement: what it shows behind that is new.
-    let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *told = None) };
-    // An attempt that ended on the way to PREOP, this one or one before, leaves the EEPROM to the PDI.
+    let quickly = start == Start::Unknown && quick(&bring_up, reported).await?;
+    // The full start begins with an acknowledgement: an error after it is new.
+    let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *reported = None) };
+    // An attempt that ended on the way to PREOP, this or an earlier one, leaves the EEPROM assigned to the PDI.
     let is_left = match &result {
         Ok(()) => quickly && bring_up.target == AlState::PreOp,
         Err(error) => !is_of_bus(error),
@@ -176,9 +177,9 @@ async fn try_once(
     result.map(|()| bring_up.target)
 }
 
-/// A SubDevice that only fell from OP to SAFEOP still has its configuration: acknowledged, it may go back to OP. Its
-/// error is reported, unless it is the one that was.
-async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool, ConfigureError> {
+/// A SubDevice that only fell from OP to SAFEOP still has its configuration: after an acknowledgement it may go back to
+/// OP. Its error is reported, unless it is the error reported before.
+async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<bool, ConfigureError> {
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
@@ -199,29 +200,29 @@ async fn quick(bring_up: &BringUp<'_>, told: &mut Option<Shown>) -> Result<bool,
     bring_up.join();
     mailbox.resume();
     if status.error {
-        if told.replace((status, code)) != Some((status, code)) {
+        if reported.replace((status, code)) != Some((status, code)) {
             bus.report(Event::StateError { subdevice: SubDeviceId(*index), requested: None, status, code });
         }
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
-    *told = None;
+    *reported = None;
     bring_up.op().await?;
     Ok(true)
 }
 
-/// Brings a member to its target state while the attempt is the current one. First it is checked whether it is that
-/// member; from another one the address is taken away.
+/// Brings a member to its target state while the attempt is the current one. First its identity is checked; the address
+/// of another SubDevice is taken away.
 pub(super) async fn bring_up_member(
     bus: Bus,
     segment: SharedSegment,
     (index, attempt): (usize, u32),
     from: Start,
-    told: Option<Shown>,
+    reported: Option<Shown>,
     check: Check,
 ) {
     let procedure = async {
         if check == Check::None {
-            return keep_up(&bus, &segment, (index, attempt), from, told).await;
+            return keep_up(&bus, &segment, (index, attempt), from, reported).await;
         }
         if !is_the_member(&bus, &segment, (index, attempt), check).await {
             return;
@@ -229,12 +230,12 @@ pub(super) async fn bring_up_member(
         if segment.view().members[index].unfit.is_some() {
             read_again(&bus, &segment, index).await;
         }
-        keep_up(&bus, &segment, (index, attempt), from, told).await;
+        keep_up(&bus, &segment, (index, attempt), from, reported).await;
     };
     while_current(&segment, index, attempt, procedure).await;
 }
 
-/// Whether what has the station address of a member is that member.
+/// Whether the SubDevice with the station address of a member is that member.
 async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), check: Check) -> bool {
     let station = segment.view().members[index].station;
     let is = match check {
@@ -247,10 +248,10 @@ async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (us
         (Ok(true), Check::Identity | Check::None) => {}
         (not, check) => {
             if not.is_ok() {
-                // Where that fails, the next look finds the address again.
+                // If that fails, the next scan finds the address again.
                 let _ = take_away(bus, segment, station).await;
             }
-            // One that was lost is looked at like others without an address of ours, and told by its place then.
+            // A SubDevice at the address of a lost member is handled as unassigned, and reported by its position then.
             segment.observe(match check {
                 Check::Return => Observation::NotReturned { index, attempt },
                 Check::Identity | Check::None => Observation::Unreachable { index, attempt },
@@ -261,8 +262,8 @@ async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (us
     true
 }
 
-/// Whether what has the station address of a lost member is that member: it may be one that had this address in an
-/// earlier session, or was exchanged for one that ran elsewhere.
+/// Whether the SubDevice with the station address of a lost member is that member. It may have this address from an
+/// earlier session, or have been moved here from another segment.
 async fn is_the_lost_one(
     bus: &Bus,
     segment: &SharedSegment,
@@ -276,7 +277,7 @@ async fn is_the_lost_one(
     })
 }
 
-/// Lets a procedure for a SubDevice run until another one begins or the SubDevice is lost.
+/// Runs a procedure for a SubDevice until another one begins or the SubDevice is lost.
 pub(super) async fn while_current(
     segment: &SharedSegment,
     index: usize,

@@ -1,8 +1,9 @@
-//! A state for one SubDevice while the others go on: the application's wish, kept until it has another one.
+//! A state of one SubDevice requested by the application while the others continue; it is kept until another one is
+//! requested.
 //!
-//! The SubDevice goes there by the shortest way, its process data ends or begins at once and not by halves, and no
-//! domain misses it meanwhile. A SubDevice that loses its power comes back to the state that was asked for last. One
-//! that refuses is brought back to the state that it had.
+//! The SubDevice changes to it by the shortest path. All of its process data ends or begins at the same time, and no
+//! domain expects it meanwhile. A SubDevice that loses its power is brought back to the last requested state. After a
+//! refusal it is brought back to its previous state.
 
 use alloc::rc::Rc;
 use core::cell::RefCell;
@@ -19,12 +20,12 @@ use crate::segment::member::Phase;
 use crate::segment::start::Start;
 use crate::supervisor::Bus;
 
-/// Whether process data may flow in a state.
+/// Whether process data may be exchanged in a state.
 pub(crate) const fn exchanges(state: AlState) -> bool {
     matches!(state, AlState::SafeOp | AlState::Op)
 }
 
-/// Brings a SubDevice to a state. The work goes on where the result is not waited for.
+/// Brings a SubDevice to a state. The procedure continues also if its result is not awaited.
 pub(crate) fn request_state(
     bus: &Bus,
     segment: &SharedSegment,
@@ -52,7 +53,7 @@ fn attempt_of(segment: &SharedSegment, index: usize) -> u32 {
     segment.view().members.get(index).map_or(0, |member| member.attempt)
 }
 
-/// What can be refused before anything happens.
+/// Errors that are detected before anything is changed.
 fn check(segment: &SharedSegment, index: usize, state: AlState) -> Result<(), ConfigureError> {
     let view = segment.view();
     let member = view.members.get(index).ok_or(ConfigureError::NoSetup)?;
@@ -93,7 +94,7 @@ async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), 
         }
         Err(error) => {
             bus.report(failure(index, &error));
-            // One that the frames did not reach has refused nothing.
+            // A SubDevice that the frames did not reach has not refused.
             let has_refused = !is_of_bus(&error);
             *result.borrow_mut() = Some(Err(error));
             if has_refused {

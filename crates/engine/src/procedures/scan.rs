@@ -1,6 +1,6 @@
-//! Finding all SubDevices (protocol 5.6): count, common ground, station addresses, what each SubDevice is, topology.
+//! Scans for all SubDevices (protocol 5.6): count, common initial state, station addresses, identity, topology.
 //!
-//! All SubDevices are asked at once, one task each; their datagrams share frames by themselves.
+//! All SubDevices are read in parallel, one task each; their datagrams share frames.
 
 mod cabling;
 mod count;
@@ -49,22 +49,21 @@ use crate::topology::{Closing, NodeStatus, Topology, rings_shown};
 
 /// Most SyncManagers and FMMUs that a controller can have.
 const MAX_CHANNELS: usize = 16;
-/// Pause between two looks whether all are in INIT.
+/// Interval of the check whether all are in INIT.
 const INIT_PAUSE: Duration = Duration::from_millis(1);
 /// How long SubDevices may take to get to INIT before they are addressed one by one.
 const INIT_LIMIT: Duration = Duration::from_millis(100);
-/// A scan is begun so often: a cable may be cut or plugged in while it runs.
+/// Attempts of a scan: a cable may be cut or plugged in during it.
 const ATTEMPTS: u8 = 3;
-/// Progress is reported in so many steps.
+/// Steps in which progress is reported.
 const PROGRESS_STEPS: usize = 10;
 
-/// Byte of the SII that says how large the EEPROM is.
+/// Byte address in the SII of the EEPROM's size.
 const SIZE_AT: usize = 2 * 0x3E;
 
-/// Scans the segment. Every SubDevice is in INIT afterwards. A scan that the segment disturbed by changing is begun
-/// again.
+/// Scans the segment. All SubDevices are in INIT afterwards. A scan is restarted if the segment changes during it.
 ///
-/// While it settles, what is there is read already: SubDevices that appear one after the other begin the scan anew
+/// While the count settles, present SubDevices are read already. Each SubDevice that appears later restarts the scan
 /// until the count has settled.
 pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     let begin = bus.now();
@@ -78,7 +77,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
                 return Ok(scan);
             }
             Err(Failure::Unsettled(now)) => {
-                // SubDevices that appear or go are counted; none at all where there were some is another matter.
+                // A changed count is an unstable segment; a count that falls to 0 is another error.
                 if now.is_none_or(|now| now.total() == 0) {
                     explain(bus).await?;
                 }
@@ -103,12 +102,12 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     }
 }
 
-/// What did not come back may have been too much for a frame of this segment.
+/// A frame that did not return may hold too many datagrams for this segment.
 pub(super) async fn explain(bus: &Bus) -> Result<(), ScanError> {
     probe(bus).await.map_or(Ok(()), |limit| Err(ScanError::FrameLimit(limit)))
 }
 
-/// Why an attempt to scan came to nothing.
+/// Why an attempt to scan failed.
 enum Failure {
     /// The count changed before it had settled.
     Unsettled(Option<Count>),
@@ -144,7 +143,7 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     let Learned { topology, closings, not_learned } = connect(bus, options.junctions, &subdevices, main_count).await?;
     let mut scan = Scan { subdevices, topology, main_count, redundant_count };
     report_findings(bus, &scan);
-    // Connections that are declared are not known yet.
+    // Declared connections are not known yet.
     if options.junctions != JunctionMode::Strict {
         let exact = options.enhanced_line_crossed && locate_crossings(bus, &mut scan).await;
         report_cabling(bus, &scan, exact);
@@ -158,8 +157,8 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     Ok(scan)
 }
 
-/// What the SubDevices of a count say about themselves, read while the count settles. One that changes ends the attempt
-/// at once, whatever reading has come to.
+/// Reads the data of the counted SubDevices while the count settles. A changed count ends the attempt at once,
+/// regardless of the reading.
 async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count) -> Result<Vec<Said>, Failure> {
     let settling = async { count::settle(bus, expected, options.settle).await.map_err(Failure::Unsettled) };
     let mut settling = pin!(settling);
@@ -185,16 +184,16 @@ async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count)
     .await
 }
 
-/// How SubDevices are connected.
+/// How the SubDevices are connected.
 struct Learned {
     topology: Topology,
     /// Closing cables of the rings behind junctions that were learned.
     closings: Vec<Closing>,
-    /// Rings behind junctions that show but could not be learned.
+    /// Detected rings behind junctions that could not be learned.
     not_learned: usize,
 }
 
-/// Finds out how they are connected, of which the main copy met the first `main_count`.
+/// Determines the connections. The main copy passed the first `main_count` SubDevices.
 async fn connect(
     bus: &Bus,
     junctions: JunctionMode,
@@ -206,7 +205,7 @@ async fn connect(
         JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
         JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
     };
-    // Of rings that were not learned times of reception tell of crossed lines that are none.
+    // With rings that were not learned, receive times would show crossed lines that do not exist.
     let is_closed = bus.ring() == RingState::Closed;
     let not_learned = match junctions {
         JunctionMode::Automatic => rings_shown(&statuses, is_closed).saturating_sub(closings.len()),
@@ -218,10 +217,10 @@ async fn connect(
     Ok(Learned { topology, closings, not_learned })
 }
 
-/// What one SubDevice says about itself: its SII and its identification.
+/// Data of one SubDevice: its SII and its identification.
 type Said = (SiiContents, Option<u16>);
 
-/// Common ground, station addresses, and what each SubDevice says about itself.
+/// Sets the common initial state and station addresses, and reads each SubDevice.
 async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
     level(bus).await?;
     let are_clean = to_init(bus, count).await?;
@@ -236,7 +235,7 @@ pub(crate) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
     NodeStatus { dl_status: info.dl_status, receive_times: info.receive_times, ports: info.controller.ports }
 }
 
-/// The same starting point for all: loops automatic, aliases off, event mask, no FMMU, no SyncManager, no clock
+/// Sets the same initial state in all: loops automatic, aliases off, event mask, no FMMU, no SyncManager, no clock
 /// activity, EEPROM to EtherCAT, error counters clear.
 async fn level(bus: &Bus) -> Result<(), BusError> {
     let init = AlControl::with_acknowledge(AlState::Init).encode();
@@ -259,13 +258,13 @@ async fn level(bus: &Bus) -> Result<(), BusError> {
     bus.transfer_all(second, None).await.map(drop)
 }
 
-/// ECAT events that SubDevices tell in every datagram: a port changed.
+/// ECAT events that SubDevices report in every datagram: a port changed.
 pub(super) fn event_mask() -> EcatEvent {
     EcatEvent { dl_status: true, ..EcatEvent::default() }
 }
 
-/// Waits until all are in INIT, as the OR of their AL status shows it; false where they are not in time. Devices that
-/// copy AL control into AL status show the acknowledge bit as an error: they get the bare state.
+/// Waits until all are in INIT, according to the OR of their AL status; false if the time limit passes. Devices that
+/// copy AL control into AL status show the acknowledge bit as an error: the state is written to them without it.
 async fn to_init(bus: &Bus, count: u16) -> Result<bool, BusError> {
     let until = bus.now() + INIT_LIMIT;
     loop {
@@ -284,8 +283,8 @@ async fn to_init(bus: &Bus, count: u16) -> Result<bool, BusError> {
     }
 }
 
-/// Clears errors that are left, each for itself: one that stays out of INIT hides in the OR what the others need. It is
-/// dealt with when it is configured.
+/// Clears remaining errors, SubDevice by SubDevice. A SubDevice that stays outside INIT would hide the state of the
+/// others in the OR; its error is handled when it is configured.
 async fn clear_errors(bus: &Bus, count: u16) -> Result<(), BusError> {
     let cleared = bus.gather((0..count).map(Position), |bus, position| async move {
         let station = station_at(position);
@@ -327,7 +326,7 @@ async fn ask(bus: &Bus, position: Position, station: StationAddress, cache: &Sii
     let contents = match sii::read(bus, station, cache).await {
         Ok(contents) => contents,
         Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
-        // A broken EEPROM is a matter of its SubDevice alone.
+        // A broken EEPROM fails only its own SubDevice.
         Err(error) => {
             bus.report(Event::SiiOddity { position, what: error.to_string() });
             return Ok((SiiContents::unreadable(), None));
@@ -337,7 +336,7 @@ async fn ask(bus: &Bus, position: Position, station: StationAddress, cache: &Sii
     Ok((contents, identification))
 }
 
-/// Reads what one SubDevice is: SII, controller, ports, alias, receive times.
+/// Reads one SubDevice: SII, controller, ports, alias, receive times.
 pub(super) async fn read_one(
     bus: &Bus,
     position: Position,
@@ -361,7 +360,7 @@ async fn read_registers(bus: &Bus, position: Position, station: StationAddress) 
     let information = Information::decode(answered(&replies, station, registers, 0)?);
     let dl_status = DlStatus::decode(answered(&replies, station, registers, 1)?);
     let alias = u16::from_le_bytes(*answered(&replies, station, registers, 2)?);
-    // Without a clock it does not answer.
+    // A SubDevice without a clock does not increment the WKC.
     let receive_times = if information.features.dc {
         let times = DcReceiveTimes::decode(answered(&replies, station, registers, 3)?);
         Some(times.ports.map(|time| time.0))
@@ -371,7 +370,7 @@ async fn read_registers(bus: &Bus, position: Position, station: StationAddress) 
     Ok(Readout { position, station, alias, information, dl_status, receive_times })
 }
 
-/// One of several replies, which exactly one SubDevice must have given.
+/// One of several replies, which exactly one SubDevice must have processed.
 fn answered<const N: usize, const M: usize>(
     replies: &[Reply],
     station: StationAddress,
@@ -392,7 +391,7 @@ fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInf
             info.warnings.clear();
             (None, None, SiiProblem::Unreadable)
         }
-        // A blank one has no categories either.
+        // A blank EEPROM has no categories.
         _ if info.is_blank() => return info,
         ChainEnd::Sound { .. } if contents.categories.is_empty() => {
             (None, Some(SiiHeader::LEN), SiiProblem::NoCategories)

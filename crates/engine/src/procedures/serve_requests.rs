@@ -1,4 +1,4 @@
-//! Serving the requests of cyclic threads ([`crate::request`]).
+//! Serves the requests of cyclic threads ([`crate::request`]).
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -21,7 +21,7 @@ use crate::request::{Access, AcyclicSide, Order, RequestFailure, Subject};
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
-/// The requests that exist. A request whose other side is gone is forgotten.
+/// Open requests. A request whose handle was dropped is removed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Requests {
     all: Rc<RefCell<Vec<AcyclicSide>>>,
@@ -35,17 +35,17 @@ impl Requests {
         all.push(served);
     }
 
-    /// Rung by requests that are started or cancelled.
+    /// Signalled by requests that are started or cancelled.
     pub(crate) fn bell(&self) -> &Bell {
         &self.bell
     }
 
-    /// They are not served any more.
+    /// Ends the service of requests.
     pub(crate) fn end(&self) {
         self.all.borrow().iter().for_each(AcyclicSide::end);
     }
 
-    fn asked(&self) -> Vec<(AcyclicSide, Order)> {
+    fn ordered(&self) -> Vec<(AcyclicSide, Order)> {
         let mut all = self.all.borrow_mut();
         all.retain(|served| !served.is_abandoned());
         all.iter().filter_map(|served| Some((served.clone(), served.take()?))).collect()
@@ -56,7 +56,7 @@ impl Requests {
     }
 }
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: Requests) {
     let (cancelled, rung) = (bus.signal(), bus.signal());
     loop {
@@ -64,7 +64,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
         if requests.any_cancelled() {
             cancelled.notify();
         }
-        for (served, order) in requests.asked() {
+        for (served, order) in requests.ordered() {
             let station = segment.view().members.get(order.subdevice).map(|member| member.station);
             let member = station.zip(segment.mailbox(order.subdevice));
             match member {
@@ -78,7 +78,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
     }
 }
 
-/// What a request that has worked brought: data of a read, and what the data says it is about.
+/// Result of a successful request: data of a read, and the subject of the data.
 type Done = (Option<Vec<u8>>, Option<Subject>);
 
 async fn serve(
@@ -113,7 +113,7 @@ async fn execute(
     target: (StationAddress, Mailbox),
 ) -> Result<Done, RequestFailure> {
     let (station, mailbox) = target;
-    // The whole has a limit; no part of it needs a shorter one.
+    // The request as a whole has a limit; its parts need no shorter one.
     let limits = Limits::new(order.timeout, order.timeout);
     let read = match order.subject {
         Subject::Object { index, sub_index, complete_access } => {

@@ -1,5 +1,5 @@
-//! What can be asked of one SubDevice besides its mailbox (Master Redundancy 10.8): registers, ports, resets, error
-//! counters, its EEPROM.
+//! Services of one SubDevice besides its mailbox (Master Redundancy 10.8): registers, ports, resets, error counters,
+//! its EEPROM.
 
 pub mod ports;
 pub mod registers;
@@ -14,7 +14,7 @@ use super::sii::program::SiiProgramError;
 use crate::declared::{Address, SubDeviceId};
 use crate::supervisor::BusError;
 
-/// Why a service was not done.
+/// Why a service failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ServiceError {
@@ -34,35 +34,35 @@ pub enum ServiceError {
         /// Bytes.
         length: usize,
     },
-    /// There are ports 0 to 3.
+    /// Not a port: ports are 0 to 3.
     Port {
         /// The port.
         port: u8,
     },
-    /// It hangs on the main link itself: there is no port before it.
+    /// It is connected to the main link directly: there is no port before it.
     OnTheLink {
         /// The SubDevice.
         subdevice: SubDeviceId,
     },
-    /// Nothing is declared yet.
+    /// No declaration is active yet.
     NotActive,
-    /// The segment did not hold still for long enough.
+    /// The segment was not stable for long enough.
     Unsteady,
-    /// More than are taken at once.
+    /// More datagrams than allowed per call.
     TooMany {
-        /// How many.
+        /// Their number.
         got: usize,
-        /// At most.
+        /// The limit.
         limit: usize,
     },
-    /// An LRW of the application's own over process data of several SubDevices, with two links: a break would leave
-    /// half of them to each copy (protocol 9.2.2).
+    /// An LRW of the application over process data of several SubDevices, with two links: with a break each copy would
+    /// be processed by only some of them (protocol 9.2.2).
     LrwOnTwoLinks {
         /// Its logical address.
         logical: LogicalAddress,
         /// Its bytes.
         length: usize,
-        /// Two of those whose process data it covers, by their indices in the declaration.
+        /// Two SubDevices with process data in its range, by their indices in the declaration.
         subdevices: [SubDeviceId; 2],
     },
 }
@@ -75,10 +75,10 @@ impl fmt::Display for ServiceError {
             ServiceError::Sii(error) => error.fmt(f),
             ServiceError::Port { port } => write!(f, "there is no port {port}, only 0 to 3"),
             ServiceError::OnTheLink { subdevice } => {
-                write!(f, "SubDevice {subdevice} hangs on the main link: there is no port before it")
+                write!(f, "SubDevice {subdevice} is connected to the main link: there is no port before it")
             }
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
-            ServiceError::Unsteady => f.write_str("the segment changes all the time"),
+            ServiceError::Unsteady => f.write_str("the segment changes repeatedly"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
             ServiceError::LrwOnTwoLinks { logical, length, subdevices: [one, other] } => write!(
                 f,

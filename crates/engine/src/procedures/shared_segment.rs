@@ -1,5 +1,5 @@
-//! What all procedures of one MainDevice have at hand after activation: the model of the segment, to be looked at and
-//! to be told what was observed, and what belongs to the bus beside it.
+//! Shared data of all procedures of a MainDevice after activation: the model of the segment, which takes observations,
+//! and data beside the model that procedures need.
 
 use alloc::collections::VecDeque;
 use alloc::rc::Rc;
@@ -19,23 +19,23 @@ use crate::segment::{Observation, Segment, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
-/// The model and what goes with it, shared by all procedures.
+/// The model and its companions, shared by all procedures.
 #[derive(Clone, Debug)]
 pub struct SharedSegment {
     segment: Rc<RefCell<Segment>>,
     bus: Bus,
     /// Mailboxes by member, in use from PREOP on.
     mailboxes: Rc<[Mailbox]>,
-    /// Procedures that are to be started.
+    /// Procedures to be started.
     tasks: Rc<RefCell<VecDeque<Task>>>,
-    /// Something was observed that the cyclic half has not posted.
+    /// A new observation that was not posted by the cyclic half.
     news: Rc<Cell<bool>>,
     changed: Signal,
-    /// Disturbances that were wanted so far.
+    /// Disturbances requested so far.
     disturbances: Rc<Cell<u32>>,
     /// Number of the next temporary station address.
     next_temporary: Rc<Cell<u16>>,
-    /// Before then it is not tried how many datagrams a frame may hold.
+    /// Earliest time of the next test of how many datagrams a frame may hold.
     next_frame_trial: Rc<Cell<Instant>>,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
@@ -45,7 +45,7 @@ pub struct SharedSegment {
     pub statistics: ErrorStatistics,
 }
 
-/// What goes with the model.
+/// Data beside the model.
 #[derive(Debug)]
 pub struct Beside {
     /// By member.
@@ -76,14 +76,14 @@ impl SharedSegment {
         }
     }
 
-    /// A look at the model, between two points at which a procedure waits.
+    /// Borrows the model, between two points at which a procedure waits.
     pub fn view(&self) -> Ref<'_, Segment> {
         self.segment.borrow()
     }
 
-    /// Tells the model what was observed, and carries out what follows.
+    /// Passes an observation to the model, and executes its effects.
     pub fn observe(&self, seen: Observation<'_>) {
-        // Supervision need not wake for these.
+        // Supervision need not run for these.
         let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_));
         let effects = self.segment.borrow_mut().observe(seen, self.bus.now());
         for effect in effects.0 {
@@ -100,17 +100,17 @@ impl SharedSegment {
         self.changed.notify();
     }
 
-    /// Lets procedures check again what they wait for beside the model.
+    /// Makes waiting procedures check their conditions again, for changes outside the model.
     pub(super) fn notify(&self) {
         self.changed.notify();
     }
 
-    /// Hands an observation of clocks to the model.
+    /// Passes an observation of clocks to the model.
     pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
     }
 
-    /// What is posted, as the model wants it.
+    /// The posted words, in the form that the model takes.
     pub(super) fn words(&self) -> Words {
         Words {
             links: self.bus.links(),
@@ -121,14 +121,14 @@ impl SharedSegment {
         }
     }
 
-    /// Waits until the cyclic half has posted something else than this, something else was observed, or a point of
+    /// Waits until the cyclic half has posted words that differ from `seen`, until another observation, or until a
     /// time.
     pub(super) async fn until_news(&self, seen: Posted, until: Instant) {
         self.bus.until_posted(seen, until, &self.changed, || self.news.replace(false)).await;
     }
 
-    /// Waits until the cyclic half has posted something else than this, until a point of time, or until `ready`, which
-    /// is asked when something was observed or notified.
+    /// Waits until the cyclic half has posted words that differ from `seen`, until a time, or until `ready`, which is
+    /// evaluated after each observation or notification.
     pub(super) async fn until_posted(&self, seen: Posted, until: Instant, ready: impl FnMut() -> bool) {
         self.bus.until_posted(seen, until, &self.changed, ready).await;
     }
@@ -138,20 +138,20 @@ impl SharedSegment {
         self.changed.until(|| ready(&self.segment.borrow())).await
     }
 
-    /// The next procedure that is to be started.
+    /// The next procedure to be started.
     pub(super) async fn next_task(&self) -> Task {
         self.changed.until(|| self.tasks.borrow_mut().pop_front()).await
     }
 
-    /// Waits until no other disturbance is under way, and keeps others from beginning; `None` where that takes longer
-    /// than a limit. What is returned is to be dropped after everything has been undone.
+    /// Waits until no other disturbance is under way, and then blocks others; `None` if that takes longer than the
+    /// limit. The returned turn must be dropped after everything has been undone.
     pub(super) async fn disturb(&self, disturbance: Disturbance, limit: Duration) -> Option<Turn> {
         let turn = Turn::new(self, disturbance);
         let granted = self.until(|segment| segment.is_granted(turn.number).then_some(()));
         self.bus.within(limit, granted).await.is_ok().then_some(turn)
     }
 
-    /// The same without a limit, as long as the disturbance is needed; `None` where it is not needed any more.
+    /// The same without a limit, as long as the disturbance is needed; `None` if it is no longer needed.
     pub(super) async fn disturb_while(
         &self,
         disturbance: Disturbance,
@@ -180,19 +180,19 @@ impl SharedSegment {
         self.next_temporary.replace(self.next_temporary.get().wrapping_add(1))
     }
 
-    /// Before when it is not tried how many datagrams a frame may hold.
+    /// Earliest time of the next test of how many datagrams a frame may hold.
     pub(super) fn next_frame_trial(&self) -> Instant {
         self.next_frame_trial.get()
     }
 
-    /// It is not tried again before then.
+    /// Sets the earliest time of the next test.
     pub(super) fn set_next_frame_trial(&self, at: Instant) {
         self.next_frame_trial.set(at);
     }
 }
 
-/// The turn of a disturbance, or its place among those that wait. Its end is the end of the disturbance, also of a
-/// procedure that is given up.
+/// The turn of a disturbance, or its place in the queue. Dropping it ends the disturbance, also if its procedure is
+/// cancelled.
 #[derive(Debug)]
 pub(super) struct Turn {
     segment: SharedSegment,

@@ -1,7 +1,7 @@
-//! Reading the SII of a SubDevice through its controller (protocol 3.8, 4).
+//! Reads the SII of a SubDevice through its controller (protocol 3.8, 4).
 //!
-//! Only the words of the fixed area and the categories that the engine uses are read, and where another SubDevice with
-//! the same fixed area was read before, or is being read, only the category headers.
+//! Only the words of the fixed area and the categories that the engine uses are read. If another SubDevice with the
+//! same fixed area was read before, or is being read, only the category headers are read.
 
 mod cache;
 mod contents;
@@ -30,22 +30,22 @@ use crate::supervisor::{Bus, BusError};
 
 /// Categories of one SubDevice; real ones have about ten.
 const MAX_CATEGORIES: usize = 256;
-/// Words of the largest EEPROM that is followed: 64 KiB.
+/// Words of the largest supported EEPROM: 64 KiB.
 const MAX_WORDS: u32 = 0x8000;
-/// Where vendor, product, revision and serial number lie.
+/// First word of vendor, product, revision and serial number.
 const IDENTITY_WORD: u32 = 0x08;
-/// What an EEPROM gives that was never written, or that ends before.
+/// Value of an EEPROM that was never written, or behind its end.
 const ERASED: u8 = 0xFF;
 /// Words before the categories.
 const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
-/// What is read of the fixed area: all but reserved words (protocol 4.1). Words 0x20 to 0x23 are reserved too, but in
-/// many real images they differ where nothing else in the fixed area does, though the categories do: they are worth a
-/// read.
+/// Words of the fixed area that are read: all but reserved words (protocol 4.1). Words 0x20 to 0x23 are reserved too,
+/// but in many real images with otherwise equal fixed areas and different categories only these words differ, so they
+/// are read.
 const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
-/// Pause between two checks whether another procedure has read the same SII.
+/// Interval of the check whether another procedure has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
 
-/// Which categories the engine uses.
+/// Whether the engine uses a category.
 const fn is_needed(kind: CategoryKind) -> bool {
     matches!(
         kind,
@@ -90,7 +90,7 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
             }
             Found::BeingRead => bus.sleep(CACHE_PAUSE).await,
             Found::Contents(chain, contents) if own_chain.as_ref() == Some(&chain) => return Ok(contents),
-            // Another SubDevice than its fixed area says.
+            // The SubDevice has another identity than its fixed area.
             Found::Contents(..) | Found::Disputed => {
                 return categories(&mut eeprom, &area, true).await.map(|(_, contents)| contents);
             }
@@ -106,7 +106,7 @@ pub(super) async fn identity(bus: &Bus, station: StationAddress, cache: &SiiCach
     Ok(Identity { vendor_id: field(0), product_code: field(4), revision: field(8), serial: field(12) })
 }
 
-/// Follows the categories, and reads the data of those that are needed where `with_data` says so.
+/// Follows the chain of categories, and reads the data of needed ones if `with_data` is set.
 async fn categories(
     eeprom: &mut Eeprom,
     area: &FixedArea,
@@ -116,7 +116,7 @@ async fn categories(
     let mut contents =
         SiiContents { header, categories: Vec::new(), end: ChainEnd::Open { at: bytes_before(HEADER_WORDS) } };
     let mut chain = Vec::new();
-    // An EEPROM that says nothing about its size is followed as far as any goes.
+    // An EEPROM without a size is followed up to the largest size.
     let size = (contents.header.size_bytes() / 2) as u32;
     let mut end = size.clamp(HEADER_WORDS + 2, MAX_WORDS);
     let mut is_behind_size = false;
@@ -147,15 +147,15 @@ async fn categories(
         }
         word += words;
     }
-    // A chain that fills the EEPROM to its last word needs no end marker, but zeros are no chain.
+    // A chain that fills the EEPROM to its last word needs no end marker, but zeros are not a chain.
     let at = bytes_before(word);
     let is_zero = chain.last().is_some_and(|last: &CategoryHeader| last.kind == CategoryKind::Nop && last.words == 0);
     contents.end = if word == end && !is_zero { ChainEnd::Sound { at } } else { ChainEnd::Open { at } };
     Ok((chain, contents))
 }
 
-/// Whether the last words before this one are written, though the size word says that the EEPROM ends earlier. Other
-/// MainDevices (IgH, SOEM) do not look at the size word at all.
+/// Whether the last words before this one are written, though the size word contains a smaller size. Other MainDevices
+/// (IgH, SOEM) ignore the size word.
 async fn goes_on(eeprom: &mut Eeprom, end: u32, behind: u32) -> Result<bool, SiiReadError> {
     let first = end.max(behind.saturating_sub(2));
     Ok(behind <= MAX_WORDS && eeprom.bytes(first, behind - first, None).await?.iter().any(|byte| *byte != ERASED))
@@ -168,16 +168,16 @@ const fn bytes_before(word: u32) -> usize {
 
 /// Written to `SII_CONFIGURATION`: takes the EEPROM from the PDI.
 pub(super) const FORCE: [u8; 1] = [0x02];
-/// Written to `SII_CONFIGURATION`: the EEPROM is EtherCAT's.
+/// Written to `SII_CONFIGURATION`: assigns the EEPROM to EtherCAT.
 pub(super) const ETHERCAT: [u8; 1] = [0x00];
 
-/// Takes the EEPROM of one SubDevice away from its PDI (protocol 5.6).
+/// Takes the EEPROM of one SubDevice from its PDI (protocol 5.6).
 pub(super) async fn claim(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     bus.fpwr(station, map::SII_CONFIGURATION, &FORCE).await?;
     bus.fpwr(station, map::SII_CONFIGURATION, &ETHERCAT).await
 }
 
-/// Gives the EEPROM of a SubDevice to its PDI, or takes it back.
+/// Assigns the EEPROM of a SubDevice to its PDI, or back to EtherCAT.
 pub(super) async fn assign(bus: &Bus, station: StationAddress, to_pdi: bool) -> Result<(), BusError> {
     let target = Target::Station(station, map::SII_CONFIGURATION);
     bus.transfer(Command::Fpwr, target, alloc::vec![u8::from(to_pdi)], None).await.map(drop)

@@ -1,10 +1,10 @@
-//! Taking all SubDevices down to a state: the end of an orderly stop (protocol 5.3).
+//! Brings all SubDevices down to a state: the end of an orderly stop (protocol 5.3).
 //!
-//! Each is led by itself. What one broadcast asks for, some may not do: a SubDevice that was not declared is in INIT
-//! and has no mailbox for PREOP, one may have another target state, one that copies AL control into AL status takes an
-//! acknowledgement for an error; and of all AL states together frames bring back the OR. INIT is the exception, because
-//! all states lead there: a broadcast asks for it first, so that all leave OP at once and those without a known
-//! address, too.
+//! Each SubDevice gets its own request. A broadcast is not possible for all of them: an undeclared SubDevice is in INIT
+//! and has no mailbox for PREOP, a SubDevice may have another target state, a device that copies AL control into AL
+//! status would show the acknowledgement as an error; and a broadcast read returns only the OR of all AL states. INIT
+//! is the exception, because every state may change to it: a broadcast requests it first, so that all leave OP at once,
+//! including SubDevices without a known address.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -19,16 +19,18 @@ use crate::segment::Segment;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
-/// Pause between two looks at AL status.
+/// Interval of reads of AL status.
 const PAUSE: Duration = Duration::from_millis(1);
-/// A SubDevice that is silent so many times in a row is not there: at the edge of a cut a copy may have met none.
-const SILENT_LOOKS: u8 = 3;
-/// Pause between two of them: ends of a cable may notice late that it is cut.
+/// Consecutive reads without an answer after which a SubDevice is absent: at the moment of a cut a copy may have been
+/// processed by none.
+const SILENT_READS: u8 = 3;
+/// Pause between two of these reads: the ends of a cable may detect late that it is cut.
 const SILENT_PAUSE: Duration = Duration::from_millis(10);
-/// From a request until one that shows an error is asked again: applications take milliseconds to clear it.
+/// Time from a request until it is repeated if the SubDevice shows an error: applications take milliseconds to clear
+/// it.
 const ASKED_AGAIN: Duration = Duration::from_millis(20);
 
-/// Why not all SubDevices are known to be in the state.
+/// Why not all SubDevices are confirmed in the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopError {
@@ -36,21 +38,21 @@ pub enum StopError {
     Bus(BusError),
     /// No SubDevice answers any more.
     NoAnswer,
-    /// Some did not get there in time.
+    /// Some did not reach the state in time.
     NotReached {
-        /// Index in the declaration of the first of them; `None` for one that was not declared.
+        /// Index in the declaration of the first of them; `None` if it was not declared.
         subdevice: Option<usize>,
         /// Its station address.
         station: StationAddress,
-        /// What was asked for.
+        /// The requested state.
         requested: AlState,
         /// Its AL status at the end.
         status: AlStatus,
-        /// The last reason that it gave; 0 where it gave none.
+        /// The last AL status code; 0 if there was none.
         code: AlStatusCode,
-        /// How long was waited.
+        /// The time limit.
         limit: Duration,
-        /// How many more did not get there.
+        /// Number of other SubDevices that did not reach the state.
         others: usize,
     },
 }
@@ -91,25 +93,25 @@ impl From<BusError> for StopError {
     }
 }
 
-/// A SubDevice to be led: its index in the declaration, if it was declared, and its station address.
-pub(crate) type Led = (Option<usize>, StationAddress);
+/// A SubDevice to be stopped: its index in the declaration, if it was declared, and its station address.
+pub(crate) type ToStop = (Option<usize>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
-pub(crate) fn all_known(segment: &Segment) -> Vec<Led> {
+pub(crate) fn all_known(segment: &Segment) -> Vec<ToStop> {
     let members = segment.members.iter().enumerate().map(|(index, member)| (Some(index), member.station));
     members.chain(segment.unassigned.iter().map(|it| (None, it.station))).collect()
 }
 
-/// Takes SubDevices to a state that lies below the one they are in. Those that are in a lower one stay there, and so do
-/// those in BOOT, unless INIT is asked for. Where none is known, only INIT is asked for, of all at once.
-pub(crate) async fn stop(bus: &Bus, led: Vec<Led>, state: AlState, limit: Duration) -> Result<(), StopError> {
+/// Brings SubDevices to a state below their present one. SubDevices in a lower state stay there, and so do those in
+/// BOOT unless INIT is requested. If no address is known, only INIT is requested, by broadcast.
+pub(crate) async fn stop(bus: &Bus, to_stop: Vec<ToStop>, state: AlState, limit: Duration) -> Result<(), StopError> {
     let until = bus.now() + limit;
     if state == AlState::Init {
         bus.bwr(map::AL_CONTROL, &AlControl::with_acknowledge(state).encode()).await?;
     }
-    let stations = led.iter().map(|(_, station)| *station);
-    let ends = bus.gather(stations, |bus, station| async move { lead(&bus, station, state, until).await }).await;
-    let mut late = led.iter().zip(&ends).filter_map(|((subdevice, station), end)| match end {
+    let stations = to_stop.iter().map(|(_, station)| *station);
+    let ends = bus.gather(stations, |bus, station| async move { bring_down(&bus, station, state, until).await }).await;
+    let mut late = to_stop.iter().zip(&ends).filter_map(|((subdevice, station), end)| match end {
         End::Late(status, code) => Some((*subdevice, *station, *status, *code)),
         End::There | End::Silent | End::Failed(_) => None,
     });
@@ -127,20 +129,20 @@ pub(crate) async fn stop(bus: &Bus, led: Vec<Led>, state: AlState, limit: Durati
     Ok(())
 }
 
-/// What came of leading one SubDevice.
+/// Result for one SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     There,
     /// It does not answer.
     Silent,
-    /// It was not there at the end of the time; the last reason that it gave.
+    /// It was not in the state at the limit; its last AL status and code.
     Late(AlStatus, AlStatusCode),
     /// Its frames were lost.
     Failed(BusError),
 }
 
-/// Leads one SubDevice down, and clears its error.
-async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant) -> End {
+/// Brings one SubDevice down, and clears its error.
+async fn bring_down(bus: &Bus, station: StationAddress, state: AlState, until: Instant) -> End {
     let (mut silent, mut next, mut reason) = (0, None, AlStatusCode(0));
     loop {
         match read_status(bus, station).await {
@@ -163,7 +165,7 @@ async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant
             }
             Err(BusError::Wkc { got: Wkc(0), .. }) => {
                 silent += 1;
-                if silent >= SILENT_LOOKS {
+                if silent >= SILENT_READS {
                     return End::Silent;
                 }
                 bus.sleep(SILENT_PAUSE).await;
@@ -174,7 +176,7 @@ async fn lead(bus: &Bus, station: StationAddress, state: AlState, until: Instant
     }
 }
 
-/// Whether a SubDevice need not be asked for a state any more.
+/// Whether a SubDevice needs no further request.
 fn is_down(status: AlStatus, state: AlState) -> bool {
     let rank = |state: AlState| match state {
         AlState::Init => Some(0),

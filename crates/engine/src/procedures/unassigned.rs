@@ -1,7 +1,7 @@
-//! SubDevices that answer but have no station address of ours: found, read, and given the address of the declared
-//! SubDevice that they are, as the model tells (`segment::unassigned`).
+//! SubDevices that answer but have no assigned station address: they are found, read, and get the address of the
+//! declared SubDevice that the model identifies (`segment::unassigned`).
 //!
-//! Each is read by a procedure of its own, so that one whose EEPROM is slow or broken keeps no other waiting.
+//! Each is read by its own procedure, so that a slow or broken EEPROM delays no other SubDevice.
 
 mod address;
 mod doubles;
@@ -35,35 +35,35 @@ use crate::segment::member::Phase;
 use crate::segment::unassigned::{Knowledge, Matches, UnassignedSubDevice};
 use crate::supervisor::{Bus, BusError};
 
-/// Pause before an SII that could not be read is read again; it doubles with every failure.
+/// Pause before a failed read of an SII is repeated; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Searches without success in a row before that is reported.
+/// Consecutive failed searches before an event reports them.
 const PATIENCE: u32 = 100;
-/// Searches without success in a row before it is tried whether frames hold too many datagrams.
+/// Consecutive failed searches before it is tested whether frames hold too many datagrams.
 const DOUBT: u32 = 3;
-/// So long a search may wait for the end of another disturbance; then it is tried again.
+/// Maximum wait of a search for the end of another disturbance; then it is repeated.
 const LIMIT: Duration = Duration::from_millis(20);
-/// Failures of the bus in a row before they are reported.
+/// Consecutive failures of the bus before an event reports them.
 const BUS_PATIENCE: u32 = 3;
 
-/// The search for SubDevices without a station address of ours.
+/// The search for SubDevices without an assigned station address.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
-    /// Without success, in a row.
+    /// Consecutive failures.
     failures: Rc<Cell<u32>>,
 }
 
 impl Search {
-    /// Finds SubDevices without a known station address, gives them one and has them read. True where none is left that
-    /// is not known.
+    /// Finds SubDevices without a known station address, assigns one to each and has them read. True if all SubDevices
+    /// are known.
     pub(super) async fn run(&self, bus: &Bus, segment: &SharedSegment) -> bool {
         let Some(turn) = segment.disturb(Disturbance::Readdress, LIMIT).await else { return false };
         let found = find(bus, segment).await;
         drop(turn);
         let (complete, reason) = match found {
-            Ok(complete) => (complete, "SubDevices answer that cannot be told apart".into()),
+            Ok(complete) => (complete, "SubDevices answer that cannot be distinguished".into()),
             Err(error) => (false, error.to_string()),
         };
         if complete {
@@ -82,7 +82,7 @@ impl Search {
     }
 }
 
-/// True where none is left that is not known.
+/// True if all SubDevices are known.
 async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
     let Some(before) = view(bus).await? else { return Ok(false) };
     let old = segment.view().unknown(&before);
@@ -90,7 +90,7 @@ async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
         segment.observe(Observation::Places(&before));
         return Ok(true);
     }
-    // One that is given another address is read anew.
+    // A SubDevice with a new address is read again.
     segment.observe(Observation::Readdressing(&old));
     let (given, complete) = give(bus, segment, &before, &old).await?;
     let Some(mut after) = view(bus).await? else { return Ok(false) };
@@ -102,7 +102,7 @@ async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
     Ok(complete && is_known)
 }
 
-/// Reads one, again and again until it works or it is unassigned no longer.
+/// Reads a SubDevice, repeatedly until it succeeds or the SubDevice is no longer unassigned.
 pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: StationAddress) {
     let mut pause = FIRST_PAUSE;
     let mut bus_failures = 0;
@@ -119,8 +119,8 @@ pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: S
         bus_failures = if failed_on_bus { bus_failures + 1 } else { 0 };
         let is_patient = failed_on_bus && bus_failures < BUS_PATIENCE;
         let is_read = result.is_ok();
-        let told = |error: ScanError| (!is_patient).then(|| error.to_string());
-        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(told) });
+        let reason = |error: ScanError| (!is_patient).then(|| error.to_string());
+        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(reason) });
         if is_read {
             return;
         }
@@ -135,13 +135,14 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) 
     read_one(bus, position.unwrap_or_default(), station, &segment.cache).await
 }
 
-/// Gives those that are absent members their addresses, and has the others told. To be called when it is known of all
-/// members whether they are there: one that is absent, but not known to be, may be the one that another SubDevice is.
+/// Assigns their addresses to those that are absent members, and reports the others. To be called when it is known of
+/// all members whether they are present: otherwise an unassigned SubDevice might be taken for another member of the
+/// same type.
 ///
-/// False where it could not be found out where they are.
+/// False if their positions could not be determined.
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
-    let Some(told) = find_places(bus, segment).await else { return false };
-    let Matches { matched, held } = segment.view().match_all(&told, bus.now());
+    let Some(identified) = find_places(bus, segment).await else { return false };
+    let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
     for (station, index) in held {
         segment.observe(Observation::Held { station, index });
     }
@@ -155,9 +156,9 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
     true
 }
 
-/// Looks again where they are, if a member is missed: since they were found the ring may have opened somewhere else,
-/// and of several alike it is the place that tells them apart. Gives back which members cables tell; `None` where the
-/// segment changes.
+/// Determines the positions again if a member is missing: the ring may have opened at another place since, and
+/// SubDevices of the same type are distinguished by position only. Returns the members identified by cables; `None`
+/// while the segment changes.
 async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
     let is_one_missed = {
         let view = segment.view();
@@ -167,20 +168,20 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
         return Some(Vec::new());
     }
     let seen = view(bus).await.ok()??;
-    // One that has come since may be the first of several alike.
+    // A SubDevice that was added since may be the first of several of the same type.
     if !segment.view().unknown(&seen).is_empty() {
         return None;
     }
     segment.observe(Observation::Places(&seen));
-    if !segment.view().asks_for_cables() {
+    if !segment.view().needs_cables() {
         return Some(Vec::new());
     }
     let ports = ports_of(bus, &seen).await.ok()??;
-    let told = segment.view().told_by_cables(&seen, &ports);
-    Some(told)
+    let identified = segment.view().identified_by_cables(&seen, &ports);
+    Some(identified)
 }
 
-/// Makes one the member that it is, unless its address cannot be written now.
+/// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.
 async fn admit(
     bus: &Bus,
     segment: &SharedSegment,
@@ -195,7 +196,7 @@ async fn admit(
         Err(reason) => return segment.observe(Observation::Misfit { station, index, reason }),
     };
     let written = bus.fpwr(station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;
-    // The reply to the first try may have been lost, and then the old address answers no more.
+    // The reply to the first attempt may be lost; then the old address no longer answers.
     if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return;
     }

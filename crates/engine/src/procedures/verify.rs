@@ -1,8 +1,8 @@
-//! Looking from time to time whether SubDevices in their target state still have the registers that were written to
-//! them: SyncManagers, FMMUs, watchdog.
+//! Checks once a second whether SubDevices in their target state still hold the registers that were written to them:
+//! SyncManagers, FMMUs, watchdog.
 //!
-//! A SubDevice without them stays in OP and answers everything, only its process data or its mails are missing. That
-//! happens when a copy of a write that was thought lost arrives late, behind later ones, or when something else writes.
+//! A SubDevice without them stays in OP and answers everything; only its process data or its mails are missing. Causes
+//! are a duplicate of a write that arrives late, after later writes, or writes of other software.
 
 mod held;
 
@@ -19,13 +19,13 @@ use crate::segment::Observation;
 use crate::segment::member::Phase;
 use crate::supervisor::Bus;
 
-/// Pause between two looks: up to three datagrams per SubDevice and second.
+/// Interval of the checks: up to three datagrams per SubDevice and second.
 const PAUSE: Duration = Duration::from_secs(1);
-/// So often in a row a SubDevice is configured anew for the same reason; one that holds something else each time does
-/// so by itself.
+/// Consecutive repetitions of a SubDevice's configuration for the same difference. If the difference changes each time,
+/// the count restarts.
 const ATTEMPTS: u8 = 3;
 
-/// A SubDevice to be looked at.
+/// A SubDevice to be checked.
 struct Suspect {
     index: usize,
     attempt: u32,
@@ -33,27 +33,27 @@ struct Suspect {
     registers: Vec<Held>,
 }
 
-/// What a look found.
+/// Result of a check.
 enum Found {
-    /// It holds what was written.
+    /// It holds the written values.
     Right(usize),
-    /// It does not; what differs.
+    /// It does not; the difference.
     Wrong(Suspect, String),
 }
 
-/// What a SubDevice held when it was configured anew last, and how often that has not helped.
+/// The difference at the last repeated configuration of a SubDevice, and the number of repetitions without success.
 #[derive(Clone, Debug, Default)]
 struct Remedy {
     reason: String,
     tries: u8,
 }
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
     let mut remedies = alloc::vec![Remedy::default(); segment.view().members.len()];
     loop {
         bus.sleep(PAUSE).await;
-        let all = bus.gather_in_turns(settled(&segment), look).await;
+        let all = bus.gather_in_turns(settled(&segment), check).await;
         let mut wrong = Vec::new();
         for found in all.into_iter().flatten() {
             match found {
@@ -61,8 +61,8 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
                 Found::Wrong(suspect, _) => wrong.push(suspect),
             }
         }
-        // Once may be the edge of a change.
-        for found in bus.gather(wrong, look).await.into_iter().flatten() {
+        // A single difference may be due to a change under way.
+        for found in bus.gather(wrong, check).await.into_iter().flatten() {
             if let Found::Wrong(suspect, reason) = found {
                 let remedy = &mut remedies[suspect.index];
                 if remedy.reason != reason {
@@ -78,7 +78,7 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// Members that are where they should be, with what was written to them for that.
+/// Members in their target state, with the registers written for it.
 fn settled(segment: &SharedSegment) -> Vec<Suspect> {
     let access = segment.view();
     let members = access.members.iter().enumerate();
@@ -92,14 +92,14 @@ fn settled(segment: &SharedSegment) -> Vec<Suspect> {
         .collect()
 }
 
-/// `None` where it does not answer, which others look after.
-async fn look(bus: Bus, suspect: Suspect) -> Option<Found> {
+/// `None` if it does not answer, which the supervision handles.
+async fn check(bus: Bus, suspect: Suspect) -> Option<Found> {
     let mut wrong = None;
     for held in &suspect.registers {
         let got = bus.fprd(suspect.station, held.register, held.bytes.len()).await.ok()?;
         if !held.is_in(&got) {
             wrong.get_or_insert_with(|| {
-                format!("{} were written, something else is there: {}", held.name(), held.differences(&got))
+                format!("{} were written, but other values were read: {}", held.name(), held.differences(&got))
             });
         }
     }

@@ -36,7 +36,7 @@ pub(crate) async fn visit(
     }
     request(AlState::Op, AlState::Init).await?;
     sii::claim(bus, station).await?;
-    // Place and length of one that is switched on cannot be changed.
+    // Start address and length of an enabled SyncManager cannot be changed.
     let sync_managers = vec![0; SyncManager::LEN * usize::from(info.controller.sync_manager_count)];
     bus.fpwr(station, map::SYNC_MANAGER_BASE, &sync_managers).await?;
     let layout = match state {
@@ -53,7 +53,7 @@ pub(crate) async fn visit(
     }
     sii::assign(bus, station, true).await?;
     let result = request(AlState::Init, state).await;
-    // A boot loader may need it for as long as it runs.
+    // A boot loader may need the EEPROM as long as it runs.
     if state != AlState::Boot || result.is_err() {
         sii::claim(bus, station).await?;
     }

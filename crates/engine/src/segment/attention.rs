@@ -1,5 +1,5 @@
-//! When all SubDevices are looked at: as soon as something that is posted differs from what it was at the last look,
-//! when something else calls for it, and once a second.
+//! Decides when all SubDevices are scanned: as soon as posted words differ from those of the last scan, on request, and
+//! once a second.
 
 use core::time::Duration;
 
@@ -14,51 +14,53 @@ use crate::time::Instant;
 
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_micros(500);
-/// All SubDevices are looked at so often even if nothing changed: an OR can hide one state behind others.
+/// Interval of scans without a change: an OR can hide one state behind others.
 const ROUTINE: Duration = Duration::from_secs(1);
-/// A supervision result that so many came before since a round ended was not out when a SubDevice was looked at.
+/// A supervision result with a number this much higher than that at the end of a round was certainly sent after the
+/// round's reads.
 const SURELY_LATER: u32 = 8;
-/// Rounds in a row because of a request that stands.
+/// Consecutive rounds because of an ECAT event request that stays set.
 const MOST_MISSED: u8 = 3;
 
-/// What the last round has brought.
+/// Result of the last round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Round {
-    /// It is known of all members whether they are there.
+    /// It is known of all members whether they are present.
     pub is_certain: bool,
-    /// More SubDevices are counted than have answered, and all were asked: unknown ones are to be found first.
+    /// More SubDevices are counted than have answered, and all were read: unknown SubDevices have to be found first.
     pub finds_others: bool,
-    /// No others are missing: those without a declaration may be told apart.
+    /// No others are missing: those without a declaration can be identified.
     pub is_complete: bool,
-    /// Looks do not come back though process data does, or the other way round, and that is worth a trial.
+    /// Scans do not return though process data does, or the reverse, often enough for a test of the frame limit.
     pub is_blind: bool,
-    /// It counts: no SubDevice was out of reach on purpose, and something was counted.
+    /// The round is valid: no SubDevice was out of reach on purpose, and a count was available.
     pub counts: bool,
 }
 
-/// What calls for a round.
+/// Triggers of a round.
 #[derive(Debug)]
 pub(super) struct Attention {
-    /// What was posted when the last round began.
+    /// The words posted when the last round began.
     seen: Supervision,
     ring: RingWord,
-    /// The state of the ring that had been told by then.
+    /// The state of the ring reported by then.
     reported: RingState,
-    /// Number of the result at the end of the last round, and rounds since only because of what had been missed.
+    /// Number of the result at the end of the last round, and the number of rounds since then that were started only
+    /// because of missed requests.
     checked: u32,
     missed: u8,
-    /// Something else calls for a round.
+    /// Another trigger requests a round.
     is_wanted: bool,
     is_awaited: bool,
     next_routine: Instant,
-    /// Not before then.
+    /// Earliest time of the next round.
     earliest: Instant,
-    is_looking: bool,
-    /// What the last round has brought.
+    is_scanning: bool,
+    /// Result of the last round.
     pub round: Round,
-    /// Rounds in a row in which looks were lost though frames came back, or the other way round.
+    /// Consecutive rounds in which scans were lost though frames returned, or the reverse.
     pub blind: u8,
-    /// When to look at what is posted though nothing else is posted.
+    /// Time of the next evaluation if no words are posted before.
     pub wake: Instant,
 }
 
@@ -74,7 +76,7 @@ impl Default for Attention {
             is_awaited: false,
             next_routine: Instant::default(),
             earliest: Instant::default(),
-            is_looking: false,
+            is_scanning: false,
             round: Round::default(),
             blind: 0,
             wake: Instant::default(),
@@ -83,7 +85,7 @@ impl Default for Attention {
 }
 
 impl Attention {
-    /// Something is not as it was when the last round began.
+    /// A word differs from its value at the start of the last round.
     pub fn has_changed(&self, words: &Words, reported: RingState) -> bool {
         words.supervision.is_some_and(|(_, supervision)| supervision != self.seen)
             || words.ring != self.ring
@@ -91,15 +93,15 @@ impl Attention {
             || self.is_wanted
     }
 
-    /// Ports have changed again right behind a look that took their request for attention away: it stands, as before
-    /// the look. `None` where that cannot be.
+    /// Ports have changed again directly after a scan that cleared their ECAT event: the event is set again, as before
+    /// the scan. `None` if that is impossible.
     fn has_missed(&mut self, words: &Words) -> Option<bool> {
         let (number, supervision) = words.supervision?;
         if !EcatEvent::from_bits(supervision.irq).dl_status {
             self.missed = 0;
             return None;
         }
-        // Requests of those that are not looked at stand for ever.
+        // Events of SubDevices that are not scanned stay set for ever.
         if self.missed >= MOST_MISSED {
             return None;
         }
@@ -108,7 +110,7 @@ impl Attention {
         Some(is_missed)
     }
 
-    /// Starts a round where one is called for. Returns when to look again though nothing else is posted.
+    /// Starts a round if it is requested. Returns the time of the next evaluation if no words are posted before.
     pub fn observe(
         &mut self,
         words: &Words,
@@ -117,8 +119,9 @@ impl Attention {
         now: Instant,
         effects: &mut Effects,
     ) -> Instant {
-        // Silence tells nothing while SubDevices are out of reach on purpose; the end of that is an observation.
-        if self.is_looking || disturbance == Some(Disturbance::IsolateRings) {
+        // A missing answer has no meaning while SubDevices are out of reach on purpose; the end of this state is an
+        // observation.
+        if self.is_scanning || disturbance == Some(Disturbance::IsolateRings) {
             return Instant::NEVER;
         }
         if now < self.earliest {
@@ -129,8 +132,8 @@ impl Attention {
         if !changed && now < self.next_routine {
             return if missed.is_some() { self.next_routine.min(now + PAUSE) } else { self.next_routine };
         }
-        effects.start(Task::Look { routine: !changed && !self.is_awaited });
-        (self.is_looking, self.is_awaited, self.is_wanted) = (true, false, false);
+        effects.start(Task::Scan { routine: !changed && !self.is_awaited });
+        (self.is_scanning, self.is_awaited, self.is_wanted) = (true, false, false);
         self.seen = words.supervision.map_or(self.seen, |(_, supervision)| supervision);
         self.ring = words.ring;
         self.reported = reported;
@@ -143,20 +146,20 @@ impl Attention {
         self.reported
     }
 
-    /// A round is called for.
+    /// Requests a round.
     pub fn want(&mut self) {
         self.is_wanted = true;
     }
 
-    /// The next round comes after a pause at the latest.
+    /// Requests a round after a pause at the latest.
     pub fn again_in(&mut self, pause: Duration, now: Instant) {
         self.is_awaited = true;
         self.next_routine = self.next_routine.min(now + pause);
     }
 
-    /// A round has ended, when results had this number.
+    /// A round has ended; `number` is the latest result's.
     pub fn end(&mut self, number: Option<u32>, now: Instant) {
-        self.is_looking = false;
+        self.is_scanning = false;
         self.checked = number.unwrap_or(0);
         self.earliest = now + PAUSE;
     }

@@ -1,4 +1,4 @@
-//! Where the ring is broken, as the ports of SubDevices tell it.
+//! Places of breaks of the ring according to the ports of SubDevices.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,16 +12,16 @@ use crate::topology::{PortOf, Topology, ends_of_earlier_break};
 /// Breaks as reported.
 #[derive(Debug, Default)]
 pub(super) struct Breaks {
-    /// The state of the ring when it was looked at last.
+    /// The state of the ring at the last evaluation.
     pub state: RingState,
-    /// Looks for a place that are left.
-    pub looks: u8,
+    /// Remaining scans for a place.
+    pub readings: u8,
     /// Broken cables of the open ring that were reported.
-    pub told: Vec<Cable>,
+    pub reported: Vec<Cable>,
 }
 
-/// The cables of the ring that no longer have communication, in its order. Branches are none of it: what is behind one
-/// is reported as lost. `dl_status` by position.
+/// The cables of the ring that no longer have communication, in its order. Branches are excluded: SubDevices behind a
+/// broken branch are reported as lost. `dl_status` by position.
 pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>]) -> Vec<Cable> {
     let Some(first) = topology.nodes.first() else { return Vec::new() };
     let trunk = trunk(topology);
@@ -30,7 +30,7 @@ pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>])
     let inner = inner.filter_map(|node| topology.connection_to(node));
     let inner = inner.map(|it| Cable { near: Some(it.near), far: Some(it.far) });
     let last = topology.open_ports.iter().map(|at| Cable { near: Some(*at), far: None });
-    // One end is enough: the other may have no power.
+    // One end is sufficient: the SubDevice at the other may have no power.
     let all = core::iter::once(first).chain(inner).chain(last);
     let mut broken: Vec<Cable> = all.filter(|cable| is_broken(dl_status, cable) == Some(true)).collect();
     if broken.is_empty() {
@@ -39,13 +39,13 @@ pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>])
     broken
 }
 
-/// Whether a cable has no communication at one of its ends, as far as that is known.
+/// Whether a cable has no communication at one of its ends, as far as known.
 pub(super) fn is_broken(dl_status: &[Option<DlStatus>], cable: &Cable) -> Option<bool> {
     let ends = [cable.near, cable.far].into_iter().flatten().filter_map(|at| communicates(dl_status, at));
     ends.reduce(|one, other| one && other).map(|communicates| !communicates)
 }
 
-/// SubDevices on the way between the interfaces, by position; all where that way is not known.
+/// SubDevices on the path between the interfaces, by position; all if that path is not known.
 fn trunk(topology: &Topology) -> Vec<bool> {
     let mut trunk = vec![false; topology.nodes.len()];
     let mut follow = |end: Option<usize>| {
@@ -65,7 +65,7 @@ fn trunk(topology: &Topology) -> Vec<bool> {
     trunk
 }
 
-/// Whether a port has communication, where that is known.
+/// Whether a port has communication, if known.
 fn communicates(dl_status: &[Option<DlStatus>], at: PortOf) -> Option<bool> {
     let status = dl_status.get(at.node).copied().flatten()?;
     Some(status.ports[usize::from(at.port & 3)].communication)

@@ -1,4 +1,4 @@
-//! How SubDevices are connected, as it was found last.
+//! Connections of the SubDevices according to the last scan or rescan.
 
 use alloc::vec::Vec;
 
@@ -8,26 +8,26 @@ use super::member::Member;
 use crate::ring_status::{Cable, CableErrors};
 use crate::topology::Topology;
 
-/// A port, by the SubDevice that has it.
+/// A port, with the station address of its SubDevice.
 pub type End = (StationAddress, u8);
 
-/// Connections, and what is known of the cables.
+/// Connections, and data of the cables.
 #[derive(Clone, Debug)]
 pub struct Cabling {
-    /// Connections as the scan found them, or a rescan after it.
+    /// Connections according to the scan or a later rescan.
     pub topology: Topology,
-    /// Station addresses by position, as found together with these.
+    /// Station addresses by position, found at the same time.
     pub stations: Vec<StationAddress>,
-    /// All cables with what their ends have counted.
+    /// All cables with the error counts of their ends.
     pub cables: Vec<(Cable, CableErrors)>,
-    /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's
-    /// first: also those whose SubDevices are not all there.
+    /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's end
+    /// first: also rings with absent SubDevices.
     pub closings: Vec<[End; 2]>,
-    /// How often other cables, or other SubDevices at their ends, were found since the scan.
+    /// Increased with each change of cables, or of the SubDevices at their ends, since the scan.
     pub version: u32,
 }
 
-/// Station addresses by position: those of members, and at other places what was found there.
+/// Station addresses by position: those of members, and at other positions those of the scan.
 pub fn stations_by_position(members: &[Member], found: impl Iterator<Item = StationAddress>) -> Vec<StationAddress> {
     let mut stations: Vec<StationAddress> = found.collect();
     for member in members {

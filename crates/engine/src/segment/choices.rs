@@ -1,11 +1,11 @@
-//! What is chosen at activation.
+//! Settings at activation.
 
 use crate::junction::JunctionMode;
 
-/// What is chosen at activation.
+/// Settings at activation.
 #[derive(Clone, Copy, Debug)]
 pub struct Choices {
-    /// The redundant link is taken down for a moment where a closed ring has crossed lines (LC-03).
+    /// The redundant link is taken down for a moment if a closed ring has crossed lines (LC-03).
     pub enhanced_line_crossed: bool,
     /// Rings behind junctions.
     pub junctions: JunctionMode,

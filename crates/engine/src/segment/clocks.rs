@@ -1,5 +1,5 @@
-//! What is known of the clocks of a segment (protocol 7): where they are, what was measured and written, which are the
-//! references, how far the others are from them. What follows from observations is in [`super::rules`].
+//! Data of the clocks of a segment (protocol 7): positions, measured and written values, the references, the
+//! differences. The effects of observations are in [`super::rules`].
 
 mod life;
 mod measured;

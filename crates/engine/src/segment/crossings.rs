@@ -11,15 +11,15 @@ use super::member::Member;
 use crate::junction::JunctionMode;
 use crate::topology::{Finding, Topology};
 
-/// Bits of DL_STATUS that are about ports.
+/// Bits of DL_STATUS that show ports.
 pub const PORT_BITS: u16 = 0xFFF0;
 
 /// A SubDevice that frames enter at another port than 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crossing {
-    /// Its station address, and its position now; `None` where only the ring shows that there is one.
+    /// Its station address, and its present position; `None` if the ring shows only that there is a crossing.
     pub subdevice: Option<(StationAddress, Position)>,
-    /// The port of entry, where known.
+    /// The port of entry, if known.
     pub entry_port: Option<u8>,
 }
 
@@ -29,28 +29,30 @@ impl Crossing {
     }
 }
 
-/// What a look at the segment shows of crossed lines.
+/// Result of a scan for crossed lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LineCheck {
-    /// SubDevices that are crossed.
+    /// Crossed SubDevices.
     pub crossings: Vec<Crossing>,
-    /// All of a ring are: its interfaces are swapped.
+    /// All SubDevices of a ring are crossed: its interfaces are swapped.
     pub swapped: bool,
-    /// Others that were looked at and are not crossed; empty where the ring was closed, which shows that of none.
+    /// SubDevices known not to be crossed; empty if the ring was closed, which does not show this.
     pub straight: Vec<StationAddress>,
-    /// Rings behind junctions that are whole and not known.
+    /// Rings behind junctions that are whole and unknown.
     pub unknown_rings: usize,
 }
 
 impl LineCheck {
-    /// Whether it adds nothing to what was reported of a segment and takes nothing back.
-    pub fn says_the_same_as(&self, told: &LineCheck) -> bool {
+    /// Whether it neither adds to the reported result nor withdraws from it.
+    pub fn adds_nothing_to(&self, reported: &LineCheck) -> bool {
         let crossed = |check: &LineCheck| check.crossings.iter().map(Crossing::station).collect::<BTreeSet<_>>();
-        crossed(self) == crossed(told) && self.swapped == told.swapped && self.unknown_rings <= told.unknown_rings
+        crossed(self) == crossed(reported)
+            && self.swapped == reported.swapped
+            && self.unknown_rings <= reported.unknown_rings
     }
 
-    /// What was reported and still holds, with what is new. A closed ring takes nothing back that an open one has
-    /// shown, and an open one shows nothing of those that do not answer.
+    /// The reported result that is still valid, combined with the new one. A closed ring withdraws nothing that an open
+    /// one has shown, and an open ring shows nothing of SubDevices that do not answer.
     pub(super) fn and(mut self, found: LineCheck) -> LineCheck {
         if found.crossings.is_empty() {
             self.crossings.clear();
@@ -69,8 +71,8 @@ impl LineCheck {
     }
 }
 
-/// Whether frames reach all of a ring the wrong way round: in a closed one those of the redundant link only, in an open
-/// one as the findings say.
+/// Whether frames pass all SubDevices of a ring in the wrong direction: in a closed ring only frames of the redundant
+/// link reach them, in an open ring according to the findings.
 pub fn is_swapped(topology: &Topology) -> bool {
     let crossed = |finding: &&Finding| matches!(finding, Finding::CrossedLine { .. });
     let count = topology.nodes.len();
@@ -79,35 +81,35 @@ pub fn is_swapped(topology: &Topology) -> bool {
             || topology.findings.iter().filter(crossed).count() == count)
 }
 
-/// How far the search for crossed lines is.
+/// State of the search for crossed lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Search {
-    /// Nothing has changed since the last look at the segment.
+    /// Nothing has changed since the last scan.
     Idle,
-    /// The segment is being looked at.
+    /// A scan is under way.
     UnderWay,
-    /// The last look has come to nothing.
+    /// The last scan had no result.
     Again,
 }
 
-/// Notes changes of ports, and has each crossing reported once.
+/// Detects changes of ports, and reports each crossing once.
 #[derive(Debug)]
 pub(super) struct Crossings {
-    /// Rings behind junctions are watched.
+    /// Rings behind junctions are monitored.
     pub junctions: bool,
-    /// What members said about their ports when the segment was looked at last; empty before the first time.
+    /// Port states of members at the last scan; empty before the first one.
     pub ports: Vec<Option<u16>>,
-    /// How far the search is.
+    /// State of the search.
     pub search: Search,
     /// Reported crossings.
-    pub told: LineCheck,
+    pub reported: LineCheck,
 }
 
 impl Crossings {
     /// Crossings that the scan reported are not reported again.
     pub fn new(cabling: &Cabling, members: &[Member], choices: Choices) -> Crossings {
         let topology = &cabling.topology;
-        let told = topology.findings.iter().filter_map(|finding| match *finding {
+        let reported = topology.findings.iter().filter_map(|finding| match *finding {
             Finding::CrossedLine { node, entry_port } => {
                 let member = members.iter().find(|member| member.node == Some(node))?;
                 let subdevice = Some((member.station, Position(node as u16)));
@@ -115,16 +117,16 @@ impl Crossings {
             }
             _ => None,
         });
-        let mut told = LineCheck { crossings: told.collect(), ..LineCheck::default() };
+        let mut reported = LineCheck { crossings: reported.collect(), ..LineCheck::default() };
         if topology.is_assumed() {
-            told.crossings.push(Crossing { subdevice: None, entry_port: None });
+            reported.crossings.push(Crossing { subdevice: None, entry_port: None });
         }
-        told.swapped = is_swapped(topology);
+        reported.swapped = is_swapped(topology);
         let junctions = choices.junctions != JunctionMode::Disabled || !topology.local_rings.is_empty();
-        Crossings { junctions, ports: Vec::new(), search: Search::Idle, told }
+        Crossings { junctions, ports: Vec::new(), search: Search::Idle, reported }
     }
 
-    pub fn told(&self) -> &LineCheck {
-        &self.told
+    pub fn reported(&self) -> &LineCheck {
+        &self.reported
     }
 }

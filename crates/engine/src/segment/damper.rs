@@ -1,21 +1,21 @@
-//! How often a state that changes is reported: each change at once, as long as changes are rare.
+//! Limits the reports of a changing state: each change is reported at once, as long as changes are rare.
 //!
-//! A change that follows another one closely is reported when the state has held for a moment. A cable that changes too
-//! often for long is reported only when it has been steady for a second: a loose plug bounces for hours.
+//! A change closely after another one is reported when the state has been stable for a moment. If a cable changes too
+//! often for a long time, it is reported only after a stable second: a loose plug bounces for hours.
 
 use core::time::Duration;
 
 use crate::time::Instant;
 
-/// A change that comes so long after the one before is reported at once.
+/// A change this long after the previous one is reported at once.
 const QUIET: Duration = Duration::from_millis(20);
-/// One that comes earlier is reported when it has held for so long.
+/// An earlier change is reported after it was stable for this time.
 const HOLD: Duration = Duration::from_millis(3);
-/// A state that changes too often is reported when it has held for so long.
+/// A state that changes too often is reported after it was stable for this time.
 const STEADY: Duration = Duration::from_secs(1);
 /// Changes that may be reported in a row.
 const BUDGET: u32 = 32;
-/// One more may be reported each time this has passed: four a second in the long run.
+/// One more may be reported each time this has passed: four a second on average.
 const REFILL: Duration = Duration::from_millis(250);
 
 /// Decides when a change is reported.
@@ -41,15 +41,15 @@ impl Default for Damper {
 }
 
 impl Damper {
-    /// The state changed since the last look. At the edge of a cut frames of one cycle may show both states: that is
-    /// one change.
+    /// The state changed since the last evaluation. At the moment of a cut frames of one cycle may show both states:
+    /// that is one change.
     pub(crate) fn changed(&mut self, now: Instant) {
         self.is_prompt = self.changed_at.is_none_or(|at| now.since(at) >= QUIET);
         self.changed_at = Some(now);
     }
 
-    /// Whether the state as it is may be told.
-    pub(crate) fn may_tell(&mut self, now: Instant) -> bool {
+    /// Whether the present state may be reported.
+    pub(crate) fn may_report(&mut self, now: Instant) -> bool {
         let held = self.changed_at.map_or(Duration::MAX, |at| now.since(at));
         if self.is_unsteady {
             return held >= STEADY;
@@ -57,7 +57,7 @@ impl Damper {
         self.is_prompt || held >= HOLD
     }
 
-    /// It is reported. True where from now on it changes too often to be reported each time.
+    /// Counts a report. True if from now on the state changes too often to be reported each time.
     pub(crate) fn tell(&mut self, now: Instant) -> bool {
         let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
         if refills > 0 {
@@ -79,10 +79,10 @@ impl Damper {
 mod tests {
     use super::*;
 
-    /// Looks every 500 us at a state that flips every `half_period`; returns how often it was reported, and how often
-    /// that it is unsteady.
+    /// Evaluates every 500 us a state that flips every `half_period`; returns how often it was reported, and how often
+    /// as unsteady.
     fn flap(half_period: Duration, lasts: Duration) -> (u32, u32) {
-        let (mut damper, mut told_state, mut told, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
+        let (mut damper, mut reported_state, mut reported, mut unsteady, mut flips) = (Damper::default(), 0, 0, 0, 0);
         let mut now = Instant(0);
         while now < Instant(0) + lasts {
             now += Duration::from_micros(500);
@@ -91,55 +91,55 @@ mod tests {
                 damper.changed(now);
                 flips = due;
             }
-            if told_state != flips % 2 && damper.may_tell(now) {
-                told_state = flips % 2;
-                told += 1;
+            if reported_state != flips % 2 && damper.may_report(now) {
+                reported_state = flips % 2;
+                reported += 1;
                 unsteady += u32::from(damper.tell(now));
             }
         }
-        (told, unsteady)
+        (reported, unsteady)
     }
 
     #[test]
-    fn changes_that_are_rare_are_told_each_and_at_once() {
+    fn rare_changes_are_each_reported_at_once() {
         assert_eq!(flap(Duration::from_millis(300), Duration::from_secs(60)), (200, 0));
         let mut damper = Damper::default();
         damper.changed(Instant(5));
-        assert!(damper.may_tell(Instant(5)));
+        assert!(damper.may_report(Instant(5)));
     }
 
     // covers: ring-flap
     #[test]
-    fn flapping_at_any_rate_is_told_a_bounded_number_of_times() {
+    fn flapping_at_any_rate_is_reported_a_bounded_number_of_times() {
         let lasts = Duration::from_secs(60);
         for micros in [1, 10, 100, 700, 3_000, 15_000, 25_000, 60_000, 150_000, 240_000, 1_000_000] {
-            let (told, unsteady) = flap(Duration::from_micros(micros), lasts);
+            let (reported, unsteady) = flap(Duration::from_micros(micros), lasts);
             let most = BUDGET + (lasts.as_nanos() / REFILL.as_nanos()) as u32;
-            assert!(told <= most, "{told} of {most} with a half period of {micros} us");
+            assert!(reported <= most, "{reported} of {most} with a half period of {micros} us");
             assert!(unsteady <= 1, "{unsteady}");
         }
-        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "back again before anybody looked");
-        assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then told no more until it is steady");
+        assert_eq!(flap(Duration::from_micros(10), lasts).0, 0, "the state was restored before an evaluation");
+        assert_eq!(flap(Duration::from_millis(25), lasts), (BUDGET + 3, 1), "then no report until it is steady");
     }
 
     #[test]
-    fn what_was_unsteady_is_told_when_it_has_been_steady_for_a_second() {
+    fn an_unsteady_state_is_reported_after_a_stable_second() {
         let mut damper = Damper::default();
         let mut now = Instant(0);
         let mut became = 0;
         for _ in 0..1000 {
             now += Duration::from_millis(30);
             damper.changed(now);
-            if damper.may_tell(now) {
+            if damper.may_report(now) {
                 became += u32::from(damper.tell(now));
             }
         }
         assert_eq!(became, 1);
-        assert!(damper.is_unsteady(now) && !damper.may_tell(now + Duration::from_millis(999)));
+        assert!(damper.is_unsteady(now) && !damper.may_report(now + Duration::from_millis(999)));
         now += STEADY;
-        assert!(!damper.is_unsteady(now) && damper.may_tell(now));
-        assert!(!damper.tell(now), "some are told again");
+        assert!(!damper.is_unsteady(now) && damper.may_report(now));
+        assert!(!damper.tell(now), "some are reported again");
         damper.changed(now + STEADY);
-        assert!(damper.may_tell(now + STEADY));
+        assert!(damper.may_report(now + STEADY));
     }
 }

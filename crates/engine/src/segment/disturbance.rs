@@ -1,28 +1,28 @@
-//! Procedures that put SubDevices out of reach, take a link out of use or change station addresses, on purpose, and
-//! those that need all of that to stay as it is: one at a time.
+//! Disturbances: procedures that put SubDevices out of reach, take a link out of use or change station addresses on
+//! purpose, and procedures that need all of this unchanged. Only one runs at a time.
 //!
-//! None of these can be cancelled: each runs to its undo. Where several are wanted at once the most urgent one is next.
-//! Each ends within its own time limit, and sooner where a more urgent one waits, so that a segment that changes all
-//! the time starves none.
+//! A running disturbance cannot be cancelled: it runs until it is undone. If several are requested, the most urgent one
+//! is next. Each ends within its own time limit, and earlier if a more urgent one waits, so that none waits for ever in
+//! a segment that changes repeatedly.
 
 use alloc::vec::Vec;
 
 /// A kind of disturbance; the most urgent one first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Disturbance {
-    /// No frame comes back: one ring behind a junction after the other is examined, while the others are left out.
+    /// No frame returns: one ring behind a junction after the other is examined, while the others are excluded.
     IsolateRings,
-    /// Rings are opened at a port, so that propagation delays of their cables can be measured.
+    /// Rings are opened at a port, to measure propagation delays of their cables.
     OpenByPort,
     /// SubDevices without a known station address get one.
     Readdress,
-    /// The redundant link is down, so that crossed lines are located.
+    /// The redundant link is down, to locate crossed lines.
     OpenByLink,
     /// Ports and station addresses of the whole segment are read.
     Rescan,
 }
 
-/// A disturbance, and the number of the procedure's wish for it: several may want the same kind.
+/// A request for a disturbance with the procedure's number: several procedures may request the same kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wanted {
     /// The kind.
@@ -31,7 +31,7 @@ pub struct Wanted {
     pub number: u32,
 }
 
-/// The disturbance under way, and those that wait for its end.
+/// The disturbance under way, and the waiting ones.
 #[derive(Debug, Default)]
 pub(super) struct Slot {
     running: Option<Wanted>,
@@ -46,28 +46,28 @@ impl Slot {
         self.running.map(|running| running.disturbance)
     }
 
-    /// Whether that is this one.
+    /// Whether the disturbance under way has this number.
     pub fn is_granted(&self, number: u32) -> bool {
         self.running.is_some_and(|running| running.number == number)
     }
 
-    /// Whether a more urgent one waits for the end of the one under way.
+    /// Whether a more urgent disturbance waits.
     pub fn is_outranked(&self) -> bool {
         self.running().is_some_and(|running| self.waiting.iter().any(|waiting| waiting.disturbance < running))
     }
 
-    /// How often SubDevices were put out of reach: a scan across such a moment does not show which SubDevices answer.
+    /// How often SubDevices were put out of reach: a scan during such a time does not show which SubDevices answer.
     pub fn isolations(&self) -> u32 {
         self.isolations
     }
 
-    /// A disturbance is wanted. It is under way at once where no other is.
+    /// Requests a disturbance. It is under way at once if no other is.
     pub fn want(&mut self, wanted: Wanted) {
         self.waiting.push(wanted);
         self.grant();
     }
 
-    /// A disturbance has been undone, or is not wanted any more before it began.
+    /// A disturbance has been undone, or its request was withdrawn before it began.
     pub fn end(&mut self, number: u32) {
         self.waiting.retain(|waiting| waiting.number != number);
         if self.is_granted(number) {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn one_is_under_way_at_a_time_and_the_most_urgent_one_is_next() {
+    fn one_disturbance_runs_at_a_time_and_the_most_urgent_is_next() {
         let mut slot = Slot::default();
         want(&mut slot, [OpenByLink, OpenByPort, IsolateRings]);
         assert_eq!((slot.running(), slot.isolations()), (Some(OpenByLink), 0));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disturbance_that_is_not_wanted_any_more_is_not_granted() {
+    fn a_withdrawn_disturbance_is_not_granted() {
         let mut slot = Slot::default();
         want(&mut slot, [IsolateRings, OpenByPort]);
         slot.end(1);
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn two_of_a_kind_are_under_way_one_after_the_other() {
+    fn two_disturbances_of_a_kind_run_one_after_the_other() {
         let mut slot = Slot::default();
         want(&mut slot, [Rescan, Rescan]);
         assert!(slot.is_granted(0) && !slot.is_granted(1));

@@ -1,4 +1,4 @@
-//! What follows from an observation.
+//! Effects of an observation.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -11,87 +11,88 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::ring_status::Occupant;
 
-/// AL status and code that a SubDevice showed.
+/// AL status and code of a SubDevice.
 pub type Shown = (AlStatus, AlStatusCode);
 
-/// One consequence. They are carried out in their order.
+/// One effect. Effects are executed in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// An event for the application.
     Report(Event),
     /// An event about an identified SubDevice.
     ReportOf(Event, Occupant),
-    /// Mail to and from a member stops until it is there again.
+    /// Mail to and from a member stops until it is present again.
     SuspendMailbox {
         /// The member.
         index: usize,
     },
     /// Positions from here on are reached through the redundant link (protocol CR-09).
     MainCount(u16),
-    /// Other SubDevices are at the positions of the cabling.
+    /// The SubDevices at the positions of the cabling have changed.
     Occupants(Vec<Occupant>),
     /// A procedure is to be started.
     Start(Task),
 }
 
-/// What has to be found out before a SubDevice is configured.
+/// Check before a SubDevice is configured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
     /// Nothing.
     None,
-    /// Whether it is the member by its identity: another SubDevice may have its station address.
+    /// Whether it is the member, by its identity: another SubDevice may have its station address.
     Identity,
-    /// The same of one that was lost, by what was written to it before: it may be one of an earlier session.
+    /// The same for a lost member, by the registers written to it before: the SubDevice may be one of an earlier
+    /// session.
     Return,
 }
 
-/// A procedure on the bus. What it finds comes back as an observation.
+/// A procedure on the bus. It returns its result as an observation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
-    /// All SubDevices are looked at.
-    Look {
-        /// Nothing has happened: a few at a time.
+    /// Scans all SubDevices.
+    Scan {
+        /// Nothing has changed: a few SubDevices at a time.
         routine: bool,
     },
-    /// A member is brought to its target state, until it is there, it is lost, or another attempt begins.
+    /// Brings a member to its target state, until it is reached, the member is lost, or another attempt begins.
     BringUp {
         /// The member.
         index: usize,
         /// Number of the attempt.
         attempt: u32,
-        /// What is known of its registers.
+        /// State of its registers.
         from: Start,
-        /// Its error that is reported and still holds.
-        told: Option<Shown>,
-        /// What has to be found out first.
+        /// Its error that is reported and still present.
+        reported: Option<Shown>,
+        /// The check before it.
         check: Check,
     },
-    /// A member's inputs are read until all are there.
+    /// Reads a member's inputs until all have been delivered.
     ProveInputs {
         /// The member.
         index: usize,
-        /// Number of the mapping that they prove.
+        /// Number of the mapping to prove.
         mapping: u32,
     },
-    /// The SII of a SubDevice without a declaration is read.
+    /// Reads the SII of a SubDevice without a declaration.
     ReadUnassigned {
         /// Its temporary address.
         station: StationAddress,
     },
-    /// The segment is looked at for crossed lines.
+    /// Scans the segment for crossed lines.
     ExamineCabling {
-        /// In a closed ring the redundant link may be taken down meanwhile (LC-03).
+        /// In a closed ring the redundant link may be taken down for it (LC-03).
         in_control: bool,
     },
-    /// Rings behind junctions are looked into, one after the other.
+    /// Examines rings behind junctions, one after the other.
     IsolateRings,
-    /// The reference time is distributed many times, as fast as the segment allows (protocol 7.2).
+    /// Distributes the reference time many times, as fast as the segment allows (protocol 7.2).
     CompensateDrift,
-    /// The cabling is looked at anew, because a hot connect group has joined or left.
+    /// Scans the cabling again, because a hot connect group has joined or left.
     FollowGroups,
 }
 
-/// All consequences of one observation.
+/// All effects of one observation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects(pub Vec<Effect>);
 

@@ -8,7 +8,7 @@ use crate::config::groups;
 use crate::declared::GroupId;
 use crate::event::Event;
 
-/// How many of a group's SubDevices answer, how many are in the states that were declared, and of how many.
+/// Per group: SubDevices that answer, SubDevices in their declared states, and all SubDevices.
 pub fn counts(members: &[Member]) -> Vec<(usize, usize, usize)> {
     let groups = groups(members.iter().map(|member| &*member.config));
     let count = |group: &Vec<usize>| {
@@ -20,15 +20,15 @@ pub fn counts(members: &[Member]) -> Vec<(usize, usize, usize)> {
     groups.iter().map(count).collect()
 }
 
-/// The groups, and which of them were reported to have joined.
+/// The groups, and which of them were reported as joined.
 #[derive(Debug)]
 pub(super) struct HotConnect {
     /// Members by group.
     groups: Vec<Vec<usize>>,
     joined: Vec<bool>,
-    /// With each change the cabling is another one, which is taken over.
+    /// The cabling changes with each join or leave, and has to be taken over.
     follow: bool,
-    /// Changes so far, and of these the ones that the cabling was taken over after.
+    /// Changes so far, and the number of changes up to which the cabling was taken over.
     changes: u32,
     followed: u32,
     is_following: bool,
@@ -46,7 +46,7 @@ impl HotConnect {
         self.changes
     }
 
-    /// Tells what has changed since the last time.
+    /// Reports changes since the last time.
     pub fn observe(&mut self, members: &[Member], effects: &mut Effects) {
         for (number, group) in self.groups.iter().enumerate() {
             let settled = |index: &usize| members[*index].phase == Phase::Settled(members[*index].config.target);
@@ -66,7 +66,7 @@ impl HotConnect {
         }
     }
 
-    /// The cabling was taken over as it is after so many changes.
+    /// The cabling was taken over as of this number of changes.
     pub fn follow(&mut self, changes: u32) {
         self.followed = changes;
         self.is_following = false;

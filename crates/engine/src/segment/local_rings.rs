@@ -1,5 +1,4 @@
-//! What becomes of local rings in operation: which of their cables are broken, seen in the DL status of the SubDevices
-//! at both ends (JR-09).
+//! Local rings in operation: broken cables according to the DL status of the SubDevices at both ends (JR-09).
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -14,9 +13,9 @@ use crate::ring_status::{Cable, CableErrors};
 use crate::time::Instant;
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, RingCable, Topology};
 
-/// A cable counts as whole again when it was so for this long: a plug that makes bad contact must not flood anybody.
+/// A cable counts as whole again after this time: a plug with bad contact must not cause a flood of events.
 const STEADY: Duration = Duration::from_millis(50);
-/// A cable, and what is known about it.
+/// A cable and its state.
 #[derive(Clone, Debug)]
 struct Watched {
     cable: RingCable,
@@ -26,7 +25,7 @@ struct Watched {
     whole_since: Option<Instant>,
 }
 
-/// Watches the cables of all local rings.
+/// Monitors the cables of all local rings.
 #[derive(Debug)]
 pub(super) struct LocalRings {
     rings: Vec<Vec<Watched>>,
@@ -35,14 +34,14 @@ pub(super) struct LocalRings {
     /// The SubDevices at the places of the cabling, and the version of that cabling.
     places: Places,
     version: u32,
-    /// Cables that have become known: where they begin, and the SubDevice behind them.
+    /// Cables that have become known: the port where they begin, and the SubDevice behind them.
     completed: Vec<(PortOf, usize)>,
     /// How many cables are broken.
     broken: usize,
 }
 
 impl LocalRings {
-    /// Watches the rings of a cabling.
+    /// Monitors the rings of a cabling.
     pub fn new(cabling: &Cabling, members: &[Member]) -> LocalRings {
         let declared = |node: usize| members.iter().position(|member| member.node == Some(node));
         let stations = cabling.stations.clone();
@@ -62,25 +61,25 @@ impl LocalRings {
         }
     }
 
-    /// Goes over to the cabling that a rescan has found since, if one has. `status` is by the positions of that.
+    /// Takes over the cabling of a new rescan, if there is one. `status` is by the positions of that rescan.
     pub fn follow(&mut self, cabling: &Cabling, members: &[Member], status: &[Option<NodeStatus>]) {
         if self.version != cabling.version {
             self.go_over(LocalRings::new(cabling, members), status);
         }
     }
 
-    /// A break that was reported goes on to be that of one cable: one that is broken and has an end in common with the
-    /// one of which it was reported, or else is in the same ring, or else has that and is whole again. Where there is
-    /// none, the cable is gone.
+    /// Carries reported breaks over to the new cabling. A reported break is assigned to, in this order: a broken cable
+    /// with one end in common with the reported cable; a broken cable of the same ring; a cable with a common end, or
+    /// of the same ring, that is whole again. Without any of these the cable no longer exists.
     fn go_over(&mut self, new: LocalRings, status: &[Option<NodeStatus>]) {
         let before = core::mem::replace(self, new);
         let places = &self.places;
-        let told = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
+        let reported = before.rings.iter().zip(&before.closings).flat_map(|(ring, closing)| {
             let head = before.places.end(closing.head);
             ring.iter().filter(|watched| watched.reported).map(move |watched| (watched, head))
         });
-        for (told, head) in told {
-            let ends = before.places.ends(&told.cable);
+        for (reported, head) in reported {
+            let ends = before.places.ends(&reported.cable);
             let rank = |watched: &Watched, is_of_ring: bool| {
                 let shares = places.ends(&watched.cable).iter().flatten().any(|end| ends.contains(&Some(*end)));
                 match (is_down(&watched.cable, status) == Some(true), shares, is_of_ring) {
@@ -98,19 +97,19 @@ impl LocalRings {
                 .filter(|(watched, _)| !watched.reported)
                 .filter_map(|(watched, is_of_ring)| Some((rank(watched, is_of_ring)?, watched)));
             if let Some((_, watched)) = ranked.min_by_key(|(rank, _)| *rank) {
-                (watched.reported, watched.whole_since) = (true, told.whole_since);
+                (watched.reported, watched.whole_since) = (true, reported.whole_since);
             }
         }
         self.broken = self.rings.iter().flatten().filter(|watched| watched.reported).count();
     }
 
-    /// Puts cables that have become known since into the cabling.
+    /// Adds cables that have become known to the cabling.
     pub fn complete_cabling(&mut self, cabling: &mut Cabling) {
         for (near, node) in self.completed.drain(..) {
             cabling.topology.attach_behind_break(near, node);
             let known = cabling.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
             if let Some(cable) = known.filter(|known| cabling.cables.iter().all(|(cable, _)| cable != known)) {
-                // Those that lead to SubDevices come first, in their order.
+                // Cables to SubDevices come first, in their order.
                 let closes = |it: &Cable| {
                     self.closings.iter().any(|closing| (it.near, it.far) == (Some(closing.tail), Some(closing.head)))
                 };
@@ -122,7 +121,7 @@ impl LocalRings {
         }
     }
 
-    /// Whether there is anything to watch.
+    /// Whether there is any cable to monitor.
     pub fn is_empty(&self) -> bool {
         self.rings.is_empty()
     }
@@ -132,7 +131,7 @@ impl LocalRings {
         self.broken
     }
 
-    /// Takes in what SubDevices said about their ports, by position; reports each edge once. Returns when to look again
+    /// Processes the port states of SubDevices, by position; reports each edge once. Returns when to evaluate again
     /// though nothing changes.
     pub fn observe(
         &mut self,
@@ -166,7 +165,7 @@ impl LocalRings {
         again
     }
 
-    /// A ring that was broken when it was looked at is known as a whole once it is whole.
+    /// A ring that was open at the scan is completely known as soon as it is whole.
     fn complete(&mut self, status: &[Option<NodeStatus>]) {
         let is_unknown = |watched: &Watched| watched.cable.near.is_none() && !watched.reported;
         if !self.rings.iter().flatten().any(is_unknown) {
@@ -201,7 +200,7 @@ struct Places {
 }
 
 impl Places {
-    /// Both ends of a cable, by the SubDevices there.
+    /// Both ends of a cable, with the SubDevices there.
     fn ends(&self, cable: &RingCable) -> [Option<End>; 2] {
         [cable.near, Some(cable.far)].map(|at| self.end(at?))
     }
@@ -226,7 +225,7 @@ impl Places {
     }
 }
 
-/// Whether a cable has no communication at one end; `None` where neither end says anything.
+/// Whether a cable has no communication at one end; `None` if neither end answers.
 pub fn is_down(cable: &RingCable, status: &[Option<NodeStatus>]) -> Option<bool> {
     let end = |at: PortOf| {
         let status = status.get(at.node).copied().flatten()?;
@@ -314,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_that_was_broken_at_the_scan_is_known_as_a_whole_once_it_is_whole() {
+    fn a_ring_broken_at_the_scan_is_completely_known_once_it_is_whole() {
         let mut watch = watch(CUT_1_2);
         assert_eq!(seen(&mut watch, 0, CUT_1_2), [event(None, at(2, 0), true, 1)]);
         assert_eq!(seen(&mut watch, 10, WHOLE), []);
@@ -324,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_member_without_power_is_two_breaks_and_silence_is_none() {
+    fn a_member_without_power_is_two_breaks_and_a_missing_answer_is_none() {
         let mut watch = watch(WHOLE);
         let mut status: Vec<Option<NodeStatus>> = nodes([&[0, 1, 3], &[0], &[], &[1]]).into_iter().map(Some).collect();
         status[2] = None;

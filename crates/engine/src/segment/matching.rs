@@ -1,24 +1,24 @@
-//! Which absent SubDevices the unassigned SubDevices between two known ones are.
+//! Identifies unassigned SubDevices between two known ones as absent SubDevices.
 //!
-//! Both are in the order of the segment, and that order decides: of several alike the first on the main side is the
-//! first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours. Serial
-//! numbers decide before order does.
+//! Both are in the order of the segment, and this order decides: of several of the same type the first on the main side
+//! is the first, the last on the redundant side the last, because a SubDevice can only answer through its neighbours.
+//! Serial numbers have priority over order.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// How well an unassigned SubDevice fits an absent SubDevice.
+/// How well an unassigned SubDevice matches an absent one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fit {
-    /// It is not that one.
+    /// It is another one.
     No,
-    /// Its SII cannot be read: it may be that one, and keeps the place.
+    /// Its SII cannot be read: it may be the absent one, and occupies its place.
     Unreadable,
-    /// It could be that one, which has never been there.
+    /// It may be the absent one, which was never seen.
     NeverSeen,
-    /// It could be that one.
+    /// It may be the absent one.
     Seen,
-    /// It has the serial number of that one.
+    /// It has the serial number of the absent one.
     Serial,
 }
 
@@ -33,8 +33,8 @@ impl Fit {
     }
 }
 
-/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` tells of an unassigned and an absent one how
-/// well they fit; `from_main` whether an unassigned one answers on the main link.
+/// The absent SubDevice that each unassigned SubDevice is, if any. `fit` returns how well an unassigned and an absent
+/// one match; `from_main` is true for an unassigned one that answers on the main link.
 pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usize) -> Fit) -> Vec<Option<usize>> {
     let mut assigned = vec![None; from_main.len()];
     for (candidate, slot) in assigned.iter_mut().enumerate() {
@@ -42,8 +42,8 @@ pub(super) fn assign(from_main: &[bool], absent: usize, fit: impl Fn(usize, usiz
     }
     let open: Vec<usize> = (0..assigned.len()).filter(|candidate| assigned[*candidate].is_none()).collect();
     let places: Vec<usize> = (0..absent).filter(|place| !assigned.contains(&Some(*place))).collect();
-    // The best sum of scores; the lower half of the word prefers places near the side that an unassigned one answers
-    // from.
+    // Maximises the sum of scores; the lower half of the word prefers places near the side on which the unassigned
+    // SubDevice answers.
     let value = |one: usize, other: usize| {
         let (candidate, place) = (open[one], places[other]);
         let near = if from_main[candidate] { places.len() - other } else { other + 1 };
@@ -83,40 +83,40 @@ mod tests {
     }
 
     #[test]
-    fn subdevices_alike_keep_the_order_of_the_segment() {
+    fn subdevices_of_one_type_keep_the_order_of_the_segment() {
         assert_eq!(assigned(&[true, true], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[false, false], &[[Seen; 2]; 2]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, false], &[[Seen; 3]; 2]), [Some(0), Some(2)]);
     }
 
     #[test]
-    fn fewer_than_are_absent_are_next_to_the_neighbours_they_answer_through() {
+    fn fewer_subdevices_than_absent_members_match_the_nearest_places() {
         assert_eq!(assigned(&[true], &[[Seen; 3]]), [Some(0)]);
         assert_eq!(assigned(&[false], &[[Seen; 3]]), [Some(2)]);
         assert_eq!(assigned(&[false, false], &[[Seen; 3]; 2]), [Some(1), Some(2)]);
     }
 
     #[test]
-    fn one_that_was_there_before_is_preferred_to_one_that_never_was() {
+    fn a_member_seen_before_is_preferred_to_a_member_never_seen() {
         assert_eq!(assigned(&[true], &[[NeverSeen, Seen]]), [Some(1)]);
         assert_eq!(assigned(&[true, true], &[[NeverSeen, Seen]; 2]), [Some(0), Some(1)], "both are there now");
         assert_eq!(assigned(&[true], &[[NeverSeen, No]]), [Some(0)]);
     }
 
     #[test]
-    fn a_serial_number_decides_before_order_does() {
+    fn serial_numbers_have_priority_over_order() {
         assert_eq!(assigned(&[true], &[[Seen, Serial]]), [Some(1)]);
         assert_eq!(assigned(&[true, true], &[[Seen, Serial], [Seen, Seen]]), [Some(1), Some(0)]);
     }
 
     #[test]
-    fn an_unreadable_one_keeps_its_place_unless_a_readable_one_needs_it() {
+    fn an_unreadable_subdevice_keeps_its_place_unless_a_readable_one_matches() {
         assert_eq!(assigned(&[true, true], &[[Unreadable; 2], [Seen; 2]]), [Some(0), Some(1)]);
         assert_eq!(assigned(&[true, true], &[[Unreadable], [Seen]]), [None, Some(0)]);
     }
 
     #[test]
-    fn one_that_fits_nowhere_is_no_member() {
+    fn a_subdevice_that_matches_nowhere_is_no_member() {
         assert_eq!(assigned(&[true, true], &[[No, No], [No, Seen]]), [None, Some(1)]);
         assert_eq!(assigned::<0>(&[true], &[[]]), [None]);
     }

@@ -1,4 +1,4 @@
-//! A SubDevice that the application declared: its identity, its phase, its incidents.
+//! A SubDevice declared by the application: its identity, its phase, its incidents.
 
 use alloc::rc::Rc;
 use core::time::Duration;
@@ -11,7 +11,7 @@ use crate::config::SubDeviceConfig;
 use crate::info::SubDeviceInfo;
 use crate::time::Instant;
 
-/// How far a SubDevice is.
+/// Phase of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// It does not answer.
@@ -22,20 +22,20 @@ pub enum Phase {
     Settled(AlState),
 }
 
-/// A SubDevice that the application declared.
+/// A SubDevice declared by the application.
 #[derive(Debug)]
 pub struct Member {
     /// The declaration.
     pub config: Rc<SubDeviceConfig>,
-    /// The state to which it is brought: that of the declaration, or another one that was requested since.
+    /// Its target state: that of the declaration, or one requested since.
     pub target: AlState,
-    /// Its identity and abilities; `None` while it has never answered.
+    /// Its identity and features; `None` if it has never answered.
     pub info: Option<SubDeviceInfo>,
     /// Its station address.
     pub station: StationAddress,
-    /// How far it is.
+    /// Its phase.
     pub phase: Phase,
-    /// Number of the attempt to configure it that is under way; one that is out of date ends.
+    /// Number of the configuration attempt under way; procedures of earlier attempts end.
     pub attempt: u32,
     /// Its registers hold its configuration, FMMUs included, until it loses power or is sent back to INIT.
     pub configured: bool,
@@ -43,29 +43,29 @@ pub struct Member {
     pub node: Option<usize>,
     /// Its configuration, shared with the procedure that applies it.
     pub setup: Option<Rc<Setup>>,
-    /// Why it has none though it is there.
+    /// Why it has none although it is present.
     pub unfit: Option<SetupError>,
-    /// What has happened to it since activation.
+    /// Incidents since activation.
     pub incidents: Incidents,
-    /// How often its process data was mapped, or counted on anew: inputs that were read before prove nothing.
+    /// Number of its mappings, increased also when its process data is expected anew: inputs read before prove nothing.
     pub(super) mapping: u32,
-    /// Silent looks in a row.
+    /// Consecutive scans without an answer.
     pub(super) silent: u8,
-    /// Process data does not wait for it though it is not lost.
+    /// Process data does not wait for it although it is not lost.
     pub(super) suspended: bool,
-    /// What answers at its address while it is lost.
+    /// The SubDevice that answers at its address while it is lost.
     pub(super) mistaken: Mistaken,
 }
 
-/// First pause before what answers at the address of a lost SubDevice is asked again which one it is.
+/// First pause before the SubDevice at the address of a lost member is identified again.
 const FIRST_PAUSE: Duration = Duration::from_millis(2);
-/// Longest pause: all are looked at so often anyway.
+/// Longest pause: the interval of the routine scans.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// So many times in a row are reported.
+/// Consecutive identifications after which it is reported.
 const PATIENCE: u32 = 10;
 
-/// What answers at the address of a lost SubDevice and is not known to be it. It loses the address; one that keeps it
-/// is asked again and again, after a pause that doubles.
+/// A SubDevice at the address of a lost member that is not identified as the member. Its address is taken away; while
+/// it keeps the address it is identified again, after a pause that doubles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Mistaken {
     times: u32,
@@ -73,7 +73,7 @@ pub(super) struct Mistaken {
 }
 
 impl Mistaken {
-    /// Once more. Returns the pause before it is asked again; none after the first time.
+    /// Counts an identification. Returns the pause before the next; none after the first.
     pub fn again(&mut self, now: Instant) -> Option<Duration> {
         self.times = self.times.saturating_add(1);
         let doublings = self.times.checked_sub(2)?;
@@ -82,51 +82,51 @@ impl Mistaken {
         Some(pause)
     }
 
-    /// How long it is not asked.
+    /// Remaining pause before the next identification.
     pub fn pause(&self, now: Instant) -> Option<Duration> {
         (now < self.until).then(|| self.until.since(now))
     }
 
     /// It keeps the address: to be reported now.
-    pub fn is_to_tell(&self) -> bool {
+    pub fn is_due(&self) -> bool {
         self.times == PATIENCE
     }
 }
 
-/// What has happened to a SubDevice.
+/// Incidents of a SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Incidents {
-    /// How often it was no longer there.
+    /// How often it was lost.
     pub absences: u32,
-    /// How often it left its state by itself.
+    /// How often it left its state without a request.
     pub state_changes: u32,
 }
 
 impl Member {
-    /// Whether it was there at the activation, or has come since.
+    /// Whether it was present at the activation, or has come since.
     pub fn is_there(&self) -> bool {
         self.setup.is_some() || self.unfit.is_some()
     }
 
-    /// Whether its process data flows in a state.
+    /// Whether its process data is exchanged in a state.
     pub fn exchanges(&self, state: AlState) -> bool {
         let early = || self.setup.as_ref().is_none_or(|setup| !setup.plan.is_op_only());
         state == AlState::Op || (state == AlState::SafeOp && early())
     }
 
-    /// It answers, and its process data has not been mapped or counted on anew since this number.
+    /// It answers, and its process data has not been mapped or expected anew since this number.
     pub fn is_mapped_as(&self, mapping: u32) -> bool {
         self.phase != Phase::Absent && self.mapping == mapping
     }
 
-    /// Another attempt to configure it begins; one that is under way ends. Returns its number.
+    /// Begins another attempt to configure it; the previous attempt ends. Returns the number.
     pub(super) fn begin_attempt(&mut self) -> u32 {
         self.phase = Phase::Configuring;
         self.attempt = self.attempt.wrapping_add(1);
         self.attempt
     }
 
-    /// A member of which nothing is known but what the scan found.
+    /// A member with the data of the scan only.
     pub fn new(
         config: SubDeviceConfig,
         info: Option<SubDeviceInfo>,

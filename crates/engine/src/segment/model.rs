@@ -1,11 +1,10 @@
-//! The model itself: what it holds, and what can be asked of it.
+//! The data of the model, and its queries.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::asked::Asked;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cabling::Cabling;
@@ -20,6 +19,7 @@ use super::port_control::{BlockedPort, PortControl};
 use super::ring::{Ring, Words};
 use super::silence::Silence;
 use super::unassigned::UnassignedSubDevice;
+use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
 use crate::declared::SubDeviceId;
@@ -27,20 +27,20 @@ use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
 use crate::time::Instant;
 
-/// What is known, to begin with.
+/// Initial knowledge.
 #[derive(Debug)]
 pub struct Known {
     /// The declared SubDevices.
     pub members: Vec<Member>,
     /// SubDevices without a declaration.
     pub unassigned: Vec<UnassignedSubDevice>,
-    /// Where process data lies.
+    /// Layout of process data.
     pub layout: Layout,
-    /// How all of them are connected.
+    /// Connections of all SubDevices.
     pub cabling: Cabling,
     /// Distributed clocks.
     pub clocks: Clocks,
-    /// What is known of the ring.
+    /// State of the ring.
     pub ring: RingStatus,
     /// Carriers of the links.
     pub carriers: [Option<bool>; 2],
@@ -51,15 +51,15 @@ pub struct Known {
 pub struct Segment {
     /// The declared SubDevices.
     pub members: Vec<Member>,
-    /// SubDevices that answer and have no declaration, or are not known to have one yet.
+    /// SubDevices that answer and have no declaration, or are not yet identified.
     pub unassigned: Vec<UnassignedSubDevice>,
-    /// Where process data lies.
+    /// Layout of process data.
     pub layout: Layout,
-    /// Connections, as the scan found them or a rescan after it.
+    /// Connections according to the scan or a later rescan.
     pub cabling: Cabling,
     /// Ports that were closed to cut SubDevices off.
     pub blocked: Vec<BlockedPort>,
-    /// Orders to junctions of local rings about their ports.
+    /// Commands to junctions of local rings about their ports.
     pub port_controls: Vec<PortControl>,
     pub(super) board: Arc<Board>,
     pub(super) choices: Choices,
@@ -72,7 +72,7 @@ pub struct Segment {
     pub(super) hot_connect: HotConnect,
     pub(super) attention: Attention,
     pub(super) slot: Slot,
-    /// How often the cabling was taken over from a look at the whole segment.
+    /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
 }
 
@@ -102,8 +102,8 @@ impl Segment {
         }
     }
 
-    /// When to look at what is posted though nothing else is posted.
-    pub fn next_look(&self) -> Instant {
+    /// Time of the next evaluation if no words are posted before.
+    pub fn next_evaluation(&self) -> Instant {
         self.attention.wake
     }
 
@@ -112,18 +112,18 @@ impl Segment {
         &self.clocks
     }
 
-    /// The references that the exchange distributes; `None` while these are not the right ones, or stopped.
+    /// The references that the exchange distributes; `None` while they are outdated or the distribution is stopped.
     pub fn references_in_use(&self) -> Option<References> {
         let (references, _) = self.board.clocks.references();
         (references == self.clocks.references() && !self.board.clocks.is_held()).then_some(references)
     }
 
-    /// The ring and its links, as they were reported.
+    /// State of the ring and its links as reported.
     pub fn ring_status(&self) -> RingStatus {
         self.ring.status
     }
 
-    /// What puts SubDevices out of reach, or a link out of use, on purpose now.
+    /// The procedure that now puts SubDevices out of reach, or a link out of use, on purpose.
     pub fn disturbance(&self) -> Option<Disturbance> {
         self.slot.running()
     }
@@ -138,17 +138,17 @@ impl Segment {
         self.slot.is_outranked()
     }
 
-    /// Whether no frame comes back because of broken local rings.
+    /// Whether no frame returns because of broken local rings.
     pub fn is_blocked(&self) -> bool {
         self.silence.is_blocked
     }
 
-    /// What a question that is asked now is about.
-    pub fn asked(&self) -> Asked {
-        Asked { cabling: self.cabling.version, isolations: self.slot.isolations() }
+    /// The version of the model, for a procedure that starts now.
+    pub fn versions(&self) -> Versions {
+        Versions { cabling: self.cabling.version, isolations: self.slot.isolations() }
     }
 
-    /// The last round of looks.
+    /// The last round of scans.
     pub fn round(&self) -> Round {
         self.attention.round
     }
@@ -159,21 +159,21 @@ impl Segment {
     }
 
     /// Crossed lines as reported.
-    pub fn told_crossings(&self) -> &LineCheck {
-        self.crossings.told()
+    pub fn reported_crossings(&self) -> &LineCheck {
+        self.crossings.reported()
     }
 
-    /// How often the cabling was taken over from a look at the whole segment.
+    /// How often the cabling of a rescan was taken over.
     pub fn adoptions(&self) -> u32 {
         self.adoptions
     }
 
-    /// Local rings whose cables are watched.
+    /// Whether cables of local rings are monitored.
     pub fn has_local_rings(&self) -> bool {
         !self.local_rings.is_empty()
     }
 
-    /// Which SubDevice is at each position of the cabling.
+    /// The SubDevice at each position of the cabling.
     pub fn occupants(&self) -> Vec<Occupant> {
         let at = |(node, station): (usize, &StationAddress)| Occupant {
             station: *station,

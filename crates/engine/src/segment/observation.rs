@@ -1,4 +1,4 @@
-//! What was seen, heard or done: all that changes the model.
+//! Observations: all inputs that change the model.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -9,64 +9,64 @@ use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
-use super::asked::Asked;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
-use super::look::Look;
-use super::looked::Looked;
 use super::port_control::BlockedPort;
+use super::reading::Reading;
 use super::ring::Words;
+use super::round_result::RoundResult;
 use super::seen::Seen;
 use super::start::Start;
+use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
 use crate::ring_status::CableErrors;
 use crate::topology::NodeStatus;
 
-/// What a SubDevice does in process data from now on.
+/// How a SubDevice takes part in process data from now on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProcessDataStep {
-    /// Nothing is counted on any more.
+    /// It takes no part: no working counter expects it.
     Off,
     /// Its FMMUs are about to be cleared.
     Unmapped,
-    /// Both.
+    /// Both: no part, and its FMMUs are about to be cleared.
     Left,
     /// Its FMMUs are about to be set.
     Mapped,
-    /// It is counted on, for its inputs as soon as they were seen.
+    /// The working counter expects it; its inputs as soon as they were proven.
     Joined,
 }
 
-/// Something that was observed.
+/// An observation.
 #[derive(Debug)]
 pub enum Observation<'a> {
-    /// What the exchange has posted, and what the links tell.
+    /// Words posted by the exchange, and carriers of the links.
     Words(Words),
-    /// A round of looks has brought this so far. `others`: answers of SubDevices without a declaration.
-    PartOfLooks {
-        /// What it was about.
-        asked: Asked,
+    /// Intermediate result of a round of scans. `others`: answers of SubDevices without a declaration.
+    PartOfRound {
+        /// Version of the model at the request.
+        versions: Versions,
         /// By member.
-        looks: &'a [Look],
+        readings: &'a [Reading],
         /// Answers of SubDevices without a declaration.
         others: usize,
         /// SubDevices that the latest supervision result counts.
         counted: Option<Wkc>,
     },
-    /// A round of looks is complete.
-    Looks(Looked<'a>),
-    /// What followed from a round of looks is done. With the number of the latest supervision result.
+    /// A round of scans is complete.
+    Round(RoundResult<'a>),
+    /// All effects of a round of scans are completed. With the number of the latest supervision result.
     RoundEnded(Option<u32>),
-    /// Another round is called for.
-    LookAgain,
-    /// Another round is called for after a pause.
-    LookAgainIn(Duration),
+    /// Another round is requested.
+    ScanAgain,
+    /// Another round is requested after a pause.
+    ScanAgainIn(Duration),
 
-    /// The configuration of all members that are there may begin.
+    /// The configuration of all present members may begin.
     Started(Start),
-    /// They will be configured later: what answers meanwhile has not come back.
+    /// They will be configured later: an answer meanwhile is not a return.
     Delayed,
     /// A member reached a state.
     Reached {
@@ -77,105 +77,105 @@ pub enum Observation<'a> {
         /// The state.
         state: AlState,
     },
-    /// What answers at a lost member's address is that member.
+    /// The SubDevice at a lost member's address is that member.
     Returned {
         /// The member.
         index: usize,
-        /// The attempt that found it out.
+        /// The attempt that identified it.
         attempt: u32,
     },
-    /// What answers at a lost member's address is another SubDevice, or cannot be identified.
+    /// The SubDevice at a lost member's address is another one, or cannot be identified.
     NotReturned {
         /// The member.
         index: usize,
-        /// The attempt that found it out.
+        /// The attempt that identified it.
         attempt: u32,
     },
     /// A member does not answer.
     Unreachable {
         /// The member.
         index: usize,
-        /// The attempt that found it out.
+        /// The attempt that detected it.
         attempt: u32,
     },
     /// A member's registers hold its configuration, or no longer do.
     Configured {
         /// The member.
         index: usize,
-        /// They do.
+        /// They hold it.
         is: bool,
     },
-    /// A member's registers do not hold what was written to them.
+    /// A member's registers do not hold the written values.
     Undone {
         /// The member.
         index: usize,
         /// Its attempt when they were read.
         attempt: u32,
-        /// What is not there.
+        /// The missing value.
         reason: String,
     },
-    /// What a member does in process data from now on.
+    /// How a member takes part in process data from now on.
     ProcessData {
         /// The member.
         index: usize,
-        /// What it does.
+        /// The step.
         step: ProcessDataStep,
     },
-    /// A member was seen to give all its inputs.
+    /// A member has delivered all its inputs.
     Proven {
         /// The member.
         index: usize,
         /// Number of the mapping for which they were read.
         mapping: u32,
     },
-    /// The application wants a member in another state.
+    /// The application requests a state of a member.
     Requested {
         /// The member.
         index: usize,
         /// The state.
         state: AlState,
     },
-    /// A member has refused that.
+    /// A member has refused the requested state.
     Refused {
         /// The member.
         index: usize,
         /// The attempt.
         attempt: u32,
-        /// The state that was its target before.
+        /// The previous target state.
         before: AlState,
     },
     /// A member's SII was read again.
     ReadAgain {
         /// The member.
         index: usize,
-        /// What it says.
+        /// The data read.
         info: &'a SubDeviceInfo,
     },
 
-    /// What has happened to members is counted from 0 again.
+    /// The incident counters of members are reset.
     IncidentsForgotten,
 
-    /// Where SubDevices are, all of which are known.
+    /// Positions of SubDevices, all of which are known.
     Places(&'a View),
-    /// These addresses are taken from the SubDevices that have them.
+    /// These addresses are taken away from the SubDevices that have them.
     Readdressing(&'a [StationAddress]),
-    /// Temporary addresses were given.
+    /// Temporary addresses were assigned.
     Given {
-        /// Where SubDevices are with them.
+        /// Positions of the SubDevices with these addresses.
         view: &'a View,
         /// The addresses.
         given: &'a [StationAddress],
     },
-    /// An unassigned SubDevice was read, or could not be: then why, where that is to be told.
+    /// An unassigned SubDevice was read, or could not be: then with the reason, if it is to be reported.
     Read {
         /// Its address.
         station: StationAddress,
-        /// What it is.
+        /// Its data.
         read: Result<Rc<SubDeviceInfo>, Option<String>>,
     },
-    /// An unassigned SubDevice is none of the declared ones.
+    /// An unassigned SubDevice matches no declaration.
     Unexpected(StationAddress),
-    /// An unassigned SubDevice is a member and does not fit.
+    /// An unassigned SubDevice is a member but does not fit its declaration.
     Misfit {
         /// Its address.
         station: StationAddress,
@@ -188,79 +188,79 @@ pub enum Observation<'a> {
     Held {
         /// Its address.
         station: StationAddress,
-        /// The member.
+        /// An unassigned SubDevice may be this member, or another one of the same type.
         index: usize,
     },
-    /// An unassigned SubDevice has got the address of the member that it is.
+    /// An unassigned SubDevice was identified as a member and has got its address.
     Admitted {
         /// Its address until then.
         station: StationAddress,
         /// The member.
         index: usize,
-        /// What it is.
+        /// Its data.
         info: Box<SubDeviceInfo>,
     },
 
-    /// The segment was looked at for crossed lines.
+    /// A check for crossed lines has ended.
     LineChecked {
-        /// What was found; `None` where it changes too much to tell.
+        /// The result; `None` if the segment changed too often for a result.
         found: Option<LineCheck>,
-        /// The redundant link was down meanwhile.
+        /// The redundant link was down during the check.
         in_control: bool,
     },
-    /// The whole segment was looked at.
+    /// A rescan of the whole segment has ended.
     Rescanned {
-        /// What was found.
+        /// The result.
         seen: Seen<'a>,
-        /// What was posted then.
+        /// Words posted at that time.
         words: Words,
     },
-    /// The cabling was followed up to so many changes of hot connect groups.
+    /// The cabling was followed up to this number of changes of hot connect groups.
     GroupsFollowed(u32),
-    /// Cables have counted errors since the last look. By their number in the cabling that was asked about.
+    /// Cables have counted errors since the last reading. By number in the cabling of that version.
     CableErrors {
-        /// What it was about.
-        asked: Asked,
-        /// Those that are new.
+        /// Version of the model at the request.
+        versions: Versions,
+        /// The new errors.
         fresh: &'a [CableErrors],
     },
 
     /// Clocks were measured, written, read or lost.
     Clocks(ClockObservation<'a>),
 
-    /// A disturbance is wanted.
+    /// A disturbance is requested.
     Wanted(Wanted),
-    /// The one with this number has been undone, or is not wanted any more.
+    /// The disturbance with this number has been undone, or is no longer requested.
     Undisturbed(u32),
-    /// Rings behind junctions have been looked into, and all is as before.
+    /// An examination of rings behind junctions has ended without changes.
     Isolated {
-        /// What it was about.
-        asked: Asked,
-        /// What SubDevices said about their ports, by position.
+        /// Version of the model at the request.
+        versions: Versions,
+        /// Port states of the SubDevices, by position.
         found: &'a [Option<NodeStatus>],
-        /// What was posted then.
+        /// Words posted at that time.
         words: Words,
     },
-    /// A junction is about to get an order about its ports.
+    /// A port command to a junction is about to be sent.
     PortsOrdered {
         /// The junction.
         station: StationAddress,
-        /// What.
+        /// The command.
         control: DlControl,
     },
-    /// It has got it.
-    PortsTold(StationAddress),
-    /// The order that a junction has was read, after so many orders.
+    /// The junction has got the command.
+    PortsWritten(StationAddress),
+    /// The port control of a junction was read, after this number of commands.
     PortsRead {
         /// The junction.
         station: StationAddress,
-        /// Orders by then.
+        /// Commands up to then.
         orders: u32,
-        /// What it said.
+        /// The value read.
         control: DlControl,
     },
     /// Ports were closed to cut a SubDevice off.
     Blocked(&'a [BlockedPort]),
-    /// They are about to be opened.
+    /// The closed ports are about to be opened.
     Unblocking,
 }

@@ -1,4 +1,4 @@
-//! Which member is at which position, and where members belong in the order of the segment.
+//! The member at each position, and the order of members in the segment.
 
 use alloc::vec::Vec;
 
@@ -10,12 +10,12 @@ use super::member::Member;
 #[derive(Debug)]
 pub struct Owners {
     all: Vec<Option<usize>>,
-    /// Without those of groups, which may be anywhere.
+    /// Without members of groups, which have no fixed position.
     anchors: Vec<Option<usize>>,
 }
 
 impl Owners {
-    /// Owners by position; some of them float.
+    /// Owners by position; `floats` is true for members of groups.
     pub fn new(all: Vec<Option<usize>>, floats: impl Fn(usize) -> bool) -> Owners {
         let anchors = all.iter().map(|owner| owner.filter(|index| !floats(*index))).collect();
         Owners { all, anchors }
@@ -31,7 +31,7 @@ impl Owners {
         self.all.get(at).copied().flatten()
     }
 
-    /// The member right before a position.
+    /// The member directly before a position.
     pub fn before(&self, at: usize) -> Option<usize> {
         self.at(at.checked_sub(1)?)
     }
@@ -42,8 +42,8 @@ impl Owners {
     }
 }
 
-/// The member at each position. Where several have the address of one member, the one between its neighbours is it; if
-/// that does not tell, none of them is.
+/// The member at each position. If several SubDevices have the address of a member, the member is the one between its
+/// neighbours; if that is ambiguous, none.
 pub(super) fn owners_of(members: &[Member], stations: &[StationAddress]) -> Owners {
     let floats = |index: usize| members[index].config.group.is_some();
     let member = |station: &StationAddress| members.iter().position(|member| member.station == *station);
@@ -67,7 +67,7 @@ pub(super) fn owners_of(members: &[Member], stations: &[StationAddress]) -> Owne
         let between: Vec<usize> = candidates.iter().copied().filter(is_between).collect();
         let keeper = match between[..] {
             [only] => Some(only),
-            // It was there at the scan, and none has moved since.
+            // Its position at the scan, as no SubDevice has moved since.
             _ => between.into_iter().find(|at| members[index].node == Some(*at)),
         };
         if let Some(at) = keeper {
@@ -83,14 +83,14 @@ fn neighbours(owners: &[Option<usize>], at: usize) -> (Option<usize>, Option<usi
     (before, owners.iter().skip(at + 1).copied().flatten().next())
 }
 
-/// Where a member belongs in the order of the segment, which need not be that of the declaration.
+/// The place of a member in the order of the segment, which may differ from the order of the declaration.
 pub(super) type Rank = (Option<usize>, bool, usize);
 
-/// The ranks of all members; those of groups mean nothing.
+/// The ranks of all members; those of groups have no meaning.
 pub(super) fn ranks(members: &[Member]) -> Vec<Rank> {
     let mut last = None;
     let rank = |(index, member): (usize, &Member)| {
-        // One that was never seen belongs behind the one that is declared before it.
+        // A member that was never seen is placed behind the member declared before it.
         if member.config.group.is_none() {
             last = member.node.or(last);
         }

@@ -1,9 +1,8 @@
-//! Orders to SubDevices about their ports.
+//! Port commands to SubDevices.
 //!
-//! Rings of which no frame comes back are looked into by writing the loops of all ports of their junctions at once. A
-//! port that was closed on purpose must stay closed then, also where that was less than a look ago, or where the answer
-//! to the order did not come back any more. So an order counts from before it leaves on, and nothing that is read while
-//! it is under way.
+//! When no frame returns, rings are examined by writing the loops of all ports of their junctions at once. A port that
+//! was closed on purpose must stay closed then, also if it was closed after the last scan, or if the answer to the
+//! command was lost. So a command is stored before it is sent, and values read while it is under way are ignored.
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::DlControl;
@@ -17,15 +16,15 @@ pub struct BlockedPort {
     pub port: u8,
 }
 
-/// The order to a junction.
+/// The port control of a junction.
 #[derive(Clone, Copy, Debug)]
 pub struct PortControl {
     /// The junction.
     pub station: StationAddress,
-    /// The order.
+    /// The last command.
     pub control: DlControl,
-    /// Orders of the application so far.
+    /// Commands of the application so far.
     pub orders: u32,
-    /// Of these the ones that are under way.
+    /// Commands of the application under way.
     pub under_way: u32,
 }

@@ -1,9 +1,8 @@
-//! Rings behind junctions that are known, in a segment that is looked at anew: where they close now, and where they are
-//! broken.
+//! Known rings behind junctions in a rescanned segment: where they close now, and where they are broken.
 //!
-//! Hot connect groups may be pieces of them. A ring whose last SubDevices have left ends at the one before these. What
-//! leads to the SubDevice behind a break no port tells: it is followed from the junction on, along the members that
-//! were known before and those that have come since, as far as there is no choice.
+//! Hot connect groups may be parts of them. A ring without its last SubDevices ends at the SubDevice before these. No
+//! port shows the cable to the SubDevice behind a break: it is traced from the junction on, along the previous members
+//! and new ones, as long as there is only one possibility.
 
 use alloc::vec::Vec;
 
@@ -14,7 +13,7 @@ use super::cabling::{Cabling, End};
 use crate::junction::{HEAD_PORT, START_PORT};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, Topology};
 
-/// Where the rings that are known close in a segment in which these are, by position.
+/// The places where the known rings close in a segment with these SubDevices, by position.
 pub fn closings(known: &Cabling, stations: &[StationAddress]) -> Vec<Closing> {
     let place = |(station, port): End| Some(PortOf { node: position(stations, station)?, port });
     let known = known.closings.iter().filter_map(|[head, tail]| {
@@ -27,8 +26,8 @@ pub fn closings(known: &Cabling, stations: &[StationAddress]) -> Vec<Closing> {
     known.collect()
 }
 
-/// The cabling of the segment in which these are, with these rings. What is behind a break of one hangs where it hangs
-/// when the ring is whole, as far as that is known.
+/// The cabling of a segment with these SubDevices and these rings. SubDevices behind a break are placed as in the whole
+/// ring, as far as this is known.
 pub fn cabling(known: &Cabling, stations: &[StationAddress], status: &[NodeStatus], main_count: usize) -> Topology {
     let mut topology = Topology::with_local_rings(status, main_count, &closings(known, stations));
     for at in 0..topology.local_rings.len() {
@@ -53,7 +52,7 @@ fn last_before_break(
 ) -> Option<PortOf> {
     let head = ring.closing.head;
     let ring_before = before(known, (*stations.get(head.node)?, head.port));
-    // The port at which the ring left a SubDevice when that was seen last.
+    // The port at which the ring left a SubDevice when it was seen last.
     let port_before = |node: usize| {
         let cables = ring_before.map(|ring| ring.cables.as_slice()).unwrap_or_default();
         let nears = cables.iter().filter_map(|cable| end(known, cable.near?));
@@ -76,7 +75,7 @@ fn last_before_break(
     None
 }
 
-/// The port at which a line goes on or ends behind a SubDevice, where there is no choice.
+/// The port at which a line continues or ends behind a SubDevice, if there is only one possibility.
 fn only_way_on(topology: &Topology, status: &[NodeStatus], node: usize) -> Option<u8> {
     let here = topology.nodes.get(node)?;
     let kinds = status.get(node)?.ports;
@@ -90,7 +89,7 @@ fn only_way_on(topology: &Topology, status: &[NodeStatus], node: usize) -> Optio
     }
 }
 
-/// The ring that closes at a port of a junction, as it was known so far.
+/// The previously known ring that closes at a port of a junction.
 fn before(known: &Cabling, head: End) -> Option<&LocalRing> {
     known.topology.local_rings.iter().find(|ring| end(known, ring.closing.head) == Some(head))
 }

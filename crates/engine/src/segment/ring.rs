@@ -1,8 +1,8 @@
-//! The ring and the links: opened and closed with the counts of both sides, redundancy lost and regained, a carrier
-//! gone and back. Each edge is reported once, and not too often ([`Damper`]); what is asked for is always up to date.
+//! State of the ring and of the links: opened and closed with the counts of both sides, redundancy lost and restored,
+//! carrier lost and back. Each edge is reported once, at a limited rate ([`Damper`]); the status is always up to date.
 //!
-//! All of it comes from words that the exchange posts: nothing here waits for a frame, so that the event comes in the
-//! cycle whose frames showed the change.
+//! All inputs are words posted by the exchange: nothing here waits for a frame, so the event comes in the cycle whose
+//! frames showed the change.
 
 use core::time::Duration;
 
@@ -17,16 +17,16 @@ use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyL
 use crate::time::Instant;
 use crate::topology::{Topology, are_doubtful};
 
-/// Pause between two looks at results while counts are settling, or a change has still to be told.
+/// Interval of evaluation while counts settle, or while a change is not yet reported.
 const PAUSE: Duration = Duration::from_micros(500);
-/// Where the counts are not known from before: supervision results until they must be the same twice in a row. At the
-/// edge of a cut one copy may be processed by fewer SubDevices than are connected to its side.
+/// If the counts before the change are not known: supervision results after which two equal counts in a row are
+/// required. At the moment of a cut one copy may be processed by fewer SubDevices than are connected to its side.
 const SETTLING_RESULTS: u32 = 20;
 
-/// Words that the exchange has posted, and what the links tell.
+/// Words posted by the exchange, and the carriers of the links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// The links that there are.
+    /// The links in use.
     pub links: LinkSet,
     /// By [`Link::index`].
     pub carriers: [Option<bool>; 2],
@@ -38,38 +38,38 @@ pub struct Words {
     pub cycles: u64,
 }
 
-/// What is known of the ring, and what was reported of it.
+/// State of the ring, and what was reported of it.
 #[derive(Debug)]
 pub(super) struct Ring {
     /// The state that was reported last.
     reported: RingState,
-    /// Changes of the ring that were seen.
+    /// Detected changes of the ring.
     changes: u32,
     damper: Damper,
-    /// The way that was seen dead last.
+    /// The direction in which frames were lost last.
     dead_way: Option<Link>,
     ways: Damper,
     carriers: [Option<bool>; 2],
     told_carriers: [Option<bool>; 2],
     cables: [Damper; 2],
-    /// Number and counts of the last supervision result that was looked at.
+    /// Number and counts of the last supervision result that was evaluated.
     last: Option<(u32, (u16, u16))>,
     /// Results since the ring changed.
     settling: u32,
     /// SubDevices that answered twice in a row while the ring did not change.
     steady: u16,
-    /// What can be asked for.
+    /// Status for the application.
     pub status: RingStatus,
 }
 
-/// What the place of a break is judged by.
+/// Data that locates a break.
 pub(super) struct Cabled<'a> {
     pub topology: &'a Topology,
     pub cables: &'a [(Cable, CableErrors)],
 }
 
 impl Ring {
-    /// A ring of which nothing was seen, on links with these carriers.
+    /// A ring without observations, on links with these carriers.
     pub fn new(status: RingStatus, carriers: [Option<bool>; 2]) -> Ring {
         Ring {
             reported: RingState::Unknown,
@@ -92,7 +92,7 @@ impl Ring {
         self.reported
     }
 
-    /// Takes in what was posted. Returns when to look again though nothing else is posted.
+    /// Processes posted words. Returns when to evaluate again though nothing else is posted.
     pub fn observe(
         &mut self,
         words: &Words,
@@ -102,13 +102,13 @@ impl Ring {
         effects: &mut Effects,
     ) -> Option<Instant> {
         match disturbance {
-            // The redundant link is down on our own order: that is nothing to tell.
+            // The redundant link is down by our own command: not reported.
             Some(Disturbance::OpenByLink) => {
                 (self.changes, self.dead_way) = (words.ring.changes, words.ring.dead_way);
                 self.carriers = words.carriers;
                 return None;
             }
-            // A ring that is open on purpose has an interface whose carrier says what it always says.
+            // While the ring is open on purpose by a port, the carrier of the interface does not change.
             Some(Disturbance::OpenByPort) => {
                 let again = self.observe_carriers(words.carriers, now, effects);
                 self.changes = words.ring.changes;
@@ -117,7 +117,7 @@ impl Ring {
             Some(Disturbance::IsolateRings | Disturbance::Readdress | Disturbance::Rescan) | None => {}
         }
         let again = self.observe_carriers(words.carriers, now, effects);
-        // One link is a ring of one, which is no news.
+        // A single link is always in the state "ring of one": not reported.
         if words.links == LinkSet::Single {
             return again;
         }
@@ -125,7 +125,7 @@ impl Ring {
         [again, is_open.then(|| now + PAUSE)].into_iter().flatten().min()
     }
 
-    /// When a change of a carrier may be reported that may not be now.
+    /// Reports changes of carriers. Returns when a change that is held back may be reported.
     fn observe_carriers(
         &mut self,
         carriers: [Option<bool>; 2],
@@ -142,7 +142,7 @@ impl Ring {
             if carriers[at] == self.told_carriers[at] {
                 continue;
             }
-            if !self.cables[at].may_tell(now) {
+            if !self.cables[at].may_report(now) {
                 again = Some(now + PAUSE);
                 continue;
             }
@@ -157,7 +157,7 @@ impl Ring {
         again
     }
 
-    /// True while something has still to be reported or to settle.
+    /// True while a change is not yet reported or counts settle.
     fn observe_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
         let word = words.ring;
         if word.changes != self.changes {
@@ -168,16 +168,16 @@ impl Ring {
             self.ways.changed(now);
             self.dead_way = word.dead_way;
         }
-        let is_settled = self.tell_ring(words, cabled, now, effects);
-        let is_told = self.tell_redundancy(word, now, effects);
+        let is_settled = self.report_ring(words, cabled, now, effects);
+        let is_told = self.report_redundancy(word, now, effects);
         self.status.state = word.state;
         self.status.changes = word.changes;
         self.status.unsteady = self.damper.is_unsteady(now);
         !is_settled || !is_told || self.status.unsteady
     }
 
-    /// True where the state was reported, and the counts of it are steady.
-    fn tell_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+    /// True if the state was reported with steady counts.
+    fn report_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
         let word = words.ring;
         let Some((number, supervision)) = words.supervision else { return true };
         let counts = (supervision.main.0, supervision.redundant.0);
@@ -189,7 +189,7 @@ impl Ring {
             self.settling = 0;
             return self.steady == supervision.total().0;
         }
-        if !self.damper.may_tell(now) {
+        if !self.damper.may_report(now) {
             return false;
         }
         let Some((main, redundant)) = self.counts(word, number, supervision) else { return false };
@@ -208,7 +208,8 @@ impl Ring {
         false
     }
 
-    /// Where all answer on one side it is the other interface's cable, which no SubDevice needs to be asked for.
+    /// If all SubDevices answer on one side, the break is at the cable of the other interface; no SubDevice has to be
+    /// read.
     fn place_at_host(
         &mut self,
         word: RingWord,
@@ -217,7 +218,7 @@ impl Ring {
         effects: &mut Effects,
     ) {
         let Cabled { topology, cables } = cabled;
-        // Which cable leads to an interface is certain only where neighbours are.
+        // Which cable leads to an interface is certain only if the neighbours are known.
         let all = self.steady > 0 && main + redundant == self.steady && !are_doubtful(topology);
         let is_end_known = !topology.open_ports.is_empty() || topology.main_end.is_some();
         let cable = match (word.state, main, redundant) {
@@ -233,13 +234,12 @@ impl Ring {
         }
     }
 
-    /// SubDevices on each link, as soon as they are certain.
+    /// SubDevices on each link, as soon as the counts are certain.
     fn counts(&mut self, word: RingWord, number: u32, supervision: Supervision) -> Option<(u16, u16)> {
         let counts = (supervision.main.0, supervision.redundant.0);
         match (word.state, word.returned) {
-            // A copy that came back on its own link was processed by all that are connected there. The others are on
-            // the other side, also
-            // where the other copy is still out or was lost.
+            // A copy that returned on its own link was processed by all SubDevices on its side. All others are on the
+            // other side, also if the other copy is late or lost.
             (RingState::Open, Some((link, count))) if self.steady > 0 => {
                 let other = self.steady.saturating_sub(count);
                 let (seen, derived) = match link {
@@ -249,7 +249,7 @@ impl Ring {
                 let is_of_both = seen == count && counts.0 > 0 && counts.1 > 0;
                 Some(if is_of_both { counts } else { derived })
             }
-            // Another frame may have shown the change, and these are still counts of the ring as it was before.
+            // Another frame may have shown the change; these are then counts from before it.
             (RingState::Open, _) if !supervision.returned => None,
             (RingState::Closed, _) if supervision.returned => None,
             (RingState::Closed, _) if supervision.total().0 == self.steady => Some(counts),
@@ -270,8 +270,8 @@ impl Ring {
         None
     }
 
-    /// True where what is known was reported.
-    fn tell_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
+    /// True if the present state was reported.
+    fn report_redundancy(&mut self, word: RingWord, now: Instant, effects: &mut Effects) -> bool {
         let before = self.status.redundancy;
         let cause = match (self.reported, word.dead_way) {
             (RingState::Open, _) => Some(RedundancyLoss::Open),
@@ -286,7 +286,7 @@ impl Ring {
         };
         let by_way = matches!(cause, Some(RedundancyLoss::OneWay(_)))
             || matches!(before, Redundancy::Lost { cause: RedundancyLoss::OneWay(_), .. });
-        if is_told || (by_way && !self.ways.may_tell(now)) {
+        if is_told || (by_way && !self.ways.may_report(now)) {
             return is_told;
         }
         let was_lost = matches!(before, Redundancy::Lost { .. });

@@ -1,4 +1,4 @@
-//! What follows from what is seen, rule by rule.
+//! Rules: the effects of observations.
 
 mod breaks;
 mod clocks;

@@ -1,10 +1,10 @@
-//! A segment as a look at all of it has shown it.
+//! Result of a complete rescan, as the model takes it.
 
 use ringcat_wire::address::StationAddress;
 
 use crate::topology::Topology;
 
-/// A segment as it was seen, all of it.
+/// Result of a complete rescan.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Connections.

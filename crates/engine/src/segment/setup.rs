@@ -1,4 +1,4 @@
-//! What has to be written to a SubDevice, complete with logical addresses.
+//! Data to write to a SubDevice, complete with logical addresses.
 
 pub mod mail_status;
 pub mod presence;
@@ -12,16 +12,16 @@ use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
 use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
 
-/// What has to be written to one SubDevice, complete with logical addresses.
+/// Data to write to one SubDevice, complete with logical addresses.
 #[derive(Debug)]
 pub struct Setup {
     /// Registers and SDOs.
     pub plan: SubDevicePlan,
     /// FMMU number and registers.
     pub fmmus: Vec<(u8, Fmmu)>,
-    /// Of these, the number of the one that shows whether there is mail.
+    /// Number of the FMMU that maps the mailbox-full bit.
     pub mail_fmmu: Option<u8>,
-    /// Of these, the number of the one that shows its AL status in the frames of its process data.
+    /// Number of the FMMU that maps its AL status into the frames of its process data.
     pub presence_fmmu: Option<u8>,
     /// FMMUs that the controller has.
     pub fmmu_count: u8,
@@ -37,7 +37,7 @@ pub struct Setup {
 pub enum SetupError {
     /// The declaration does not fit the SubDevice.
     Plan(PlanError),
-    /// The process image has no place, or another one, for what the SubDevice has.
+    /// The process image has no place, or a place of another size, for an area of the SubDevice.
     Area {
         /// The SyncManager.
         sync_manager: u8,
@@ -46,7 +46,7 @@ pub enum SetupError {
         /// Bytes of the SubDevice.
         got: u16,
     },
-    /// The process image wants its AL status through an FMMU, and of these it has none to spare.
+    /// Its AL status has to be mapped through an FMMU, and it has none free; the number of its FMMUs.
     NoSpareFmmu(u8),
 }
 
@@ -75,8 +75,8 @@ impl core::error::Error for SetupError {
 }
 
 impl Setup {
-    /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas that no domain holds are
-    /// configured without an FMMU.
+    /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas without a domain are configured
+    /// without an FMMU.
     pub fn new(
         index: usize,
         config: &SubDeviceConfig,
@@ -114,13 +114,13 @@ impl Setup {
         })
     }
 
-    /// How many areas have an FMMU.
+    /// Number of areas with an FMMU.
     pub fn process_data_fmmus(&self) -> usize {
         let others = [self.mail_fmmu, self.presence_fmmu];
         self.fmmus.iter().filter(|(number, _)| !others.contains(&Some(*number))).count()
     }
 
-    /// The FMMU registers from the first to the last one that is used, to be written at once.
+    /// The FMMU registers from the first to the last used one, for one write.
     pub fn fmmu_registers(&self) -> Vec<u8> {
         let count = self.fmmus.iter().map(|(number, _)| usize::from(*number) + 1).max().unwrap_or(0);
         let mut registers = alloc::vec![0; Fmmu::LEN * count];
@@ -132,7 +132,7 @@ impl Setup {
     }
 }
 
-/// Bytes of the process data areas that a declaration fixes by itself, for a SubDevice that is not there yet.
+/// Bytes of the process data areas fixed by the declaration, for an absent SubDevice.
 pub fn declared_areas(config: &SubDeviceConfig) -> Option<Vec<(u8, Direction, u16)>> {
     if let Some(declared) = &config.declared {
         return Some(declared.iter().filter_map(DeclaredSyncManager::area).collect());

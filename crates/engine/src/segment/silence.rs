@@ -1,15 +1,14 @@
-//! When frames came back last.
+//! Time of the last returned frame.
 
 use crate::time::Instant;
 
-/// When frames came back last.
+/// Time of the last returned frame.
 #[derive(Debug, Default)]
 pub(super) struct Silence {
-    /// Number of the last supervision result with an answer, when it was seen, and how many cycles had been sent by
-    /// then.
+    /// Number of the last supervision result with an answer, the time of its arrival, and the cycles sent by then.
     pub last: Option<(Option<u32>, Instant, u64)>,
-    /// Not looked at before then.
+    /// Earliest time of the next check.
     pub next: Instant,
-    /// It was reported that none comes back.
+    /// It was reported that no frame returns.
     pub is_blocked: bool,
 }

@@ -1,12 +1,12 @@
-//! What a SubDevice is like when its configuration begins.
+//! State of a SubDevice at the start of its configuration.
 
-/// What is known of its registers.
+/// Knowledge about its registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
     /// A scan has just put it into INIT and cleared its registers.
     Cleared,
-    /// Anything; what it still has may be used.
+    /// Any state; its configuration may be reused.
     Unknown,
-    /// Anything, and what it has is of no use.
+    /// Any state; its configuration must not be reused.
     Doubtful,
 }

@@ -1,4 +1,4 @@
-//! From posted words and observations to events, without a bus.
+//! Tests from posted words and observations to events, without a bus.
 
 mod clocks;
 
@@ -38,10 +38,10 @@ const BEHIND: u8 = 0x59;
 
 const OP: Shown = (AlStatus { state: 8, error: false, identification: false, reserved: 0 }, AlStatusCode(0));
 
-/// A change that comes so long after another one is reported at once.
+/// A change this long after the previous one is reported at once.
 const QUIET: Duration = Duration::from_millis(50);
 
-/// A closed ring of so many SubDevices, all of them members and in OP.
+/// A closed ring of `n` SubDevices, all of them members in OP.
 struct Ring {
     segment: Segment,
     words: Words,
@@ -109,10 +109,10 @@ impl Ring {
         for member in &mut ring.segment.members {
             member.phase = Phase::Settled(AlState::Op);
         }
-        // Counts are known once they were the same several times; the first looks at all are no news.
+        // Counts become valid after several equal results; the first scans give no events.
         for _ in 0..6 {
             ring.cycle();
-            ring.look(&vec![PASS; count]);
+            ring.scan(&vec![PASS; count]);
         }
         ring
     }
@@ -121,7 +121,7 @@ impl Ring {
         self.segment.observe(seen, self.now).0
     }
 
-    /// A cycle later.
+    /// The next cycle.
     fn cycle(&mut self) -> Vec<Effect> {
         self.now += Duration::from_millis(1);
         if let Some((number, _)) = &mut self.words.supervision {
@@ -132,21 +132,21 @@ impl Ring {
         self.observe(Observation::Words(words))
     }
 
-    /// A round of looks, in which all are in OP; 0 for one that is silent.
-    fn look(&mut self, high: &[u8]) -> Vec<Effect> {
+    /// A round of scans with all in OP; 0 for a silent SubDevice.
+    fn scan(&mut self, high: &[u8]) -> Vec<Effect> {
         let (status, code) = OP;
-        let looks: Vec<Look> = high
+        let readings: Vec<Reading> = high
             .iter()
             .map(|high| match high {
-                0 => Look::Silent,
-                high => Look::Answer { status, code, dl_status: node(*high).dl_status },
+                0 => Reading::Silent,
+                high => Reading::Answer { status, code, dl_status: node(*high).dl_status },
             })
             .collect();
         let before: Vec<Phase> = self.segment.members.iter().map(|member| member.phase).collect();
         let counted = self.words.supervision.map(|(_, seen)| seen.total());
-        let asked = self.segment.asked();
-        let looked = Looked { asked, looks: &looks, before: &before, unassigned: &[], counted };
-        let effects = self.observe(Observation::Looks(looked));
+        let versions = self.segment.versions();
+        let round_result = RoundResult { versions, readings: &readings, before: &before, unassigned: &[], counted };
+        let effects = self.observe(Observation::Round(round_result));
         let number = self.words.supervision.map(|(number, _)| number);
         self.observe(Observation::RoundEnded(number));
         effects
@@ -168,7 +168,7 @@ impl Ring {
     }
 }
 
-fn told(effects: &[Effect]) -> Vec<Event> {
+fn reports(effects: &[Effect]) -> Vec<Event> {
     let event = |effect: &Effect| match effect {
         Effect::Report(event) | Effect::ReportOf(event, _) => Some(event.clone()),
         _ => None,
@@ -181,7 +181,7 @@ const fn cable(near: (usize, u8), far: (usize, u8)) -> Cable {
 }
 
 #[test]
-fn a_cut_cable_is_told_in_the_cycle_that_shows_it_and_its_place_by_the_next_look() {
+fn a_cut_is_reported_in_the_cycle_that_shows_it_and_located_by_the_next_scan() {
     for count in [2, 3, 8, 64] {
         for at in 1..count {
             let mut ring = Ring::closed(count);
@@ -190,101 +190,106 @@ fn a_cut_cable_is_told_in_the_cycle_that_shows_it_and_its_place_by_the_next_look
             ring.counts(main, redundant, RingState::Open);
             let effects = ring.cycle();
             let opened = [Event::RingOpened { main, redundant }, Event::RedundancyLost { cause: RedundancyLoss::Open }];
-            assert_eq!(told(&effects), opened, "{at} of {count}");
+            assert_eq!(reports(&effects), opened, "{at} of {count}");
             assert!(effects.contains(&Effect::MainCount(main)));
-            assert!(effects.contains(&Effect::Start(Task::Look { routine: false })));
+            assert!(effects.contains(&Effect::Start(Task::Scan { routine: false })));
             let mut high = vec![PASS; count];
             (high[at - 1], high[at]) = (BEFORE, BEHIND);
             let place = cable((at - 1, 1), (at, 0));
-            let effects = ring.look(&high);
-            assert_eq!(told(&effects), [Event::BreakLocated { cable: place }], "{at} of {count}");
+            let effects = ring.scan(&high);
+            assert_eq!(reports(&effects), [Event::BreakLocated { cable: place }], "{at} of {count}");
             assert!(effects.contains(&Effect::Start(Task::ExamineCabling { in_control: false })));
             assert_eq!(ring.segment.ring_status().place, Some(place));
-            assert_eq!(told(&ring.cycle()), [], "each edge once");
+            assert_eq!(reports(&ring.cycle()), [], "each edge once");
             ring.counts(count as u16, 0, RingState::Closed);
             ring.now += QUIET;
             let closed =
                 [Event::RingClosed { main: count as u16, redundant: 0, place: Some(place) }, Event::RedundancyRegained];
-            assert_eq!(told(&ring.cycle()), closed, "{at} of {count}");
+            assert_eq!(reports(&ring.cycle()), closed, "{at} of {count}");
         }
     }
 }
 
 #[test]
-fn counts_of_the_closed_ring_are_not_taken_for_those_of_the_open_one() {
+fn counts_from_before_a_cut_are_not_reported_for_the_open_ring() {
     let mut ring = Ring::closed(8);
     ring.now += QUIET;
-    // A frame without a supervision datagram has shown the cut; results of before it come in, one after the other.
+    // A frame without a supervision datagram has shown the cut; results from before the cut arrive one after the other.
     ring.counts(8, 0, RingState::Open);
     ring.words.ring.returned = None;
     for _ in 0..4 {
         if let Some((_, seen)) = &mut ring.words.supervision {
             seen.returned = false;
         }
-        assert_eq!(told(&ring.cycle()), []);
+        assert_eq!(reports(&ring.cycle()), []);
     }
     let changes = ring.words.ring.changes;
     ring.counts(3, 5, RingState::Open);
     (ring.words.ring.changes, ring.words.ring.returned) = (changes, None);
-    let events: Vec<Event> = (0..4).flat_map(|_| told(&ring.cycle())).collect();
+    let events: Vec<Event> = (0..4).flat_map(|_| reports(&ring.cycle())).collect();
     assert!(events.contains(&Event::RingOpened { main: 3, redundant: 5 }), "{events:?}");
 }
 
 #[test]
-fn what_is_opened_on_purpose_is_no_news_and_ends_without_any() {
+fn rings_opened_on_purpose_are_not_reported() {
     for disturbance in [Disturbance::OpenByLink, Disturbance::OpenByPort] {
         let mut ring = Ring::closed(4);
         ring.observe(Observation::Wanted(Wanted { disturbance, number: 0 }));
         assert_eq!(ring.segment.disturbance(), Some(disturbance));
         ring.counts(4, 0, RingState::Open);
-        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+        assert_eq!(reports(&ring.cycle()), [], "{disturbance:?}");
         ring.counts(4, 0, RingState::Closed);
-        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+        assert_eq!(reports(&ring.cycle()), [], "{disturbance:?}");
         ring.observe(Observation::Undisturbed(0));
-        assert_eq!(told(&ring.cycle()), [], "{disturbance:?}");
+        assert_eq!(reports(&ring.cycle()), [], "{disturbance:?}");
     }
 }
 
 #[test]
-fn a_member_is_lost_when_counts_say_so_and_otherwise_at_the_second_silent_look() {
+fn a_member_is_lost_when_counts_confirm_it_or_after_two_silent_scans() {
     let mut ring = Ring::closed(3);
-    let silent = ring.look(&[PASS, PASS, 0]);
-    assert_eq!(told(&silent), [], "three are counted: a frame may have gone another way");
-    let lost = ring.look(&[PASS, PASS, 0]);
-    assert_eq!(told(&lost), [Event::Lost { subdevice: SubDeviceId(2) }]);
+    let silent = ring.scan(&[PASS, PASS, 0]);
+    assert_eq!(reports(&silent), [], "three are counted: a frame may have gone another way");
+    let lost = ring.scan(&[PASS, PASS, 0]);
+    assert_eq!(reports(&lost), [Event::Lost { subdevice: SubDeviceId(2) }]);
     assert!(lost.contains(&Effect::SuspendMailbox { index: 2 }));
     let mut ring = Ring::closed(3);
     ring.counts(2, 0, RingState::Closed);
     ring.cycle();
-    assert_eq!(told(&ring.look(&[PASS, PASS, 0])), [Event::Lost { subdevice: SubDeviceId(2) }]);
+    assert_eq!(reports(&ring.scan(&[PASS, PASS, 0])), [Event::Lost { subdevice: SubDeviceId(2) }]);
     ring.counts(3, 0, RingState::Closed);
     ring.cycle();
-    let back = ring.look(&[PASS; 3]);
-    assert_eq!(told(&back), [], "another one may have its address");
+    let back = ring.scan(&[PASS; 3]);
+    assert_eq!(reports(&back), [], "another one may have its address");
     let check = Check::Return;
-    let task = Task::BringUp { index: 2, attempt: 2, from: Start::Unknown, told: None, check };
+    let task = Task::BringUp { index: 2, attempt: 2, from: Start::Unknown, reported: None, check };
     assert!(back.contains(&Effect::Start(task)), "{back:?}");
     let back = ring.observe(Observation::Returned { index: 2, attempt: 2 });
-    assert_eq!(told(&back), [Event::Returned { subdevice: SubDeviceId(2) }]);
+    assert_eq!(reports(&back), [Event::Returned { subdevice: SubDeviceId(2) }]);
 }
 
 #[test]
-fn looks_across_an_isolation_do_not_show_which_subdevices_are_there() {
+fn scans_during_an_isolation_do_not_change_member_states() {
     let mut ring = Ring::closed(3);
-    let asked = ring.segment.asked();
+    let versions = ring.segment.versions();
     ring.observe(Observation::Wanted(Wanted { disturbance: Disturbance::IsolateRings, number: 0 }));
     ring.observe(Observation::Undisturbed(0));
     let before = [Phase::Settled(AlState::Op); 3];
     for _ in 0..3 {
-        let looked =
-            Looked { asked, looks: &[Look::Silent; 3], before: &before, unassigned: &[], counted: Some(Wkc(0)) };
-        assert_eq!(told(&ring.observe(Observation::Looks(looked))), []);
+        let round_result = RoundResult {
+            versions,
+            readings: &[Reading::Silent; 3],
+            before: &before,
+            unassigned: &[],
+            counted: Some(Wkc(0)),
+        };
+        assert_eq!(reports(&ring.observe(Observation::Round(round_result))), []);
     }
     assert_eq!(ring.segment.members[0].phase, Phase::Settled(AlState::Op));
 }
 
 #[test]
-fn an_attempt_that_is_over_changes_nothing() {
+fn results_of_an_ended_attempt_are_ignored() {
     let mut ring = Ring::closed(1);
     ring.observe(Observation::Undone { index: 0, attempt: 0, reason: "FMMUs".into() });
     assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
@@ -298,11 +303,11 @@ fn an_attempt_that_is_over_changes_nothing() {
         assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
     }
     let effects = ring.observe(Observation::Reached { index: 0, attempt: 1, state: AlState::Op });
-    assert_eq!(told(&effects), [Event::StateReached { subdevice: SubDeviceId(0), state: AlState::Op }]);
+    assert_eq!(reports(&effects), [Event::StateReached { subdevice: SubDeviceId(0), state: AlState::Op }]);
 }
 
 #[test]
-fn inputs_that_were_read_before_a_mapping_prove_nothing_of_it() {
+fn inputs_read_before_a_mapping_do_not_prove_it() {
     let mut ring = Ring::closed(1);
     let step = |step| Observation::ProcessData { index: 0, step };
     ring.observe(step(ProcessDataStep::Joined));
@@ -318,23 +323,23 @@ fn inputs_that_were_read_before_a_mapping_prove_nothing_of_it() {
 }
 
 #[test]
-fn a_carrier_that_goes_and_comes_is_told_once_each() {
+fn a_lost_and_a_returned_carrier_are_reported_once_each() {
     let mut ring = Ring::closed(2);
     ring.words.carriers[1] = Some(false);
-    assert_eq!(told(&ring.cycle()), [Event::LinkDown { link: Link::Redundant }]);
-    assert_eq!(told(&ring.cycle()), []);
+    assert_eq!(reports(&ring.cycle()), [Event::LinkDown { link: Link::Redundant }]);
+    assert_eq!(reports(&ring.cycle()), []);
     ring.now += QUIET;
     ring.words.carriers[1] = Some(true);
-    assert_eq!(told(&ring.cycle()), [Event::LinkUp { link: Link::Redundant }]);
+    assert_eq!(reports(&ring.cycle()), [Event::LinkUp { link: Link::Redundant }]);
 }
 
 #[test]
-fn without_news_the_model_sleeps_until_the_next_routine_look() {
+fn without_changes_the_model_sleeps_until_the_next_routine_scan() {
     let mut ring = Ring::closed(4);
     ring.cycle();
-    ring.look(&[PASS; 4]);
+    ring.scan(&[PASS; 4]);
     let effects = ring.cycle();
     assert_eq!(effects, []);
-    let wake = ring.segment.next_look();
-    assert!(wake > ring.now + Duration::from_millis(900), "a look at {wake:?}, now {:?}", ring.now);
+    let wake = ring.segment.next_evaluation();
+    assert!(wake > ring.now + Duration::from_millis(900), "an evaluation at {wake:?}, now {:?}", ring.now);
 }

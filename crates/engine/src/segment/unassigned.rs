@@ -1,5 +1,5 @@
-//! SubDevices that answer but have no station address of ours. One that is no declared one keeps a temporary address
-//! and is looked at again when a declared one is lost.
+//! SubDevices that answer but have no assigned station address. If such a SubDevice is not declared it keeps a
+//! temporary address, and is evaluated again when a declared one is lost.
 
 use alloc::rc::Rc;
 use alloc::string::String;
@@ -12,38 +12,38 @@ use super::owners::Owners;
 use crate::info::SubDeviceInfo;
 use crate::time::Instant;
 
-/// So long the others of a gap wait for one that is being read.
+/// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.
 pub(super) const HOLD: Duration = Duration::from_secs(1);
 
-/// What is known about a SubDevice without a declaration.
+/// Knowledge about a SubDevice without a declaration.
 #[derive(Clone, Debug)]
 pub enum Knowledge {
-    /// It is being read since then.
+    /// It is being read, since this time.
     Reading(Instant),
-    /// Its SII cannot be read; this was reported last.
+    /// Its SII cannot be read; the last reported reason.
     Unreadable(String),
-    /// Which one it is, with its temporary address.
+    /// Its data, with its temporary address.
     Known(Rc<SubDeviceInfo>),
 }
 
-/// A SubDevice that answers and is no declared one yet.
+/// A SubDevice that answers and is not matched with a declaration yet.
 #[derive(Clone, Debug)]
 pub struct UnassignedSubDevice {
     /// Its temporary address.
     pub station: StationAddress,
     /// Index of the nearest member before it, and behind it, in the order of positions. Those of groups are left out.
     pub(super) between: (Option<usize>, Option<usize>),
-    /// Index of the member right before it.
+    /// Index of the member directly before it.
     pub(super) behind: Option<usize>,
-    /// Where it is.
+    /// Its position.
     pub position: Position,
-    /// The copy on the main link reaches it.
+    /// It processes the copy of the main link.
     pub(super) from_main: bool,
     /// It was reported as unexpected.
     pub reported: bool,
-    /// It is not known since then which of several members it is.
+    /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
-    /// What is known about it.
+    /// Its identity, as far as known.
     pub knowledge: Knowledge,
 }
 
@@ -53,13 +53,12 @@ pub(super) struct At<'a> {
     pub position: usize,
     /// The members at all positions.
     pub owners: &'a Owners,
-    /// Positions that the main copy reaches.
+    /// Positions on the main link.
     pub main_count: usize,
 }
 
 impl UnassignedSubDevice {
-    /// One that a scan has found among the owners of all positions, of which the main copy reaches the first
-    /// `main_count`.
+    /// A SubDevice found by a scan. `owners` has all positions; the first `main_count` are on the main link.
     pub fn new(info: SubDeviceInfo, owners: &Owners, main_count: usize, reported: bool) -> UnassignedSubDevice {
         let (station, position) = (info.station, usize::from(info.position.0));
         let knowledge = Knowledge::Known(Rc::new(info));
@@ -77,22 +76,22 @@ impl UnassignedSubDevice {
         UnassignedSubDevice { station, between, behind, position, from_main, reported, held_since: None, knowledge }
     }
 
-    /// It is known to be none of the declared ones, or cannot be read.
+    /// It is known to be undeclared, or cannot be read.
     pub fn is_settled(&self) -> bool {
         self.reported || matches!(self.knowledge, Knowledge::Unreadable(_))
     }
 
-    /// It is being read, and those around it should wait.
+    /// It is being read, and SubDevices around it should wait.
     pub(super) fn is_awaited(&self, now: Instant) -> bool {
         matches!(self.knowledge, Knowledge::Reading(since) if now.since(since) < HOLD)
     }
 }
 
-/// Which members unassigned SubDevices are.
+/// Unassigned SubDevices identified as members.
 #[derive(Clone, Debug, Default)]
 pub struct Matches {
-    /// Those of which it is known: the absent member that one is, or `None` where it is none of them.
+    /// Identified SubDevices: the absent member, or `None` if it is none of them.
     pub matched: Vec<(UnassignedSubDevice, Option<usize>)>,
-    /// Those that may be this member, or another one of the same kind.
+    /// SubDevices that may be this member, or another one of the same type.
     pub held: Vec<(StationAddress, usize)>,
 }

@@ -1,4 +1,4 @@
-//! The station addresses of all positions, as frames have met them.
+//! The station addresses of all positions, in the order in which frames pass them.
 
 use alloc::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::board::RingWord;
 pub struct View {
     /// SubDevices on the main and on the redundant link.
     pub counts: (Wkc, Wkc),
-    /// The state of the ring meanwhile.
+    /// The state of the ring at that time.
     pub ring: RingWord,
     /// By position.
     pub stations: Vec<StationAddress>,

@@ -450,7 +450,7 @@ fn a_dictionary_that_does_not_respond_delays_only_its_subdevice() {
     network.apply(ringcat_sim::fault::Fault::Hang(DeviceIndex(ODD), true));
     let options = Options::default();
     let world = World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("scan");
-    assert!(told(&world, "its dictionary does not tell its PDOs"));
+    assert!(told(&world, "the PDOs in its dictionary cannot be read"));
     let seconds = Duration::from_nanos(world.now().0).as_secs();
     assert!(seconds < 10, "{seconds} s");
     assert_eq!(world.application().entry(SubDeviceId(ODD), 0x6041, 0), None);

@@ -1,23 +1,23 @@
-//! Waiting until the segment has changed, while its clocks could not be set up.
+//! Waits for a change of the segment, while its clocks could not be set up.
 
 use core::time::Duration;
 
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
-/// From the last change of the segment until it is measured again: a plug that is pushed in bounces.
+/// Time from the last change of the segment to its measurement: contacts of a plug bounce.
 pub(super) const SETTLE: Duration = Duration::from_millis(5);
 
-/// What became of a segment meanwhile.
+/// Kind of change.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
     None,
-    /// SubDevices answer and none did before: so it is when cycles begin, which is no change.
+    /// The first SubDevices answer: so it is when cycles begin, which is not a change.
     FirstAnswer,
     Segment,
 }
 
-/// Waits until the segment has changed and is at rest again, at most for a time.
+/// Waits until the segment has changed and is stable again, at most for a time.
 pub(super) async fn wait_for_change(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Change {
     let state = || (segment.board.ring().changes, segment.board.clocks.holds(), answering(segment));
     let (mut until, mut seen) = (bus.now() + limit, state());

@@ -12,13 +12,13 @@ use crate::segment::Segment;
 use crate::segment::clocks::ClockObservation;
 use crate::supervisor::Bus;
 
-/// Distributions in a row; then the bus is free for others for [`BURST_PAUSE`].
+/// Consecutive distributions; then the bus is free for others for [`BURST_PAUSE`].
 const BURST: u32 = 8;
 const BURST_PAUSE: Duration = Duration::from_micros(100);
-/// A burst and its pause take at least this: the loops need their time as well as their samples, and what they have not
-/// learned by the end of the phase, cycles of a millisecond take seconds for.
+/// Minimum duration of a burst and its pause: the control loops need time as well as samples. What remains of the
+/// deviation at the end of the phase takes seconds with cycles of a millisecond.
 const BURST_TIME: Duration = Duration::from_micros(640);
-/// Pause after a frame that was lost; time without a reference costs one distribution for each.
+/// Pause after a lost frame, and while there is no reference; each pause counts as one distribution.
 const PAUSE: Duration = Duration::from_millis(1);
 /// The station address of a link without a reference: no SubDevice takes the time from its datagram.
 const NONE: StationAddress = StationAddress(0);
@@ -44,8 +44,8 @@ pub(in crate::procedures) async fn compensate_drift(bus: Bus, segment: SharedSeg
         let time = reading.unwrap_or_else(|| (bus.now().0.wrapping_add(epoch) as u32, bus.now()));
         reading = None;
         match bus.distribute_time(stations, map::DC_SYSTEM_TIME, time, Wkc(followers)).await {
-            // Clocks before the reference receive what it showed last, and the time since: a frame that this host sent
-            // late has the opposite effect in the next one.
+            // Clocks before the reference receive its last value plus the time since: a late send of this host has the
+            // opposite effect in the next frame.
             Ok(reply) if reply.redundant == Wkc(0) => {
                 reading = reply.data.first_chunk().map(|bytes| (u32::from_le_bytes(*bytes), reply.sent_at));
             }
@@ -60,7 +60,8 @@ pub(in crate::procedures) async fn compensate_drift(bus: Bus, segment: SharedSeg
     segment.observe_clocks(ClockObservation::Compensated);
 }
 
-/// The references by link. `None` without any, and while a ring opens or closes: the wrong clocks would follow.
+/// The references by link. `None` without references, and while a ring opens or closes: the time would be distributed
+/// to the wrong clocks.
 fn references(segment: &Segment) -> Option<[StationAddress; 2]> {
     let references = segment.references_in_use()?;
     let stations = Link::ALL.map(|link| references.on(link).unwrap_or(NONE));

@@ -1,11 +1,11 @@
-//! How SubDevices are connected now, and how long frames take from clock to clock (protocol 7.1).
+//! Measures how SubDevices are connected and how long frames take from clock to clock (protocol 7.1).
 //!
-//! A measurement does not disturb process data, so it may be taken at any time. But a frame passes each SubDevice of a
-//! whole ring only once, which measures nothing: during the set-up every ring is opened for a moment, with the bit that
-//! closes it again by itself. In the ring of two links the last port is closed, in a ring behind a junction both ends
-//! of its closing cable. The times of cables that this measures hold afterwards, wherever they are plugged in. Before
-//! process data is exchanged the branches of forks without a clock are closed one after the other as well
-//! ([`branches`]).
+//! A measurement does not disturb process data, so it may run at any time. But a frame passes each SubDevice of a
+//! closed ring only once, which gives no round-trip time. Therefore the set-up opens every ring for a moment, with the
+//! temporary loop setting, which the controller reverts without a further command. In the ring of two links the last
+//! port is closed, in a ring behind a junction both ends of its closing cable. Cable times measured this way stay
+//! valid, also if the cables are moved. Before process data is exchanged, the branches of forks without a clock are
+//! closed one after the other as well ([`branches`]).
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -32,15 +32,15 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// Bytes from DC_RECEIVE_TIME to the end of DC_RECEIVE_TIME_EPU.
 const LATCHED_LEN: usize = 32;
-/// A latch of which something was lost is taken again so often in all.
+/// Attempts in total to repeat a latch of which a datagram was lost.
 const MOST_FAILURES: u32 = 16;
-/// Looks at a segment that changes meanwhile.
-const LOOKS: u32 = 3;
-/// So long other disturbances may keep rings from being opened.
+/// Attempts to survey a segment that changes during the survey.
+const SCANS: u32 = 3;
+/// Maximum wait for other disturbances before rings are opened.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Until a ring that was opened must be closed again: loop settings end by themselves within a second.
+/// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
 const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
-/// Pause between two looks for that.
+/// Interval of the check whether the ring is closed.
 const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
@@ -53,28 +53,28 @@ struct Survey {
     topology: Topology,
     wiring: Wiring,
     is_closed: bool,
-    /// What was latched for it, as long as no port has been changed since: a measurement like others.
+    /// Latched values since which no port has changed: usable as a measurement.
     latched: Option<Vec<Option<Latched>>>,
-    /// The link on which copies do not come home, because the ring is opened.
-    deaf: Option<Link>,
-    /// No branch is left out.
+    /// The link on which copies do not return while the ring is opened.
+    no_return: Option<Link>,
+    /// No branch is closed.
     is_whole: bool,
 }
 
-/// Which ports may be closed for a moment, for measuring.
+/// Ports that may be closed for a moment, for measuring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opening {
-    /// None that is not needed.
+    /// None.
     Nothing,
-    /// Those that make a ring a line: everything stays in reach.
+    /// Ports that make a ring a line: all SubDevices stay in reach.
     Rings,
-    /// Branches too: nothing is exchanged yet.
+    /// Branches too: no process data is exchanged yet.
     Branches,
 }
 
-/// Measures.
+/// Runs a measurement.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
-    let mut survey = look(bus, segment).await?;
+    let mut survey = survey_segment(bus, segment).await?;
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
@@ -86,37 +86,36 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
         measure_branches(bus, segment, &survey, &rings).await;
         measured = take(bus, segment, &survey).await?;
     }
-    // A ring of two links that was broken until now has a cable that was never measured, and one behind a junction that
-    // came as a whole, or came back with other cables, has several.
+    // The ring of two links that was open until now has one cable that was never measured. A local ring that was
+    // connected as a whole, or came back with other cables, has several.
     let is_open = |measured: &Measured| measured.delays.is_shared || (measured.delays.is_guessed && survey.is_closed);
     let is_open_question = is_open(&measured);
-    // Opening changes ports, so that the segment is measured again: the same is not opened twice in vain.
-    let is_in_vain = segment.view().clocks().opened_in_vain.as_ref() == Some(&survey.wiring);
-    if !is_open_question || opening != Opening::Nothing || rings.is_empty() || is_in_vain {
+    // Opening changes ports, which triggers another measurement: a ring whose opening gave no result is not opened
+    // again.
+    let gave_no_result = segment.view().clocks().opened_without_result.as_ref() == Some(&survey.wiring);
+    if !is_open_question || opening != Opening::Nothing || rings.is_empty() || gave_no_result {
         let is_still_open = is_open_question && !rings.is_empty();
-        let in_vain = is_still_open.then_some(survey.wiring);
-        segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+        let without_result = is_still_open.then_some(survey.wiring);
+        segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
         return exact(measured);
     }
     let survey = Survey { latched: None, ..survey.clone() };
     measure_open(bus, segment, &survey, &rings, &[]).await?;
     measured = take(bus, segment, &survey).await?;
-    let in_vain = is_open(&measured).then_some(survey.wiring);
-    segment.observe_clocks(ClockObservation::OpenedInVain(in_vain));
+    let without_result = is_open(&measured).then_some(survey.wiring);
+    segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
     exact(measured)
 }
 
-/// An error where times contradict each other.
+/// An error if times contradict each other.
 fn exact(measured: Measured) -> Result<Measured, String> {
     if measured.delays.is_contradictory {
-        return Err(
-            "cables of a ring do not take as long together as each by itself, although it was opened".to_string()
-        );
+        return Err("the cable times of a ring contradict each other, although it was opened".to_string());
     }
     Ok(measured)
 }
 
-/// Opens rings and leaves branches out, measures what cables take, and takes that back.
+/// Opens rings, closes branches, measures cable times, and restores the ports.
 async fn measure_open(
     bus: &Bus,
     segment: &SharedSegment,
@@ -126,7 +125,7 @@ async fn measure_open(
 ) -> Result<(), String> {
     let mut wiring = survey.wiring.clone();
     wiring.open(branches);
-    // An end of a ring in a branch that is left out needs no order, and would not hear the one that takes it back.
+    // An end of a ring in a closed branch needs no command, and could not receive the command that restores it.
     let links = if survey.is_closed { 1 } else { TREES };
     let met: Vec<usize> = (0..links).flat_map(|link| wiring.path(link)).map(|arrival| arrival.at.node).collect();
     let is_reached = |at: &&PortOf| branches.is_empty() || met.contains(&at.node);
@@ -144,13 +143,13 @@ async fn measure_open(
             open.wiring.open(&[rings, branches].concat());
             open.latched = None;
             open.is_whole = branches.is_empty();
-            // The port at the end of a ring of two links is closed: what comes to it ends there.
-            open.deaf = survey.is_closed.then_some(Link::Redundant);
+            // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
+            open.no_return = survey.is_closed.then_some(Link::Redundant);
             take(bus, segment, &open).await.map(drop)
         }
         Err(error) => Err(text(error)),
     };
-    // Where this is lost, too, the ports open by themselves.
+    // If this frame is lost too, the ports open when the temporary setting expires.
     let _ = write(bus, before).await;
     if survey.is_closed {
         wait_for_ring(bus).await;
@@ -159,7 +158,7 @@ async fn measure_open(
     result
 }
 
-/// Measures what is behind forks without a clock, branch by branch. What cannot be is left open.
+/// Measures the cables behind forks without a clock, branch by branch. Unmeasurable delays stay unknown.
 async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, rings: &[PortOf]) {
     let has_clock: Vec<bool> = {
         let view = segment.view();
@@ -173,7 +172,7 @@ async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, r
     }
 }
 
-/// Until frames of both halves have shown that the ring is closed.
+/// Waits until frames on both links have shown that the ring is closed.
 async fn wait_for_ring(bus: &Bus) {
     let until = bus.now() + CLOSING_LIMIT;
     while bus.now() < until {
@@ -187,7 +186,7 @@ async fn wait_for_ring(bus: &Bus) {
 }
 
 impl Survey {
-    /// The ports to close so that no ring is whole.
+    /// The ports to close so that every ring is open.
     fn whole_rings(&self) -> Vec<PortOf> {
         let mut ports = Vec::new();
         for ring in &self.topology.local_rings {
@@ -201,32 +200,33 @@ impl Survey {
         ports
     }
 
-    /// Whether all members of a local ring are entered at port 0.
+    /// Whether frames enter all SubDevices of a local ring at port 0.
     fn cables_are_whole(&self, closing: Closing) -> bool {
         let mut members = closing.head.node + 1..=closing.tail.node;
         members.all(|node| self.dl_status[node].ports[0].communication)
     }
 }
 
-async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
-    for _ in 0..LOOKS {
-        let looked = look_once(bus, segment).await;
-        // Ports that changed in between have told it to this look.
-        segment.observe(Observation::LookAgain);
-        match looked {
+async fn survey_segment(bus: &Bus, segment: &SharedSegment) -> Result<Survey, String> {
+    for _ in 0..SCANS {
+        let surveyed = survey_once(bus, segment).await;
+        // The ECAT events of ports that changed before have been read and cleared by this survey, so another scan is
+        // needed.
+        segment.observe(Observation::ScanAgain);
+        match surveyed {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
             Err(error) => return Err(error.to_string()),
         }
     }
-    Err("SubDevices come and go".to_string())
+    Err("SubDevices were added or lost repeatedly".to_string())
 }
 
 /// `None` while the segment changes.
-async fn look_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
+async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
     let Some(before) = view(bus).await? else { return Ok(None) };
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    // Receive times show at which port frames enter a SubDevice.
+    // Receive times show the port at which frames enter a SubDevice.
     let latched = match latch(bus, segment, &before.stations, None).await {
         Err(BusError::Wkc { .. }) => return Ok(None),
         other => other?,
@@ -265,12 +265,12 @@ async fn look_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>,
         wiring,
         is_closed,
         latched: Some(latched),
-        deaf: None,
+        no_return: None,
         is_whole: true,
     }))
 }
 
-/// Several latches of a segment as it is.
+/// Latches several times without changing the segment.
 async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Measured, String> {
     let count = segment.view().clocks().config.measurements.clamp(1, 64);
     let entries = survey.wiring.entry_ports();
@@ -282,7 +282,7 @@ async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Mea
     let count = count + measurements.count();
     let mut failures = 0;
     while measurements.count() < count {
-        match latch(bus, segment, &survey.stations, survey.deaf).await {
+        match latch(bus, segment, &survey.stations, survey.no_return).await {
             Ok(latched) => measurements.add(latched),
             Err(error @ (BusError::Busy { .. } | BusError::Disturbed { .. })) => return Err(error.to_string()),
             Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
@@ -294,7 +294,7 @@ async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Mea
     measured.ok_or_else(unfit)
 }
 
-/// What latched receive times tell of delays, `None` where they do not fit the cabling, and of cables.
+/// Computes delays (`None` if latched receive times do not fit the cabling) and cable times.
 fn evaluate(
     segment: &SharedSegment,
     survey: &Survey,
@@ -309,12 +309,12 @@ fn evaluate(
     let on_clock = reference.and_then(|index| at(clocks.nodes[index].station)).unwrap_or(0);
     let passages: Vec<Passage> = survey.stations.iter().map(|station| clocks.passage_of(*station)).collect();
     if let Some(odd) = measurements.disagreement(on_clock) {
-        // Where a port shows times that cannot be in most of them, no frame comes in there.
+        // If most latches of a port show impossible times, no frame enters there.
         return Err(if odd.is_possible() { describe(&odd, survey.stations[odd.node]) } else { unfit() });
     }
     let segment = Segment { wiring: &survey.wiring, stations: &survey.stations, passages: &passages };
     let mut cables = clocks.cables.clone();
-    // Cables of branches that are left out are where they were.
+    // Cables of closed branches keep their places.
     if survey.is_whole {
         segment.set_present(&mut cables);
     }
@@ -328,7 +328,7 @@ fn unfit() -> String {
     "receive times do not fit the cabling: a ring behind a junction may be unknown".to_string()
 }
 
-/// Measurements that do not agree. Without figures: the same reason is reported once.
+/// Describes measurements that disagree. Without figures, so that the same reason is reported once.
 fn describe(odd: &Disagreement, station: StationAddress) -> String {
     match odd.port {
         Some(port) => format!(
@@ -343,7 +343,7 @@ fn describe(odd: &Disagreement, station: StationAddress) -> String {
 }
 
 /// Writes DC_LATCH_MODE of controllers that latch in one direction only: the direction from which frames come (protocol
-/// 3.12, 7.5). Returns whether all have the right one already.
+/// 3.12, 7.5). Returns whether all registers were right already.
 async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[StationAddress], entries: &[u8]) -> bool {
     let modes = segment.view().clocks().latch_modes(stations, entries);
     if modes.is_empty() {
@@ -353,29 +353,29 @@ async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[Station
     let write = |bus: Bus, (station, backwards): (StationAddress, bool)| async move {
         bus.fpwr(station, map::DC_LATCH_MODE, &[u8::from(backwards)]).await
     };
-    // Those without the register do not answer.
+    // SubDevices without the register do not increment the WKC.
     let _ = bus.gather(modes, write).await;
     false
 }
 
-/// Lets all clocks latch one frame and reads what these SubDevices have. Copies on the link that is `deaf` do not come
-/// home.
+/// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `no_return` do
+/// not return.
 pub(super) async fn latch(
     bus: &Bus,
     segment: &SharedSegment,
     stations: &[StationAddress],
-    deaf: Option<Link>,
+    no_return: Option<Link>,
 ) -> Result<Vec<Option<Latched>>, BusError> {
-    let (asked, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
+    let (targets, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
         let view = segment.view();
         let clocks = view.clocks();
         let lacks = |station| clocks.node_at(station).is_some_and(|node| !node.has_clock);
-        let asked = stations.iter().map(|station| (*station, !lacks(*station)));
-        (asked.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
+        let targets = stations.iter().map(|station| (*station, !lacks(*station)));
+        (targets.collect(), if clocks.config.pauses { Pauses::Allowed } else { Pauses::Forbidden })
     };
-    let latches = frames::latch(bus, pauses, deaf).await?;
-    let read = bus.gather(asked, |bus, (station, asked)| async move {
-        if !asked {
+    let latches = frames::latch(bus, pauses, no_return).await?;
+    let read = bus.gather(targets, |bus, (station, has_clock)| async move {
+        if !has_clock {
             return Ok(None);
         }
         let bytes: [u8; LATCHED_LEN] = match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {
@@ -389,7 +389,7 @@ pub(super) async fn latch(
         Ok(Some(Latched { ports: [word(0), word(4), word(8), word(12)], unit }))
     });
     let read: Vec<Option<Latched>> = read.await.into_iter().collect::<Result<_, _>>()?;
-    // A SubDevice that the frame has not passed has the times of an earlier one.
+    // A SubDevice that the frame has not passed still has the times of an earlier frame.
     let answered = Wkc(read.iter().flatten().count() as u16);
     if latches.met.0 < answered.0 {
         let target = Target::Broadcast(map::DC_RECEIVE_TIME);
@@ -419,7 +419,7 @@ fn closed(control: DlControl, station: StationAddress, ports: &[(StationAddress,
     DlControl { temporary: true, loops, ..control }
 }
 
-/// All in one frame: in between, frames would be sent into a closed port.
+/// All in one frame: a second frame would be sent into a closed port.
 async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
     let target = |station: StationAddress| Target::Station(station, map::DL_CONTROL);
     let writes = controls

@@ -1,4 +1,4 @@
-//! A clock that is not good enough for SYNC signals (protocol 7.3).
+//! A clock that is not accurate enough for SYNC signals (protocol 7.3).
 
 use core::fmt;
 use core::time::Duration;
@@ -6,18 +6,18 @@ use core::time::Duration;
 use crate::segment::clocks::HiddenDelay;
 use crate::supervisor::BusError;
 
-/// A clock did not come into its window.
+/// A clock did not reach its window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotLocked {
-    /// How long that was waited for.
+    /// The time limit.
     pub waited: Duration,
-    /// Its difference to the reference when it was read last.
+    /// The last difference to the reference.
     pub difference_ns: Option<i32>,
     /// The window.
     pub window_ns: u32,
-    /// Its position where another clock of the segment is to blame.
+    /// The position of another clock of the segment, if that is the cause.
     pub other: Option<u16>,
-    /// Its delay is not known.
+    /// Its delay is unknown.
     pub hidden: Option<HiddenDelay>,
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for NotLocked {
             f.write_str("its propagation delay is not known, ")?;
             return match hidden.fork {
                 Some(fork) => write!(f, "since the fork at position {fork} has no clock"),
-                None => f.write_str("since it is not known what lies between it and the reference clock"),
+                None => f.write_str("since the SubDevices between it and the reference clock are unknown"),
             };
         }
         match self.other {

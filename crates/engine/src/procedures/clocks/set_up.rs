@@ -36,7 +36,7 @@ pub(super) async fn set_up(bus: &Bus, segment: &SharedSegment, opening: Opening)
     write_all(bus, segment).await.map_err(text)
 }
 
-/// Measures all delays again and writes those of the links on which any is another one.
+/// Measures all delays again and writes those of the links on which a delay has changed.
 pub(super) async fn measure_again(bus: &Bus, segment: &SharedSegment) -> Result<(), String> {
     let measured = measure(bus, segment, Opening::Nothing).await?;
     segment.observe_clocks(ClockObservation::MeasuredAgain(&measured));
@@ -55,7 +55,7 @@ async fn write_all(bus: &Bus, segment: &SharedSegment) -> Result<(), BusError> {
         with_clock.map(|node| (node.station, registers(node))).collect()
     };
     let written = bus.gather(all, |bus, (station, registers)| async move { write(&bus, station, registers).await });
-    // A SubDevice that does not answer is set up when it comes back.
+    // An absent SubDevice is set up when it comes back.
     written.await.into_iter().filter(|result| !matches!(result, Err(BusError::Wkc { .. }))).collect()
 }
 
@@ -65,7 +65,7 @@ pub(super) async fn set_filters(bus: &Bus, segment: &SharedSegment) {
     let written = bus.gather(all, |bus, (index, station, depths)| async move {
         bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (index, depths))
     });
-    // A SubDevice without these registers, or that does not answer, stays as it is.
+    // SubDevices without these registers, and absent ones, are not changed.
     let written: Vec<(usize, [u8; 2])> = written.await.into_iter().flatten().collect();
     segment.observe_clocks(ClockObservation::FiltersWritten(&written));
 }
@@ -99,8 +99,8 @@ pub(super) async fn write_delays(bus: &Bus, segment: &SharedSegment, link: Link)
     Ok(())
 }
 
-/// Sets up one clock that has lost its registers: its offset comes from a frame that it and its reference latch, or
-/// from the time of the host where there is no reference.
+/// Sets up one clock that has lost its registers: its offset is computed from a frame that it and its reference latch,
+/// or from the time of the host without a reference.
 pub(super) async fn set_up_one(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), BusError> {
     let host = bus.now().0;
     let stations = segment.view().clocks().stations();

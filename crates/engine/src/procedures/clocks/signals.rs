@@ -1,4 +1,4 @@
-//! SYNC signals of one SubDevice, and waiting until its clock is good enough for them (protocol 7.3).
+//! SYNC signals of one SubDevice, and the wait until its clock is accurate enough for them (protocol 7.3).
 
 use core::time::Duration;
 
@@ -14,17 +14,17 @@ use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::clocks::{ClockObservation, Clocks};
 use crate::supervisor::{Bus, BusError};
 
-/// From the read of the clock to the first pulse at the least (protocol 7.3).
+/// Minimum time from the read of the clock to the first pulse (protocol 7.3).
 const AHEAD_NS: u64 = 100_000_000;
-/// Signals are started when the clock differs by at most this (protocol 7.2: as IgH does).
+/// Largest difference of the clock at which signals are started (protocol 7.2: as IgH does).
 const GOOD_ENOUGH_NS: u32 = 10_000;
-/// A segment that changes all the time is not waited for any longer.
+/// Maximum wait for the measurement of a segment that changes repeatedly.
 const MEASURING_LIMIT: Duration = Duration::from_secs(1);
 
-/// Sets up a clock that has lost its registers with its power, or that came later and never had them.
+/// Sets up a clock that has lost its registers with its power, or was added later.
 pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, member: usize) -> Result<(), BusError> {
     let Some(index) = index_of(segment, member) else { return Ok(()) };
-    // The first clock of a segment begins with the set-up of all, which includes each SubDevice that answers by then.
+    // The first clock of a segment starts the set-up of all, which includes each SubDevice that answers by then.
     let are_set_up = segment.until(|segment| segment.clocks().are_set_up().then_some(()));
     if bus.within(MEASURING_LIMIT, are_set_up).await.is_err() {
         return Ok(());
@@ -39,8 +39,8 @@ pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, m
         return Ok(());
     }
     segment.observe_clocks(ClockObservation::RegistersLost { index });
-    // Its place is known when the segment has been measured with it. A segment that changes all the time is not waited
-    // for.
+    // Its delay is known when the segment has been measured with it. The wait is limited for a segment that changes
+    // repeatedly.
     let measured = segment.until(|segment| segment.clocks().doubtful_since().is_none().then_some(()));
     let _ = bus.within(MEASURING_LIMIT, measured).await;
     set_up_one(bus, segment, index).await?;
@@ -48,7 +48,7 @@ pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, m
     Ok(())
 }
 
-/// The clock of a member. One that was not at the scan is added. `None` where those that are known could not be set up
+/// The clock of a member; a clock that was not found by the scan is added. `None` if the known clocks are not set up
 /// yet: their set-up includes it.
 fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
     let has_clock = |info: &SubDeviceInfo| info.controller.features.dc;
@@ -63,7 +63,7 @@ fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
     segment.view().clocks().index_of(member)
 }
 
-/// Programs the SYNC unit and starts it. The clock must be about right by then.
+/// Programs the SYNC unit and starts it. The clock must be approximately right by then.
 pub(in crate::procedures) async fn start_signals(
     bus: &Bus,
     segment: &SharedSegment,
@@ -127,11 +127,11 @@ pub(in crate::procedures) async fn wait_for_lock(
             let node = &clocks.nodes[*index];
             node.has_clock && node.link.is_some() && node.good < samples && Some(*index) != clocks.reference
         };
-        // Its own clock first: if that is right, another one keeps all waiting.
+        // Its own clock first: if that is right, another clock is the cause of the wait.
         let at_fault = own.filter(is_open).or_else(|| (0..clocks.nodes.len()).find(is_open));
         let difference_ns = at_fault.or(own).and_then(|index| clocks.nodes[index].difference_ns);
         let other = at_fault.filter(|index| Some(*index) != own).map(|index| clocks.nodes[index].position);
-        // It may become known: a branch is unplugged, or known cables are back.
+        // The delay may become known: a branch is unplugged, or known cables are back.
         let hidden = own.and_then(|index| clocks.hidden(index)).filter(|hidden| !hidden.is_estimated);
         let is_locked = clocks.are_set_up() && at_fault.is_none() && hidden.is_none();
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
@@ -139,7 +139,7 @@ pub(in crate::procedures) async fn wait_for_lock(
     wait(bus, segment, limit, check).await
 }
 
-/// Waits until clocks pass a check; an error is what the check says at the end of the time.
+/// Waits until clocks pass a check; the error is the result of the check at the time limit.
 async fn wait(
     bus: &Bus,
     segment: &SharedSegment,

@@ -1,10 +1,10 @@
-//! The set-up of the clocks, and their watch afterwards (protocol 7.2, 7.5).
+//! Set-up of the clocks, and their supervision afterwards (protocol 7.2, 7.5).
 //!
 //! The differences of all clocks are read every millisecond until all are locked, and ten times a second afterwards.
 //! When the ring opens or closes, or a SubDevice is lost, the answers also show which SubDevice answers on which link:
-//! the model then lets the delays count from the reference there, and posts the references for the cyclic frames. When
-//! ports have changed, or SubDevices came or went, all delays are measured again; the exchange distributes no time from
-//! the cycle that shows changed ports until that is done.
+//! the model then recomputes the delays from the reference on that link, and posts the references for the cyclic
+//! frames. When ports have changed, or SubDevices were lost or added, all delays are measured again; from the cycle
+//! that shows changed ports until then the exchange distributes no time.
 
 use core::time::Duration;
 
@@ -26,26 +26,25 @@ use crate::segment::clocks::{Answer, ClockObservation, Difference, Due};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
 
-/// Between two reads of the differences before all clocks are locked, and while links change.
+/// Interval of reads of the differences before all clocks are locked, and while links change.
 const PAUSE: Duration = Duration::from_millis(1);
-/// Between two reads afterwards.
+/// Interval of reads afterwards.
 const ROUTINE: Duration = Duration::from_millis(100);
-/// Between the first two tries to set the clocks up. Each further one comes after twice the time, until the segment
-/// changes.
+/// Pause between the first two attempts to set the clocks up. It doubles with each attempt, until the segment changes.
 const RETRY: Duration = Duration::from_millis(100);
-/// The longest time between two of them.
+/// The longest of these pauses.
 const LONGEST_RETRY: Duration = Duration::from_secs(10);
-/// A ring that opened or closed explains ports that change within so long: in each part the way from clock to clock is
-/// what it was (protocol 7.5), so that the distribution does not wait for the measurement.
+/// Port changes within this time are explained by a ring that opened or closed: in each part the path from clock to
+/// clock is unchanged (protocol 7.5), so the distribution does not wait for the measurement.
 const EXPLAINED: Duration = Duration::from_millis(20);
-/// Between two tries to measure it.
+/// Pause between two attempts to measure a changed segment.
 const AGAIN: Duration = Duration::from_millis(20);
-/// A segment that cannot be measured for so long has its clocks followed as they were.
+/// If a segment cannot be measured for this time, time is distributed with the old delays.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Clocks before a reference that are read with it in one frame.
 const IN_A_FRAME: usize = 32;
 
-/// The first try to set the clocks up, before other frames are on the way.
+/// The first attempt to set the clocks up, before other frames are sent.
 pub(crate) async fn begin(bus: &Bus, segment: &SharedSegment) {
     try_set_up(bus, segment, Opening::Branches).await;
 }
@@ -58,9 +57,9 @@ async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
     segment.observe_clocks(done);
 }
 
-/// Runs for ever.
+/// Runs until the MainDevice stops.
 pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
-    // The first clock may come with a group that joins.
+    // The first clock may be added by a hot connect group.
     segment.until(|segment| segment.clocks().is_any().then_some(())).await;
     let mut pause = RETRY;
     while !segment.view().clocks().are_set_up() {
@@ -117,8 +116,8 @@ fn doubtful_since(segment: &SharedSegment) -> Option<Instant> {
     segment.view().clocks().doubtful_since()
 }
 
-/// Waits until the differences have to be read or the segment measured, or until something is posted or a clock has
-/// come back. While clocks are outside or links change, differences are read every [`PAUSE`].
+/// Waits until the differences have to be read or the segment measured, or until words are posted or a clock has come
+/// back. While clocks are outside or links change, differences are read every [`PAUSE`].
 async fn wait(bus: &Bus, segment: &SharedSegment, next_read: Instant, next_measurement: Instant, is_explained: bool) {
     let posted = bus.posted();
     let doubtful = doubtful_since(segment);
@@ -148,7 +147,7 @@ async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
     set_filters(bus, segment).await;
 }
 
-/// Reads all differences, and does what follows from them.
+/// Reads all differences, and executes the resulting actions.
 async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     let holds = segment.board.clocks.holds();
     let stations: Vec<Option<StationAddress>> = {
@@ -158,7 +157,7 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     let answers = bus.gather(stations, |bus, station| async move {
         let Some(station) = station else { return Some(Answer::default()) };
         let target = Target::Station(station, map::DC_SYSTEM_TIME_DIFFERENCE);
-        // With DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE behind it. A lost frame tells nothing.
+        // Including DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE. A lost frame gives no information.
         let reply = bus.transfer(Command::Fprd, target, vec![0; 8], Some(Wkc(1))).await.ok()?;
         Some(decode(&reply))
     });
@@ -198,8 +197,9 @@ fn decode(reply: &Reply) -> Answer {
     Answer { link: Some(link), difference, deviation_ppb }
 }
 
-/// Clocks that frames pass before the reference receive the time that the host predicts, so that their own differences
-/// show by how late it sends. Their real differences come from one frame that reads them and the reference.
+/// Clocks that frames pass before the reference receive the time predicted by the host, so their own differences
+/// contain the sending delay of the host. Their true differences are computed from one frame that reads them and the
+/// reference.
 async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option<Answer>]) {
     let groups: Vec<(usize, Vec<usize>)> = {
         let view = segment.view();
@@ -220,7 +220,7 @@ async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option
             let delay = |index: usize| view.clocks().nodes[index].delay_ns;
             for (index, reply) in some.iter().zip(others) {
                 let Some(answer) = answers[*index].as_mut().filter(|answer| answer.link.is_some()) else { continue };
-                // Another frame has passed at another time.
+                // Another frame passed at another time.
                 if reply.frame != of_reference.frame || [reply, of_reference].map(Reply::wkc) != [Wkc(1); 2] {
                     answers[*index] = None;
                     continue;
@@ -233,7 +233,7 @@ async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option
     }
 }
 
-/// Reads the reference clock: which system time belongs to which host time.
+/// Reads the reference clock: the system time at a host time.
 async fn follow_reference(bus: &Bus, segment: &SharedSegment) {
     let station = {
         let view = segment.view();

@@ -1,4 +1,4 @@
-//! Why SAFEOP may have been refused: the process data that is configured beside that of the SubDevice's dictionary.
+//! Reasons for a refused SAFEOP: compares the configured process data with the SubDevice's dictionary.
 
 use alloc::format;
 
@@ -11,7 +11,7 @@ use crate::mail::Limits;
 use crate::mail::coe::pdo;
 use crate::procedures::al_state::StateError;
 
-/// Codes that may mean that the sizes are wrong (protocol 5.5).
+/// AL status codes that may be due to wrong sizes (protocol 5.5).
 const OF_SIZES: [AlStatusCode; 5] = [
     AlStatusCode::INVALID_SYNC_MANAGER_CONFIGURATION,
     AlStatusCode::INVALID_OUTPUT_CONFIGURATION,
@@ -21,7 +21,7 @@ const OF_SIZES: [AlStatusCode; 5] = [
 ];
 
 impl BringUp<'_> {
-    /// Tells where dictionary and configuration differ, if that may be why.
+    /// Reports differences between dictionary and configuration, if they may be the cause.
     pub(super) async fn explain(&self, error: &ConfigureError) {
         let ConfigureError::State(StateError::Refused { code, .. }) = error else { return };
         if !OF_SIZES.contains(code) || !self.mailbox.is_open() {
@@ -29,7 +29,7 @@ impl BringUp<'_> {
         }
         let limits = Limits::new(self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
         for area in &self.setup.plan.process_data {
-            // One without such lists has nothing to compare.
+            // A SubDevice without these objects has nothing to compare.
             let Ok(pdos) = pdo::read_assignment(&self.mailbox, area.sync_manager, limits).await else { return };
             let entries = pdos.iter().flat_map(|pdo| pdo.entries.iter().flatten());
             let bits: u32 = entries.map(|entry| u32::from(entry.bit_length)).sum();

@@ -30,18 +30,18 @@ pub enum ConfigureError {
         number: usize,
         /// The transition to which it belongs.
         transition: Transition,
-        /// What it is for, in the words of its declaration.
+        /// Its purpose, as commented in the declaration.
         comment: Option<String>,
-        /// What happened.
+        /// The error.
         error: StartupError,
     },
     /// A clock did not lock.
     NotLocked(NotLocked),
-    /// It never was there, so nothing is known to write.
+    /// It was never present, so its configuration is unknown.
     NoSetup,
-    /// What its SII says cannot be set up.
+    /// Its SII cannot be set up as declared.
     Unfit(SetupError),
-    /// It has no boot loader: its SII gives no mailboxes for BOOT.
+    /// It has no boot loader: its SII contains no mailboxes for BOOT.
     NoBoot,
     /// It does not answer. It is brought to the requested state when it comes back.
     Absent,
@@ -49,7 +49,7 @@ pub enum ConfigureError {
     Interrupted,
 }
 
-/// What happened to a start-up command.
+/// Why a start-up command failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum StartupError {
@@ -59,13 +59,13 @@ pub enum StartupError {
     Soe(SoeError),
     /// EoE.
     Eoe(EoeError),
-    /// An object holds another value than it must.
+    /// An object holds another value than required.
     Value {
         /// The object.
         object: SdoAddress,
-        /// What it must hold.
+        /// The required value.
         expected: Vec<u8>,
-        /// What it holds.
+        /// The value read.
         got: Vec<u8>,
     },
     /// A register.

@@ -1,4 +1,4 @@
-//! From the state in which a SubDevice is to the one that was requested, by the shortest way that keeps what it has.
+//! Brings a SubDevice from its present state to the requested one, by the shortest path that keeps its configuration.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, SyncManager, map};
@@ -11,7 +11,7 @@ use crate::segment::start::Start;
 use crate::supervisor::BusError;
 
 impl BringUp<'_> {
-    /// Goes to the target state. Where there is no short way it is the one through INIT.
+    /// Changes to the target state. Without a shorter path the change goes through INIT.
     pub(in crate::procedures) async fn travel(&self) -> Result<(), ConfigureError> {
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
         let configured = self.segment.view().members[self.index].configured;
@@ -29,12 +29,13 @@ impl BringUp<'_> {
         }
     }
 
-    /// Whether it is in PREOP as we brought it there.
+    /// Whether it is in PREOP with the configuration of this session.
     fn is_prepared(&self) -> bool {
         self.setup.plan.mailbox.is_empty() || self.mailbox.is_open()
     }
 
-    /// SyncManagers for OP only are switched off first: where only they depend on states, outputs end with them.
+    /// SyncManagers that are active in OP only are switched off first: if only they depend on states, outputs end with
+    /// them.
     async fn leave_op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::Os).await?;
         if self.setup.plan.is_op_only() {
@@ -47,7 +48,8 @@ impl BringUp<'_> {
         self.request(AlState::Op, AlState::SafeOp).await
     }
 
-    /// Process data ends for all of it at once, before the SubDevice ends it by halves. Mail goes on.
+    /// Ends all process data of the SubDevice at the same time, before the state change ends only part of it. Mail
+    /// continues.
     pub(super) async fn part(&self) -> Result<(), BusError> {
         self.process_data(ProcessDataStep::Left);
         let mut fmmus = alloc::vec![0; self.setup.fmmu_registers().len()];

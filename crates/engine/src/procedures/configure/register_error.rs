@@ -1,4 +1,4 @@
-//! What happened to a command to a register.
+//! Why a command to a register failed.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -15,30 +15,30 @@ use crate::supervisor::BusError;
 pub struct RegisterError {
     /// The first register.
     pub address: RegisterAddress,
-    /// What happened.
+    /// The error.
     pub cause: RegisterFailure,
 }
 
-/// What happened to a command to a register.
+/// Why a command to a register failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RegisterFailure {
-    /// The SubDevice did not take it, or the bus failed.
+    /// The SubDevice did not process it, or the bus failed.
     Bus(BusError),
-    /// The register holds something else.
+    /// The register holds another value.
     Value(Box<WrongValue>),
 }
 
-/// What a register holds instead of what it must hold.
+/// The value of a register and the required value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WrongValue {
-    /// What it must hold.
+    /// The required value.
     pub expected: Vec<u8>,
-    /// Bits that count.
+    /// Compared bits.
     pub mask: Option<Vec<u8>>,
-    /// What it held last.
+    /// The last value read.
     pub got: Vec<u8>,
-    /// So long it was looked at.
+    /// The time limit.
     pub limit: Duration,
 }
 
@@ -58,12 +58,12 @@ impl fmt::Display for RegisterError {
     }
 }
 
-/// The first bytes of data, in the order in which they lie.
+/// The first bytes of data, in memory order.
 pub(super) struct Hex<'a>(pub &'a [u8]);
 
 impl fmt::Display for Hex<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        /// Bytes that are shown.
+        /// Number of bytes shown.
         const SHOWN: usize = 16;
         for (number, byte) in self.0.iter().take(SHOWN).enumerate() {
             write!(f, "{}{byte:02x}", if number == 0 { "" } else { " " })?;

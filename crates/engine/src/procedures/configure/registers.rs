@@ -1,4 +1,5 @@
-//! Commands to registers: written until the SubDevice takes them, read until they hold what they must (protocol 8.2).
+//! Commands to registers: written until the SubDevice takes them, read until they hold the required value (protocol
+//! 8.2).
 
 use alloc::boxed::Box;
 use alloc::vec;
@@ -11,7 +12,7 @@ use super::register_error::{RegisterError, RegisterFailure, WrongValue};
 use crate::config::{RegisterAccess, RegisterCommand};
 use crate::supervisor::BusError;
 
-/// Pause between two attempts, and between two looks.
+/// Pause between two attempts, and between two reads.
 const PAUSE: Duration = Duration::from_millis(1);
 
 impl BringUp<'_> {
@@ -47,7 +48,7 @@ impl BringUp<'_> {
         let until = self.bus.now() + limit;
         let mut retries = command.retries;
         loop {
-            // The last look comes when the time is over, so that a value in the last moment counts.
+            // The last read comes after the limit, so that a value at the last moment counts.
             let is_last = self.bus.now() >= until;
             let failure = match self.bus.fprd(station, command.address, expected.len()).await {
                 Ok(got) if matches(&got, expected, mask) => return Ok(()),

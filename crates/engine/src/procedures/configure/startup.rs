@@ -1,4 +1,4 @@
-//! Start-up commands of a transition, one after the other in the order of the declaration.
+//! Start-up commands of a transition, executed in the order of the declaration.
 
 use core::time::Duration;
 
@@ -15,17 +15,17 @@ use crate::mail::soe::{self, SoeAddress};
 const MAX_READ: usize = 0x1_0000;
 
 impl BringUp<'_> {
-    /// Sends all commands of a transition. The first that fails ends it.
+    /// Sends all commands of a transition. The first error ends it.
     pub(super) async fn command(&self, transition: Transition) -> Result<(), ConfigureError> {
         self.command_those(transition, |_| true).await
     }
 
-    /// Sends those that need no mailbox.
+    /// Sends the commands that need no mailbox.
     pub(super) async fn command_registers(&self, transition: Transition) -> Result<(), ConfigureError> {
         self.command_those(transition, |action| matches!(action, StartupAction::Register(_))).await
     }
 
-    /// Sends those that need one.
+    /// Sends the commands that need the mailbox.
     pub(super) async fn command_mail(&self, transition: Transition) -> Result<(), ConfigureError> {
         self.command_those(transition, |action| !matches!(action, StartupAction::Register(_))).await
     }

@@ -1,18 +1,19 @@
-//! Where rings behind junctions are broken when no frame comes back: two of them broke (JR-02).
+//! Locates breaks of rings behind junctions when no frame returns, because two of them are broken (JR-02).
 //!
-//! The second SubDevice with nothing on its port 0 destroys every frame, but all that are passed before it take part in
-//! it, among them the junction at which its ring begins. So a junction can get a blind order to leave its ring out,
-//! by closing both ports of the ring. One ring after the other is looked into while all others are left out; then the
-//! others are reached again, too. The settings are temporary (protocol 2.2, DL control bit 1): what becomes of frames
-//! meanwhile, the loops return to what they were within about a second. All loops of a junction are written at once,
-//! and they cannot be read any more: those that were closed on purpose are known from before ([`super::orders`]), and
+//! The second SubDevice without a link on port 0 destroys every frame, but all SubDevices before it process the frame
+//! first, among them the junction where its ring begins. So a junction can get a command without a reply to exclude its
+//! ring, by closing both ports of the ring. One ring after the other is examined while all others are excluded; then
+//! frames return, and the other SubDevices are in reach. The settings are temporary (protocol 2.2, DL control bit 1):
+//! if frames are lost, the loops revert within about a second. A write sets all loops of a junction, and the previous
+//! ones cannot be read at this time: ports that were closed on purpose are known from before ([`super::orders`]), and
 //! stay closed.
 //!
-//! A ring behind a member of another one that is broken too is reached from one side of that one: from the side on
-//! which it begins, where all are entered at port 0, or else from the one on which it closes. Then its own closing side
-//! is left out: the break of the outer ring is the one unconnected port 0 that frames may pass.
+//! If a ring is connected to a member of another broken ring, it is reached through one side of the outer ring: the
+//! side on which the outer ring begins, if frames enter all SubDevices there at port 0, otherwise the side on which it
+//! closes. Then its own closing side is excluded: frames may pass only one unconnected port 0, which is the break of
+//! the outer ring.
 //!
-//! While it goes on, most SubDevices are out of reach at one time or another, which must not mean that they are lost
+//! During the examination most SubDevices are out of reach for some time, and must not be reported as lost
 //! ([`Disturbance::IsolateRings`]).
 
 use alloc::vec;
@@ -32,41 +33,41 @@ use crate::topology::{Closing, LocalRing, NodeStatus, PortOf};
 
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
-/// Rings that are looked into; each takes some frames, and what the settings last for is about a second.
+/// Maximum number of examined rings: each takes some frames, and the settings last for about a second.
 const MOST: usize = 16;
-/// Pause after it.
+/// Pause after the examination.
 const PAUSE: Duration = Duration::from_millis(5);
-/// Orders that come back without the junction's answer before it is out of reach: the first ones open the way for the
-/// next.
+/// Commands that return without the junction's answer before it counts as out of reach: the first ones restore the path
+/// for the next.
 const TRIES: usize = 4;
 
-/// A ring, as far as it has to be known here.
+/// Data of a ring.
 #[derive(Clone, Debug)]
 struct Ring {
     /// Its junction, by position and by station address.
     head: usize,
     junction: StationAddress,
-    /// Ports of the junction at which it begins, and the one at which it closes.
+    /// Ports of the junction at which it begins, and the port at which it closes.
     begins: Vec<u8>,
     closes: u8,
     ring: LocalRing,
 }
 
-/// How far frames get into a ring.
+/// The sides from which frames enter a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sides {
-    /// Not at all.
+    /// None.
     Neither,
-    /// As they do: in at its beginning, and in at its end where it is broken.
+    /// Both, as in normal operation: at its beginning, and at its end if it is broken.
     Both,
-    /// At its beginning only. Where it is whole they do not come back.
+    /// At its beginning only. If the ring is whole, frames do not return.
     Beginning,
-    /// At its end only. Where it is whole they do not come back.
+    /// At its end only. If the ring is whole, frames do not return.
     End,
 }
 
 impl Ring {
-    /// `None` where its junction is not declared.
+    /// `None` if its junction is not declared.
     fn new(segment: &Segment, ring: &LocalRing) -> Option<Ring> {
         let Closing { head: PortOf { node: head, port: closes }, tail } = ring.closing;
         let junction = segment.station_of(head)?;
@@ -82,7 +83,7 @@ impl Ring {
         self.head < node && node <= self.ring.closing.tail.node
     }
 
-    /// Whether one of its cables was seen to be broken.
+    /// Whether a break of one of its cables was found.
     fn is_broken(&self, found: &[Option<NodeStatus>]) -> bool {
         self.ring.cables.iter().any(|cable| is_down(cable, found) == Some(true))
     }
@@ -94,34 +95,34 @@ impl Ring {
     }
 }
 
-/// Examines all local rings, and hands the ports of their members to the model. Waits for the end of any other
-/// disturbance, which has a limit of its own, as long as no frame comes back.
+/// Examines all local rings, and passes the port states of their members to the model. As long as no frame returns,
+/// waits for the end of any other disturbance, which has its own limit.
 pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
     let Some(turn) = segment.disturb_while(Disturbance::IsolateRings, Segment::is_blocked).await else { return };
-    let asked = segment.view().asked();
-    let found = look_inside(&bus, &segment).await;
-    // Frames that left before the last loop opened may still be on their way.
+    let versions = segment.view().versions();
+    let found = examine_rings(&bus, &segment).await;
+    // Frames sent before the last loop opened may still be on the wire.
     bus.sleep(PAUSE).await;
     drop(turn);
-    segment.observe(Observation::Isolated { asked, found: &found, words: segment.words() });
+    segment.observe(Observation::Isolated { versions, found: &found, words: segment.words() });
 }
 
-/// Returns what members said about their ports, by position. Empty where that cannot be done: there is one ring only,
-/// or a junction is not declared.
-async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
+/// Returns the port states of members, by position. Empty if the examination is impossible: there is only one ring, or
+/// a junction is not declared.
+async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
     let (rings, count) = {
         let view = segment.view();
         let topology = &view.cabling.topology;
         let rings = topology.local_rings.iter().map(|ring| Ring::new(&view, ring));
         let mut rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
-        // Those around others first.
+        // Outer rings first.
         rings.sort_by_key(|ring| ring.head);
         let is_possible = (2..=MOST).contains(&rings.len());
         (if is_possible { rings } else { Vec::new() }, topology.nodes.len())
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
     for ring in &rings {
-        // Rings around it lead there.
+        // Frames reach it through the rings around it.
         let broken_around = |other: &Ring| other.holds(ring.head) && other.is_broken(&found);
         let broken: Vec<usize> = rings.iter().filter(|other| broken_around(other)).map(|other| other.head).collect();
         let ways: &[(Sides, Sides)] = match broken[..] {
@@ -142,7 +143,7 @@ async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatu
         }
     }
     if !rings.is_empty() {
-        // It need not come back, and will not where two are open. What it does not reach ends by itself.
+        // The frame does not return if two rings are open. Settings that are not restored expire.
         let open = loops(segment, &rings, |_| Sides::Both);
         let write = |bus: Bus, (command, target, data)| async move { bus.transfer_once(command, target, data).await };
         let _ = bus.gather(open, write).await;
@@ -150,9 +151,10 @@ async fn look_inside(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatu
     found
 }
 
-/// Has junctions let frames into their rings or not, for a moment. Frames that do not come back have done it all the
-/// same, so it is done when one does: each that is lost may have been the one that makes the next one return. And each
-/// that comes back may have opened the way to the junction that is wanted; false where it is out of reach all the same.
+/// Opens or closes rings at their junctions for a moment. A junction executes the command even if the frame does not
+/// return. So the commands are repeated until a frame returns: a lost frame may have been the one that makes the next
+/// return, and a returned frame may have opened the path to the wanted junction. False if that junction stays out of
+/// reach.
 async fn set_loops(
     bus: &Bus,
     segment: &SharedSegment,
@@ -163,7 +165,7 @@ async fn set_loops(
     for number in 0..TRIES {
         let replies = bus.transfer_all(loops(segment, rings, &sides), Some(Wkc(1))).await?;
         let mut all = rings.iter().zip(&replies);
-        // The first one went where the loops of before let it.
+        // The first frame took the path of the previous loops.
         if number > 0 && all.any(|(ring, reply)| ring.head == wanted.head && reply.wkc() == Wkc(1)) {
             return Ok(true);
         }
@@ -171,7 +173,7 @@ async fn set_loops(
     Ok(false)
 }
 
-/// What has them do that.
+/// The datagrams with these commands.
 fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides) -> Vec<(Command, Target, Vec<u8>)> {
     let controls = rings.iter().map(|ring| {
         // The application may order something meanwhile.
@@ -187,7 +189,7 @@ fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides
     writes.collect()
 }
 
-/// Reads the ports of a ring's junction and members.
+/// Reads the port states of a ring's junction and members.
 async fn read(bus: &Bus, segment: &SharedSegment, ring: &Ring, found: &mut [Option<NodeStatus>]) {
     let members: Vec<_> = {
         let access = segment.view();

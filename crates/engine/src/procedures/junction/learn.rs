@@ -1,14 +1,14 @@
-//! Finding out where local rings close, at a scan in mode automatic (JR-03).
+//! Determines where local rings close, during a scan in mode automatic (JR-03).
 //!
-//! Open ports allow several answers ([`candidates_with`]), so each is tried: both ends of a supposed closing cable are
-//! closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still answer; any
-//! other pair of ports cuts SubDevices off. Where the ring is broken already, the end at the junction alone is closed,
-//! and those between the break and the closing cable, and no others, must fall silent. The loops return to what they
-//! were in any case: the setting is temporary (protocol 2.2, DL control bit 1).
+//! Open ports allow several possibilities ([`candidates_with`]), so each is tested: both ends of a supposed closing
+//! cable are closed for a moment, in one frame. If it is that cable, the ring is open there and all SubDevices still
+//! answer; with any other pair of ports some SubDevices are cut off. If the ring is broken already, only the end at the
+//! junction is closed, and exactly the SubDevices between the break and the closing cable must stop answering. The
+//! loops revert in any case: the setting is temporary (protocol 2.2, DL control bit 1).
 //!
-//! A try in vain says more than no: of a ring that is closed at its junction and somewhere in the middle the members
-//! behind that fall silent, up to the last one. So that one's cable is tried next, and a ring takes two or three tries,
-//! however long.
+//! A failed test gives more information: if a ring is closed at its junction and in the middle, the members behind the
+//! middle stop answering, up to the last one. So the cable of the last one is tested next, and a ring takes two or
+//! three tests, however long it is.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -22,16 +22,16 @@ use super::super::scan::station_at;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
-/// Closing cables that are tried and are none.
+/// Maximum number of failed tests.
 const TRIES: usize = 256;
-/// Of these, so many of which frames do not come back: they cost [`TEMPORARY`] each.
+/// Maximum number of failed tests without a returned frame: these cost [`TEMPORARY`] each.
 const SLOW_TRIES: usize = 16;
-/// Until temporary loop settings have certainly ended.
+/// Time after which temporary loop settings have certainly expired.
 const TEMPORARY: Duration = Duration::from_millis(1_200);
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
 
-/// The closing cables of all local rings, whole or broken; none where they cannot be found out. Every SubDevice has the
+/// The closing cables of all local rings, whole or broken; none if they cannot be determined. Every SubDevice has the
 /// station address of its position.
 pub(in super::super) async fn learn(
     bus: &Bus,
@@ -39,7 +39,7 @@ pub(in super::super) async fn learn(
     main_count: usize,
     ring_closed: bool,
 ) -> Result<Vec<Closing>, BusError> {
-    // In a ring that is taken for something else, times of reception tell of crossed lines.
+    // With a ring that was not recognised, receive times would show crossed lines that do not exist.
     let untimed: Vec<NodeStatus> = nodes.iter().map(|node| NodeStatus { receive_times: None, ..*node }).collect();
     let (mut right, mut wrong) = (Vec::new(), Vec::new());
     let (mut slow, mut likely): (usize, Vec<Closing>) = (0, Vec::new());
@@ -51,7 +51,7 @@ pub(in super::super) async fn learn(
         let hinted = likely.drain(..).find_map(|likely| with(&[likely]).filter(|set| set.contains(&likely)));
         let Some(mut set) = hinted.or_else(|| with(&[])) else { break };
         let topology = Topology::with_local_rings(&untimed, main_count, &set);
-        // Which SubDevices are behind a break depends on the rings that are in it, which are tried first.
+        // Which SubDevices are behind a break depends on the inner rings, which are tested first.
         set.sort_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
             match attempt(bus, nodes, &topology, closing).await? {
@@ -77,21 +77,21 @@ pub(in super::super) async fn learn(
     Ok(Vec::new())
 }
 
-/// What a try has shown.
+/// Result of a test.
 enum Tried {
     /// The ring closes here.
     Right,
-    /// It does not. The last of the SubDevices that fell silent behind the supposed last member.
+    /// It does not. The last of the SubDevices that stopped answering behind the supposed last member.
     Wrong { last_silent: Option<usize> },
-    /// No frame came back.
+    /// No frame returned.
     NoFrame,
 }
 
-/// Tries whether a ring closes here.
+/// Tests whether a ring closes here.
 async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<Tried, BusError> {
     let Closing { head, tail } = closing;
     let broken = first_behind_break(nodes, topology, closing);
-    // Behind a break all is reached through the closing cable.
+    // SubDevices behind a break are reached through the closing cable only.
     let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
     let Some(answers) = with_closed(bus, &ports, nodes.len()).await? else { return Ok(Tried::NoFrame) };
@@ -110,8 +110,7 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
     Some(first.far.node).filter(is_open)
 }
 
-/// Which of so many SubDevices answer, by position, while these ports are closed; `None` where frames do not come back
-/// then.
+/// Which of `count` SubDevices answer, by position, while these ports are closed; `None` if no frame returns then.
 pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Result<Option<Vec<bool>>, BusError> {
     let mut controls = Vec::new();
     for port in ports {
@@ -125,7 +124,7 @@ pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Re
     let before = |control: &DlControl| DlControl { temporary: false, ..*control };
     let open = ports.iter().zip(&controls).map(|(port, control)| (*port, before(control)));
     if result.is_err() || write(bus, open.collect()).await.is_err() {
-        // Frames get lost, or one of the two does not answer: the settings end by themselves.
+        // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
     }
     Ok(result.ok())
@@ -133,16 +132,16 @@ pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Re
 
 /// Which SubDevices answer, by position.
 async fn answering(bus: &Bus, count: usize) -> Result<Vec<bool>, BusError> {
-    // Where frames do not come back at all this is the quicker way to know.
+    // If no frame returns at all, this detects it faster.
     bus.brd(map::TYPE, 1).await?;
-    let asked = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
+    let ports = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
         match bus.fprd(station(at), map::TYPE, 1).await {
             Ok(_) => Ok(true),
             Err(BusError::Wkc { .. }) => Ok(false),
             Err(error) => Err(error),
         }
     });
-    asked.await.into_iter().collect()
+    ports.await.into_iter().collect()
 }
 
 fn closed(control: DlControl, port: u8) -> DlControl {
@@ -157,7 +156,7 @@ fn station(port: PortOf) -> StationAddress {
     station_at(Position(port.node as u16))
 }
 
-/// All in one frame: in between, frames would be sent into a closed port.
+/// All in one frame: a second frame would be sent into a closed port.
 async fn write(bus: &Bus, controls: Vec<(PortOf, DlControl)>) -> Result<(), BusError> {
     let target = |port: &PortOf| Target::Station(station(*port), map::DL_CONTROL);
     let writes =

@@ -1,5 +1,5 @@
-//! What junctions were told to do about their ports: read while they can be asked, and noted when the application
-//! orders something else ([`crate::segment::PortControl`]).
+//! Port commands to junctions: read while junctions answer, and stored when the application sends another command
+//! ([`crate::segment::PortControl`]).
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ use super::super::shared_segment::SharedSegment;
 use crate::segment::Observation;
 use crate::supervisor::Bus;
 
-/// An order of the application that is under way.
+/// A command of the application that is under way.
 #[derive(Debug)]
 pub(crate) struct UnderWay {
     segment: SharedSegment,
@@ -19,12 +19,12 @@ pub(crate) struct UnderWay {
 
 impl Drop for UnderWay {
     fn drop(&mut self) {
-        self.segment.observe(Observation::PortsTold(self.station));
+        self.segment.observe(Observation::PortsWritten(self.station));
     }
 }
 
-/// Notes that bytes are about to be written from a register on, until what it returns is dropped. `None` where that is
-/// not about the ports of a junction with a ring.
+/// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
+/// write does not concern the ports of a junction with a ring.
 pub(crate) fn ordering(
     segment: Option<&SharedSegment>,
     station: StationAddress,
@@ -44,7 +44,7 @@ pub(crate) fn ordering(
         *byte = *written.unwrap_or(byte);
     }
     let control = DlControl::decode(&bytes);
-    // What holds for a moment only need not be kept.
+    // Temporary settings need not be stored.
     if !is_written || control.temporary {
         return None;
     }
@@ -52,18 +52,18 @@ pub(crate) fn ordering(
     Some(UnderWay { segment: segment.clone(), station })
 }
 
-/// Reads what the junctions of all local rings were told to do about their ports, while they can be asked. Where there
-/// is one ring only it never has to be known.
+/// Reads the port control of the junctions of all local rings, while they answer. With only one ring it is never
+/// needed.
 pub(in super::super) async fn note_controls(bus: &Bus, segment: &SharedSegment) {
-    let asked: Vec<(StationAddress, u32)> = {
+    let before: Vec<(StationAddress, u32)> = {
         let view = segment.view();
         let junctions = if view.cabling.topology.local_rings.len() > 1 { view.junctions() } else { Vec::new() };
-        let orders = |station| view.port_control(station).map_or(0, |told| told.orders);
+        let orders = |station| view.port_control(station).map_or(0, |entry| entry.orders);
         junctions.into_iter().map(|station| (station, orders(station))).collect()
     };
-    let read = bus.gather(asked, |bus, (station, orders)| async move {
+    let read = bus.gather(before, |bus, (station, orders)| async move {
         let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await.ok()?);
-        // What holds for a moment is our own order.
+        // Temporary settings are our own.
         (!control.temporary).then_some((station, orders, control))
     });
     for (station, orders, control) in read.await.into_iter().flatten() {

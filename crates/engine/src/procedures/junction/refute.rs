@@ -1,12 +1,12 @@
-//! Whether a ring that was declared closes where it is said to (JR-05, JR-06), before anybody is configured.
+//! Tests whether a declared ring closes as declared (JR-05, JR-06), before any SubDevice is configured.
 //!
-//! Open ports do not tell: whatever follows the junction could as well hang on the last member of its ring. So it is
-//! tried, as [`super::learn()`] does: with both ends of the closing cable closed for a moment all answer,
-//! and with the end at the junction alone, all but those behind a break of the ring do. Where one end only has
-//! communication it is no cable between the two. Where neither has, the closing cable may be broken, which shows
-//! nothing: such a ring is believed.
+//! Open ports do not show it: the SubDevice behind the junction could as well be connected to the last member of its
+//! ring. So it is tested as in [`super::learn()`]: with both ends of the closing cable closed for a moment all
+//! SubDevices answer, and with only the end at the junction closed, all except those behind a break of the ring. If
+//! only one end has communication there is no cable between the two. If neither has, the closing cable may be broken;
+//! such a ring is accepted without a test.
 //!
-//! A segment that changes meanwhile shows nothing either, and what is found wrong is tried again.
+//! A segment that changes during the test gives no result, and a negative result is tested again.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -20,13 +20,13 @@ use crate::junction::ClosingEvidence;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
-/// What is wrong has to be so each time.
+/// Consecutive negative results that are required.
 const TRIES: usize = 2;
-/// Scans until all answer, and the pause between two of them.
-const LOOKS: u8 = 5;
+/// Scans until all SubDevices answer.
+const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// A closing cable that is not where it was declared, by its number, and what shows it. Every SubDevice has the station
+/// The number of a closing cable that is not where it was declared, and the evidence. Every SubDevice has the station
 /// address of its position.
 pub(crate) async fn refute(
     bus: &Bus,
@@ -36,9 +36,9 @@ pub(crate) async fn refute(
 ) -> Option<(usize, ClosingEvidence)> {
     let mut last = None;
     for _ in 0..TRIES {
-        let nodes = look(bus, scanned).await?;
+        let nodes = present_ports(bus, scanned).await?;
         last = Some(attempt(bus, &nodes, main_count, closings).await?);
-        if look(bus, scanned).await? != nodes {
+        if present_ports(bus, scanned).await? != nodes {
             return None;
         }
     }
@@ -53,7 +53,7 @@ async fn attempt(
 ) -> Option<(usize, ClosingEvidence)> {
     let topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut numbers: Vec<usize> = (0..closings.len()).collect();
-    // Which SubDevices are behind a break depends on the rings that are in it.
+    // Which SubDevices are behind a break depends on the inner rings.
     numbers.sort_by_key(|number| core::cmp::Reverse(closings[*number].head.node));
     for number in numbers {
         let closing = closings[number];
@@ -82,10 +82,10 @@ async fn attempt(
     None
 }
 
-/// Ports as they are now; `None` where not all answer.
-async fn look(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
-    // Where frames of a link got lost for a while they are not waited for, until one has come back.
-    for _ in 0..LOOKS {
+/// Present port states; `None` if not all SubDevices answer.
+async fn present_ports(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
+    // After frames of a link were lost for a while, the bus does not wait for that link until one has returned.
+    for _ in 0..SCANS {
         if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.len()) {
             break;
         }

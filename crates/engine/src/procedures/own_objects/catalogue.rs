@@ -1,4 +1,4 @@
-//! Which objects the MainDevice itself has (protocol 10.2, ETG.1510), and their entries.
+//! The objects of the MainDevice itself (protocol 10.2, ETG.1510), and their entries.
 
 use alloc::vec::Vec;
 
@@ -10,11 +10,10 @@ use crate::event::history::MESSAGES;
 pub(super) const LIST: usize = 255;
 /// Lists of addresses.
 const LISTS: u16 = 16;
-/// SubDevices that have objects: the lists have room for no more.
+/// SubDevices with objects: the lists have room for no more.
 pub(super) const MAX_MODULES: usize = LIST * LISTS as usize;
 
-/// Bytes of a text: a longer one is cut, and a shorter one is filled with zeros where a whole object is
-/// read.
+/// Bytes of a text: a longer text is cut, and a shorter text is padded with zeros if a whole object is read.
 pub(super) const TEXT_BYTES: usize = 64;
 
 /// Bytes of the two parameters of each message of the diagnosis history: a station address (UNSIGNED16), a code
@@ -40,11 +39,11 @@ pub(super) enum Object {
     SoftwareVersion,
     Identity,
     DiagnosisHistory,
-    /// What was declared of a SubDevice.
+    /// Declared data of a SubDevice.
     Configuration(usize),
-    /// What was found of it.
+    /// Data found by the scan.
     Information(usize),
-    /// How it is.
+    /// Present state of a SubDevice.
     Diagnosis(usize),
     ModularProfile,
     DetectModules,
@@ -101,7 +100,7 @@ const IDENTITY: &[Entry] = &[
     entry(3, U32, "Revision number"),
     entry(4, U32, "Serial number"),
 ];
-/// Those before the messages.
+/// Entries before the messages.
 const HISTORY: &[Entry] = &[
     entry(DiagnosisHistory::MAXIMUM_MESSAGES, U8, "Maximum messages"),
     entry(DiagnosisHistory::NEWEST_MESSAGE, U8, "Newest message"),
@@ -171,7 +170,7 @@ const OF_MAIN_DEVICE: &[Entry] = &[
 const CONTROL: &[Entry] = &[writable(entry(16, BOOL, "Reset diagnosis information"))];
 
 impl Object {
-    /// The object with an index, where so many SubDevices are declared.
+    /// The object with an index, with this number of declared SubDevices.
     pub(super) fn at(index: u16, declared: usize) -> Option<Object> {
         let module = usize::from(index & MODULE);
         let is_module = module < declared.min(MAX_MODULES);
@@ -196,7 +195,7 @@ impl Object {
         })
     }
 
-    /// The indices of all objects, where so many SubDevices are declared, in ascending order.
+    /// The indices of all objects, with this number of declared SubDevices, in ascending order.
     pub(super) fn indices(declared: usize) -> impl Iterator<Item = u16> {
         let modules = declared.min(MAX_MODULES) as u16;
         let of_each = [CONFIGURATION, INFORMATION, DIAGNOSIS].into_iter().flat_map(move |first| first..first + modules);
@@ -209,8 +208,8 @@ impl Object {
             .chain([0xF120, 0xF200])
     }
 
-    /// Its entries but subindex 0 of arrays and records, and the messages of the history. Of the lists of addresses the
-    /// first stands for all.
+    /// Its entries without subindex 0 of arrays and records, and without the messages of the history. For lists of
+    /// addresses, only the first entry.
     pub(super) const fn entries(self) -> &'static [Entry] {
         match self {
             Object::DeviceType => DEVICE_TYPE,
@@ -254,7 +253,7 @@ impl Object {
         }
     }
 
-    /// What it is.
+    /// Its object code.
     pub(super) const fn code(self) -> ObjectCode {
         match self {
             Object::DeviceType | Object::Name | Object::HardwareVersion | Object::SoftwareVersion => {
@@ -312,7 +311,7 @@ mod tests {
 
     // covers: 10.2, own-objects
     #[test]
-    fn every_index_that_is_listed_is_an_object_and_no_other_is() {
+    fn exactly_the_listed_indices_are_objects() {
         for declared in [0, 3, MAX_MODULES + 100] {
             let listed: Vec<u16> = Object::indices(declared).collect();
             assert!(listed.is_sorted_by(|one, next| one < next));

@@ -1,4 +1,4 @@
-//! The command "detect modules" (0xF002): a look at the whole segment while everything goes on.
+//! The command "detect modules" (0xF002): a rescan of the whole segment while process data continues.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -11,22 +11,22 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 use super::seen::Seen;
 use crate::procedures::unassigned::rescan::rescan;
 
-/// The segment has to hold still within.
+/// Time within which the segment must become stable.
 const LIMIT: Duration = Duration::from_secs(5);
 
-/// How far the command is: the codes of 0xF002:2.
+/// State of the command: the codes of 0xF002:2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Status {
-    /// Nothing was asked for, or it is done, and there is a response.
+    /// No command was given, or it has ended, with a response.
     #[default]
     Done = 1,
     /// It failed.
     Failed = 3,
-    /// It goes on.
+    /// It is under way.
     Running = 255,
 }
 
-/// The command and what it has found.
+/// The command and its result.
 #[derive(Debug, Default)]
 pub(super) struct Detection {
     status: Cell<Status>,
@@ -38,12 +38,12 @@ impl Detection {
         self.status.get()
     }
 
-    /// Station addresses that the command has found, by position; before it has found any, those of the scan.
+    /// Station addresses found by the command, by position; before its first result, those of the scan.
     pub(super) fn found(&self, seen: &Seen) -> Vec<StationAddress> {
         self.found.borrow().clone().unwrap_or_else(|| seen.scanned.clone())
     }
 
-    /// Begins; refused while it goes on, and before activation.
+    /// Starts the command; refused while it is under way, and before activation.
     pub(super) fn start(this: &Rc<Detection>, seen: &Seen) -> Result<(), AbortCode> {
         let segment = seen.segment.clone().ok_or(AbortCode::CANNOT_BE_STORED_DEVICE_STATE)?;
         if this.status.replace(Status::Running) == Status::Running {

@@ -1,4 +1,5 @@
-//! Entries about a SubDevice that its own dictionary answers, by mailbox, when a client asks (protocol 6.3, 10.2).
+//! Entries whose values are read from the object dictionary of a SubDevice, by mailbox, at each request of a client
+//! (protocol 6.3, 10.2).
 
 use core::time::Duration;
 
@@ -9,35 +10,35 @@ use crate::mail::coe::{SdoAddress, SdoFailure, read};
 use crate::mail::{Limits, Mailbox};
 use crate::procedures::shared_segment::SharedSegment;
 
-/// Other clients of address 0 wait meanwhile.
+/// Short limits: other clients of address 0 wait meanwhile.
 const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(300));
 const DEVICE_TYPE: SdoAddress = SdoAddress::new(0x1000, 0);
-/// Bytes that any of these entries may have.
+/// Maximum bytes of these entries.
 const ROOM: usize = 4;
 
-/// A SubDevice, and which entries are wanted.
-pub(super) struct Asked<W> {
-    /// That of one that speaks CoE.
+/// A SubDevice, and the requested entries.
+pub(super) struct Requested<W> {
+    /// The mailbox, if the SubDevice supports CoE.
     mailbox: Option<Mailbox>,
     wants: W,
 }
 
-impl<W: Fn(u8) -> bool> Asked<W> {
-    /// `wants` says whether a subindex is wanted; of others it is not asked.
-    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Asked<W> {
+impl<W: Fn(u8) -> bool> Requested<W> {
+    /// `wants` returns whether a subindex is requested; others are not read.
+    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Requested<W> {
         let view = segment.view();
         let info = view.members.get(index).and_then(|member| member.info.as_ref());
         let speaks = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
-        Asked { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
+        Requested { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
     }
 
-    /// What it answers; `None` also where it does not.
+    /// The value read; `None` also without an answer.
     async fn value(&self, sub_index: u8, object: SdoAddress) -> Option<u32> {
         let mailbox = self.mailbox.as_ref().filter(|_| (self.wants)(sub_index))?;
         let before = mailbox.last_protocol_error();
         let answer = read(mailbox, object, LIMITS, ROOM).await;
         if answer.as_ref().is_err_and(|error| matches!(error.cause, SdoFailure::Aborted(_))) {
-            // That it lacks the object is no error of anybody.
+            // A missing object is not an error of the SubDevice.
             mailbox.forget_protocol_error(before);
         }
         let mut bytes = answer.ok()?;
@@ -45,7 +46,7 @@ impl<W: Fn(u8) -> bool> Asked<W> {
         bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))
     }
 
-    /// Its device type (0x1000); 0 where it has none.
+    /// Its device type (0x1000); 0 if it has none.
     pub async fn device_type(&self, sub_index: u8) -> u32 {
         self.value(sub_index, DEVICE_TYPE).await.unwrap_or(0)
     }
@@ -56,7 +57,7 @@ impl<W: Fn(u8) -> bool> Asked<W> {
         self.value(sub_index, maximum).await.is_some()
     }
 
-    /// Whether there are messages in it that are not acknowledged.
+    /// Whether it contains messages that are not acknowledged.
     pub async fn has_news(&self, sub_index: u8) -> bool {
         let news = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
         self.value(sub_index, news).await.is_some_and(|news| news != 0)

@@ -15,8 +15,8 @@ use super::catalogue::Object;
 /// Bytes of a description beside its name.
 const DESCRIPTION_ROOM: usize = 16;
 
-/// The messages that answer a request, where so many SubDevices are declared; each fits the room. The error is that of
-/// a mailbox error reply.
+/// The messages that answer a request, with this number of declared SubDevices; each fits into `room`. The error is
+/// that of a mailbox error reply.
 pub(super) fn answer(payload: &[u8], room: usize, declared: usize) -> Result<Vec<Vec<u8>>, u16> {
     match respond(payload, declared) {
         Ok((opcode, Ok(data))) => Ok(fragments(opcode, &data, room)),
@@ -44,7 +44,7 @@ fn respond(payload: &[u8], declared: usize) -> Result<(InformationOpcode, Data),
     })
 }
 
-/// Nothing is mapped, stored or set at start-up: those lists are empty.
+/// No object can be mapped, stored or set at start-up: those lists are empty.
 fn list(kind: ListType, declared: usize) -> Data {
     let numbers: Vec<u16> = match kind {
         ListType::Lengths => vec![Object::indices(declared).count() as u16, 0, 0, 0, 0],
@@ -94,7 +94,7 @@ fn entry(request: EntryRequest, declared: usize) -> Data {
     Ok(bytes)
 }
 
-/// The data in as many messages as it takes. Each has an even number of bytes, so that no index is torn.
+/// The data in as many messages as needed. Each has an even number of bytes, so that no index is split.
 fn fragments(opcode: InformationOpcode, data: &[u8], room: usize) -> Vec<Vec<u8>> {
     let most = (room.saturating_sub(SdoInformation::OVERHEAD) & !1).max(2);
     let count = data.len().div_ceil(most).max(1);
@@ -104,7 +104,7 @@ fn fragments(opcode: InformationOpcode, data: &[u8], room: usize) -> Vec<Vec<u8>
         let fragments_left = left as u16;
         let message = SdoInformation { opcode, fragments_left, data: piece, incomplete: left > 0 };
         let mut bytes = vec![0; SdoInformation::OVERHEAD + piece.len()];
-        // It has the length that it needs.
+        // The buffer has the length of the message.
         let length = message.encode(&mut bytes).unwrap_or(0);
         bytes.truncate(length);
         bytes
@@ -125,7 +125,7 @@ mod tests {
 
     // covers: 6.3
     #[test]
-    fn the_list_comes_in_fragments_and_is_whole() {
+    fn the_list_is_complete_in_fragments() {
         let messages = ask(InformationOpcode::ListRequest, &ListType::All.code().to_le_bytes(), 64);
         let mut data = Vec::new();
         for (number, message) in messages.iter().enumerate() {

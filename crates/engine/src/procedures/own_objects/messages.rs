@@ -57,7 +57,7 @@ fn encode(incident: &Incident, station: Option<StationAddress>) -> Vec<u8> {
         parameters: &parameters[..length],
     };
     let mut bytes = vec![0; DiagnosisMessage::OVERHEAD + PARAMETERS];
-    // It has the length that it needs.
+    // The buffer has the length of the message.
     let length = message.encode(&mut bytes).unwrap_or(0);
     bytes.truncate(length);
     bytes

@@ -5,19 +5,19 @@ use core::time::Duration;
 use super::seen::Seen;
 use crate::time::Instant;
 
-/// A rate is that of at least so long.
+/// Minimum time over which a rate is computed.
 const SPAN: Duration = Duration::from_secs(1);
 
-/// Frames per second, cyclic and acyclic ones, between two requests that are a second apart at least.
+/// Frames per second, cyclic and acyclic, between two requests that are at least a second apart.
 #[derive(Debug, Default)]
 pub(super) struct Rates {
-    /// When frames were counted last, and how many there were.
+    /// Time and number of frames of the last count.
     before: Option<(Instant, [u64; 2])>,
     rates: [u32; 2],
 }
 
 impl Rates {
-    /// The rates now. The first request says 0 and begins to count.
+    /// The present rates. The first request returns 0 and starts the count.
     pub(super) fn take(&mut self, now: Instant, sent: [u64; 2]) -> [u32; 2] {
         let Some((at, before)) = self.before else {
             self.before = Some((now, sent));
@@ -36,12 +36,12 @@ impl Rates {
     }
 }
 
-/// Frames that were sent, cyclic and acyclic ones.
+/// Frames sent, cyclic and acyclic.
 pub(super) fn sent(seen: &Seen) -> [u64; 2] {
     [seen.segment.as_ref().map_or(0, |segment| segment.board.frames().sent), seen.acyclic.sent]
 }
 
-/// Frames that were lost, cyclic and acyclic ones.
+/// Frames lost, cyclic and acyclic.
 pub(super) fn lost(seen: &Seen) -> [u64; 2] {
     [seen.segment.as_ref().map_or(0, |segment| segment.board.frames().lost), seen.acyclic.lost]
 }

@@ -1,4 +1,4 @@
-//! What the MainDevice's own objects are about.
+//! Data of the MainDevice's own objects.
 
 use alloc::vec::Vec;
 
@@ -7,7 +7,7 @@ use ringcat_wire::address::StationAddress;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{AcyclicCounters, Bus};
 
-/// What the objects are about, at the moment of a request.
+/// Data of the objects at the time of a request.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen {
     pub bus: Bus,

@@ -1,4 +1,4 @@
-//! What is kept from request to request.
+//! Data kept between requests.
 
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
@@ -9,14 +9,14 @@ use super::detection::Detection;
 use super::rates::Rates;
 use super::upload::Upload;
 
-/// What all clients share, and their uploads.
+/// Data shared by all clients, and their uploads.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     /// By client.
     pub uploads: RefCell<BTreeMap<u64, Upload>>,
     pub detection: Rc<Detection>,
     pub rates: RefCell<Rates>,
-    /// Frames that were lost when the diagnosis was reset, cyclic and acyclic ones.
+    /// Lost frames at the time of the last reset of the diagnosis, cyclic and acyclic.
     pub forgotten: Cell<[u64; 2]>,
     /// Wrong working counters at that time, by SubDevice.
     pub forgotten_wkc: RefCell<Vec<u32>>,

@@ -15,11 +15,11 @@ pub(super) struct Upload {
     address: SdoAddress,
     data: Vec<u8>,
     sent: usize,
-    /// That of the next segment.
+    /// Toggle bit of the next segment.
     toggle: bool,
 }
 
-/// The first answer, and what is left for segments.
+/// The first answer, and the upload with the data for segments.
 pub(super) fn begin(address: SdoAddress, data: Vec<u8>, room: usize) -> (Vec<u8>, Option<Upload>) {
     let SdoAddress { index, sub_index, complete_access } = address;
     if (1..=EXPEDITED_MAX_DATA).contains(&data.len()) {
@@ -46,7 +46,7 @@ impl Upload {
         Ok((answer, last))
     }
 
-    /// Which object it is.
+    /// Address of the object.
     pub(super) const fn address(&self) -> SdoAddress {
         self.address
     }
@@ -67,7 +67,7 @@ pub(super) fn encode(response: &SdoResponse<'_>) -> Vec<u8> {
         | SdoResponse::Abort { .. } => 0,
     };
     let mut bytes = vec![0; INITIATE_LEN + data];
-    // It has the length that it needs.
+    // The buffer has the length of the response.
     let length = response.encode(&mut bytes).unwrap_or(0);
     bytes.truncate(length);
     bytes
@@ -79,7 +79,7 @@ mod tests {
 
     // covers: 6.3, own-objects
     #[test]
-    fn a_value_of_any_length_arrives_whole_and_a_wrong_toggle_ends_it() {
+    fn values_of_any_length_are_complete_and_a_wrong_toggle_aborts() {
         let room = 32;
         for length in 0..200_usize {
             let data: Vec<u8> = (0..length).map(|byte| byte as u8).collect();

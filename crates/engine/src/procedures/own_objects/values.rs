@@ -1,4 +1,4 @@
-//! Values of the MainDevice's own objects (protocol 10.2), as of now: registers are read at each request.
+//! Values of the MainDevice's own objects (protocol 10.2): registers are read at each request.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -7,7 +7,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, map};
 
 use super::catalogue::{LIST, MAX_MODULES, Object, TEXT_BYTES, Values};
-use super::in_its_dictionary::Asked;
+use super::in_its_dictionary::Requested;
 use super::seen::Seen;
 use super::shared::Shared;
 use super::{messages, rates};
@@ -25,7 +25,7 @@ const DEVICE_TYPE: u32 = 5001;
 const NAME: &[u8] = b"RingCAT";
 const HARDWARE_VERSION: &[u8] = b"none";
 const SOFTWARE_VERSION: &[u8] = env!("CARGO_PKG_VERSION").as_bytes();
-/// Objects of the SubDevices follow one another.
+/// Distance between the objects of two SubDevices.
 const INDEX_DISTANCE: u16 = 1;
 /// Bits of the link status 0x8nnn:35, above them a bit for each port.
 const NO_LINK: u8 = 1 << 0;
@@ -48,7 +48,7 @@ fn u32_(sub_index: u8, value: u32) -> (u8, Vec<u8>) {
     (sub_index, value.to_le_bytes().to_vec())
 }
 
-/// Counters stop at the largest value.
+/// Counters saturate.
 fn counter(sub_index: u8, value: u64) -> (u8, Vec<u8>) {
     u32_(sub_index, u32::try_from(value).unwrap_or(u32::MAX))
 }
@@ -57,15 +57,14 @@ fn text(sub_index: u8, value: &[u8]) -> (u8, Vec<u8>) {
     (sub_index, value[..value.len().min(TEXT_BYTES)].to_vec())
 }
 
-/// All values of an object. Where only one entry is `wanted`, SubDevices are not asked by mailbox for others: these are
-/// zeros.
+/// All values of an object. If only one entry is `wanted`, other entries that need mailbox requests are zeros.
 pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object, wanted: Option<u8>) -> Values {
     match (object, &seen.segment) {
         (Object::DeviceType, _) => vec![u32_(0, DEVICE_TYPE)],
         (Object::Name, _) => vec![text(0, NAME)],
         (Object::HardwareVersion, _) => vec![text(0, HARDWARE_VERSION)],
         (Object::SoftwareVersion, _) => vec![text(0, SOFTWARE_VERSION)],
-        // There is no vendor id of ours.
+        // RingCAT has no vendor id.
         (Object::Identity, _) => (1..=4).map(|sub_index| u32_(sub_index, 0)).collect(),
         (Object::DiagnosisHistory, segment) => messages::read(&seen.bus, segment.as_ref()),
         (Object::ModularProfile, _) => vec![u16_(1, INDEX_DISTANCE), u16_(2, MAX_MODULES as u16)],
@@ -106,7 +105,7 @@ fn main_device(seen: &Seen, shared: &Shared) -> Values {
     ]
 }
 
-/// The lowest state of those that must be there; 0 while one of them is missing or on its way.
+/// The lowest state of the mandatory SubDevices; 0 while a SubDevice is missing or on its way.
 fn lowest_state(segment: &Segment) -> u16 {
     let mandatory = segment.members.iter().filter(|member| !member.config.optional);
     let code = |member: &Member| match member.phase {
@@ -123,9 +122,9 @@ async fn dl_status(bus: &Bus, segment: &SharedSegment, index: usize) -> Option<[
 
 async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted: Option<u8>) -> Values {
     let status = dl_status(bus, segment, index).await.map(|bytes| DlStatus::decode(&bytes));
-    let asked = Asked::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
-    let device_type = asked.device_type(4).await;
-    let has_history = asked.has_history(40).await;
+    let requested = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let device_type = requested.device_type(4).await;
+    let has_history = requested.has_history(40).await;
     let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };
     let (expected, info) = (&member.config.expected, member.info.as_ref());
@@ -152,7 +151,7 @@ async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted:
     ]
 }
 
-/// The ports that had something plugged in at the scan.
+/// The ports with a cable at the scan.
 fn preset_ports(segment: &Segment, member: &Member) -> [bool; 4] {
     let Some((node, here)) = member.node.and_then(|node| Some((node, segment.cabling.topology.nodes.get(node)?)))
     else {
@@ -215,7 +214,7 @@ async fn information(bus: &Bus, segment: &SharedSegment, index: usize) -> Values
     ]
 }
 
-/// What a SubDevice's registers say; zeros where it does not answer.
+/// Register values of a SubDevice; zeros if it does not answer.
 #[derive(Default)]
 struct Registers {
     al_control: [u8; 2],
@@ -238,8 +237,8 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
     let kept = &segment.statistics;
     let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, kept, index, station)).await;
     let registers = registers.unwrap_or_default();
-    let asked = Asked::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
-    let has_news = asked.has_news(19).await;
+    let requested = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
+    let has_news = requested.has_news(19).await;
     let counted = counted.ok().or_else(|| kept.find(index)).unwrap_or_default();
     let access = segment.view();
     let Some(member) = access.members.get(index) else { return Vec::new() };

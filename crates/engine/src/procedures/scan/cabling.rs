@@ -1,4 +1,4 @@
-//! What a scan shows about the cabling: crossed lines, swapped interfaces, odd ports (protocol 9.5).
+//! Findings of a scan about the cabling: crossed lines, swapped interfaces, unexpected ports (protocol 9.5).
 
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -15,7 +15,7 @@ use crate::segment::{LineCheck, is_swapped};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, Finding, PortOf};
 
-/// Finds crossed SubDevices while the redundant link is down; false where the ring is not closed or changes meanwhile.
+/// Finds crossed SubDevices while the redundant link is down; false if the ring is not closed or changes meanwhile.
 pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     if !stays_closed(bus).await {
         return false;
@@ -29,7 +29,7 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     });
     let mut exact: Vec<Finding> = exact.collect();
     if exact.len() < found.len() {
-        // It could not be disconnected, and only the ring shows that there is something.
+        // The link could not be disconnected: only the fact of a crossing is known.
         return false;
     }
     let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
@@ -40,7 +40,7 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
 }
 
 impl Known for Scan {
-    fn note_look(&self) {}
+    fn note_port_scan(&self) {}
 
     fn are_measuring(&self) -> bool {
         false
@@ -56,7 +56,7 @@ impl Known for Scan {
     }
 
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
-        // None has moved that shortly after.
+        // Positions are unchanged so shortly after the scan.
         let place = |at: PortOf| {
             let station = self.subdevices.get(at.node)?.station;
             Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })
@@ -70,7 +70,7 @@ impl Known for Scan {
     }
 }
 
-/// What is odd about the cabling. `exact`: where lines are crossed is known, also in a closed ring.
+/// Reports unusual cabling. `exact`: the places of crossings are known, also in a closed ring.
 pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
     let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
     if swapped {
@@ -92,7 +92,7 @@ pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
             }
         }
     }
-    // In a closed ring only branches on port 2 and crossed SubDevices work on the redundant copy (protocol LC-04).
+    // In a closed ring only branches on port 2 and crossed SubDevices process the redundant copy (protocol LC-04).
     let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
     if bus.links() == LinkSet::Ring
         && bus.ring() == RingState::Closed

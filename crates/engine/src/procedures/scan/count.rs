@@ -1,4 +1,4 @@
-//! How many SubDevices there are, and whether it stays so: after power-on they appear one after the other.
+//! Counts SubDevices until the count is stable: after power-on they appear one after the other.
 
 use core::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::time::Instant;
 /// Pause between two counts.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// SubDevices on both links, and since when it is so many.
+/// SubDevices on both links, and the time since which the count is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Count {
     pub main: Wkc,
@@ -36,7 +36,7 @@ impl Count {
     }
 }
 
-/// One count; `None` where no frame came back.
+/// One count; `None` if no frame returned.
 async fn count(bus: &Bus) -> Result<Option<Count>, BusError> {
     match bus.brd(map::TYPE, 1).await {
         Ok(reply) => Ok(Some(Count { main: reply.main, redundant: reply.redundant, since: bus.now() })),
@@ -61,7 +61,7 @@ pub(super) async fn first(bus: &Bus, options: &ScanOptions, begin: Instant) -> R
     }
 }
 
-/// Counts until the number has been the same for the settling time. Another one, or none, is the error.
+/// Counts until the number has been the same for the settling time. The error is another count, or none.
 pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Result<(), Option<Count>> {
     while bus.now().since(expected.since) < settle {
         bus.sleep(PAUSE.min(settle)).await;

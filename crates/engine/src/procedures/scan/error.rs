@@ -13,23 +13,23 @@ use crate::supervisor::BusError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ScanError {
-    /// Frames came back, but no SubDevice had touched them.
+    /// Frames returned, but no SubDevice had processed them.
     NoSubDevices,
-    /// No frame came back.
+    /// No frame returned.
     NoAnswer,
     /// The count did not settle.
     Unsettled {
         /// The last two counts.
         counts: [u16; 2],
     },
-    /// The segment changed while it was scanned, again and again.
+    /// The segment changed repeatedly during the scan.
     Changed {
         /// SubDevices on the main and on the redundant link at the beginning.
         before: (u16, u16),
-        /// And at the end.
+        /// At the end.
         after: (u16, u16),
     },
-    /// Frames with as many datagrams as fit do not bring them back processed.
+    /// Frames with as many datagrams as fit return unprocessed.
     FrameLimit(FrameLimit),
     /// More SubDevices than station addresses.
     TooMany {
@@ -40,9 +40,9 @@ pub enum ScanError {
     Bus(BusError),
     /// The SII of a SubDevice cannot be read.
     Sii {
-        /// Where.
+        /// Its position.
         position: Position,
-        /// Why.
+        /// The error.
         error: SiiReadError,
     },
 }
@@ -88,7 +88,7 @@ impl From<BusError> for ScanError {
 }
 
 impl ScanError {
-    /// The segment or frames may be to blame, so that another try is worth it.
+    /// The segment or lost frames may be the cause, so another attempt is useful.
     pub(super) const fn is_passing(&self) -> bool {
         match self {
             ScanError::Bus(_) | ScanError::Changed { .. } => true,

@@ -1,19 +1,19 @@
-//! What a scan found.
+//! Result of a scan.
 
 use alloc::vec::Vec;
 
 use crate::info::SubDeviceInfo;
 use crate::topology::Topology;
 
-/// What a scan found.
+/// Result of a scan.
 #[derive(Clone, Debug)]
 pub struct Scan {
     /// The SubDevices in the order of the processing units.
     pub subdevices: Vec<SubDeviceInfo>,
-    /// How they are connected.
+    /// Their connections.
     pub topology: Topology,
-    /// How many of them the main copy met.
+    /// Number of SubDevices that the main copy passed.
     pub main_count: usize,
-    /// How many the redundant copy met.
+    /// Number of SubDevices that the redundant copy passed.
     pub redundant_count: usize,
 }

@@ -1,4 +1,4 @@
-//! How to scan.
+//! Options of a scan.
 
 use core::time::Duration;
 
@@ -6,7 +6,7 @@ use crate::junction::JunctionMode;
 use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::sii::SiiCache;
 
-/// How to scan.
+/// Options of a scan.
 #[derive(Clone, Debug)]
 pub struct ScanOptions {
     /// The count must stay the same for this long.
@@ -15,10 +15,10 @@ pub struct ScanOptions {
     pub patience: Duration,
     /// SII contents read before.
     pub cache: SiiCache,
-    /// What becomes of rings behind junctions.
+    /// Handling of rings behind junctions.
     pub junctions: JunctionMode,
-    /// Whether the redundant link may be taken down for a moment to find out where a line is crossed.
+    /// Whether the redundant link may be taken down for a moment to locate a crossed line.
     pub enhanced_line_crossed: bool,
-    /// Whose dictionaries are asked for PDOs.
+    /// Dictionaries that are read for PDOs.
     pub pdos: ReadPdos,
 }

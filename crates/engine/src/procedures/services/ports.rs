@@ -1,4 +1,4 @@
-//! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off from the others on purpose (protocol 2.2).
+//! Ports of a SubDevice: opened and closed by DL control; SubDevices cut off on purpose (protocol 2.2).
 
 pub use crate::segment::BlockedPort;
 
@@ -16,15 +16,15 @@ use crate::ring::RingState;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 
-/// The byte of DL_CONTROL that holds the loops of all ports.
+/// The byte of DL_CONTROL with the loop settings of all ports.
 const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
 
-/// Until settings that end by themselves have certainly ended.
+/// Time after which temporary settings have certainly expired.
 const TEMPORARY: Duration = Duration::from_millis(1_300);
-/// Pause between two looks for that.
+/// Interval of the check for it.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// What a port does about its loop.
+/// The loop control of a port.
 pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopControl, ServiceError> {
     check(port)?;
     let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
@@ -48,8 +48,8 @@ pub async fn set(
     Ok(())
 }
 
-/// What a SubDevice was told to do about its loops. Settings that end by themselves, as of rings that are looked into,
-/// are waited for: whatever is written meanwhile would end with them.
+/// The loop settings of a SubDevice. Waits until temporary settings have expired, as those of examined rings: a value
+/// written meanwhile would expire with them.
 async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, BusError> {
     let until = bus.now() + TEMPORARY;
     loop {
@@ -66,8 +66,8 @@ const fn check(port: u8) -> Result<(), ServiceError> {
     if port < 4 { Ok(()) } else { Err(ServiceError::Port { port }) }
 }
 
-/// Cuts a declared SubDevice off by closing the port of its neighbour before it. In a closed ring those behind it stay,
-/// for the port of the neighbour behind it is closed too; in a line they go with it.
+/// Cuts off a declared SubDevice by closing the port of its neighbour before it. In a closed ring the port of the
+/// neighbour behind it is closed too, so the SubDevices behind it stay in reach; in a line they are cut off too.
 pub(crate) async fn block(
     bus: &Bus,
     segment: &SharedSegment,
@@ -75,7 +75,7 @@ pub(crate) async fn block(
 ) -> Result<Vec<BlockedPort>, ServiceError> {
     let ports = neighbours(bus, segment, subdevice)?;
     if let Err(error) = set_all(bus, segment, &ports, LoopControl::Closed).await {
-        // One end that is closed alone swallows the frames of the other side.
+        // A cable with only one closed end loses the frames of the other side.
         let _ = set_all(bus, segment, &ports, LoopControl::Auto).await;
         return Err(error);
     }
@@ -83,8 +83,8 @@ pub(crate) async fn block(
     Ok(ports)
 }
 
-/// Opens all ports that were closed to cut SubDevices off; returns how many there were. Where one cannot be reached
-/// now, all are kept for the next try.
+/// Opens all ports that were closed to cut SubDevices off; returns their number. If a port cannot be reached now, all
+/// are kept for the next attempt.
 pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
     let blocked = segment.view().blocked.clone();
     segment.observe(Observation::Unblocking);
@@ -92,11 +92,11 @@ pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<u
     if opened.is_err() {
         segment.observe(Observation::Blocked(&blocked));
     }
-    segment.observe(Observation::LookAgain);
+    segment.observe(Observation::ScanAgain);
     opened.map(|()| blocked.len())
 }
 
-/// Sets ports of several SubDevices with one frame: a cable of which one end is closed swallows frames.
+/// Sets ports of several SubDevices with one frame: a cable with only one closed end loses frames.
 async fn set_all(
     bus: &Bus,
     segment: &SharedSegment,
@@ -125,7 +125,7 @@ async fn set_all(
     Ok(())
 }
 
-/// The ports of its neighbours that lead to a SubDevice.
+/// The ports of its neighbours that are connected to a SubDevice.
 fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
     let access = segment.view();
     let missing = ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() };

@@ -10,10 +10,10 @@ use crate::procedures::junction::ordering;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
-/// Bytes that a SubDevice has.
+/// Address space of a SubDevice.
 const MEMORY: usize = 1 << 16;
 
-/// Reads bytes from an address on, in as many datagrams as it takes.
+/// Reads bytes from an address on, in as many datagrams as needed.
 pub async fn read(
     bus: &Bus,
     station: StationAddress,
@@ -30,8 +30,8 @@ pub async fn read(
     Ok(bytes)
 }
 
-/// Writes bytes from an address on, in as many datagrams as it takes. A datagram whose frame is lost is sent again, so
-/// that a register may be written twice.
+/// Writes bytes from an address on, in as many datagrams as needed. A datagram of a lost frame is sent again: a
+/// register may be written twice.
 pub async fn write(
     bus: &Bus,
     segment: Option<&SharedSegment>,

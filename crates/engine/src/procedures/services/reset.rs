@@ -9,10 +9,10 @@ use super::ServiceError;
 use crate::supervisor::{Bus, BusError};
 
 const SEQUENCE: [u8; 3] = *b"RES";
-/// The sequence is begun anew so often when a frame of it is lost.
+/// Attempts of the sequence when a frame of it is lost.
 const TRIES: u32 = 4;
 
-/// Has a controller start anew, as after power-on. It loses its station address and is found again like one that was
+/// Restarts a controller as after power-on. It loses its station address, and is found again like a SubDevice that was
 /// switched off.
 pub async fn reset_controller(bus: &Bus, station: StationAddress) -> Result<(), ServiceError> {
     let mut tries = 0;
@@ -21,7 +21,7 @@ pub async fn reset_controller(bus: &Bus, station: StationAddress) -> Result<(), 
         match sequence(bus, station).await {
             Ok(()) => return Ok(()),
             Err(error @ BusError::Lost { .. }) if tries < TRIES => {
-                // The answer may have been lost alone, to the last letter even.
+                // Only the answer may have been lost, also that of the last letter.
                 match bus.fprd_array::<1>(station, map::ESC_RESET_ECAT).await {
                     Ok(_) => {}
                     Err(BusError::Wkc { .. }) => return Ok(()),
@@ -33,7 +33,7 @@ pub async fn reset_controller(bus: &Bus, station: StationAddress) -> Result<(), 
     }
 }
 
-/// Each letter leaves when the one before has come back: a frame can bring one only.
+/// Each letter is sent after the previous one has returned: the register takes one letter per frame.
 async fn sequence(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     let (target, expected) = (Target::Station(station, map::ESC_RESET_ECAT), Wkc(1));
     for letter in SEQUENCE {

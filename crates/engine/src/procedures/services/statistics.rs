@@ -1,4 +1,4 @@
-//! Reading error counters of SubDevices: on a period, on demand; clearing them (protocol 2.5).
+//! Reads error counters of SubDevices, periodically and on request; clears them (protocol 2.5).
 
 use alloc::vec::Vec;
 
@@ -13,10 +13,10 @@ use crate::procedures::error_statistics::{ErrorStatistics, WATCHDOGS};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
-/// A counter that has come so far is cleared.
+/// A counter with this value is cleared.
 const NEARLY_FULL: u8 = 0xC0;
 
-/// Runs for ever: reads all counters in turns, with the period between two beginnings.
+/// Runs until the MainDevice stops: reads all counters in turns, once per period.
 pub(crate) async fn collect(bus: Bus, segment: SharedSegment) {
     loop {
         let kept = &segment.statistics;
@@ -28,7 +28,7 @@ pub(crate) async fn collect(bus: Bus, segment: SharedSegment) {
             let read_one = move |bus: Bus, (subdevice, station)| {
                 let kept = own.clone();
                 async move {
-                    // One that does not answer is the matter of the supervision.
+                    // The supervision handles a SubDevice that does not answer.
                     let _ = read(&bus, &kept, subdevice, station).await;
                 }
             };
@@ -63,7 +63,7 @@ pub(crate) async fn read(
     kept.find(subdevice).ok_or(ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() })
 }
 
-/// Clears the counters of one SubDevice, and what was kept of them.
+/// Clears the counters of one SubDevice, and their totals.
 pub(crate) async fn clear(
     bus: &Bus,
     kept: &ErrorStatistics,
@@ -75,7 +75,7 @@ pub(crate) async fn clear(
     Ok(())
 }
 
-/// What is counted between the reading and the writing is lost.
+/// Errors between the read and the write are not counted.
 async fn clear_registers(
     bus: &Bus,
     kept: &ErrorStatistics,

@@ -1,8 +1,8 @@
-//! SII contents that were read before, for SubDevices with the same fixed area and the same category headers.
+//! SII contents read before, for SubDevices with the same fixed area and the same category headers.
 //!
-//! The checksum of the SII covers 14 bytes and tells nothing about the rest, so that equal headers are asked for, and
-//! two SubDevices have to be read alike before others are spared: one bad EEPROM is a matter of its SubDevice alone.
-//! Where two differ each is read for itself.
+//! The checksum of the SII covers only 14 bytes. Therefore the category headers must be equal too, and two SubDevices
+//! must have been read with equal contents before the cache is used for others: one bad EEPROM must not affect another
+//! SubDevice. If two differ, every SubDevice is read.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -14,16 +14,16 @@ use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
 
 use super::contents::SiiContents;
 
-/// Kinds of SubDevices that are kept, more than a segment has; beyond, the oldest is forgotten.
+/// Entries of the cache, more than a segment has types of SubDevices; beyond this the oldest entry is removed.
 const MAX_ENTRIES: usize = 1024;
 
 /// The fixed area as far as it is read, zero elsewhere.
 pub(super) type FixedArea = [u8; SiiHeader::LEN];
 
-/// What was read of a SubDevice.
+/// Data read from a SubDevice.
 type Read = (Vec<CategoryHeader>, SiiContents);
 
-/// Whether two say the same but for names, which nothing depends on.
+/// Whether two contents are equal except for names, which have no effect.
 fn agree(one: &Read, other: &Read) -> bool {
     let facts = |read: &Read| {
         let categories = read.1.categories.iter().filter(|(kind, ..)| *kind != CategoryKind::Strings);
@@ -32,12 +32,12 @@ fn agree(one: &Read, other: &Read) -> bool {
     one.0 == other.0 && one.1.end == other.1.end && facts(one) == facts(other)
 }
 
-/// What is known of a fixed area.
+/// Knowledge about a fixed area.
 #[derive(Debug)]
 enum Known {
-    /// One SubDevice was read, or is being read; how many are.
+    /// One SubDevice was read, or some are being read; the number of readers.
     Once { read: Option<(StationAddress, Read)>, readers: usize },
-    /// Two were read alike.
+    /// Two were read with equal contents.
     Twice(Read),
     /// Two differ.
     Disputed,
@@ -49,13 +49,13 @@ struct Entry {
     known: Known,
 }
 
-/// What the cache has for a fixed area.
+/// The cache's entry for a fixed area.
 pub(super) enum Found {
-    /// Too few have read it; the procedure that holds the claim does.
+    /// Too few have been read; the procedure with the claim reads its own.
     Nothing(Claim),
-    /// Others read it now.
+    /// Other procedures are reading it.
     BeingRead,
-    /// It was read, with these category headers.
+    /// Two equal contents were read, with these category headers.
     Contents(Vec<CategoryHeader>, SiiContents),
     /// SubDevices with it differ.
     Disputed,
@@ -66,34 +66,34 @@ pub(super) enum Found {
 pub struct SiiCache {
     pub(super) enabled: bool,
     entries: Rc<RefCell<Vec<Entry>>>,
-    /// The time of a command of the quickest EEPROM so far, as a first guess for the next one.
+    /// The time of a command of the fastest EEPROM so far, as a first estimate for the next one.
     pace: Rc<Cell<Option<Duration>>>,
 }
 
 impl SiiCache {
-    /// An empty cache; switched off it keeps nothing.
+    /// An empty cache; a disabled one stores nothing.
     pub fn new(enabled: bool) -> SiiCache {
         SiiCache { enabled, entries: Rc::default(), pace: Rc::default() }
     }
 
-    /// SII contents that are kept.
+    /// Number of stored SII contents.
     pub fn len(&self) -> usize {
         self.entries.borrow().len()
     }
 
-    /// Whether nothing is kept.
+    /// Whether nothing is stored.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Forgets everything: an EEPROM was written.
+    /// Clears the cache: an EEPROM was written.
     pub fn clear(&self) {
         self.entries.borrow_mut().retain(|entry| matches!(entry.known, Known::Once { read: None, .. }));
     }
 
-    /// What there is, or the right to read it for the SubDevice with this address.
+    /// The stored contents, or the right to read them for the SubDevice with this address.
     pub(super) fn find(&self, area: &FixedArea, station: StationAddress) -> Found {
-        /// So many read at once: as many as have to agree.
+        /// Concurrent readers: as many as have to agree.
         const READERS: usize = 2;
         let claim = || Claim { entries: self.entries.clone(), area: *area, station };
         let mut entries = self.entries.borrow_mut();
@@ -115,12 +115,12 @@ impl SiiCache {
         }
     }
 
-    /// The first guess for another EEPROM.
+    /// The first estimate for another EEPROM.
     pub(super) fn pace(&self) -> Option<Duration> {
         self.pace.get()
     }
 
-    /// One slow EEPROM must not make the others slow: the quickest counts.
+    /// The fastest EEPROM counts: a slow one must not delay the others.
     pub(super) fn teach(&self, learnt: Option<Duration>) {
         if let Some(learnt) = learnt {
             self.pace.set(Some(self.pace.get().map_or(learnt, |known| known.min(learnt))));
@@ -128,8 +128,8 @@ impl SiiCache {
     }
 }
 
-/// The right to read an SII with this fixed area; further SubDevices with the same one wait. Dropped, also with the
-/// procedure that reads, another one may try.
+/// The right to read an SII with this fixed area; further SubDevices with the same area wait. When it is dropped, also
+/// together with its procedure, another procedure may read.
 pub(super) struct Claim {
     entries: Rc<RefCell<Vec<Entry>>>,
     area: FixedArea,
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn two_read_and_when_they_agree_others_are_spared() {
+    fn after_two_equal_contents_further_subdevices_use_the_cache() {
         let cache = SiiCache::new(true);
         let claims = [1, 2].map(|station| claim(&cache, &area(1), station).expect("two may read"));
         assert!(claim(&cache, &area(1), 3).is_none(), "two do");
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn one_subdevice_does_not_confirm_itself_and_two_that_differ_are_both_read() {
+    fn one_subdevice_does_not_confirm_itself_and_differing_ones_are_both_read() {
         let cache = SiiCache::new(true);
         for _ in 0..3 {
             claim(&cache, &area(1), 1).expect("one is not enough").settle(Vec::new(), contents(&area(1)));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_quickest_eeprom_is_the_guess_for_others() {
+    fn the_fastest_eeprom_is_the_estimate_for_others() {
         let cache = SiiCache::new(true);
         cache.teach(Some(Duration::from_micros(550)));
         cache.teach(Some(Duration::from_millis(5)));

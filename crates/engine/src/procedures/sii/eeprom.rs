@@ -1,8 +1,8 @@
 //! Words of an EEPROM through the SII interface of its controller (protocol 3.8).
 //!
-//! A poll brings the data of a command along, and the next command travels behind it in the same frame: while the
-//! EEPROM is busy the controller refuses it, and where it was in time it goes on at once. Which word the data belongs
-//! to is told by the address register, so that commands that came twice, late or not at all are noticed.
+//! A poll reads the data of a command, and the next command follows it in the same frame: while the EEPROM is busy the
+//! controller refuses the command, otherwise it starts at once. The address register shows which word the data belongs
+//! to, so duplicated, late and lost commands are detected.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -21,19 +21,19 @@ use crate::time::Instant;
 const COMMAND_LIMIT: Duration = Duration::from_millis(100);
 /// How long a controller may take to load its EEPROM after power-on.
 const LOAD_LIMIT: Duration = Duration::from_millis(500);
-/// A command that the EEPROM did not acknowledge or the controller did not take is given again so often.
+/// Repetitions of a command that the EEPROM did not acknowledge or the controller did not take.
 const RETRIES: usize = 3;
 /// Bytes of control, address and data registers in one poll with 8-byte reads.
 const POLL_LEN: usize = 14;
 
-/// A read command that the controller was given.
+/// A read command sent to the controller.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     word: u32,
     at: Instant,
 }
 
-/// What a poll showed.
+/// Result of a poll.
 struct Poll {
     control: SiiControl,
     address: u32,
@@ -42,15 +42,15 @@ struct Poll {
     taken: bool,
 }
 
-/// Why a command brought no data.
+/// Why a command returned no data.
 enum Failure {
-    /// The data register holds another word, or what the poll found is no longer there.
+    /// The data register holds another word, or the polled data was overwritten.
     NotTaken,
     /// The EEPROM reported an error.
     Command(SiiControl),
 }
 
-/// The EEPROM of one SubDevice, and what was read of it.
+/// The EEPROM of one SubDevice, and the words read so far.
 pub(super) struct Eeprom {
     bus: Bus,
     station: StationAddress,
@@ -62,7 +62,7 @@ pub(super) struct Eeprom {
 }
 
 impl Eeprom {
-    /// Waits until the controller has loaded its configuration, and until the last command of another user is done.
+    /// Waits until the controller has loaded its configuration, and until the last command of another user has ended.
     pub(super) async fn open(bus: &Bus, station: StationAddress, pace: Pace) -> Result<Eeprom, SiiReadError> {
         let begin = bus.now();
         loop {
@@ -86,12 +86,12 @@ impl Eeprom {
         }
     }
 
-    /// When reading has to be over.
+    /// Time at which reading must have ended.
     pub(super) fn until(&self) -> Instant {
         self.until
     }
 
-    /// Reads words. `then` is the word that will be asked for next, where that is certain: it is read ahead.
+    /// Reads words. `then` is the word that will be read next, if that is certain: it is read ahead.
     pub(super) async fn bytes(&mut self, first: u32, count: u32, then: Option<u32>) -> Result<Vec<u8>, SiiReadError> {
         let end = first + count;
         let mut bytes = Vec::with_capacity(2 * count as usize);
@@ -119,7 +119,7 @@ impl Eeprom {
         self.words.get(word as usize).copied().flatten()
     }
 
-    /// Reads what begins at a word, and has what begins at `ahead` under way afterwards.
+    /// Reads the data at a word. Afterwards a command for `ahead` is under way.
     async fn fetch(&mut self, word: u32, ahead: Option<u32>) -> Result<u16, SiiReadError> {
         let mut failures = 0;
         loop {
@@ -133,7 +133,7 @@ impl Eeprom {
                 self.command(word).await?;
                 continue;
             };
-            // Once something went wrong, one thing at a time.
+            // After a failure no command is sent ahead.
             let next = if failures > 0 {
                 None
             } else if given.word == word {
@@ -154,8 +154,8 @@ impl Eeprom {
         }
     }
 
-    /// Writes from SII_CONTROL on; true where the controller took it. It does not while the EEPROM is busy, as when the
-    /// reply to a command was lost and the command is sent again.
+    /// Writes from SII_CONTROL on; true if the controller took the command. It refuses commands while the EEPROM is
+    /// busy, also if the reply to a command was lost and the command is sent again.
     async fn write(&self, data: Vec<u8>) -> Result<bool, BusError> {
         let target = Target::Station(self.station, map::SII_CONTROL);
         let reply = self.bus.transfer(Command::Fpwr, target, data, Some(Wkc(1))).await?;
@@ -174,7 +174,7 @@ impl Eeprom {
         Ok(())
     }
 
-    /// Polls until a command is done, and gives the next one as soon as it is.
+    /// Polls until a command has ended, and sends the next one at once.
     async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
         self.bus.sleep_until(given.at + self.pace.first()).await;
         let mut first = true;
@@ -198,7 +198,7 @@ impl Eeprom {
                 return Ok(if poll.address == given.word { Ok(()) } else { Err(Failure::NotTaken) });
             }
             if poll.taken {
-                // It was done between the poll and the command behind it.
+                // The EEPROM finished between the poll and the command behind it.
                 return Ok(Err(Failure::NotTaken));
             }
             if elapsed > COMMAND_LIMIT {

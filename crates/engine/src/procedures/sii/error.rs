@@ -1,4 +1,4 @@
-//! Why an SII cannot be read, and how long that may take.
+//! Why an SII cannot be read, and the time limit.
 
 use core::fmt;
 use core::time::Duration;
@@ -21,12 +21,12 @@ pub enum SiiReadError {
         /// Word address.
         word: u32,
     },
-    /// Reading the whole took too long.
+    /// Reading the whole SII took too long.
     TooSlow {
-        /// Word address that was to be read next.
+        /// Word address of the next read.
         word: u32,
     },
-    /// The controller does not take the read command, again and again.
+    /// The controller repeatedly does not take the read command.
     Refused {
         /// Word address.
         word: u32,
@@ -35,13 +35,13 @@ pub enum SiiReadError {
     Command {
         /// Word address.
         word: u32,
-        /// What the control register said.
+        /// Value of the control register.
         control: SiiControl,
     },
 }
 
 impl SiiReadError {
-    /// A change of the segment or lost frames may be to blame, so that another try is worth it.
+    /// A change of the segment or lost frames may be the cause, so another attempt is useful.
     pub(in crate::procedures) const fn is_passing(&self) -> bool {
         matches!(self, SiiReadError::Bus(_) | SiiReadError::Refused { .. })
     }

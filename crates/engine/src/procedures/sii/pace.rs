@@ -1,4 +1,4 @@
-//! How long an EEPROM takes for a command, learnt from those that it has done: when the first poll is worth sending.
+//! Learns the time that an EEPROM takes for a command, to send the first poll at the right time.
 
 use core::time::Duration;
 
@@ -6,41 +6,42 @@ use core::time::Duration;
 const SHORTEST_PAUSE: Duration = Duration::from_micros(50);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_millis(1);
-/// The first poll never comes later: an EEPROM that is slow for a while must not stay so in our eyes.
+/// Latest time of the first poll: an EEPROM that is slow for a while must not be polled late for ever.
 const LONGEST_WAIT: Duration = Duration::from_millis(5);
 
-/// Known times are not narrowed down any further than this.
+/// The learned time is not refined below this.
 const NARROW: Duration = Duration::from_micros(40);
 
-/// What is known about the speed of an EEPROM.
+/// Learned speed of an EEPROM.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Pace {
-    /// So long after a command the first poll is sent.
+    /// Time from a command to its first poll.
     wait: Option<Duration>,
-    /// A first poll that came so early was in vain.
+    /// A first poll after this time was too early.
     too_early: Duration,
-    /// What the last command took, where its first poll came too early.
+    /// Time of the last command, if its first poll was too early.
     slow: Option<Duration>,
 }
 
 impl Pace {
-    /// A guess to begin with.
+    /// An initial estimate.
     pub(super) const fn guess(wait: Option<Duration>) -> Pace {
         Pace { wait, too_early: Duration::ZERO, slow: None }
     }
 
-    /// From a command to its first poll.
+    /// Time from a command to its first poll.
     pub(super) fn first(&self) -> Duration {
         self.wait.unwrap_or(SHORTEST_PAUSE)
     }
 
-    /// From one poll to the next, for a command that has taken so long.
+    /// Time from one poll to the next, for a command that has taken `elapsed`.
     pub(super) fn next(elapsed: Duration) -> Duration {
         (elapsed / 16).clamp(SHORTEST_PAUSE, LONGEST_PAUSE)
     }
 
-    /// A command was done after this time, at its first poll or at a later one. One alone that is slower than those
-    /// before teaches nothing; those that are in time are asked a little earlier, down to what was too early.
+    /// A command was done after this time, at its first poll or at a later one. A single command that is slower than
+    /// the previous ones changes nothing. If the first poll is in time, the next one is sent a little earlier, down to
+    /// a time that was too early.
     pub(super) fn took(&mut self, time: Duration, at_first_poll: bool) {
         if at_first_poll {
             self.slow = None;
@@ -57,7 +58,7 @@ impl Pace {
         self.slow = Some(time);
     }
 
-    /// What was learnt.
+    /// The learned time.
     pub(super) fn learnt(&self) -> Option<Duration> {
         self.wait
     }
@@ -71,7 +72,7 @@ mod tests {
         Duration::from_micros(us)
     }
 
-    /// A command of an EEPROM that takes so long; how often it is polled.
+    /// A command of an EEPROM that takes `busy`; returns the number of polls.
     fn command(pace: &mut Pace, busy: Duration) -> u32 {
         let (mut elapsed, mut polls) = (pace.first(), 1);
         while elapsed < busy {
@@ -83,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn one_slow_command_is_no_rule() {
+    fn one_slow_command_changes_nothing() {
         let mut pace = Pace::default();
         command(&mut pace, us(60_000));
         assert_eq!(pace.first(), us(50));

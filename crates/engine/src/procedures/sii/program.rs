@@ -1,7 +1,7 @@
-//! Writing an EEPROM: word by word, each read back (protocol 3.8, 4.7); the alias; loading what was written.
+//! Writing an EEPROM: word by word, each read back (protocol 3.8, 4.7); the alias; reloading the configuration.
 //!
-//! Words that are right already are left alone. The configuration area goes last, so that a write that is cut off
-//! leaves the one that was there. Afterwards the EEPROM has the owner of before.
+//! Words that are right already are not written. The configuration area is written last, so that an interrupted write
+//! leaves the previous one. Afterwards the EEPROM is assigned as before.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -23,7 +23,7 @@ use crate::supervisor::{Bus, BusError};
 const WRITE_LIMIT: Duration = Duration::from_millis(100);
 /// How long a controller may take to load its configuration.
 const LOAD_LIMIT: Duration = Duration::from_millis(500);
-/// A word is written so often before it is given up: an EEPROM that is still busy inside does not acknowledge.
+/// Attempts to write a word: an EEPROM that is still busy internally does not acknowledge.
 const TRIES: u32 = 4;
 /// Pause before another try.
 const TRY_PAUSE: Duration = Duration::from_millis(5);
@@ -47,19 +47,19 @@ pub enum SiiProgramError {
         /// Word address.
         word: u32,
     },
-    /// The controller does not take the command, again and again: does the PDI hold the EEPROM?
+    /// The controller repeatedly does not take the command. The PDI may hold the EEPROM.
     Refused {
         /// Word address.
         word: u32,
     },
-    /// The EEPROM did not acknowledge a word, or there is none there.
+    /// The EEPROM did not acknowledge a word, or there is no EEPROM.
     Command {
         /// Word address.
         word: u32,
-        /// What the control register said.
+        /// Value of the control register.
         control: SiiControl,
     },
-    /// What was read back is not what was written.
+    /// The value read back differs from the written one.
     Mismatch {
         /// Word address.
         word: u32,
@@ -70,21 +70,21 @@ pub enum SiiProgramError {
     },
     /// The controller refuses the configuration area that it loaded: its checksum is wrong.
     NotLoaded {
-        /// What the control register said.
+        /// Value of the control register.
         control: SiiControl,
     },
     /// These bytes are no SII image.
     Image(SiiError),
     /// The image does not end with an end marker.
     EndMarker,
-    /// Not a number of whole words, none, or more than an EEPROM has.
+    /// Not a whole number of words, empty, or more than an EEPROM has.
     Length {
         /// Bytes.
         bytes: usize,
     },
-    /// The configuration area that is there has a wrong checksum.
+    /// The present configuration area has a wrong checksum.
     Checksum {
-        /// The checksum that belongs to it.
+        /// The checksum computed from it.
         expected: u8,
         /// Word 7.
         got: u16,
@@ -157,7 +157,8 @@ pub struct SiiWritten {
     pub unchanged: usize,
 }
 
-/// Whether bytes may be written as an SII: an image with checksum, categories and end marker; with `force` any words.
+/// Checks whether bytes may be written as an SII: an image with checksum, categories and end marker; with `force` any
+/// words.
 pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
     let bytes = image.len();
     if bytes == 0 || !bytes.is_multiple_of(2) || bytes / 2 > MAX_WORDS as usize {
@@ -183,7 +184,7 @@ pub async fn read_words(
     bytes
 }
 
-/// Reads the whole EEPROM of one SubDevice, as large as it says that it is.
+/// Reads the whole EEPROM of one SubDevice; the SII contains its size.
 pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, SiiProgramError> {
     const SIZE_WORD: u32 = 0x3E;
     let access = Access::begin(bus, station).await?;
@@ -212,8 +213,8 @@ pub async fn write(
     written
 }
 
-/// Writes the alias, with the checksum that the configuration area then has; one that is wrong now is not made right
-/// unless `force` says so. The controller takes over an alias when it starts, not when it loads again (protocol 4.7).
+/// Writes the alias and the new checksum of the configuration area. A checksum that is wrong before is corrected only
+/// with `force`. The controller takes over an alias when it starts, not when it reloads (protocol 4.7).
 pub async fn write_alias(
     bus: &Bus,
     station: StationAddress,
@@ -240,7 +241,7 @@ pub async fn write_alias(
     written
 }
 
-/// Has the controller load its configuration from the EEPROM again (command 0x0400).
+/// Makes the controller reload its configuration from the EEPROM (command 0x0400).
 pub async fn reload(bus: &Bus, station: StationAddress) -> Result<(), SiiProgramError> {
     let access = Access::begin(bus, station).await?;
     let loaded = access.reload().await;
@@ -256,11 +257,11 @@ fn checksum_of(words: &[u16]) -> u8 {
     checksum(&bytes)
 }
 
-/// The EEPROM while it is EtherCAT's.
+/// The EEPROM while it is assigned to EtherCAT.
 struct Access<'a> {
     bus: &'a Bus,
     station: StationAddress,
-    /// It was offered to the PDI before.
+    /// It was assigned to the PDI before.
     offered: bool,
 }
 
@@ -347,8 +348,8 @@ impl<'a> Access<'a> {
         if failed { Err(SiiProgramError::NotLoaded { control }) } else { Ok(()) }
     }
 
-    /// Writes from SII_CONTROL on. A command that comes twice because its answer was lost finds the controller busy, or
-    /// does the same once more.
+    /// Writes from SII_CONTROL on. If the answer is lost the command is sent twice: the controller is then busy, or
+    /// repeats the same operation.
     async fn command(&self, word: u32, data: Vec<u8>) -> Result<(), SiiProgramError> {
         let target = Target::Station(self.station, map::SII_CONTROL);
         let reply = self.bus.transfer(Command::Fpwr, target, data, Some(Wkc(1))).await?;

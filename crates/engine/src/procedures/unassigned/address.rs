@@ -1,10 +1,10 @@
-//! A temporary station address for each SubDevice that has none of ours, without ever writing to a position.
+//! Assigns a temporary station address to each SubDevice without an assigned one, without writes to a position.
 //!
-//! Positions move when a cable is cut or plugged in, also while a frame is on its way, and a write to a position may
-//! then hit a SubDevice in OP. So positions are only read. Addresses are given through the address that a SubDevice
-//! has: one that no other has is written, and where several have the same one it is exchanged (FPRW): the first
-//! SubDevice on a link takes the new address and hands its old one on with the datagram, so that the others take what
-//! they have.
+//! Positions change when a cable is cut or plugged in, also while a frame is on the wire, and a write to a position may
+//! then reach a SubDevice in OP. So positions are only read. A SubDevice gets its new address through its present one:
+//! an address that only one SubDevice has is written; if several have the same, it is exchanged (FPRW): the first
+//! SubDevice on a link takes the new address and returns its old one in the datagram, so that the SubDevices behind it
+//! write the address that they have.
 
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
@@ -19,18 +19,19 @@ use super::super::shared_segment::SharedSegment;
 use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 
-/// Temporary station addresses, taken in turn: one that was out of reach for a while must not be mistaken for another.
+/// Temporary station addresses, used in turn: a SubDevice that was out of reach for a while must not be taken for
+/// another one.
 const TEMPORARY: RangeInclusive<u16> = 0xC000..=0xFFFE;
-/// Addresses that are given in one round, before all others are looked at again.
+/// Addresses assigned in one round, before all others are scanned again.
 const ROUND: usize = 64;
-/// What a SubDevice adds to the working counter when it reads and writes.
+/// Working counter of a SubDevice that reads and writes.
 const EXCHANGED: u16 = 3;
 
 /// Reads all station addresses; `None` while the segment changes.
 async fn read(bus: &Bus) -> Result<Option<View>, BusError> {
     let ring = |bus: &Bus| bus.board().map(|board| board.ring()).unwrap_or_default();
     let before = ring(bus);
-    // Positions behind a break are counted from there (protocol CR-09).
+    // Positions behind a break are counted from the redundant link (protocol CR-09).
     let counted = bus.brd(map::TYPE, 1).await?;
     let count = counted.wkc().0.min(MAX_SUBDEVICES);
     let read = bus.gather((0..count).map(Position), |bus, position| async move {
@@ -48,7 +49,7 @@ async fn read(bus: &Bus) -> Result<Option<View>, BusError> {
     Ok(steady.then_some(View { counts, ring: before, stations }))
 }
 
-/// Reads all station addresses twice; `None` where that is not the same.
+/// Reads all station addresses twice; `None` if the results differ.
 pub(in super::super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> {
     let Some(first) = read(bus).await? else { return Ok(None) };
     Ok(read(bus).await?.filter(|second| *second == first))
@@ -71,8 +72,8 @@ fn fresh(segment: &SharedSegment, present: &[StationAddress]) -> StationAddress 
     address
 }
 
-/// Gives each SubDevice that has one of these addresses one of its own. Returns what was given, and whether none is
-/// left.
+/// Gives each SubDevice with one of these addresses one of its own. Returns the new addresses, and whether none of the
+/// old ones is left.
 pub(super) async fn give(
     bus: &Bus,
     segment: &SharedSegment,
@@ -99,7 +100,7 @@ pub(super) async fn give(
     Ok((given, true))
 }
 
-/// Takes an address from the SubDevice that has it. It is found with another one.
+/// Takes an address away from the SubDevice that has it, which gets a temporary one.
 pub(in super::super) async fn take_away(
     bus: &Bus,
     segment: &SharedSegment,
@@ -109,9 +110,9 @@ pub(in super::super) async fn take_away(
     exchange(bus, station, new, true).await.map(drop)
 }
 
-/// Gives the first SubDevice on each link that has an address a new one. Returns on which links one took it.
+/// Gives the first SubDevice with an address on each link a new one. Returns the links on which a SubDevice took it.
 ///
-/// The two links get different ones: there may be one on the other link whose answers do not arrive.
+/// The two links get different new addresses: the answers of a SubDevice on one link may be lost.
 async fn exchange(
     bus: &Bus,
     station: StationAddress,
@@ -122,7 +123,7 @@ async fn exchange(
     let reply = bus.exchange(station, map::STATION_ADDRESS, bytes(main), bytes(redundant)).await?;
     let taken = [reply.main.0 >= EXCHANGED, reply.redundant.0 >= EXCHANGED];
     if single && taken == [false; 2] {
-        // Controllers that cannot read and write at once (FEATURES bit 10).
+        // For controllers that cannot read and write at once (FEATURES bit 10).
         let target = Target::Station(station, map::STATION_ADDRESS);
         let reply = bus.transfer_once(Command::Fpwr, target, bytes(main)).await?;
         return Ok([reply.wkc() != Wkc(0), false]);

@@ -1,9 +1,9 @@
-//! Station addresses that several SubDevices had: which of them the member is.
+//! Station addresses that several SubDevices had: determines which of them is the member.
 //!
-//! One of an earlier session, or of another MainDevice, may have a member's address and its identity too. What this
-//! MainDevice wrote to it tells them apart: each session has logical addresses of its own (decision 0023), so FMMUs
-//! with those of the member are those of the member. Only where nothing was mapped, place and identity decide. Those
-//! that are not the member keep the temporary address that they were given, and are unassigned.
+//! A SubDevice of an earlier session, or of another MainDevice, may have a member's address and its identity too. The
+//! FMMUs distinguish them: each session has its own logical addresses (decision 0023), so only the member has FMMUs
+//! with the addresses written to it. If nothing was mapped, position and identity decide. SubDevices that are not the
+//! member keep their temporary address, and are unassigned.
 
 use alloc::vec::Vec;
 
@@ -16,20 +16,20 @@ use crate::segment::Owners;
 use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 
-/// What tells whether a SubDevice is a member.
+/// Evidence whether a SubDevice is a member.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) enum Mark {
     /// It holds the FMMUs that were written to the member.
     Borne,
     /// It does not hold them.
     Missing,
-    /// Nothing is mapped for the member at present.
+    /// No process data is mapped for the member at present.
     Unmapped,
     /// The member has no FMMUs.
     None,
 }
 
-/// Whether the SubDevice at a station address holds what was mapped for a member.
+/// Whether the SubDevice at a station address holds the mapping of a member.
 pub(in super::super) async fn mark(
     bus: &Bus,
     segment: &SharedSegment,
@@ -49,14 +49,14 @@ pub(in super::super) async fn mark(
     }
     match bus.fprd(station, map::FMMU_BASE, expected.len()).await {
         Ok(got) => Ok(if got == expected { Mark::Borne } else { Mark::Missing }),
-        // Fewer FMMUs than the member has.
+        // It has fewer FMMUs than the member.
         Err(BusError::Wkc { got: Wkc(0), .. }) => Ok(Mark::Missing),
         Err(error) => Err(error),
     }
 }
 
-/// Whether the SubDevice at a station address says that it is of the kind and has the serial number of a member; one
-/// that cannot be read has to be trusted.
+/// Whether the SubDevice at a station address has the identity and serial number of a member; if it cannot be read,
+/// true.
 pub(in super::super) async fn has_identity(
     bus: &Bus,
     segment: &SharedSegment,
@@ -78,8 +78,8 @@ pub(in super::super) async fn has_identity(
     }
 }
 
-/// Gives each member its address back that several had. `before` is how it was then, `after` how it is now that each of
-/// them has an address of its own, `owners` the member at each place by order.
+/// Gives each member its address back if several SubDevices had it. `before` is the view then, `after` the view now
+/// that each of them has an address of its own, `owners` the member at each place by order.
 pub(super) async fn restore(
     bus: &Bus,
     segment: &SharedSegment,
@@ -99,14 +99,14 @@ pub(super) async fn restore(
     Ok(())
 }
 
-/// Members whose addresses several have.
+/// Members whose addresses several SubDevices have.
 fn doubled(segment: &SharedSegment, view: &View) -> Vec<(usize, StationAddress)> {
     let access = segment.view();
     let members = access.members.iter().enumerate().map(|(index, member)| (index, member.station));
     members.filter(|(_, station)| view.positions(*station).count() > 1).collect()
 }
 
-/// The address that the member has now, where it is known which of them it is.
+/// The present address of the member, if it is known which SubDevice it is.
 async fn keeper(
     bus: &Bus,
     segment: &SharedSegment,
@@ -118,7 +118,7 @@ async fn keeper(
 ) -> Result<Option<StationAddress>, BusError> {
     let has_moved = before.counts != after.counts;
     let known: Vec<StationAddress> = segment.view().members.iter().map(|member| member.station).collect();
-    // Where places have changed meanwhile, any that has no address of ours may be one of them.
+    // If positions have changed meanwhile, any SubDevice without an assigned address may be one of them.
     let is_candidate = |at: &usize| match before.stations.get(*at) {
         Some(then) if !has_moved => *then == station,
         _ => !known.contains(&after.stations[*at]),
@@ -132,11 +132,11 @@ async fn keeper(
             Mark::Unmapped | Mark::None => return by_place(bus, segment, owners, before, after, index).await,
         }
     }
-    // Where several bear it, one was taken for the other before.
+    // If several hold the mapping, one was configured in place of another before.
     Ok(if let [only] = bearers[..] { Some(only) } else { None })
 }
 
-/// Nothing tells but place and identity.
+/// Only position and identity decide.
 async fn by_place(
     bus: &Bus,
     segment: &SharedSegment,

@@ -1,7 +1,8 @@
-//! The same starting point for a stranger as after a scan: INIT, nothing mapped, its EEPROM to EtherCAT.
+//! Sets an unassigned SubDevice to the same initial state as after a scan: INIT, nothing mapped, its EEPROM assigned to
+//! EtherCAT.
 //!
-//! One that another MainDevice configured, or that was plugged in with power of its own, would otherwise go on putting
-//! its inputs into our process data.
+//! A SubDevice that was configured by another MainDevice, or was plugged in while powered, would otherwise continue to
+//! write its inputs into the process data.
 
 use alloc::vec;
 use core::time::Duration;
@@ -15,12 +16,12 @@ use super::super::scan::event_mask;
 use super::super::sii::claim;
 use crate::supervisor::{Bus, BusError};
 
-/// How long a stranger may take to get to INIT before it is read all the same.
+/// How long an unassigned SubDevice may take to reach INIT before it is read anyway.
 const INIT_LIMIT: Duration = Duration::from_millis(100);
-/// Pause between two looks at its state.
+/// Interval of reads of its state.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Levels one SubDevice; the rest comes with its configuration.
+/// Sets the initial state of one SubDevice; other registers are written with its configuration.
 pub(super) async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     bus.fpwr(station, map::DL_CONTROL.offset(1), &[0]).await?;
     bus.fpwr(station, map::DL_CONTROL.offset(3), &[0]).await?;
@@ -30,7 +31,7 @@ pub(super) async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusE
     claim(bus, station).await
 }
 
-/// Clears FMMUs and SyncManagers, as many as there are.
+/// Clears all FMMUs and SyncManagers of the controller.
 async fn unmap(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     let information = Information::decode(&bus.fprd_array(station, map::TYPE).await?);
     let fmmus = Fmmu::LEN * usize::from(information.fmmu_count);
@@ -43,7 +44,8 @@ async fn unmap(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     Ok(())
 }
 
-/// Devices that copy AL control into AL status show the acknowledge bit as an error: they get the bare state.
+/// Devices that copy AL control into AL status show the acknowledge bit as an error: the state is written to them
+/// without it.
 async fn to_init(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     let until = bus.now() + INIT_LIMIT;
     let mut acknowledge = true;

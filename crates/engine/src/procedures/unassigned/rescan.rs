@@ -1,8 +1,8 @@
-//! A scan of the whole segment while process data goes on: which SubDevice is at which place now, which have moved, are
+//! Scans the whole segment while process data continues: the position of each SubDevice, and which have moved or are
 //! missing (Master Redundancy 10.8).
 //!
-//! It reads positions and no process data: no working counter changes. Supervision finds and reads SubDevices without a
-//! station address of ours, and this waits for that.
+//! It reads positions and no process data: no working counter changes. Supervision finds and reads SubDevices without
+//! an assigned station address; the rescan waits for this.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -27,12 +27,12 @@ use crate::topology::Topology;
 
 /// Pause between two scans.
 const PAUSE: Duration = Duration::from_millis(10);
-/// So long a scan may wait for the end of a disturbance; then it is tried again.
+/// Maximum wait of a scan for the end of a disturbance; then it is repeated.
 const LIMIT: Duration = Duration::from_millis(100);
 
-/// So long the segment may take to hold still after a group has joined or left.
+/// Maximum time for the segment to become stable after a group has joined or left.
 const FOLLOW_LIMIT: Duration = Duration::from_millis(200);
-/// Pause before the cabling is looked at again where it could not be taken over, twice as long each time.
+/// Pause before the cabling is scanned again if it could not be taken over; doubled each time.
 const AGAIN: Duration = Duration::from_millis(50);
 /// The longest of these pauses.
 const LONGEST: Duration = Duration::from_secs(2);
@@ -44,7 +44,7 @@ pub enum Identified {
     Declared(SubDeviceId),
     /// An undeclared one. It is left alone.
     Undeclared(Identity),
-    /// It was not found out in time.
+    /// Not identified in time.
     Unknown,
 }
 
@@ -57,21 +57,20 @@ pub struct Found {
     pub station: StationAddress,
     /// Its identity.
     pub identified: Identified,
-    /// Its place in the cabling that was known before, where the order of the declared SubDevices is another one since
-    /// because of it.
+    /// Its position in the previous cabling, if this move changes the order of the declared SubDevices.
     pub moved_from: Option<Position>,
 }
 
-/// What a look at the whole segment has brought.
+/// Result of a scan of the whole segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rescan {
-    /// SubDevices met by the main copy and by the redundant one.
+    /// SubDevices passed by the main copy and by the redundant copy.
     pub counts: (Wkc, Wkc),
     /// All that answer, by position.
     pub subdevices: Vec<Found>,
-    /// Declared ones that do not, by their index in the declaration.
+    /// Declared SubDevices that do not answer, by their index in the declaration.
     pub missing: Vec<SubDeviceId>,
-    /// Cabling as the ports tell it now, with the rings behind junctions that are known.
+    /// Present cabling according to the ports, with the known rings behind junctions.
     pub topology: Topology,
 }
 
@@ -81,7 +80,7 @@ impl Rescan {
         self.subdevices.iter().all(|found| found.identified != Identified::Unknown)
     }
 
-    /// Declared SubDevices with the places that they have moved from and to.
+    /// Declared SubDevices that have moved: old and new position.
     pub fn moved(&self) -> impl Iterator<Item = (SubDeviceId, Position, Position)> + '_ {
         self.subdevices.iter().filter_map(|found| match found.identified {
             Identified::Declared(index) => Some((index, found.moved_from?, found.position)),
@@ -90,16 +89,16 @@ impl Rescan {
     }
 }
 
-/// Scans until the segment holds still and all are identified, for so long at most. Then what is known
-/// is the result. Those that have moved are reported.
+/// Scans until the segment is stable and all are identified, or until the limit; then returns the last result. Moves
+/// are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
-    let (rescan, _) = look_until(bus, segment, limit).await?;
+    let (rescan, _) = scan_until(bus, segment, limit).await?;
     report_moved(bus, &rescan);
     Ok(rescan)
 }
 
-/// Takes over the cabling after hot connect groups have joined or left, as soon as nothing is broken that would be
-/// forgotten.
+/// Takes over the cabling after hot connect groups have joined or left, as soon as no break is open whose place would
+/// be lost.
 pub(in crate::procedures) async fn follow_groups(bus: Bus, segment: SharedSegment) {
     let mut pause = AGAIN;
     loop {
@@ -113,13 +112,13 @@ pub(in crate::procedures) async fn follow_groups(bus: Bus, segment: SharedSegmen
     }
 }
 
-/// A look that was not asked for, because the segment is known to be another one. True where the cabling was taken
-/// over; where that cannot be nothing is sent, and nothing told.
+/// A rescan without a request, because the segment is known to have changed. True if the cabling was taken over; if it
+/// cannot be, nothing is sent or reported.
 async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> bool {
     if !segment.view().is_whole(&segment.words()) {
         return false;
     }
-    let Ok((rescan, true)) = look_until(bus, segment, limit).await else { return false };
+    let Ok((rescan, true)) = scan_until(bus, segment, limit).await else { return false };
     report_moved(bus, &rescan);
     true
 }
@@ -130,20 +129,20 @@ fn report_moved(bus: &Bus, rescan: &Rescan) {
     }
 }
 
-/// With whether the cabling was taken over.
-async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
+/// Also returns whether the cabling was taken over.
+async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
     let until = bus.now() + limit;
-    segment.observe(Observation::LookAgain);
+    segment.observe(Observation::ScanAgain);
     loop {
-        // What puts SubDevices out of reach or gives them other addresses would show in the middle of it.
-        let looked = match segment.disturb(Disturbance::Rescan, LIMIT).await {
-            Some(_turn) => look(bus, segment).await,
+        // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
+        let scanned = match segment.disturb(Disturbance::Rescan, LIMIT).await {
+            Some(_turn) => scan_once(bus, segment).await,
             None => Ok(None),
         };
-        // This scan has cleared the requests of ports that changed in between.
-        segment.observe(Observation::LookAgain);
+        // This scan has cleared the ECAT events of ports that changed before.
+        segment.observe(Observation::ScanAgain);
         let is_last = bus.now() >= until;
-        match looked {
+        match scanned {
             Ok(Some(rescan)) if is_last || rescan.is_complete() => {
                 let is_adopted = rescan.is_complete() && adopt(segment, &rescan);
                 return Ok((rescan, is_adopted));
@@ -155,7 +154,7 @@ async fn look_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
     }
 }
 
-/// Hands a complete look to the model. True where its cabling is that of the segment from now on.
+/// Passes a complete scan to the model. True if its cabling is taken over.
 fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
     let stations: Vec<StationAddress> = rescan.subdevices.iter().map(|found| found.station).collect();
     let member = |found: &Found| if let Identified::Declared(index) = found.identified { Some(index.0) } else { None };
@@ -166,8 +165,8 @@ fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
     segment.view().adoptions() != before
 }
 
-/// One look; `None` while the segment changes.
-async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusError> {
+/// One scan; `None` while the segment changes.
+async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusError> {
     let Some(seen) = view(bus).await? else { return Ok(None) };
     let Some(ports) = ports_of(bus, &seen).await? else { return Ok(None) };
     let access = segment.view();
@@ -183,15 +182,15 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
         };
         let identified = match (owners.at(at), known) {
             (Some(index), _) => Identified::Declared(SubDeviceId(index)),
-            // Until it was reported it may be one that is missed.
+            // Until it is reported as undeclared it may be a missing member.
             (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Identified::Undeclared(info.identity),
             (None, _) => Identified::Unknown,
         };
         subdevices.push(Found { position: Position(at as u16), station: *station, identified, moved_from: None });
     }
     let place_at_scan = |index: usize| access.members[index].node;
-    // In a ring that is open elsewhere than at the scan, or that was open then and has branches, frames meet these in
-    // another order (CR-09): that is no move.
+    // If a ring is open at another place than at the scan, or was open then and has branches, frames pass its
+    // SubDevices in another order (CR-09): not a move.
     let scanned = &access.cabling.topology;
     let was_open = scanned.redundant_head.is_some();
     let is_comparable = match bus.ring() {
@@ -208,8 +207,7 @@ async fn look(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>, BusE
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
 
-/// The ports of all that were seen; `None` where the segment has changed since: ports of one would be mixed with those
-/// of another.
+/// The ports of all SubDevices; `None` if the segment has changed since: port states of two cablings would be mixed.
 pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStatus>>, BusError> {
     let ports = bus.gather((0..seen.stations.len() as u16).map(Position), |bus, position| async move {
         let bytes = bus.aprd(position, map::DL_STATUS, DlStatus::LEN).await?;
@@ -223,7 +221,7 @@ pub(super) async fn ports_of(bus: &Bus, seen: &View) -> Result<Option<Vec<DlStat
     Ok((view(bus).await?.as_ref() == Some(seen)).then_some(ports))
 }
 
-/// The fewest SubDevices without which the others are in the order of the scan: these have moved.
+/// Marks the fewest SubDevices without which the others are in the order of the scan: these have moved.
 fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<usize>) {
     let mut placed = Vec::new();
     for (at, found) in subdevices.iter().enumerate() {
@@ -241,9 +239,10 @@ fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<
     }
 }
 
-/// Of numbers that are all different, those of a longest ascending row.
+/// Members of a longest ascending subsequence of distinct numbers.
 fn longest_ascent(numbers: &[usize]) -> Vec<bool> {
-    // By length of a row the place of its last number, the smallest there is; by place the one before in its row.
+    // `ends[n]`: the place of the smallest last number of a subsequence of length n + 1. By place: its predecessor in
+    // the subsequence.
     let mut ends: Vec<usize> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::new();
     for (at, number) in numbers.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Registers that a SubDevice holds in a state, as they were written.
+//! Registers that a SubDevice must hold in a state.
 
 use alloc::format;
 use alloc::string::String;
@@ -12,16 +12,16 @@ use ringcat_wire::register::{SyncManager, map};
 use crate::config::{RegisterAccess, StartupAction, SubDeviceConfig};
 use crate::segment::setup::Setup;
 
-/// Bits of a SyncManager's control byte that do not depend on the controller: buffer type and direction.
+/// Compared bits of a SyncManager's control byte: buffer type and direction. The others depend on the controller.
 const CONTROL_MASK: u8 = 0x0F;
-/// Of its activate byte: whether it is switched on. The mailbox toggles another one.
+/// Compared bit of its activate byte: whether it is enabled. The mailbox toggles another bit.
 const ACTIVATE_MASK: u8 = 0x01;
 
-/// Registers in a row.
+/// Consecutive registers.
 pub(super) struct Held {
     pub register: RegisterAddress,
     pub bytes: Vec<u8>,
-    /// Bits that count.
+    /// Compared bits.
     mask: Vec<u8>,
     what: &'static str,
 }
@@ -32,30 +32,30 @@ impl Held {
         Held { register, bytes, mask, what }
     }
 
-    /// Whether registers that were read hold it.
+    /// Whether the read registers hold it.
     pub fn is_in(&self, got: &[u8]) -> bool {
         got.len() == self.bytes.len() && self.wrong(got).next().is_none()
     }
 
-    /// Places of bytes that differ.
+    /// Offsets of bytes that differ.
     fn wrong<'a>(&'a self, got: &'a [u8]) -> impl Iterator<Item = usize> + 'a {
         let all = self.bytes.iter().zip(got).zip(&self.mask).enumerate();
         all.filter(|(_, ((expected, got), mask))| (*expected ^ *got) & *mask != 0).map(|(at, _)| at)
     }
 
-    /// What it is and where it begins.
+    /// Its name and first address.
     pub fn name(&self) -> String {
         format!("{} from register {} on", self.what, self.register)
     }
 
-    /// The first byte that is another one.
+    /// Describes the first byte that differs.
     pub fn differences(&self, got: &[u8]) -> String {
         let Some(at) = self.wrong(got).next() else { return String::new() };
         let (expected, got) = (self.bytes[at], got[at]);
         format!("expected {expected:#04x} at {}, got {got:#04x}", self.register.offset(at as u16))
     }
 
-    /// What a start-up command writes is none of ours.
+    /// Excludes registers that a start-up command writes.
     fn leave_out(&mut self, first: RegisterAddress, length: usize) {
         for (at, mask) in self.mask.iter_mut().enumerate() {
             let address = usize::from(self.register.0) + at;
@@ -66,8 +66,8 @@ impl Held {
     }
 }
 
-/// What a SubDevice holds in a state: mailbox SyncManagers from PREOP on, the others and FMMUs from SAFEOP on. One for
-/// OP only has its process data in OP only.
+/// Registers that a SubDevice holds in a state: mailbox SyncManagers from PREOP on, the others and FMMUs from SAFEOP
+/// on. A SubDevice that exchanges process data in OP only holds those in OP only.
 pub(super) fn registers(setup: &Setup, config: &SubDeviceConfig, state: AlState) -> Vec<Held> {
     let (from_preop, from_safeop, in_op) = match state {
         AlState::Init | AlState::Boot => (false, false, false),
@@ -103,7 +103,7 @@ pub(super) fn registers(setup: &Setup, config: &SubDeviceConfig, state: AlState)
     registers
 }
 
-/// All of them at once, those in between left out.
+/// All SyncManagers in one range; registers in between are excluded.
 fn held_by_sync_managers(sync_managers: &[(u8, SyncManager)]) -> Option<Held> {
     let last = sync_managers.iter().map(|(number, _)| usize::from(*number)).max()?;
     let mut held = Held::new(map::SYNC_MANAGER_BASE, vec![0; SyncManager::LEN * (last + 1)], "SyncManagers");

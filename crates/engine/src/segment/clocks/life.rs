@@ -1,5 +1,4 @@
-//! The life of the clocks of a segment: from the declaration to the lock, and from each change to the next
-//! measurement.
+//! Phases of the clocks of a segment: from the declaration to the lock, and from each change to the next measurement.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -8,7 +7,7 @@ use crate::clocks::SyncWindow;
 use crate::link::Link;
 use crate::time::Instant;
 
-/// The life of the clocks of a segment.
+/// Phases of the clocks of a segment.
 #[derive(Debug)]
 pub enum Life {
     /// No distributed clocks are declared.
@@ -28,20 +27,19 @@ pub enum Life {
 pub struct Running {
     /// The static drift compensation.
     pub compensation: Compensation,
-    /// Whether the delays that are known are those of the segment.
+    /// Whether the known delays are valid.
     pub delays: Delays,
-    /// What is known and not yet written.
+    /// Known values that are not yet written.
     pub unwritten: Unwritten,
     /// The registers to write next.
     pub due: Due,
     /// Whether all clocks have reached the window.
     pub lock: Lock,
-    /// By index, the links of the last answers, where they contradict the known links: the next answers must confirm
-    /// them.
+    /// By index, the links of the last answers, if they contradict the known links: the next answers must confirm them.
     pub unconfirmed: Option<Vec<Option<Option<Link>>>>,
 }
 
-/// The static drift compensation: its differences do not show the pace of the cycles.
+/// The static drift compensation: while it runs, differences do not show the accuracy of the cyclic distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compensation {
     /// It is under way.
@@ -51,22 +49,22 @@ pub enum Compensation {
     Idle,
 }
 
-/// Whether the delays that are known are those of the segment.
+/// Whether the known delays are those of the segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delays {
     /// They are.
     #[default]
     Valid,
-    /// The segment has changed since they were measured, at this time first.
+    /// The segment has changed since they were measured, first at this time.
     Doubtful(Instant),
 }
 
-/// Delays that are known and not yet written, by link.
+/// Known delays that are not yet written, by link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unwritten {
     /// Links with such delays.
     pub links: [bool; 2],
-    /// Clocks that get another delay.
+    /// Clocks with a changed delay.
     pub clocks: usize,
     /// The largest change.
     pub largest_ns: u32,
@@ -90,6 +88,6 @@ pub enum Lock {
     /// Not yet.
     #[default]
     Open,
-    /// They have. While some clocks receive the time that the host predicts, this evaluates the differences.
+    /// They have. While some clocks receive the time predicted by the host, this evaluates the differences.
     Locked(SyncWindow),
 }

@@ -13,6 +13,6 @@ pub struct Measured {
     pub stations: Vec<StationAddress>,
     /// Delays by position.
     pub delays: Delays,
-    /// How much faster than the reference each clock runs, by position.
+    /// Drift of each clock against the reference (positive: faster), by position.
     pub drift_ppb: Vec<Option<i64>>,
 }

@@ -1,4 +1,4 @@
-//! One SubDevice, as far as clocks are concerned.
+//! Clock data of one SubDevice.
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
@@ -8,15 +8,15 @@ use crate::config::{Passage, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
 
-/// Depth of the mean of differences of clocks that receive the time that the host predicts.
+/// Depth of the mean of differences, for clocks that receive the time predicted by the host.
 const AVERAGE: u32 = 5;
 
-/// A SubDevice of the scan, or a declared one that came later, as far as clocks are concerned.
+/// Clock data of a SubDevice of the scan, or of a declared one that was added later.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// Its station address.
     pub station: StationAddress,
-    /// Where it was found.
+    /// Its position when it was found.
     pub position: u16,
     /// Kinds of its ports.
     pub ports: [PortKind; 4],
@@ -26,35 +26,35 @@ pub struct Node {
     pub has_clock: bool,
     /// SYNC signals are declared for it.
     pub is_configured: bool,
-    /// What is declared of passages through it.
+    /// Its declared passage times.
     pub passage: Option<Passage>,
-    /// From where frames come in to its processing unit, with fraction.
+    /// Delay from the entry of frames into the segment to its processing unit, with fraction.
     pub unit: Option<i64>,
-    /// That cannot be measured, since a fork without a clock hides it.
+    /// Why this delay cannot be measured: a fork without a clock hides it.
     pub hidden: Option<Unknown>,
     /// The fork, and whether an estimate was written, as reported for [`Node::hidden`].
     pub reported_hidden: Option<(Option<usize>, bool)>,
-    /// Where that counts from: measurements and links number these places.
+    /// Number of the origin of that delay, by measurement and link.
     pub origin: u32,
-    /// DC_LATCH_MODE says that frames enter it from behind.
+    /// DC_LATCH_MODE is set for frames that enter from behind.
     pub latches_backwards: bool,
     /// Last written DC_FILTER_DIFFERENCE and DC_FILTER_SPEED.
     pub filter_depths: Option<[u8; 2]>,
-    /// It has lost its offset and has not got another one since.
+    /// Its offset was lost and not written since.
     pub is_unset: bool,
     /// Last written DC_SYSTEM_TIME_DELAY.
     pub delay_ns: i64,
     /// Last written DC_SYSTEM_TIME_OFFSET.
     pub offset_ns: i64,
-    /// How much faster than the reference it would run by itself.
+    /// Drift against the reference without its control loop.
     pub drift_ppb: i64,
     /// DC_SYSTEM_TIME_DIFFERENCE of its last answer.
     pub difference_ns: Option<i32>,
-    /// Where frames pass it before its reference: a mean of that, with [`AVERAGE`] fractional bits.
+    /// For a clock that frames pass before its reference: mean of the difference, with [`AVERAGE`] fractional bits.
     pub average: Option<i64>,
-    /// Largest magnitude of that since it was locked.
+    /// Largest magnitude of the difference since it was locked.
     pub worst_ns: u32,
-    /// Samples in a row within the window.
+    /// Consecutive samples within the window.
     pub good: u32,
     /// The link of its last answer.
     pub link: Option<Link>,
@@ -94,7 +94,7 @@ impl Node {
         self.has_clock && (self.unit.is_some() || self.hidden.is_none())
     }
 
-    /// Adds a difference to the mean: differences of a clock that receives the time that the host predicts have the
+    /// Adds a difference to the mean: differences of a clock that receives the time predicted by the host contain the
     /// jitter of the host.
     pub fn average(&mut self, ahead_ns: i32) -> i32 {
         let before = self.average.unwrap_or(i64::from(ahead_ns) << AVERAGE);

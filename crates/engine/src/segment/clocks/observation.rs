@@ -13,23 +13,23 @@ use crate::link::Link;
 pub enum ClockObservation<'a> {
     /// The set-up of all clocks begins.
     SetUpBegun,
-    /// It could not be completed, for this reason.
+    /// The set-up failed, for this reason.
     SetUpFailed(String),
-    /// The segment has changed: its delays may not be what they were, and a set-up may succeed.
+    /// The segment has changed: its delays may be wrong, and a set-up may succeed.
     SegmentChanged,
-    /// DC_LATCH_MODE is about to be written: whether frames enter from behind.
+    /// DC_LATCH_MODE is about to be written; true if frames enter from behind.
     LatchModes(&'a [(StationAddress, bool)]),
-    /// What latched receive times tell of cables.
+    /// Cable times from latched receive times.
     Cables(Cables),
-    /// The cables whose times are not known although the rings on them were opened; `None` where all are known.
-    OpenedInVain(Option<Wiring>),
+    /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
+    OpenedWithoutResult(Option<Wiring>),
     /// The delays of all clocks, for their set-up.
     Measured(&'a Measured),
-    /// Local times that one frame latched, by index, and the system time that they are to show.
+    /// Local times latched by one frame, by index, and the system time that they are to show.
     Latched {
         /// Local times.
         latched: &'a [Option<Latched>],
-        /// System time of that frame where it came in.
+        /// System time of that frame where it entered the segment.
         wanted: u64,
     },
     /// Offsets and delays of all clocks are written.
@@ -51,23 +51,23 @@ pub enum ClockObservation<'a> {
     /// Filter depths are written, by index.
     FiltersWritten(&'a [(usize, [u8; 2])]),
 
-    /// A declared SubDevice with a clock that was not at the scan.
+    /// A declared SubDevice with a clock that was not found by the scan.
     Came {
         /// Its index in the declaration.
         member: usize,
     },
-    /// The registers of a clock do not hold what was written, or never did.
+    /// The registers of a clock do not hold the written values, or were never written.
     RegistersLost {
         /// Its index.
         index: usize,
     },
-    /// Local times that one frame latched, for the set-up of one clock.
+    /// Local times latched by one frame, for the set-up of one clock.
     LatchedFor {
         /// Its index.
         index: usize,
         /// Local times by index.
         latched: &'a [Option<Latched>],
-        /// System time where no other clock has it.
+        /// System time according to the host, used without a reference.
         host: u64,
     },
     /// Offset and delay of that clock are written.
@@ -75,21 +75,21 @@ pub enum ClockObservation<'a> {
         /// Its index.
         index: usize,
     },
-    /// Clocks have to learn the time of their reference.
+    /// Clocks have to be synchronized with their reference.
     TimeWanted,
     /// The static drift compensation has ended.
     Compensated,
 
     /// The differences of all clocks.
     Answers {
-        /// By index; `None` where the answer was lost.
+        /// By index; `None` if the answer was lost.
         answers: &'a [Option<Answer>],
-        /// A ring has opened or closed: that explains changes of ports.
+        /// A ring has opened or closed, which explains changes of ports.
         is_explained: bool,
         /// The number of stops of the distribution when they were read.
         holds: u32,
     },
-    /// The delays that [`Due::Delays`](super::life::Due) wants are written, as far as possible.
+    /// The delays required by [`Due::Delays`](super::life::Due) are written, as far as possible.
     Followed {
         /// The number of stops of the distribution when the answers were read.
         holds: u32,
@@ -103,25 +103,25 @@ pub enum ClockObservation<'a> {
     },
 }
 
-/// The answer of one clock, and the link on which it came.
+/// The answer of one clock, and the link on which it arrived.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Answer {
-    /// `None`: it did not answer.
+    /// `None`: no answer.
     pub link: Option<Link>,
-    /// Its time less that of its reference.
+    /// Its time minus that of its reference.
     pub difference: Difference,
-    /// How much faster its loop makes it run.
+    /// Speed-up by its control loop.
     pub deviation_ppb: i64,
 }
 
-/// The time of a clock less that of its reference.
+/// The time of a clock minus that of its reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Difference {
     /// Not read.
     #[default]
     Unknown,
-    /// As the clock has it (DC_SYSTEM_TIME_DIFFERENCE).
+    /// Value of DC_SYSTEM_TIME_DIFFERENCE.
     Own(i32),
-    /// Of a clock that frames pass before the reference, as one frame has read both.
+    /// For a clock that frames pass before the reference: computed from one frame that read both.
     InFront(i32),
 }

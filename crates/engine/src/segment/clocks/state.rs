@@ -16,14 +16,14 @@ use crate::link::Link;
 use crate::time::Instant;
 use crate::topology::Topology;
 
-/// DC_FILTER_DIFFERENCE of clocks behind their reference: the time they receive is exact, and a mean that lags behind
-/// the samples makes the loop oscillate where drift is large.
+/// DC_FILTER_DIFFERENCE of clocks behind their reference: the received time is exact, and a mean that lags behind the
+/// samples makes the loop oscillate at large drift.
 const EXACT_DEPTH: u8 = 0;
-/// Of clocks that receive the time that the host predicts: its reset value, which removes most of the host's jitter.
+/// For clocks that receive the time predicted by the host: its reset value, which removes most of the host's jitter.
 const HOST_DEPTH: u8 = 4;
 /// DC_FILTER_SPEED: its reset value.
 const SPEED_DEPTH: u8 = 12;
-/// Of a reference that is steered: the host's jitter must not change its speed.
+/// For a reference that is steered: the host's jitter must not change its speed.
 const STEADY_DEPTH: u8 = 15;
 
 /// All clocks of a segment.
@@ -31,25 +31,25 @@ const STEADY_DEPTH: u8 = 15;
 pub struct Clocks {
     /// The declaration.
     pub config: ClockConfig,
-    /// Their life.
+    /// Phase of the clocks.
     pub(in crate::segment) life: Life,
-    /// By position of the scan, then those that came later.
+    /// By position of the scan, then later ones.
     pub nodes: Vec<Node>,
     /// The index of the reference.
     pub reference: Option<usize>,
-    /// What was measured of cables.
+    /// Measured cable times.
     pub cables: Cables,
     /// Measurements so far.
     pub(in crate::segment) measured: u32,
-    /// Rings on these cables were opened, and the times of the cables are not known all the same.
-    pub opened_in_vain: Option<Wiring>,
-    /// System time when host time is zero, as the reference clock has it.
+    /// Rings with these cables were opened, and the cable times are still unknown.
+    pub opened_without_result: Option<Wiring>,
+    /// System time of the reference clock at host time zero.
     pub epoch: u64,
 }
 
 impl Clocks {
-    /// No clocks, or those of a scan, where they are declared: `members` has the index in the declaration and the
-    /// declaration of a SubDevice.
+    /// No clocks, or those of a scan, if clocks are declared: `members` contains index and declaration of each
+    /// SubDevice.
     pub fn new<'a>(
         config: Option<ClockConfig>,
         scanned: &[SubDeviceInfo],
@@ -66,8 +66,8 @@ impl Clocks {
         };
         let config = config.unwrap_or_default();
         let epoch = config.epoch;
-        let (reference, cables, measured, opened_in_vain) = (None, Cables::default(), 0, None);
-        Clocks { config, life, nodes, reference, cables, measured, opened_in_vain, epoch }
+        let (reference, cables, measured, opened_without_result) = (None, Cables::default(), 0, None);
+        Clocks { config, life, nodes, reference, cables, measured, opened_without_result, epoch }
     }
 
     /// Whether distributed clocks are declared.
@@ -90,7 +90,7 @@ impl Clocks {
         self.running().is_some_and(|running| matches!(running.lock, Lock::Locked(_)))
     }
 
-    /// Since when the delays may not be those of the segment.
+    /// Time since which the delays may be wrong.
     pub fn doubtful_since(&self) -> Option<Instant> {
         match self.running()?.delays {
             Delays::Valid => None,
@@ -103,7 +103,7 @@ impl Clocks {
         self.running().is_some_and(|running| running.unconfirmed.is_some())
     }
 
-    /// The links with delays that are known and not yet written.
+    /// The links with known delays that are not yet written.
     pub fn unwritten(&self) -> Vec<Link> {
         let links = self.running().map_or([false; 2], |running| running.unwritten.links);
         Link::ALL.into_iter().filter(|link| links[link.index()]).collect()
@@ -131,13 +131,13 @@ impl Clocks {
         self.nodes.iter().any(|node| node.has_clock)
     }
 
-    /// Whether a clock that answers is outside its window, or has not been inside for long enough.
+    /// Whether a clock that answers is outside its window, or has been inside for too short a time.
     pub fn is_any_outside(&self) -> bool {
         let samples = self.config.lock_samples;
         self.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
     }
 
-    /// Each clock of the segment, by position of the scan; then those that came later.
+    /// Each clock of the segment, by position of the scan; then later ones.
     pub fn status(&self) -> Vec<ClockStatus> {
         let with_clock = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
         let status = |(index, node): (usize, &Node)| ClockStatus {
@@ -169,7 +169,7 @@ impl Clocks {
         })
     }
 
-    /// The reference among those that `can` be it: the chosen one, or the first as the configuration wants it.
+    /// Elects the reference among the nodes with `can`: the configured one, or the first that the configuration allows.
     pub fn elect(&self, can: impl Fn(&Node) -> bool) -> Option<usize> {
         let able = |(_, node): &(usize, &Node)| node.has_clock && !node.is_unset && can(node);
         let candidates = || self.nodes.iter().enumerate().filter(able).map(|(index, _)| index);
@@ -183,8 +183,8 @@ impl Clocks {
         preferred.or_else(|| candidates().next())
     }
 
-    /// Index of the clock that the others on a link follow: the reference of the segment where it is on that link, else
-    /// the first that frames pass. `None` where delays on that link count from different places.
+    /// Index of the reference clock on a link: the reference of the segment if it is on that link, otherwise the first
+    /// clock that frames pass. `None` if delays on that link have different origins.
     pub fn reference_on(&self, link: Link) -> Option<usize> {
         if self.is_mixed(link) {
             return None;
@@ -197,14 +197,14 @@ impl Clocks {
         self.reference.filter(here).or_else(first)
     }
 
-    /// The references that the copies of cyclic frames have to distribute.
+    /// The references whose time the copies of cyclic frames distribute.
     pub fn references(&self) -> References {
         let station = |link| self.reference_on(link).map(|index| self.nodes[index].station);
         let redundant_leads = self.reference.and_then(|index| self.nodes[index].link) == Some(Link::Redundant);
         References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads }
     }
 
-    /// Whether delays on a link count from different places.
+    /// Whether delays on a link have different origins.
     pub fn is_mixed(&self, link: Link) -> bool {
         let mut here =
             self.nodes.iter().filter(|node| node.has_clock && node.link == Some(link) && node.unit.is_some());
@@ -223,7 +223,7 @@ impl Clocks {
     }
 
     /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED by index. References
-    /// and clocks before them receive the time that the host predicts, all others that of a reference.
+    /// and clocks before them receive the time predicted by the host, all others the time of a reference.
     pub fn filters(&self) -> Vec<(usize, StationAddress, [u8; 2])> {
         let nodes = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock && node.link.is_some());
         let depths = nodes.map(|(index, node)| (index, node.station, self.filter_depths(index)));
@@ -265,8 +265,7 @@ impl Clocks {
         Passage { processed: exact(declared.processing_ns), forwarded: exact(declared.forwarding_ns) }
     }
 
-    /// Clocks whose DC_LATCH_MODE differs from what these ports need, at which frames enter: whether they enter from
-    /// behind (protocol 3.12, 7.5).
+    /// Clocks whose DC_LATCH_MODE differs from the setting that these entry ports need (protocol 3.12, 7.5).
     pub fn latch_modes(&self, stations: &[StationAddress], entries: &[u8]) -> Vec<(StationAddress, bool)> {
         let wanted = stations.iter().zip(entries).map(|(station, entry)| (*station, *entry != 0));
         let is_other = |(station, backwards): &(StationAddress, bool)| {

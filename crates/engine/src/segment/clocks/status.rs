@@ -4,10 +4,10 @@ use ringcat_wire::address::{Position, StationAddress};
 
 use crate::declared::SubDeviceId;
 
-/// What is known about the clock of one SubDevice.
+/// Status of the clock of one SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockStatus {
-    /// Position in the scan, or where it was found later.
+    /// Position in the scan, or at which it was found later.
     pub position: u16,
     /// Its station address.
     pub station: StationAddress,
@@ -15,33 +15,34 @@ pub struct ClockStatus {
     pub subdevice: Option<SubDeviceId>,
     /// It is the reference of the segment.
     pub is_reference: bool,
-    /// Nanoseconds from the reference of its part of the segment (0x0928).
+    /// Delay in nanoseconds from the reference of its part of the segment (0x0928).
     pub delay_ns: i64,
-    /// That cannot be measured where it is, and why.
+    /// Why the delay cannot be measured.
     pub hidden: Option<HiddenDelay>,
-    /// System time less local time when it was set up (0x0920).
+    /// System time minus local time at the set-up (0x0920).
     pub offset_ns: i64,
-    /// How much faster than the reference it would run by itself, in parts per billion: as it ran within the
-    /// milliseconds of the first measurement, to some tens of thousands; once it was locked, what its control loop
-    /// makes up for (0x0932).
+    /// Drift against the reference without its control loop, in parts per billion (positive: faster): from the first
+    /// milliseconds of the measurement, accurate to some tens of thousands; once it was locked, the deviation
+    /// compensated by its control loop (0x0932).
     pub drift_ppb: i64,
-    /// Its time less that of the reference in nanoseconds (0x092C); `None` before it was read.
+    /// Its time minus that of the reference in nanoseconds (0x092C); `None` before the first read.
     pub difference_ns: Option<i32>,
-    /// Largest magnitude of that since it was locked.
+    /// Largest magnitude of the difference since it was locked.
     pub worst_ns: u32,
     /// It was within the window for as many samples as configured.
     pub is_locked: bool,
 }
 
-/// Why the delay of a SubDevice is not known (protocol 7.1): it is behind a fork without a clock, and the latched
-/// receive times show only the sum of that fork's branches.
+/// Why the delay of a SubDevice is unknown (protocol 7.1): it is behind a fork without a clock, and the latched receive
+/// times show only the sum of that fork's branches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HiddenDelay {
-    /// Position of the fork; `None` where the SubDevices between this one and the reference are not known.
+    /// Position of the fork; `None` if the SubDevices between this one and the reference are unknown.
     pub fork: Option<Position>,
-    /// The least and the most that it may be away from the reference, in nanoseconds; `None` where nothing is known.
+    /// Lower and upper bound of the delay from the reference, in nanoseconds; `None` without bounds.
     pub range_ns: Option<(i64, i64)>,
     /// The middle of that range was written
-    /// ([`ClockConfig::estimated_delays`](crate::config::ClockConfig::estimated_delays)); otherwise no delay was.
+    /// ([`ClockConfig::estimated_delays`](crate::config::ClockConfig::estimated_delays)); otherwise no delay was
+    /// written.
     pub is_estimated: bool,
 }

@@ -1,4 +1,4 @@
-//! One event per break of the ring, when its neighbours have noticed it, and those of rings behind junctions.
+//! Reports each break of the ring once, when its neighbours have detected it, and breaks of rings behind junctions.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -9,27 +9,27 @@ use ringcat_wire::register::DlStatus;
 use crate::event::Event;
 use crate::ring::RingState;
 use crate::ring_status::Cable;
-use crate::segment::asked::Asked;
 use crate::segment::breaks::{is_broken, locate_breaks};
 use crate::segment::effect::Effects;
-use crate::segment::look::Look;
 use crate::segment::model::Segment;
+use crate::segment::reading::Reading;
+use crate::segment::versions::Versions;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 
-/// Looks for the place of a break: its neighbours may notice the lost link later than frames do.
-const LOOKS: u8 = 25;
-/// Pause between two of them, and between the first few.
+/// Scans for the place of a break: its neighbours may detect the lost link later than frames show it.
+const SCANS: u8 = 25;
+/// Pause between two of these scans, and between the first few.
 const PAUSE: Duration = Duration::from_millis(10);
 const FIRST_LOOKS: u8 = 5;
 const FIRST_PAUSE: Duration = Duration::from_millis(1);
 
 impl Segment {
-    /// What members said about their ports, by their position in the cabling.
-    pub(in crate::segment) fn by_position(&self, looks: &[Look]) -> Vec<Option<NodeStatus>> {
+    /// Port states of members, by their position in the cabling.
+    pub(in crate::segment) fn by_position(&self, readings: &[Reading]) -> Vec<Option<NodeStatus>> {
         let mut by_position = vec![None; self.cabling.topology.nodes.len()];
-        for (member, look) in self.members.iter().zip(looks) {
-            let (Some(node), Look::Answer { dl_status, .. }) = (member.node, look) else { continue };
+        for (member, reading) in self.members.iter().zip(readings) {
+            let (Some(node), Reading::Answer { dl_status, .. }) = (member.node, reading) else { continue };
             let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
             if let Some(slot) = by_position.get_mut(node) {
                 *slot = Some(NodeStatus { dl_status: *dl_status, receive_times: None, ports });
@@ -38,46 +38,45 @@ impl Segment {
         by_position
     }
 
-    /// Reports breaks that have a place now. `reported` is the state of the ring that had been reported when the looks
-    /// began.
+    /// Reports breaks that are located now. `reported` is the reported state of the ring when the scans began.
     pub(in crate::segment) fn observe_breaks(
         &mut self,
-        looks: &[Look],
+        readings: &[Reading],
         reported: RingState,
         now: Instant,
         effects: &mut Effects,
     ) {
         if core::mem::replace(&mut self.breaks.state, reported) != reported {
-            self.breaks.looks = LOOKS;
+            self.breaks.readings = SCANS;
         }
-        // While all were looked at, the ring may have closed.
+        // The ring may have closed during the scans.
         if reported != RingState::Open || self.ring.reported() != RingState::Open {
             return;
         }
-        let by_position: Vec<_> = self.by_position(looks).iter().map(|it| it.map(|node| node.dl_status)).collect();
-        // An interface's cable is reported together with the ring.
+        let by_position: Vec<_> = self.by_position(readings).iter().map(|it| it.map(|node| node.dl_status)).collect();
+        // A break at an interface's cable is reported together with the ring.
         match self.ring.status.place {
-            None => self.breaks.told.clear(),
-            Some(place) if !self.breaks.told.contains(&place) => self.breaks.told = vec![place],
+            None => self.breaks.reported.clear(),
+            Some(place) if !self.breaks.reported.contains(&place) => self.breaks.reported = vec![place],
             Some(_) => {}
         }
         let broken = self.broken_cables(&by_position);
         for cable in &broken {
-            if !self.breaks.told.contains(cable) {
-                self.breaks.told.push(*cable);
+            if !self.breaks.reported.contains(cable) {
+                self.breaks.reported.push(*cable);
                 effects.report(Event::BreakLocated { cable: *cable });
             }
         }
-        // The last one that is mended closes the ring.
+        // The repair of the last broken cable is reported as the closing of the ring.
         let mended = |cable: &Cable| !broken.contains(cable) && is_broken(&by_position, cable) == Some(false);
-        while let Some(at) = self.breaks.told.iter().position(mended).filter(|_| self.breaks.told.len() > 1) {
-            self.breaks.told.remove(at);
+        while let Some(at) = self.breaks.reported.iter().position(mended).filter(|_| self.breaks.reported.len() > 1) {
+            self.breaks.reported.remove(at);
         }
-        let place = self.breaks.told.first().copied();
+        let place = self.breaks.reported.first().copied();
         self.ring.status.place = place;
-        if place.is_none() && self.breaks.looks > 0 {
-            let is_first = LOOKS - self.breaks.looks < FIRST_LOOKS;
-            self.breaks.looks -= 1;
+        if place.is_none() && self.breaks.readings > 0 {
+            let is_first = SCANS - self.breaks.readings < FIRST_LOOKS;
+            self.breaks.readings -= 1;
             self.attention.again_in(if is_first { FIRST_PAUSE } else { PAUSE }, now);
         }
     }
@@ -92,7 +91,7 @@ impl Segment {
         ends.map(|(near, far)| Cable { near, far }).into_iter().collect()
     }
 
-    /// Events of rings behind junctions, from what SubDevices said about their ports, by position.
+    /// Reports events of rings behind junctions from port states of SubDevices, by position.
     pub(in crate::segment) fn observe_local_rings(
         &mut self,
         status: &[Option<NodeStatus>],
@@ -109,15 +108,15 @@ impl Segment {
         self.local_rings.complete_cabling(&mut self.cabling);
     }
 
-    /// Rings have been looked into; positions are those of the cabling that was asked about.
+    /// Rings have been examined; positions are those of the cabling of that version.
     pub(in crate::segment) fn observe_isolated(
         &mut self,
-        asked: Asked,
+        versions: Versions,
         found: &[Option<NodeStatus>],
         now: Instant,
         effects: &mut Effects,
     ) {
-        if asked.cabling == self.cabling.version {
+        if versions.cabling == self.cabling.version {
             self.observe_local_rings(found, now, effects);
         }
     }

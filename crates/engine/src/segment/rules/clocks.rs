@@ -1,4 +1,4 @@
-//! What follows from observations of clocks (protocol 7).
+//! Effects of observations of clocks (protocol 7).
 
 mod answers;
 mod delays;
@@ -19,7 +19,7 @@ use crate::segment::model::Segment;
 use crate::time::Instant;
 
 impl Segment {
-    /// What follows from an observation of clocks.
+    /// Processes an observation of clocks.
     pub(super) fn observe_clocks(&mut self, seen: ClockObservation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
             ClockObservation::SetUpBegun => self.clocks.reference = self.clocks.elect(|_| true),
@@ -27,7 +27,7 @@ impl Segment {
             ClockObservation::SegmentChanged => self.doubt(now),
             ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
             ClockObservation::Cables(cables) => self.clocks.cables = cables,
-            ClockObservation::OpenedInVain(wiring) => self.clocks.opened_in_vain = wiring,
+            ClockObservation::OpenedWithoutResult(wiring) => self.clocks.opened_without_result = wiring,
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
             ClockObservation::SetUp => self.observe_set_up(effects),
@@ -64,7 +64,7 @@ impl Segment {
         self.post_clock_words();
     }
 
-    /// What the exchange has to know of clocks at any time.
+    /// Posts the clock words for the exchange.
     fn post_clock_words(&self) {
         let words = &self.board.clocks;
         if matches!(self.clocks.life, Life::NotSetUp(_) | Life::Running(_)) && self.clocks.is_any() {
@@ -93,7 +93,7 @@ impl Segment {
         self.compensate(effects);
     }
 
-    /// The segment has changed. What is known of clocks that are set up is in doubt until it is measured again; a
+    /// The segment has changed. The delays of clocks that are set up are doubtful until they are measured again; a
     /// failure of the set-up is reported anew.
     fn doubt(&mut self, now: Instant) {
         match &mut self.clocks.life {
@@ -129,7 +129,7 @@ impl Segment {
         }
     }
 
-    /// A clock that was not at the scan.
+    /// A clock that was not found by the scan.
     fn observe_clock(&mut self, member: usize) {
         let Some(declared) = self.members.get(member) else { return };
         if let Some(info) = &declared.info
@@ -158,7 +158,7 @@ impl Segment {
             (running.unwritten.clocks, running.unwritten.largest_ns) = (changes.clocks, changes.largest_ns);
         }
         if running.unwritten.links.contains(&true) {
-            // No time is distributed while delays count from different clocks.
+            // No time is distributed while delays have different origins.
             self.board.clocks.post_references(References::default());
         }
     }
@@ -187,7 +187,7 @@ impl Segment {
         self.follow(holds);
     }
 
-    /// References are those that are wanted, and the distribution goes on.
+    /// Posts the wanted references and resumes the distribution.
     fn follow(&mut self, holds: u32) {
         self.board.clocks.post_references(self.clocks.references());
         self.board.clocks.answer(holds);
@@ -196,7 +196,7 @@ impl Segment {
         }
     }
 
-    /// Replaces a reference that is lost. Returns whether there is another one.
+    /// Replaces a lost reference. Returns whether there is another one.
     fn elect(&mut self, effects: &mut Effects) -> bool {
         let clocks = &mut self.clocks;
         let before = clocks.reference;

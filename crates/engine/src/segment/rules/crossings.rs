@@ -1,8 +1,8 @@
-//! Crossed lines in operation (protocol 9.5): whenever ports of SubDevices have changed, the segment is looked at anew,
-//! and each SubDevice that is entered at another port than 0 is reported, once.
+//! Crossed lines in operation (protocol 9.5): after each change of ports the segment is scanned again, and each
+//! SubDevice that frames enter at another port than 0 is reported once.
 //!
-//! More rings behind junctions than are known are reported too: an application that asked for junction redundancy must
-//! know that one of them is not watched.
+//! Unknown rings behind junctions are reported too: an application with junction redundancy must know that one of them
+//! is not monitored.
 
 use alloc::vec::Vec;
 
@@ -12,25 +12,25 @@ use crate::event::Event;
 use crate::segment::crossings::{Crossing, LineCheck, PORT_BITS, Search};
 use crate::segment::disturbance::Disturbance;
 use crate::segment::effect::{Effects, Task};
-use crate::segment::look::Look;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
+use crate::segment::reading::Reading;
 use crate::segment::unassigned::UnassignedSubDevice;
 
 impl Segment {
-    /// Takes in looks at all members; where ports have changed, the segment is looked at.
-    pub(in crate::segment) fn observe_ports(&mut self, looks: &[Look], effects: &mut Effects) {
-        let ports = |look: &Look| match look {
-            Look::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
-            Look::Unknown | Look::Silent | Look::Doubled => None,
+    /// Processes port states of all members; after a change of ports the segment is scanned.
+    pub(in crate::segment) fn observe_ports(&mut self, readings: &[Reading], effects: &mut Effects) {
+        let ports = |reading: &Reading| match reading {
+            Reading::Answer { dl_status, .. } => Some(dl_status.bits() & PORT_BITS),
+            Reading::Unknown | Reading::Silent | Reading::Doubled => None,
         };
-        let now: Vec<Option<u16>> = looks.iter().map(ports).collect();
-        // One that is silent and not lost yet will be one or the other.
+        let now: Vec<Option<u16>> = readings.iter().map(ports).collect();
+        // A silent SubDevice that is not lost yet will answer or be lost soon.
         let phase = |index: usize| self.members.get(index).map_or(Phase::Absent, |member| member.phase);
         let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && phase(index) != Phase::Absent;
         // Clocks that are being measured need the receive times of their own frame.
         let waits = self.crossings.search == Search::UnderWay || self.slot.running() == Some(Disturbance::OpenByPort);
-        // One that may be a member, and the end of a ring, is another one before it is known which it is.
+        // A SubDevice that may be a member, and the end of a ring, must be identified first.
         let waits = waits || !self.unassigned.iter().all(UnassignedSubDevice::is_settled);
         let is_new = now != self.crossings.ports || self.crossings.search == Search::Again;
         if waits || !is_new || now.iter().enumerate().any(is_open) {
@@ -44,38 +44,38 @@ impl Segment {
         }
     }
 
-    /// The segment was looked at; `None` where it changes too much to tell. Where the redundant link was down for it,
-    /// looking again soon would not help.
+    /// Result of a scan for crossed lines; `None` if the segment changed too often. If the redundant link was down for
+    /// it, an early repetition is useless.
     pub(in crate::segment) fn observe_line_check(
         &mut self,
         found: Option<LineCheck>,
         in_control: bool,
         effects: &mut Effects,
     ) {
-        // This scan has cleared the requests of ports that changed in between.
+        // This scan has cleared the ECAT events of ports that changed before.
         self.attention.want();
         self.crossings.search = if found.is_none() && !in_control { Search::Again } else { Search::Idle };
         let Some(found) = found else { return };
-        self.tell_crossings(&found, effects);
-        let told = core::mem::take(&mut self.crossings.told);
-        if self.crossings.junctions && found.unknown_rings > told.unknown_rings {
+        self.report_crossings(&found, effects);
+        let reported = core::mem::take(&mut self.crossings.reported);
+        if self.crossings.junctions && found.unknown_rings > reported.unknown_rings {
             effects.report(Event::JunctionUnknown { rings: found.unknown_rings });
         }
-        self.crossings.told = told.and(found);
+        self.crossings.reported = reported.and(found);
     }
 
-    fn tell_crossings(&self, found: &LineCheck, effects: &mut Effects) {
-        let told = &self.crossings.told;
+    fn report_crossings(&self, found: &LineCheck, effects: &mut Effects) {
+        let reported = &self.crossings.reported;
         if found.swapped {
-            if !told.swapped {
+            if !reported.swapped {
                 effects.report(Event::InterfacesSwapped);
             }
             return;
         }
         let is_told = |new: &Crossing| match new.station() {
-            Some(station) => told.crossings.iter().any(|old| old.station() == Some(station)),
-            // Which one it is may be known from when the ring was open.
-            None => !told.crossings.is_empty(),
+            Some(station) => reported.crossings.iter().any(|old| old.station() == Some(station)),
+            // The place may be known from when the ring was open.
+            None => !reported.crossings.is_empty(),
         };
         for Crossing { subdevice, entry_port } in found.crossings.iter().filter(|new| !is_told(new)).copied() {
             let position = subdevice.map(|(station, now)| {

@@ -1,11 +1,11 @@
-//! How well an unassigned SubDevice fits an absent member.
+//! How well an unassigned SubDevice matches an absent member.
 
 use crate::config::ConfigAddress;
 use crate::segment::matching::Fit;
 use crate::segment::model::Segment;
 use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
 
-/// How well an unassigned SubDevice fits an absent member.
+/// How well an unassigned SubDevice matches an absent member.
 pub(super) fn fit(segment: &Segment, it: &UnassignedSubDevice, index: usize) -> Fit {
     let member = &segment.members[index];
     let Knowledge::Known(info) = &it.knowledge else { return Fit::Unreadable };

@@ -1,5 +1,5 @@
 //! Unassigned SubDevices that are members of hot connect groups: the head by its alias or identification at any place,
-//! the others by what they are behind.
+//! the others by the SubDevice before them.
 
 use alloc::vec::Vec;
 
@@ -11,8 +11,8 @@ use crate::segment::model::Segment;
 use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
 use crate::time::Instant;
 
-/// Takes those out that are members of groups, and says which. Also those that may be one as soon as they are read are
-/// taken out, without being told anything.
+/// Removes members of groups from the candidates and returns them. Candidates that may be members once they are read
+/// are removed too, without a result.
 pub(super) fn members(
     segment: &Segment,
     unassigned: &mut Vec<UnassignedSubDevice>,
@@ -23,7 +23,7 @@ pub(super) fn members(
         return Vec::new();
     }
     let mut matched: Vec<(UnassignedSubDevice, Option<usize>)> = Vec::new();
-    // By position what is there and waits to be read, or the member that it is.
+    // By position: the present SubDevice that is not read yet, or the member that it is.
     let mut before: Option<(u16, Option<usize>)> = None;
     let mut rest = Vec::new();
     for candidate in unassigned.drain(..) {
@@ -39,7 +39,7 @@ pub(super) fn members(
                 before = Some((at, Some(index)));
                 matched.push((candidate, Some(index)));
             }
-            // Whose place is right behind one that is not known yet may belong to that one's group.
+            // A SubDevice directly behind one that is not identified yet may belong to the group of that one.
             None if candidate.is_awaited(now) || waits_behind => {
                 before = Some((at, None));
                 if !candidate.is_awaited(now) {
@@ -54,7 +54,7 @@ pub(super) fn members(
     matched
 }
 
-/// The head that one is: absent, and alone with its alias or identification.
+/// The head that a candidate is: absent, and the only one with its alias or identification.
 fn head(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice) -> Option<usize> {
     let heads = groups.iter().filter_map(|members| members.first().copied());
     heads
@@ -62,7 +62,7 @@ fn head(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevic
         .find(|index| is_absent_and_fits(segment, candidate, *index) && is_alone(segment, candidate, *index))
 }
 
-/// No other one has the mark.
+/// No other SubDevice has the same alias or identification.
 fn is_alone(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) -> bool {
     let address = segment.members[index].config.address;
     let others = segment.unassigned.iter().filter(|other| other.station != candidate.station);
@@ -72,7 +72,7 @@ fn is_alone(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) ->
     })
 }
 
-/// The next member of the group of the member that is right before one.
+/// The next member of the group of the member directly before the candidate.
 fn follower(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice, ahead: usize) -> Option<usize> {
     let members = groups.iter().find(|members| members.contains(&ahead))?;
     let next = members.iter().skip_while(|index| **index != ahead).nth(1)?;

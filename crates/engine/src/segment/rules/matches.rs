@@ -1,4 +1,4 @@
-//! Which absent members unassigned SubDevices are.
+//! Identifies unassigned SubDevices as absent members.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -19,13 +19,14 @@ use crate::segment::unassigned::{HOLD, Matches, UnassignedSubDevice};
 use crate::time::Instant;
 
 impl Segment {
-    /// Which absent members they are. To be asked when it is known of all members whether they are there: one that is
-    /// absent, but not known to be, may be the one that an unassigned one is. `told`: those of which cables tell it.
-    pub fn match_all(&self, told: &[(StationAddress, usize)], now: Instant) -> Matches {
+    /// Matches all unassigned SubDevices with absent members. To be called when it is known of all members whether they
+    /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches
+    /// proven by cables.
+    pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned = self.unassigned.clone();
         unassigned.sort_by_key(|it| it.position);
         let mut matched = group_matching::members(self, &mut unassigned, now);
-        let by_cable = |it: &UnassignedSubDevice| told.iter().find(|(station, _)| *station == it.station);
+        let by_cable = |it: &UnassignedSubDevice| identified.iter().find(|(station, _)| *station == it.station);
         for (it, index) in unassigned.iter().filter_map(|it| Some((it, by_cable(it)?.1))) {
             matched.push((it.clone(), Some(index)));
         }
@@ -36,7 +37,7 @@ impl Segment {
                 continue;
             }
             let mut absent = self.absent_between(gap[0].between);
-            absent.retain(|index| told.iter().all(|(_, other)| other != index));
+            absent.retain(|index| identified.iter().all(|(_, other)| other != index));
             let from_main: Vec<bool> = gap.iter().map(|it| it.from_main).collect();
             let fit = |candidate: usize, place: usize| fit(self, &gap[candidate], absent[place]);
             for (it, place) in gap.iter().zip(assign(&from_main, absent.len(), fit)) {
@@ -50,8 +51,8 @@ impl Segment {
         Matches { matched, held }
     }
 
-    /// It could be another absent member as well: of one kind with several, without a serial number, and not as many of
-    /// them are there as are missed. Outputs of one must not go to another one.
+    /// Another absent member matches as well: there are several members of the type, no serial number, and fewer
+    /// SubDevices present than members missing. Outputs of one must not go to another one.
     fn is_doubtful(
         &self,
         it: &UnassignedSubDevice,
@@ -66,11 +67,11 @@ impl Segment {
         let missed = self.absent().filter(alike).count();
         let here = absent.iter().filter(|index| alike(index)).count();
         let there = gap.iter().filter(|other| self.may_be(other, index)).count();
-        // Where some are crossed in a closed ring, order is another one when it is open.
+        // With crossed SubDevices in a closed ring, the order changes when it opens.
         missed > 1 && (self.cabling.topology.is_assumed() || here != missed || there != missed)
     }
 
-    /// It is left alone until it is known which of several members it is, and that is reported when it lasts.
+    /// The SubDevice is not configured until it is known which of several members it is; if this lasts, it is reported.
     pub(in crate::segment) fn hold(
         &mut self,
         station: StationAddress,
@@ -90,7 +91,7 @@ impl Segment {
         }
     }
 
-    /// Whether an absent member is between the same two others.
+    /// Whether an absent member is between the same two known members.
     pub(in crate::segment) fn is_between(&self, it: &UnassignedSubDevice, index: usize) -> bool {
         self.absent_between(it.between).contains(&index)
     }
@@ -111,7 +112,7 @@ impl Segment {
         absent
     }
 
-    /// Where one is in the place of the one absent member that belongs there: what differs.
+    /// If a SubDevice is in the place of the only absent member there: the difference to its declaration.
     pub(in crate::segment) fn mismatch(&self, it: &UnassignedSubDevice, info: &SubDeviceInfo) -> Option<Event> {
         let [subdevice] = self.absent_between(it.between)[..] else { return None };
         let (field, expected, got) = self.members.get(subdevice)?.config.expected.mismatch(info)?;

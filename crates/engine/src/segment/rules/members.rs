@@ -1,4 +1,5 @@
-//! What becomes of the declared SubDevices: each is a machine of its own, so that a hundred come back at once.
+//! State changes of the declared SubDevices: each is a state machine of its own, so that a hundred recover at the same
+//! time.
 
 use alloc::format;
 use alloc::rc::Rc;
@@ -12,97 +13,108 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::ring::RingState;
-use crate::segment::asked::Asked;
 use crate::segment::attention::Round;
 use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
-use crate::segment::look::{Look, answers};
-use crate::segment::looked::Looked;
 use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
 use crate::segment::observation::ProcessDataStep;
+use crate::segment::reading::{Reading, answers};
+use crate::segment::round_result::RoundResult;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
+use crate::segment::versions::Versions;
 use crate::time::Instant;
 
-/// A SubDevice is lost when it was silent in so many looks in a row: at the edge of a cut a copy may have been
+/// Consecutive scans without an answer after which a SubDevice is lost: at the moment of a cut a copy may have been
 /// processed by none.
-const SILENT_LOOKS: u8 = 2;
-/// Pause before a silent SubDevice is looked at again.
-const SECOND_LOOK_PAUSE: Duration = Duration::from_millis(2);
-/// Rounds in a row in which looks do not come back though process data does, or the other way round, before it is tried
+const SILENT_READS: u8 = 2;
+/// Pause before a silent SubDevice is read again.
+const REPEAT_PAUSE: Duration = Duration::from_millis(2);
+/// Consecutive rounds in which scans do not return though process data does, or the reverse, before it is tested
 /// whether frames hold too many datagrams.
 const BLIND_ROUNDS: u8 = 2;
 
 impl Segment {
-    /// Takes in a round of looks.
-    pub(in crate::segment) fn observe_looks(&mut self, looked: &Looked<'_>, now: Instant, effects: &mut Effects) {
-        let Looked { asked, looks, before, unassigned, counted } = *looked;
+    /// Processes a complete round of scans.
+    pub(in crate::segment) fn observe_round(
+        &mut self,
+        round_result: &RoundResult<'_>,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let RoundResult { versions, readings, before, unassigned, counted } = *round_result;
         self.attention.round = Round::default();
-        if asked.isolations != self.slot.isolations() {
-            // Some were out of reach on purpose meanwhile.
-            return self.attention.again_in(SECOND_LOOK_PAUSE, now);
+        if versions.isolations != self.slot.isolations() {
+            // Some SubDevices were put out of reach on purpose during the round.
+            return self.attention.again_in(REPEAT_PAUSE, now);
         }
-        // Either frames of looks do not come back though SubDevices process those of the exchange, or the other way
-        // round.
+        // Either scan frames do not return though SubDevices process those of the exchange, or the reverse.
         let is_blind = match counted {
-            Some(counted) if counted != Wkc(0) => looks.contains(&Look::Unknown),
-            Some(_) | None => answers(looks) > 0,
+            Some(counted) if counted != Wkc(0) => readings.contains(&Reading::Unknown),
+            Some(_) | None => answers(readings) > 0,
         };
         self.attention.blind = if is_blind { self.attention.blind.saturating_add(1) } else { 0 };
         self.attention.round.is_blind = self.attention.blind == BLIND_ROUNDS;
         let Some(counted) = counted else { return };
-        let others = unassigned.iter().filter(|(_, look)| look.is_answer()).count();
-        let (counted, answering) = (usize::from(counted.0), answers(looks) + others);
-        // When the count and the answers agree, a silent SubDevice is certainly not there.
-        let needed = if counted == answering { 1 } else { SILENT_LOOKS };
-        let is_certain = self.judge(looks, before, needed, now, effects);
+        let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
+        let (counted, answering) = (usize::from(counted.0), answers(readings) + others);
+        // If the count agrees with the answers, a silent SubDevice is certainly absent.
+        let needed = if counted == answering { 1 } else { SILENT_READS };
+        let is_certain = self.judge(readings, before, needed, now, effects);
         if needed == 1 {
-            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Look::Silent)));
+            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Reading::Silent)));
         }
         if !is_certain {
-            // Certainty soon, and then again only when something changes.
-            self.attention.again_in(SECOND_LOOK_PAUSE, now);
+            // One quick repetition, and then the next scan only when something changes.
+            self.attention.again_in(REPEAT_PAUSE, now);
         }
         let reported: RingState = self.attention.reported();
-        self.observe_breaks(looks, reported, now, effects);
-        let status = self.by_position(looks);
+        self.observe_breaks(readings, reported, now, effects);
+        let status = self.by_position(readings);
         self.observe_local_rings(&status, now, effects);
-        self.observe_ports(looks, effects);
+        self.observe_ports(readings, effects);
         self.attention.round = Round {
             is_certain,
-            finds_others: counted > answering && !looks.contains(&Look::Unknown),
+            finds_others: counted > answering && !readings.contains(&Reading::Unknown),
             is_complete: counted <= answering,
             is_blind: self.attention.round.is_blind,
             counts: true,
         };
     }
 
-    /// Draws conclusions from what each member said. True where it is known of all whether they are there.
-    fn judge(&mut self, looks: &[Look], before: &[Phase], needed: u8, now: Instant, effects: &mut Effects) -> bool {
+    /// Derives member states from the answers. True if it is known of all whether they are present.
+    fn judge(
+        &mut self,
+        readings: &[Reading],
+        before: &[Phase],
+        needed: u8,
+        now: Instant,
+        effects: &mut Effects,
+    ) -> bool {
         let mut certain = true;
-        for (index, look) in looks.iter().enumerate() {
+        for (index, reading) in readings.iter().enumerate() {
             let Some(member) = self.members.get_mut(index) else { continue };
-            match (look, member.phase) {
-                (Look::Unknown | Look::Doubled, _) => certain = false,
-                (Look::Silent, Phase::Absent) => {
-                    (member.silent, member.mistaken) = (SILENT_LOOKS, Mistaken::default());
+            match (reading, member.phase) {
+                (Reading::Unknown | Reading::Doubled, _) => certain = false,
+                (Reading::Silent, Phase::Absent) => {
+                    (member.silent, member.mistaken) = (SILENT_READS, Mistaken::default());
                 }
-                (Look::Silent, Phase::Configuring | Phase::Settled(_)) => {
-                    member.silent = (member.silent + 1).min(SILENT_LOOKS);
+                (Reading::Silent, Phase::Configuring | Phase::Settled(_)) => {
+                    member.silent = (member.silent + 1).min(SILENT_READS);
                     if member.silent >= needed {
                         self.lose(index, effects);
                     } else {
                         certain = false;
                     }
                 }
-                // It has got there since: what it said is not what it says now.
-                (Look::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
+                // The member reached this state after the answer was read: the answer is outdated.
+                (Reading::Answer { .. }, Phase::Settled(_)) if before.get(index) != Some(&member.phase) => {
                     member.silent = 0;
-                    self.attention.again_in(SECOND_LOOK_PAUSE, now);
+                    self.attention.again_in(REPEAT_PAUSE, now);
                 }
-                (Look::Answer { status, code, .. }, phase) => {
+                (Reading::Answer { status, code, .. }, phase) => {
                     member.silent = 0;
-                    self.heard(index, phase, (*status, *code), now, effects);
+                    self.observe_answer(index, phase, (*status, *code), now, effects);
                 }
             }
         }
@@ -110,7 +122,14 @@ impl Segment {
     }
 
     /// A member answered.
-    fn heard(&mut self, index: usize, phase: Phase, (status, code): Shown, now: Instant, effects: &mut Effects) {
+    fn observe_answer(
+        &mut self,
+        index: usize,
+        phase: Phase,
+        (status, code): Shown,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
         let member = &mut self.members[index];
         match phase {
             Phase::Configuring => {}
@@ -126,7 +145,7 @@ impl Segment {
                 effects.report(Event::StateError { subdevice: SubDeviceId(index), requested: None, status, code });
                 self.start(index, Start::Unknown, Some((status, code)), Check::None, effects);
             }
-            // Its station address answers again: it has come back, if it is the same one.
+            // Its station address answers again: it has come back, if it is the same SubDevice.
             Phase::Absent => {
                 member.suspended = false;
                 match member.mistaken.pause(now) {
@@ -137,22 +156,22 @@ impl Segment {
         }
     }
 
-    /// As soon as all that the cyclic datagram counts have answered, process data no longer waits for the others:
-    /// whether they are lost is seen later, whose inputs are new is seen now.
-    pub(in crate::segment) fn observe_part_of_looks(
+    /// As soon as all SubDevices that the cyclic datagram counts have answered, process data no longer waits for the
+    /// others. Whether the others are lost follows later; which inputs are fresh is known now.
+    pub(in crate::segment) fn observe_part_of_round(
         &mut self,
-        asked: Asked,
-        looks: &[Look],
+        versions: Versions,
+        readings: &[Reading],
         others: usize,
         counted: Option<Wkc>,
     ) {
-        if asked.isolations != self.slot.isolations()
-            || counted.map(|counted| usize::from(counted.0)) != Some(answers(looks) + others)
+        if versions.isolations != self.slot.isolations()
+            || counted.map(|counted| usize::from(counted.0)) != Some(answers(readings) + others)
         {
             return;
         }
-        for (index, look) in looks.iter().enumerate() {
-            let Some(member) = self.members.get_mut(index).filter(|_| !look.is_answer()) else { continue };
+        for (index, reading) in readings.iter().enumerate() {
+            let Some(member) = self.members.get_mut(index).filter(|_| !reading.is_answer()) else { continue };
             if matches!(member.phase, Phase::Settled(_)) && self.board.takes_part(index) {
                 self.board.set_taking_part(index, false);
                 member.suspended = true;
@@ -160,7 +179,7 @@ impl Segment {
         }
     }
 
-    /// A member no longer answers. What was under way for it ends.
+    /// A member no longer answers. Procedures under way for it end.
     pub(in crate::segment) fn lose(&mut self, index: usize, effects: &mut Effects) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.attempt = member.attempt.wrapping_add(1);
@@ -172,23 +191,23 @@ impl Segment {
         let is_excused = !member.exchanges(member.target);
         self.board.set_taking_part(index, false);
         self.board.set_unproven(index, false);
-        // One that was on its way to process data is missed from now on.
+        // A member that was on its way to process data counts as missing from now on.
         self.board.set_excused(index, is_excused);
         effects.0.push(Effect::SuspendMailbox { index });
     }
 
-    /// Starts the configuration of a member that answers. `told`: its error that was told.
+    /// Starts the configuration of a member that answers. `reported`: its error that was reported.
     pub(in crate::segment) fn start(
         &mut self,
         index: usize,
         from: Start,
-        told: Option<Shown>,
+        reported: Option<Shown>,
         check: Check,
         effects: &mut Effects,
     ) {
         let Some(member) = self.members.get_mut(index) else { return };
         let attempt = member.begin_attempt();
-        effects.start(Task::BringUp { index, attempt, from, told, check });
+        effects.start(Task::BringUp { index, attempt, from, reported, check });
     }
 
     /// Starts the configuration of all members that were found.
@@ -200,7 +219,7 @@ impl Segment {
         }
     }
 
-    /// What answers at a lost member's address is that member.
+    /// The SubDevice that answers at a lost member's address is that member.
     pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
         if let Some(member) = self.current(index, attempt) {
             member.mistaken = Mistaken::default();
@@ -208,15 +227,15 @@ impl Segment {
         }
     }
 
-    /// What answers at a lost member's address is not known to be that member. It has lost the address, and the next
-    /// look finds it without one; unless it keeps the address.
+    /// The SubDevice that answers at a lost member's address is not identified as that member. Its address has been
+    /// taken away, and the next scan finds it without one, unless that failed.
     pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32, now: Instant, effects: &mut Effects) {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Absent;
         let (pause, station) = (member.mistaken.again(now), member.station);
-        if member.mistaken.is_to_tell() {
+        if member.mistaken.is_due() {
             let reason = format!(
-                "what answers at its station address {:#06x} is not known to be it, and does not give up the address",
+                "the SubDevice at its address {:#06x} is another one or unknown, and does not give up the address",
                 station.0
             );
             effects.failed(index, reason);
@@ -227,7 +246,7 @@ impl Segment {
         }
     }
 
-    /// A member has reached the state to which it was to be brought.
+    /// A member has reached its requested state.
     pub(in crate::segment) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
         let Some(member) = self.current(index, attempt) else { return };
         member.phase = Phase::Settled(state);
@@ -236,7 +255,7 @@ impl Segment {
         effects.report(Event::StateReached { subdevice: SubDeviceId(index), state });
     }
 
-    /// A member is to be brought to another state.
+    /// A member gets another target state.
     pub(in crate::segment) fn request(&mut self, index: usize, state: AlState) {
         let Some(member) = self.members.get_mut(index) else { return };
         member.target = state;
@@ -246,7 +265,7 @@ impl Segment {
             Phase::Settled(is) if is == state => {}
             Phase::Settled(_) | Phase::Configuring => {
                 member.begin_attempt();
-                // On the way up it is excused until it is there.
+                // On the way up its missing answers are excused until it has joined.
                 if !exchanges {
                     self.board.set_excused(index, true);
                 }
@@ -254,7 +273,7 @@ impl Segment {
         }
     }
 
-    /// A member has refused a state, and keeps the one that it was to have before.
+    /// A member has refused a state, and keeps its previous target.
     pub(in crate::segment) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
         let Some(member) = self.current(index, attempt) else { return };
         member.target = before;
@@ -262,7 +281,7 @@ impl Segment {
         self.board.set_excused(index, is_excused);
     }
 
-    /// What a member does in process data from now on.
+    /// How a member takes part in process data from now on.
     pub(in crate::segment) fn observe_process_data(
         &mut self,
         index: usize,
@@ -278,7 +297,7 @@ impl Segment {
                 self.board.set_taking_part(index, false);
                 self.board.set_unproven(index, false);
             }
-            // SyncManagers for OP only are still off.
+            // SyncManagers that are active in OP only are still off.
             ProcessDataStep::Mapped => {
                 member.mapping = member.mapping.wrapping_add(1);
                 let is_op_only = member.setup.as_ref().is_some_and(|setup| setup.plan.is_op_only());
@@ -296,14 +315,14 @@ impl Segment {
         }
     }
 
-    /// A member was seen to give all inputs of a mapping. One that is over proves nothing of the next.
+    /// A member has delivered all inputs of a mapping. The proof of an earlier mapping is ignored.
     pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
         if self.members.get(index).is_some_and(|member| member.mapping == mapping) {
             self.board.set_unproven(index, false);
         }
     }
 
-    /// A member's registers do not hold its configuration any more.
+    /// A member's registers no longer hold its configuration.
     pub(in crate::segment) fn observe_undone(
         &mut self,
         index: usize,
@@ -315,7 +334,7 @@ impl Segment {
             return;
         }
         effects.failed(index, reason.to_string());
-        // Another SubDevice may answer at its address: one that was out of reach since an earlier session.
+        // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier session.
         self.start(index, Start::Doubtful, None, Check::Identity, effects);
     }
 
@@ -328,20 +347,20 @@ impl Segment {
                 member.take_setup(index, setup, effects);
                 member.info = Some(info.clone());
             }
-            // As before.
+            // The same error as before.
             Err(_) if member.unfit.is_some() => {}
             Err(error) => effects.failed(index, error.to_string()),
         }
     }
 
-    /// Members that are there will be configured later: what answers meanwhile has not come back.
+    /// Present members will be configured later: an answer meanwhile is not a return.
     pub(in crate::segment) fn delay_all(&mut self) {
         for member in self.members.iter_mut().filter(|member| member.is_there()) {
             member.phase = Phase::Configuring;
         }
     }
 
-    /// What has happened to members is counted from 0 again.
+    /// Resets the incident counters of all members.
     pub(in crate::segment) fn forget_incidents(&mut self) {
         self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
     }
@@ -352,21 +371,20 @@ impl Segment {
         }
     }
 
-    /// The member whose attempt of that number is under way.
+    /// The member, if this attempt is the current one.
     pub(in crate::segment) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
         self.members.get_mut(index).filter(|member| member.attempt == attempt)
     }
 }
 
 impl Member {
-    /// Takes its configuration. What could not be followed at the activation has no place in the process image: without
-    /// outputs no SubDevice that has some goes to OP, so it is brought to SAFEOP only.
+    /// Stores its configuration. A configuration that could not be planned at the activation has no place in the
+    /// process image: a SubDevice with outputs must not go to OP without them, so its target is SAFEOP.
     pub(in crate::segment) fn take_setup(&mut self, index: usize, setup: Setup, effects: &mut Effects) {
         if self.unfit.take().is_some() && setup.plan.mapped_areas().count() > setup.process_data_fmmus() {
             let has_outputs = setup.plan.mapped_areas().any(|(_, area)| area.direction == Direction::Outputs);
             let mut what =
-                "its SII can be followed now: it has no place in the process image before the next activation"
-                    .to_string();
+                "its SII can be used now: it has no place in the process image before the next activation".to_string();
             if has_outputs && self.target == AlState::Op {
                 self.target = AlState::SafeOp;
                 what.push_str(", and stays in SAFEOP without outputs");

@@ -1,9 +1,10 @@
-//! Which absent members unassigned SubDevices are by the cables that lead to them.
+//! Identifies unassigned SubDevices as absent members by the cables to their neighbours.
 //!
-//! Several may be alike. Their order tells them apart where all of them are there; where some are not, or a ring is
-//! open elsewhere than at the scan so that frames meet its SubDevices from the other side, only their neighbours do. In
-//! go the cables as the scan or a rescan found them and as the ports tell them now: what hangs on the port of a member
-//! to which a cable led before, with the same port of its own, is what hung there.
+//! Several may be of the same type. If all of them are present, their order distinguishes them. If some are missing, or
+//! a ring is open at another place than at the scan so that frames pass its SubDevices from the other side, only their
+//! neighbours do. Inputs are the cables of the scan or rescan and the present cables according to the ports: the
+//! SubDevice that is connected to the same port of a member, with the same port of its own, as before is the SubDevice
+//! of before.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,9 +24,9 @@ use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 type End = Option<PortOf>;
 
 impl Segment {
-    /// An unassigned SubDevice could be several of those that are missed, or one of them though order does not say so:
-    /// then ports have to be read ([`Segment::told_by_cables`]).
-    pub fn asks_for_cables(&self) -> bool {
+    /// An unassigned SubDevice matches several absent members, or one of them without proof by order: then ports have
+    /// to be read ([`Segment::identified_by_cables`]).
+    pub fn needs_cables(&self) -> bool {
         self.unassigned.iter().any(|it| {
             let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();
             match fits[..] {
@@ -36,14 +37,14 @@ impl Segment {
         })
     }
 
-    /// Unassigned SubDevices with the members that they are, as far as cables tell. `ports` by position.
-    pub fn told_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
+    /// Unassigned SubDevices with the members that they are, as far as the cables show. `ports` by position.
+    pub fn identified_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
         let owners = self.owners(&view.stations);
         let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
-        Look { segment: self, view, nodes: self.nodes(view, ports) }.told(owners)
+        Present { segment: self, view, nodes: self.nodes(view, ports) }.identified(owners)
     }
 
-    /// What the ports of all SubDevices say, with their kinds as far as they are known. By position.
+    /// Port states of all SubDevices, with their port kinds if known. By position.
     pub fn nodes(&self, view: &View, ports: &[DlStatus]) -> Vec<NodeStatus> {
         let owners = self.owners(&view.stations);
         let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
@@ -58,14 +59,14 @@ impl Segment {
         view.stations.iter().zip(ports).enumerate().map(node).collect()
     }
 
-    /// Members that are missed, but for those of groups.
+    /// Absent members, without those of groups.
     pub(in crate::segment) fn absent(&self) -> impl Iterator<Item = usize> + '_ {
         let members = self.members.iter().enumerate();
         let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
         absent.map(|(index, _)| index)
     }
 
-    /// It is known what it is, and that is what the member was when it was seen last.
+    /// Its identity is known, and equals the last known identity of the member.
     pub(in crate::segment) fn may_be(&self, it: &UnassignedSubDevice, index: usize) -> bool {
         let is_known = matches!(it.knowledge, Knowledge::Known(_));
         is_known && matches!(fit(self, it, index), Fit::Seen | Fit::Serial)
@@ -73,25 +74,25 @@ impl Segment {
 }
 
 /// The segment as it is now.
-struct Look<'a> {
+struct Present<'a> {
     segment: &'a Segment,
     view: &'a View,
     nodes: Vec<NodeStatus>,
 }
 
-impl Look<'_> {
+impl Present<'_> {
     fn unassigned_at(&self, at: usize) -> Option<&UnassignedSubDevice> {
         self.segment.unassigned.iter().find(|it| self.view.position(it.station) == Some(at))
     }
 
-    /// The absent member that was at a place, if the unassigned one at a position may be it.
+    /// The absent member that was at a place, if the unassigned SubDevice at a position may be it.
     fn candidate(&self, node: usize, at: usize) -> Option<usize> {
         let index = self.segment.members.iter().position(|member| member.node == Some(node))?;
         let unassigned = self.unassigned_at(at)?;
         (self.segment.absent().any(|it| it == index) && self.segment.may_be(unassigned, index)).then_some(index)
     }
 
-    fn told(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
+    fn identified(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
         let count = members.len();
         if self.is_as_before(&members) {
             let unassigned = (0..count).filter(|at| members[*at].is_none());
@@ -104,7 +105,7 @@ impl Look<'_> {
             return Vec::new();
         }
         let (before, now) = (ends(before), self.ends(&now));
-        let mut told = Vec::new();
+        let mut identified = Vec::new();
         loop {
             let found = self.next_to(&members, &before, &now);
             let is_sure = |(at, index): &(usize, usize)| {
@@ -112,11 +113,11 @@ impl Look<'_> {
             };
             let sure: Vec<(usize, usize)> = found.iter().copied().filter(is_sure).collect();
             if sure.is_empty() {
-                return told;
+                return identified;
             }
             for (at, index) in sure {
                 members[at] = Some(index);
-                told.push((self.view.stations[at], index));
+                identified.push((self.view.stations[at], index));
             }
         }
     }
@@ -137,14 +138,14 @@ impl Look<'_> {
         found
     }
 
-    /// An end of a cable in the cabling of before, where the one there is known.
+    /// An end of a cable in the previous cabling, if the SubDevice there is known.
     fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
         let Some(PortOf { node, port }) = end else { return Some(None) };
         let node = self.segment.members.get(members[node]?)?.node?;
         Some(Some(PortOf { node, port }))
     }
 
-    /// As many answer on each link as when the cabling was found, and all that are known are at their places.
+    /// The counts on each link equal those of the previous cabling, and all known SubDevices are at their places.
     fn is_as_before(&self, members: &[Option<usize>]) -> bool {
         let before = &self.segment.cabling.topology;
         let counts = (usize::from(self.view.counts.0.0), members.len());
@@ -153,8 +154,8 @@ impl Look<'_> {
         counts == (before.main_count, before.nodes.len()) && members.iter().enumerate().all(at_home)
     }
 
-    /// The cabling as the ports tell it. A ring whose last SubDevice is unassigned closes where the cables of all that
-    /// are known are those of before.
+    /// The cabling according to the ports. A ring with an unassigned last SubDevice is closed if the cables of all
+    /// known SubDevices are unchanged.
     fn topology(&self, members: &[Option<usize>]) -> Topology {
         let main_count = usize::from(self.view.counts.0.0);
         let mut closings = Vec::new();
@@ -193,7 +194,7 @@ impl Look<'_> {
         Topology::with_local_rings(&self.nodes, main_count, &closings)
     }
 
-    /// No cable between two that are known is another one than before, and all have a place.
+    /// No cable between two known SubDevices has changed, and all have a place.
     fn is_possible(&self, now: &Topology, members: &[Option<usize>], before: &[[End; 2]]) -> bool {
         let fits = |[one, other]: &[End; 2]| {
             let (one, other) = (self.place_before(members, *one), self.place_before(members, *other));

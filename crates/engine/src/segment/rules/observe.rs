@@ -1,15 +1,15 @@
-//! What follows from each observation.
+//! Dispatch of observations.
 
 use crate::ring_status::CableErrors;
-use crate::segment::asked::Asked;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::segment::observation::Observation;
 use crate::segment::ring::{Cabled, Words};
+use crate::segment::versions::Versions;
 use crate::time::Instant;
 
 impl Segment {
-    /// Takes in what was seen. What follows is to be carried out in its order.
+    /// Processes an observation. The effects must be executed in their order.
     pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
         let mut effects = Effects::default();
         self.take(seen, now, &mut effects);
@@ -17,17 +17,17 @@ impl Segment {
         effects
     }
 
-    /// What follows from each observation.
+    /// Processes an observation.
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
             Observation::Words(words) => self.observe_words(&words, now, effects),
-            Observation::PartOfLooks { asked, looks, others, counted } => {
-                self.observe_part_of_looks(asked, looks, others, counted);
+            Observation::PartOfRound { versions, readings, others, counted } => {
+                self.observe_part_of_round(versions, readings, others, counted);
             }
-            Observation::Looks(looked) => self.observe_looks(&looked, now, effects),
+            Observation::Round(round_result) => self.observe_round(&round_result, now, effects),
             Observation::RoundEnded(number) => self.attention.end(number, now),
-            Observation::LookAgain => self.attention.want(),
-            Observation::LookAgainIn(pause) => self.attention.again_in(pause, now),
+            Observation::ScanAgain => self.attention.want(),
+            Observation::ScanAgainIn(pause) => self.attention.again_in(pause, now),
 
             Observation::Started(from) => self.start_all(from, effects),
             Observation::Delayed => self.delay_all(),
@@ -57,18 +57,18 @@ impl Segment {
             Observation::LineChecked { found, in_control } => self.observe_line_check(found, in_control, effects),
             Observation::Rescanned { seen, words } => self.adopt(seen, &words, effects),
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
-            Observation::CableErrors { asked, fresh } => self.observe_cable_errors(asked, fresh),
+            Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
 
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
 
             Observation::Wanted(wanted) => self.slot.want(wanted),
             Observation::Undisturbed(number) => self.slot.end(number),
-            Observation::Isolated { asked, found, words } => {
+            Observation::Isolated { versions, found, words } => {
                 self.end_silence(&words, now);
-                self.observe_isolated(asked, found, now, effects);
+                self.observe_isolated(versions, found, now, effects);
             }
             Observation::PortsOrdered { station, control } => self.begin_order(station, control),
-            Observation::PortsTold(station) => self.end_order(station),
+            Observation::PortsWritten(station) => self.end_order(station),
             Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
             Observation::Blocked(ports) => self.blocked.extend(ports),
             Observation::Unblocking => self.blocked.clear(),
@@ -81,9 +81,9 @@ impl Segment {
         }
     }
 
-    fn observe_cable_errors(&mut self, asked: Asked, fresh: &[CableErrors]) {
-        // Where it was cabled anew since, these are of other cables.
-        if asked.cabling != self.cabling.version {
+    fn observe_cable_errors(&mut self, versions: Versions, fresh: &[CableErrors]) {
+        // If the cabling was replaced since, the counts belong to other cables.
+        if versions.cabling != self.cabling.version {
             return;
         }
         for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
@@ -97,7 +97,7 @@ impl Segment {
         let ring = self.ring.observe(words, disturbance, &cabled, now, effects);
         let silence = self.observe_silence(words, now, effects);
         let reported = self.ring.reported();
-        let look = self.attention.observe(words, reported, disturbance, now, effects);
-        self.attention.wake = [ring, silence, Some(look)].into_iter().flatten().min().unwrap_or(Instant::NEVER);
+        let evaluation = self.attention.observe(words, reported, disturbance, now, effects);
+        self.attention.wake = [ring, silence, Some(evaluation)].into_iter().flatten().min().unwrap_or(Instant::NEVER);
     }
 }

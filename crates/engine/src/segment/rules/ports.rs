@@ -1,4 +1,4 @@
-//! Orders to junctions about their ports.
+//! Port commands to junctions.
 
 use alloc::vec::Vec;
 
@@ -15,37 +15,37 @@ impl Segment {
         heads.filter_map(|head| self.station_of(head)).collect()
     }
 
-    /// The order that a junction has; that of a scan where it is not known.
+    /// The port control of a junction; that of a scan if it is unknown.
     pub fn control_of(&self, junction: StationAddress) -> DlControl {
-        self.port_control(junction).map_or_else(DlControl::default, |told| told.control)
+        self.port_control(junction).map_or_else(DlControl::default, |entry| entry.control)
     }
 
-    /// What is known of a junction's ports.
+    /// The known port control of a junction.
     pub fn port_control(&self, junction: StationAddress) -> Option<&PortControl> {
-        self.port_controls.iter().find(|told| told.station == junction)
+        self.port_controls.iter().find(|entry| entry.station == junction)
     }
 
     pub(in crate::segment) fn begin_order(&mut self, station: StationAddress, control: DlControl) {
-        let told = self.entry(station);
-        (told.control, told.orders, told.under_way) = (control, told.orders.wrapping_add(1), told.under_way + 1);
+        let entry = self.entry(station);
+        (entry.control, entry.orders, entry.under_way) = (control, entry.orders.wrapping_add(1), entry.under_way + 1);
     }
 
     pub(in crate::segment) fn end_order(&mut self, station: StationAddress) {
-        let told = self.entry(station);
-        told.under_way = told.under_way.saturating_sub(1);
+        let entry = self.entry(station);
+        entry.under_way = entry.under_way.saturating_sub(1);
     }
 
-    /// A control was read, when there had been so many orders.
+    /// A port control was read, after this number of commands.
     pub(in crate::segment) fn note_control(&mut self, station: StationAddress, orders: u32, control: DlControl) {
-        let told = self.entry(station);
-        if told.orders == orders && told.under_way == 0 {
-            told.control = control;
+        let entry = self.entry(station);
+        if entry.orders == orders && entry.under_way == 0 {
+            entry.control = control;
         }
     }
 
     fn entry(&mut self, station: StationAddress) -> &mut PortControl {
         let all = &mut self.port_controls;
-        let at = all.iter().position(|told| told.station == station).unwrap_or(all.len());
+        let at = all.iter().position(|entry| entry.station == station).unwrap_or(all.len());
         if at == all.len() {
             all.push(PortControl { station, control: DlControl::default(), orders: 0, under_way: 0 });
         }

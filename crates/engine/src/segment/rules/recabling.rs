@@ -1,5 +1,5 @@
-//! What a look at the whole segment has shown takes the place of the cabling of the scan: places of breaks, errors of
-//! cables and positions in events are then those of the segment as it is.
+//! Replaces the cabling of the scan by that of a rescan: places of breaks, errors of cables and positions in events
+//! then follow the present segment.
 
 use alloc::vec::Vec;
 
@@ -16,11 +16,11 @@ use crate::segment::ring::Words;
 use crate::segment::seen::Seen;
 use crate::topology::PortOf;
 
-/// The ends of a cable, by the SubDevices there.
+/// The ends of a cable, with the SubDevices there.
 type Ends = [Option<End>; 2];
 
 impl Segment {
-    /// Whether a look could be taken over: nothing is broken or missing that would be forgotten.
+    /// Whether a rescan can be taken over: no break and no missing SubDevice would be lost from the model.
     pub fn is_whole(&self, words: &Words) -> bool {
         let is_missed = self.members.iter().any(|member| !member.config.optional && member.phase == Phase::Absent);
         (words.links == LinkSet::Single || self.is_closed(words)) && !is_missed
@@ -30,9 +30,9 @@ impl Segment {
         words.ring.state == RingState::Closed && self.ring.status.state == RingState::Closed
     }
 
-    /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: what is
-    /// broken would be forgotten. A ring behind a junction may be broken, for it is known where it closes, and what was
-    /// told of it goes on to hold.
+    /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: the
+    /// break would be lost from the model. A ring behind a junction may be broken, because the place where it closes is
+    /// known, and its reported breaks stay valid.
     pub(in crate::segment) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
         let is_single = words.links == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
@@ -49,7 +49,7 @@ impl Segment {
             member.node = seen.members.iter().position(|owner| *owner == Some(index));
         }
         let counted = |cable: Cable| {
-            // What is not known has counted nothing, and the ends of two cables without a SubDevice are not the same.
+            // Unknown SubDevices have no counts, and ends of two cables without a SubDevice are not equal.
             let now = ends(&cable, |node| seen.stations.get(node).copied());
             let same = before.iter().find(|(ends, _)| *ends == now && now != [None, None]);
             (cable, same.map_or(CableErrors::default(), |(_, errors)| *errors))
@@ -67,7 +67,7 @@ impl Segment {
         self.cabling = Cabling { version: now.version.wrapping_add(u32::from(is_other)), ..now };
         self.adoptions = self.adoptions.wrapping_add(1);
         effects.0.push(Effect::Occupants(self.occupants()));
-        // What is broken in it may not have been reported yet.
+        // A break in it may not have been reported yet.
         self.attention.want();
     }
 
@@ -78,12 +78,12 @@ impl Segment {
         rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect()
     }
 
-    /// An unassigned SubDevice that has a place in the cabling and becomes a member has that place as a member.
+    /// An unassigned SubDevice with a place in the cabling keeps the place when it becomes a member.
     pub(in crate::segment) fn take_place(&mut self, unassigned: StationAddress, index: usize, effects: &mut Effects) {
         let stations = &mut self.cabling.stations;
         let Some(at) = stations.iter().position(|station| *station == unassigned) else { return };
         let Some(member) = self.members.get_mut(index) else { return };
-        // None answers at its temporary address any more, nor is any where the member was.
+        // Its temporary address is free now, and so is the member's previous place.
         if let Some(place) = member.node.and_then(|node| stations.get_mut(node)) {
             *place = unassigned;
         }

@@ -1,4 +1,4 @@
-//! What becomes of SubDevices without a declaration: found, read, told, or made the member that they are.
+//! Changes of SubDevices without a declaration: found, read, reported, or assigned to the member that they are.
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
@@ -33,7 +33,7 @@ impl Segment {
         self.unassigned.iter_mut().find(|it| it.station == station)
     }
 
-    /// The station addresses of those that are neither members nor listed, or that several have.
+    /// Station addresses that belong to no member and no listed SubDevice, or to several SubDevices.
     pub fn unknown(&self, view: &View) -> Vec<StationAddress> {
         let owners = self.owners(&view.stations);
         let mut old = Vec::new();
@@ -47,7 +47,7 @@ impl Segment {
         old
     }
 
-    /// Notes where they are now.
+    /// Stores their present positions.
     pub(in crate::segment) fn observe_places(&mut self, view: &View) {
         let owners = self.owners(&view.stations);
         let main_count = usize::from(view.counts.0.0);
@@ -78,7 +78,7 @@ impl Segment {
         }
     }
 
-    /// One was read, or could not be: then why, where that is worth telling.
+    /// A SubDevice was read, or could not be: then with the reason, if it is to be reported.
     pub(in crate::segment) fn observe_read(
         &mut self,
         station: StationAddress,
@@ -99,7 +99,7 @@ impl Segment {
         }
     }
 
-    /// One of which it is known that it is none of the declared ones: told once.
+    /// A SubDevice is certainly none of the declared ones: reported once.
     pub(in crate::segment) fn observe_unexpected(&mut self, station: StationAddress, effects: &mut Effects) {
         let Some(it) = self.unassigned_mut(station) else { return };
         let Knowledge::Known(info) = it.knowledge.clone() else { return };
@@ -113,7 +113,7 @@ impl Segment {
         }
     }
 
-    /// One that is a member does not fit the process image: told once.
+    /// A SubDevice is a member but does not fit the process image: reported once.
     pub(in crate::segment) fn observe_misfit(
         &mut self,
         station: StationAddress,
@@ -127,7 +127,7 @@ impl Segment {
         }
     }
 
-    /// One has got the station address of the member that it is.
+    /// A SubDevice has got the station address of the member that it is.
     pub(in crate::segment) fn observe_admitted(
         &mut self,
         station: StationAddress,
@@ -144,11 +144,11 @@ impl Segment {
         member.configured = false;
         self.unassigned.retain(|other| other.station != station);
         effects.report(Event::Returned { subdevice: SubDeviceId(index) });
-        // Whatever state it is in, it is not one that we brought it to.
+        // Its state was not set by this session.
         self.start(index, Start::Doubtful, None, Check::None, effects);
     }
 
-    /// What a member's registers need if it is this SubDevice, with its station address.
+    /// The register values that a member needs if it is this SubDevice, with its station address.
     ///
     /// # Errors
     /// It does not fit the process image.

@@ -1,5 +1,5 @@
-//! The FMMU that shows whether a SubDevice has mail (protocol 6.1): each has a bit of its own in the logical address
-//! space, so that all answer one read together.
+//! The FMMU that maps whether a SubDevice has mail (protocol 6.1): each has a bit of its own in the logical address
+//! space, so one read covers all.
 
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::datagram::MAX_DATA;
@@ -9,13 +9,13 @@ use ringcat_wire::sii::FmmuUsage;
 use crate::info::SubDeviceInfo;
 use crate::plan::SubDevicePlan;
 
-/// Where the bits lie: beyond all process data, which ends at 2 GiB.
+/// First address of the bits: beyond all process data, which ends at 2 GiB.
 pub const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
-/// Bit of the status register that says "full".
+/// The mailbox-full bit of the status register.
 const FULL_BIT: u8 = 3;
 
-/// The FMMU that shows whether there is mail, with its number: the one that the SII names, or the first one behind
-/// those of process data. `None` where the SII names none, or where bits cannot be mapped.
+/// The FMMU that maps the mailbox-full bit, with its number: the one given in the SII, or the first one behind those of
+/// process data. `None` if the SII gives none, or bits cannot be mapped.
 pub fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<(u8, Fmmu)> {
     let named = info.fmmu_usages.iter().position(|usage| *usage == FmmuUsage::MailboxStatus)?;
     let mapped = plan.mapped_areas().count();

@@ -8,8 +8,9 @@ use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Delivers, Witness};
 use crate::plan::{AreaPlan, SubDevicePlan};
 
-/// How a SubDevice shows whether its inputs came: through an FMMU that process data and mailbox leave over. One whose
-/// inputs come once per buffer only, as from a mailbox, would make every sum uncertain, and is looked at alone.
+/// How a SubDevice shows whether its inputs were processed: through an FMMU that process data and mailbox leave free.
+/// If its inputs can be read only once per buffer, as from a mailbox, they would make every sum of a working counter
+/// uncertain; it gets a separate datagram.
 pub fn witness(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Witness {
     let is_steady = |area: &AreaPlan| area.register.control.mode == SyncManagerMode::Buffered;
     let inputs = plan.mapped_areas().map(|(_, area)| area).filter(|area| area.direction == Direction::Inputs);

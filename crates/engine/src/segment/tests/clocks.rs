@@ -1,4 +1,4 @@
-//! Clocks: from what was measured, written and read to events, references and the next measurement.
+//! Clocks: from measured, written and read values to events, references and the next measurement.
 
 use crate::board::clocks::References;
 use crate::clocks::Delays;
@@ -7,7 +7,7 @@ use crate::segment::clocks::{Answer, ClockObservation, Difference, Due, Measured
 
 use super::*;
 
-/// A closed ring of so many clocks, 100 ns apart, that are set up.
+/// A closed ring of `count` clocks, 100 ns apart, that are set up.
 fn set_up(count: usize) -> Ring {
     let mut ring = declared(count);
     let measured = measured(count, 100);
@@ -15,7 +15,7 @@ fn set_up(count: usize) -> Ring {
     assert_eq!(effects, []);
     ring.clocks(ClockObservation::Measured(&measured));
     let effects = ring.clocks(ClockObservation::SetUp);
-    assert_eq!(told(&effects), [Event::ReferenceClock { position: Some(Position(0)) }]);
+    assert_eq!(reports(&effects), [Event::ReferenceClock { position: Some(Position(0)) }]);
     assert!(effects.contains(&Effect::Start(Task::CompensateDrift)));
     ring.clocks(ClockObservation::Compensated);
     ring
@@ -49,7 +49,7 @@ impl Ring {
     }
 
     fn answers(&mut self, answers: &[Option<Answer>]) -> Vec<Event> {
-        told(&self.clocks(ClockObservation::Answers { answers, is_explained: true, holds: 0 }))
+        reports(&self.clocks(ClockObservation::Answers { answers, is_explained: true, holds: 0 }))
     }
 
     fn references(&self) -> References {
@@ -84,22 +84,22 @@ fn differences_during_the_drift_compensation_lock_nothing() {
 #[test]
 fn a_set_up_that_fails_is_reported_once_until_the_segment_changes() {
     let mut ring = declared(2);
-    let mut failed = |reason: &str| told(&ring.clocks(ClockObservation::SetUpFailed(reason.into()))).len();
+    let mut failed = |reason: &str| reports(&ring.clocks(ClockObservation::SetUpFailed(reason.into()))).len();
     assert_eq!([failed("a"), failed("a"), failed("b"), failed("b")], [1, 0, 1, 0]);
     ring.clocks(ClockObservation::SegmentChanged);
-    assert_eq!(told(&ring.clocks(ClockObservation::SetUpFailed("b".into()))).len(), 1);
+    assert_eq!(reports(&ring.clocks(ClockObservation::SetUpFailed("b".into()))).len(), 1);
     assert!(!ring.segment.clocks().are_set_up());
 }
 
 #[test]
-fn a_link_is_followed_when_two_answers_show_it_and_both_links_have_references_then() {
+fn a_link_change_needs_two_answers_and_gives_both_links_references() {
     let mut ring = set_up(3);
     assert_eq!(ring.references(), References { main: Some(station(0)), ..References::default() });
     let split = [answer(Link::Main, 0), answer(Link::Main, 0), answer(Link::Redundant, 0)];
     assert_eq!(ring.answers(&split), []);
     assert_eq!(ring.references().redundant, None, "answers of both states are possible");
     assert_eq!(ring.answers(&split), []);
-    // What counted from the first clock counts from the third one there.
+    // Delays that had the first clock as origin have the third one there.
     assert_eq!((ring.segment.clocks().due(), ring.references()), (Due::Delays, References::default()));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Redundant]);
     ring.clocks(ClockObservation::DelaysWritten(Link::Redundant));
@@ -109,7 +109,7 @@ fn a_link_is_followed_when_two_answers_show_it_and_both_links_have_references_th
 }
 
 #[test]
-fn a_reference_that_is_lost_is_replaced_by_the_next_clock() {
+fn a_lost_reference_is_replaced_by_the_next_clock() {
     let mut ring = set_up(3);
     let without = [Some(Answer::default()), answer(Link::Main, 0), answer(Link::Main, 0)];
     assert_eq!(ring.answers(&without), []);
@@ -123,18 +123,18 @@ fn delays_that_could_not_be_written_are_written_after_the_next_measurement() {
     let now = measured(3, 300);
     ring.clocks(ClockObservation::MeasuredAgain(&now));
     assert_eq!(ring.references(), References::default(), "no time is distributed meanwhile");
-    // The bus fails before they are written; the next measurement shows the same delays.
+    // The bus fails before they are written; the next measurement gives the same delays.
     ring.clocks(ClockObservation::MeasuredAgain(&now));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Main]);
     ring.clocks(ClockObservation::DelaysWritten(Link::Main));
     let ended = ring.clocks(ClockObservation::MeasurementEnded { failed: None, holds: 0 });
-    assert_eq!(told(&ended), [Event::DelaysChanged { clocks: 2, largest_ns: 400 }]);
+    assert_eq!(reports(&ended), [Event::DelaysChanged { clocks: 2, largest_ns: 400 }]);
     assert_eq!(ring.references().main, Some(station(0)));
     assert_eq!(ring.segment.clocks().doubtful_since(), None);
 }
 
 #[test]
-fn a_clock_without_its_registers_is_no_reference_and_the_segment_is_measured_again() {
+fn a_clock_that_lost_its_registers_is_no_reference_and_starts_a_measurement() {
     let mut ring = set_up(2);
     assert_eq!(ring.segment.clocks().doubtful_since(), None);
     ring.now = Instant(7_000_000);
@@ -142,5 +142,5 @@ fn a_clock_without_its_registers_is_no_reference_and_the_segment_is_measured_aga
     assert_eq!(ring.segment.clocks().doubtful_since(), Some(ring.now));
     assert_eq!(ring.segment.clocks().reference, None);
     let ended = ring.clocks(ClockObservation::MeasurementEnded { failed: None, holds: 0 });
-    assert_eq!(told(&ended), [Event::ReferenceClock { position: Some(Position(1)) }]);
+    assert_eq!(reports(&ended), [Event::ReferenceClock { position: Some(Position(1)) }]);
 }

@@ -1,4 +1,4 @@
-//! What follows from the answers of clocks: their differences, and the links on which they answer.
+//! Effects of the answers of clocks: their differences, and the links on which they answer.
 
 use alloc::vec::Vec;
 
@@ -12,10 +12,10 @@ use crate::segment::model::Segment;
 use crate::time::Instant;
 
 impl Segment {
-    /// Notes the differences. The event of the lock follows when all are within the window.
+    /// Stores the differences. The lock is reported when all are within the window.
     pub(super) fn observe_differences(&mut self, answers: &[Option<Answer>], effects: &mut Effects) {
         let differences = self.differences(answers);
-        // While no time is distributed, differences are those of a frame that came another way.
+        // While no time is distributed, differences belong to a frame with another path.
         if self.board.clocks.is_held() {
             return;
         }
@@ -29,7 +29,7 @@ impl Segment {
                 all &= !node.has_clock || node.link.is_none();
                 continue;
             };
-            // Nothing is written to a reference, so that its own difference is none.
+            // Nothing is written to a reference, so its difference is zero.
             let is_reference = references.contains(&Some(index));
             let difference = if is_reference { 0 } else { difference };
             let magnitude = difference.unsigned_abs();
@@ -42,18 +42,18 @@ impl Segment {
             }
             all &= is_locked;
             if is_locked && !is_reference {
-                // What the loop makes up for, now that it has settled (protocol 7.2.1).
+                // The deviation compensated by the loop, now that it has settled (protocol 7.2.1).
                 node.drift_ppb = -deviation_ppb;
             }
             largest = largest.max(magnitude);
         }
-        // Where a reference is steered, the exchange does not see how far the others are from theirs.
+        // While a reference is steered, the exchange does not see the differences of the others from their reference.
         let is_steered = references.iter().all(Option::is_some) || self.board.clocks.is_host_told();
         self.observe_window(largest, is_steered, effects);
         self.observe_lock(all, largest, is_steered, effects);
     }
 
-    /// The difference and the deviation of each clock; those that have the jitter of the host as a mean.
+    /// The difference and the deviation of each clock; differences that contain the jitter of the host as a mean.
     fn differences(&mut self, answers: &[Option<Answer>]) -> Vec<(Option<i32>, i64)> {
         let difference = |(node, answer): (&mut Node, &Option<Answer>)| {
             let Some(answer) = answer else { return (None, 0) };
@@ -87,8 +87,8 @@ impl Segment {
         }
     }
 
-    /// Follows SubDevices from link to link, and replaces a reference that is lost. `is_explained`: changes of ports
-    /// come from a ring that opened or closed, in each part of which the way from clock to clock is what it was.
+    /// Updates the link of each SubDevice, and replaces a lost reference. `is_explained`: changes of ports are due to a
+    /// ring that opened or closed; in each part the path from clock to clock is unchanged.
     pub(super) fn follow_links(
         &mut self,
         answers: &[Option<Answer>],
@@ -107,7 +107,7 @@ impl Segment {
             return;
         }
         if Link::ALL.iter().any(|link| self.clocks.is_mixed(*link)) {
-            // What is between them is not known before the segment has been measured.
+            // Delays across the two parts are unknown until the segment has been measured.
             if let Life::Running(Running { delays: delays @ Delays::Valid, .. }) = &mut self.clocks.life {
                 *delays = Delays::Doubtful(now);
             }
@@ -120,15 +120,15 @@ impl Segment {
         }
         if running.unwritten.links.contains(&true) {
             running.due = Due::Delays;
-            // No time is distributed while delays count from different clocks.
+            // No time is distributed while delays have different origins.
             self.board.clocks.post_references(References::default());
         } else {
             self.follow(holds);
         }
     }
 
-    /// Takes over the links of the answers; returns whether any is another one. `None` where the next answers must
-    /// confirm them: answers that came while a ring opened or closed are of both states.
+    /// Takes over the links of the answers; returns whether any has changed. `None` if the next answers must confirm
+    /// them: answers during the opening or closing of a ring belong to both states.
     fn confirm_links(&mut self, answers: &[Option<Answer>]) -> Option<bool> {
         let links: Vec<Option<Option<Link>>> = answers.iter().map(|answer| answer.map(|answer| answer.link)).collect();
         let before = self.clocks.running_mut()?.unconfirmed.take();

@@ -1,4 +1,4 @@
-//! Delays and offsets as measurements and latched times give them.
+//! Delays and offsets computed from measurements and latched times.
 
 use alloc::vec::Vec;
 
@@ -8,21 +8,21 @@ use crate::clocks::{Latched, Unknown, round};
 use crate::link::Link;
 use crate::segment::clocks::{Clocks, Measured, Node};
 
-/// Delays that differ by no more than this from the written ones are what the same way gives when it is measured again.
+/// Repeated measurements of the same path differ by no more than this: such delays count as unchanged.
 const SAME_NS: i64 = 30;
 
-/// What a measurement has changed.
+/// Changes due to a measurement.
 pub(super) struct Changes {
-    /// Links with other delays.
+    /// Links with changed delays.
     pub links: Vec<Link>,
-    /// Clocks that get another delay.
+    /// Clocks with a changed delay.
     pub clocks: usize,
     /// The largest change.
     pub largest_ns: u32,
 }
 
 impl Clocks {
-    /// Takes over a measurement: the link of each SubDevice and its delay, which counts from the reference there.
+    /// Takes over a measurement: the link of each SubDevice and its delay from the reference on that link.
     pub(super) fn take_over(&mut self, measured: &Measured) {
         self.measured = self.measured.wrapping_add(1);
         let are_estimated = self.config.estimated_delays;
@@ -31,7 +31,7 @@ impl Clocks {
         for node in &mut self.nodes {
             let Some(at) = measured.stations.iter().position(|station| *station == node.station) else { continue };
             let tree = measured.delays.trees.get(at).copied().unwrap_or(0);
-            // Later it runs as fast as the reference, because its loop makes it.
+            // Once set up, the control loop makes it run as fast as the reference.
             let is_free = node.unit.is_none() || node.is_unset;
             if let Some(drift_ppb) = measured.drift_ppb.get(at).copied().flatten().filter(|_| is_free) {
                 node.drift_ppb = drift_ppb;
@@ -43,7 +43,7 @@ impl Clocks {
                 let fork = unknown.fork.and_then(at_fork);
                 node.hidden = Some(Unknown { fork: fork.map(|(_, position)| *position), ..*unknown });
                 node.unit = unknown.range.filter(|_| are_estimated).map(|(least, most)| (least + most) / 2);
-                // Its delay at another place does not hold here.
+                // The delay of its previous place is not valid here.
                 if node.is_unset {
                     node.delay_ns = 0;
                 }
@@ -56,8 +56,8 @@ impl Clocks {
         }
     }
 
-    /// Takes over a measurement after a change of the segment. Where all delays on a link are what they were, nothing
-    /// changes there.
+    /// Takes over a measurement after a change of the segment. If all delays on a link are unchanged, nothing changes
+    /// there.
     pub(super) fn measure_again(&mut self, measured: &Measured) -> Changes {
         let before: Vec<Node> = self.nodes.clone();
         self.take_over(measured);
@@ -68,8 +68,8 @@ impl Clocks {
         Changes { links, clocks: changes.count(), largest_ns }
     }
 
-    /// Where all delays on a link are what they were, what is known stays as it was: it may count from one place on
-    /// both links, and measurements in a broken ring do not. Returns whether it is so.
+    /// If all delays on a link are unchanged, the previous values and their origin are kept: they may have one origin
+    /// for both links, which measurements in an open ring do not. Returns whether they were kept.
     fn keep_same(&mut self, before: &[Node], link: Link) -> bool {
         let here: Vec<usize> = (0..before.len())
             .filter(|index| self.nodes[*index].has_delay() && self.nodes[*index].link == Some(link))
@@ -90,7 +90,7 @@ impl Clocks {
         true
     }
 
-    /// Delays on a link count from the reference there. Returns whether any has changed.
+    /// Computes the delays on a link from the reference there. Returns whether any has changed.
     pub(super) fn refer(&mut self, link: Link) -> bool {
         let Some(reference) = self.reference_on(link).and_then(|index| self.nodes[index].unit) else {
             return false;
@@ -105,20 +105,20 @@ impl Clocks {
         changed
     }
 
-    /// Offsets with which all clocks show `wanted` where the frame came in, plus their delay.
+    /// Computes the offsets with which all clocks show `wanted` where the frame enters the segment, plus their delay.
     pub(super) fn set_offsets(&mut self, latched: &[Option<Latched>], wanted: u64) {
         let references = Link::ALL.map(|link| self.reference_on(link).and_then(|index| self.nodes[index].unit));
         for (node, latched) in self.nodes.iter_mut().zip(latched) {
             let Some(latched) = latched else { continue };
-            // Without a delay it shows what it receives: the time at which the frame passes the reference.
+            // Without a delay it shows the received time: the time at which the frame passes the reference.
             let received = || references[usize::from(node.link == Some(Link::Redundant))];
             let unit = node.unit.or_else(received).map_or(0, round);
             node.offset_ns = wanted.wrapping_add_signed(unit).wrapping_sub(latched.unit) as i64;
         }
     }
 
-    /// The offset of one clock, by a frame that it and its reference have latched; by the time of the host where there
-    /// is no reference.
+    /// The offset of one clock, from a frame that it and its reference have latched; from the time of the host without
+    /// a reference.
     pub(super) fn set_offset(&mut self, index: usize, latched: &[Option<Latched>], host: u64) {
         let time = |index: usize| latched.get(index).copied().flatten().map(|latched| latched.unit);
         let Some(own) = time(index) else { return };
