@@ -17,6 +17,7 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::Names;
 use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
 
+use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::demo;
@@ -61,6 +62,7 @@ pub struct DemoArguments {
 
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
+    EndRequest::at_once()?;
     Ok(show(arguments)?)
 }
 

@@ -53,9 +53,20 @@ impl EndRequest {
             }
             shared.watch(&held);
         };
-        let thread = thread::Builder::new().name("signals".to_owned()).spawn(body);
-        thread.map_err(|error| Failure::new(format!("a thread cannot be started: {error}")))?;
+        start("signals", body)?;
         Ok(request)
+    }
+
+    /// For commands that end by themselves within seconds: SIGINT, SIGTERM and SIGHUP end the program at once, with a
+    /// last line that names the signal. To be called before there are other threads.
+    pub fn at_once() -> Result<(), Failure> {
+        let held = HeldSignals::hold();
+        let body = move || loop {
+            if let Some(signal) = held.wait(LOOK) {
+                end_at_once(&format!("ended by {signal} before the command had finished"));
+            }
+        };
+        start("signals", body)
     }
 
     /// Whether the end is requested. Cheap enough for each cycle.
@@ -89,6 +100,12 @@ impl EndRequest {
     }
 }
 
+fn start(name: &str, body: impl FnOnce() + Send + 'static) -> Result<(), Failure> {
+    let thread = thread::Builder::new().name(name.to_owned()).spawn(body);
+    thread.map_err(|error| Failure::new(format!("a thread cannot be started: {error}")))?;
+    Ok(())
+}
+
 impl Shared {
     fn watch(&self, held: &HeldSignals) {
         let mut asked_at: Option<Instant> = None;
@@ -96,9 +113,7 @@ impl Shared {
             let signal = held.wait(LOOK);
             let now = now();
             if let (Some(signal), Some(_)) = (signal, asked_at) {
-                end_at_once(&format!(
-                    "ended at once by a second signal, {signal}: SubDevices were not stopped in order"
-                ));
+                end_at_once(&format!("ended at once by a second signal, {signal}, before the orderly end"));
             }
             let limit = Instant(self.limit.load(Ordering::Relaxed));
             let is_overdue = limit != Instant::NEVER && now >= limit + GRACE;

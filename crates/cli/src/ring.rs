@@ -9,6 +9,7 @@ use ringcat::wire::address::StationAddress;
 use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
 
 use crate::access::AccessArguments;
+use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::ring;
@@ -45,6 +46,7 @@ pub struct RingArguments {
 
 /// Reads and prints; it has not held where the ring is open.
 pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
+    EndRequest::at_once()?;
     let AccessArguments { interfaces, thread, recording } = &arguments.access;
     let links = interfaces.open(*thread)?;
     let recording = recording.start(interfaces)?;

@@ -5,6 +5,7 @@ use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice};
 
 use crate::access::AccessArguments;
+use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::output::{counted, say, warn};
@@ -30,6 +31,7 @@ pub struct ScanArguments {
 
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
+    EndRequest::at_once()?;
     let AccessArguments { interfaces, thread, recording } = &arguments.access;
     let links = interfaces.open(*thread)?;
     let mut surroundings = Surroundings::watch(interfaces, &links);

@@ -1,7 +1,7 @@
 //! Public errors, events, counters and options are `#[non_exhaustive]`, so that they may grow.
 //!
 //! Input: the tree. Output: a finding for each public type of the library or of a crate below it that has such a name
-//! and not the attribute. [`EXEMPT`] lists types that represent a register or a message on the wire, and types that
+//! and not the attribute. `EXEMPT` lists types that represent a register or a message on the wire, and types that
 //! applications do not get.
 
 use crate::Finding;

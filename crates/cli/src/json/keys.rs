@@ -118,6 +118,10 @@ fn tables() -> String {
 #[test]
 fn the_page_of_all_keys_agrees_with_the_types() {
     let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/json.md"));
+    if !path.with_file_name("FEATURES.md").exists() {
+        println!("skipped: a package has no pages, {} is not there", path.display());
+        return;
+    }
     let page = std::fs::read_to_string(&path).expect("docs/json.md is there");
     let (before, rest) = page.split_once(BEGIN).expect("the page has a line where the tables begin");
     let (written, after) = rest.split_once(END).expect("the page has a line where the tables end");

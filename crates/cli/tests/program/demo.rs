@@ -1,5 +1,6 @@
 //! The `ringcat` program as a user calls it.
 
+use std::io::Read;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
@@ -24,6 +25,31 @@ fn the_demonstration_on_the_embedded_ring_holds() {
     assert_eq!(said.matches("FAILED").count(), 0, "{said}");
     for part in ["19 of 19 SubDevices read", "cutting the cable", "ring open", "ring closed", "answers again"] {
         assert!(said.contains(part), "{part} is missing in:\n{said}");
+    }
+}
+
+/// SIGINT and SIGTERM, by number.
+const SIGNALS: [(&str, &str); 2] = [("-INT", "SIGINT"), ("-TERM", "SIGTERM")];
+
+// covers: signals
+#[test]
+fn a_signal_ends_the_demonstration_with_a_result() {
+    for (signal, name) in SIGNALS {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_ringcat"))
+            .arg("demo")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        // Its first line comes when signals are held.
+        let mut first = [0];
+        child.stdout.as_mut().expect("it is piped").read_exact(&mut first).expect("a line");
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("there is a kill");
+        let output = child.wait_with_output().expect("it ends");
+        assert!(sent.success());
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        let last = text(&output.stderr).lines().last().map(str::to_owned);
+        assert_eq!(last, Some(format!("result: FAILED: ended by {name} before the command had finished")));
     }
 }
 

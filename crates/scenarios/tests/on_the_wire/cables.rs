@@ -112,7 +112,7 @@ pub fn incomplete_cycles(lines: &[String]) -> Option<usize> {
     let (mut since, mut cycles) = (None, 0);
     for line in lines {
         let Some((ms, judgement)) = line.split_once(" ms  domain 0: ") else { continue };
-        if judgement.starts_with("skipped") {
+        if judgement.starts_with("cycle skipped") {
             // No evaluation: the frames of the cycle before were still under way.
             continue;
         }
