@@ -208,9 +208,11 @@ fn in_us(time: Duration) -> impl fmt::Display {
 }
 
 fn fmt_period(f: &mut fmt::Formatter<'_>, domain: DomainId, period: Duration, shortest: Duration) -> fmt::Result {
-    let [shortest, period] = [shortest, period].map(|time| time.as_micros());
-    write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us and not zero, ")?;
-    write!(f, "got {period} us")
+    if period.is_zero() || shortest.is_zero() {
+        return write!(f, "domain {domain}: expected a period above zero, got {} us", in_us(period));
+    }
+    let [shortest, period] = [shortest, period].map(in_us);
+    write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us, got {period} us")
 }
 
 fn fmt_sync_cycle(
