@@ -6,7 +6,7 @@
 //! * `drift`: the static drift compensation;
 //! * `watch`: the set-up, the differences, the links of the references.
 //!
-//! They pass measured, written and read values to the model of the segment ([`crate::segment`]), which contains the
+//! They pass measured, written and read values to the model of the segment (`segment`), which contains the
 //! state of the clocks and decides the next step.
 
 mod changes;
