@@ -63,7 +63,7 @@ impl UsualReturn {
     /// As [`wait_from`] with [`ReceiveMode::Hybrid`] of this limit, for the first frame after one was sent at about
     /// `now`: asleep until it is nearly due.
     pub fn wait(&mut self, sockets: &[&PacketSocket], now: u64, until_ns: u64, limit: Duration) -> bool {
-        let due = now.saturating_add(self.ns.saturating_sub(Self::LEAD_NS)).min(until_ns);
+        let due = self.due_ns(now, until_ns);
         let mut found = false;
         let mut woken = now;
         if due > now {
@@ -75,6 +75,13 @@ impl UsualReturn {
             self.learn(now_ns().saturating_sub(now));
         }
         found
+    }
+
+    /// The end of the sleep: [`Self::LEAD_NS`] before the usual return, and as long before the end of the wait. A cycle
+    /// that is shorter than a wake-up never sleeps here; it would begin late each time.
+    #[inline(always)]
+    fn due_ns(&self, now: u64, until_ns: u64) -> u64 {
+        now.saturating_add(self.ns).min(until_ns).saturating_sub(Self::LEAD_NS)
     }
 
     fn learn(&mut self, took_ns: u64) {
@@ -157,5 +164,9 @@ mod tests {
         assert!(usual.ns <= 500_000, "one late frame: {}", usual.ns);
         usual.learn(300_000);
         assert_eq!(usual.ns, 300_000);
+        let now = 5_000_000;
+        assert_eq!(usual.due_ns(now, now + 1_000_000), now + 250_000);
+        assert_eq!(usual.due_ns(now, now + 200_000), now + 150_000, "the wait ends first");
+        assert!(usual.due_ns(now, now + 10_000) <= now, "a cycle of 10 us does not sleep");
     }
 }
