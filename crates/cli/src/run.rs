@@ -10,6 +10,7 @@ mod exchange;
 mod junction;
 mod live;
 mod options;
+mod pace;
 mod reasons;
 mod summary;
 
@@ -40,7 +41,8 @@ use eni::{EniNetwork, Watched};
 use exchange::Run;
 use live::Live;
 pub use options::RunArguments;
-use reasons::{Exchanged, Seen};
+use pace::Seen;
+use reasons::Exchanged;
 use summary::{End, clock_account, final_account, json, summary};
 
 /// SubDevices have this long to get to INIT in the end.

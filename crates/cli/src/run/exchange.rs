@@ -10,6 +10,7 @@ use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceSt
 use super::beside::Beside;
 use super::eni::Watched;
 use super::live::{self, Live};
+use super::pace::Seen;
 use crate::ending::EndRequest;
 use crate::interfaces::now;
 use crate::output::{say, warn, write_event};
@@ -125,7 +126,12 @@ impl Run {
         if late == 0 {
             return format!("not all clocks are locked within {limit}");
         }
-        format!("{} of {} SubDevices not in OP within {limit}", late, states.len())
+        let mut words = format!("{} of {} SubDevices not in OP within {limit}", late, states.len());
+        // A cycle that is shorter than the round trip keeps SubDevices from OP: no frame comes back in time.
+        if let Some(pace) = Seen::of(self.cycles.news()).cycle_time_not_kept(&Seen::default()) {
+            words += &format!("; {pace}");
+        }
+        words
     }
 
     fn print_states(&self, limit: Duration) {

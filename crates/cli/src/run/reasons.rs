@@ -1,29 +1,12 @@
 //! What did not hold while `ringcat run` exchanged process data, in words for its last line.
 
-use ringcat::news::News;
 use ringcat::text::Names;
-use ringcat::{AlState, ClockStatus, CyclicCounters, Pace, RingState, SubDeviceState};
+use ringcat::{AlState, ClockStatus, CyclicCounters, RingState, SubDeviceState};
 
 use super::exchange::Run;
 use super::live;
+use super::pace::Seen;
 use crate::output::counted;
-
-/// The cycle time was not kept if more than one cycle in this many was left out.
-const LEFT_OUT_PART: u64 = 10;
-
-/// Counters at a moment.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Seen {
-    counters: CyclicCounters,
-    pace: Pace,
-}
-
-impl Seen {
-    /// The present ones.
-    pub fn of(news: &News) -> Seen {
-        Seen { counters: news.counters(), pace: news.pace() }
-    }
-}
 
 /// How the exchange of process data went.
 #[derive(Debug, Default)]
@@ -76,11 +59,7 @@ impl Exchanged {
             reasons.push(format!("{incomplete} of {cycles} cycles incomplete"));
         }
         reasons.extend(self.incomplete.iter().map(|words| format!("at the end {words}")));
-        let left_out =
-            self.after.pace.skipped.saturating_sub(self.before.pace.skipped) + gained(|counters| counters.skipped);
-        if left_out * LEFT_OUT_PART > cycles + left_out {
-            reasons.push(format!("the cycle time was not kept: {left_out} of {} cycles left out", cycles + left_out));
-        }
+        reasons.extend(self.after.cycle_time_not_kept(&self.before));
         reasons.extend(self.not_in_state(names));
         match self.ring {
             Some(RingState::Open) => reasons.push("the ring is open".to_owned()),
@@ -133,7 +112,7 @@ mod tests {
     use super::*;
 
     fn seen(counters: CyclicCounters, cycles: u64, skipped: u64) -> Seen {
-        let mut pace = Pace::default();
+        let mut pace = ringcat::Pace::default();
         (pace.cycles, pace.skipped) = (cycles, skipped);
         Seen { counters, pace }
     }
