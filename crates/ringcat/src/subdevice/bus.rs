@@ -99,12 +99,14 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, number| engine.start_sii_read(number).ended())
     }
 
-    /// Writes its EEPROM; as [`Services::sii_write`].
+    /// Writes its EEPROM: each word that differs is written and read back. Without `force` only an SII image is accepted.
+    /// The SubDevice uses it after its next start.
     pub fn sii_write(self, image: Vec<u8>, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
         self.ask(move |engine, number| engine.start_sii_write(number, image, force).ended())
     }
 
-    /// Writes its alias; as [`Services::write_alias`].
+    /// Writes its alias into the EEPROM, with the new checksum. A checksum that is wrong before is corrected only with
+    /// `force`. The alias is valid from the next start of the SubDevice on.
     pub fn write_alias(self, alias: u16, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
         self.ask(move |engine, number| engine.start_alias_write(number, alias, force).ended())
     }
