@@ -99,8 +99,8 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, number| engine.start_sii_read(number).ended())
     }
 
-    /// Writes its EEPROM: each word that differs is written and read back. Without `force` only an SII image is accepted.
-    /// The SubDevice uses it after its next start.
+    /// Writes its EEPROM: each word that differs is written and read back. Without `force` only an SII image is
+    /// accepted. The SubDevice uses it after its next start.
     pub fn sii_write(self, image: Vec<u8>, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
         self.ask(move |engine, number| engine.start_sii_write(number, image, force).ended())
     }
