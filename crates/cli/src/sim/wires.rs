@@ -179,9 +179,9 @@ mod tests {
         let mut clock = Clock { begin_ns: 1_000, lead_ns: 0 };
         let mut before = clock.virtual_time(1_000);
         assert_eq!(before, SimTime(0));
-        for now_ns in (1_000..5_000).step_by(100) {
-            let arrives = clock.virtual_time(now_ns);
-            assert!(arrives >= before, "at {now_ns}");
+        for host_ns in (1_000..5_000).step_by(100) {
+            let arrives = clock.virtual_time(host_ns);
+            assert!(arrives >= before, "at {host_ns}");
             clock.leap(Duration::from_nanos(60));
             before = arrives + Duration::from_nanos(60);
         }

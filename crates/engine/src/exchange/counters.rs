@@ -60,9 +60,7 @@ impl CyclicCounters {
     pub const fn missing(&self) -> u64 {
         self.lost.saturating_sub(self.lost_late).saturating_sub(self.lost_damaged)
     }
-}
 
-impl CyclicCounters {
     /// Number of counters.
     pub const COUNT: usize = 16;
 
