@@ -84,13 +84,11 @@ impl ClockOptions {
             config.sync = signals;
         }
         let epoch = system_time::epoch(now());
-        let config = ClockConfig {
-            reference: self.reference,
-            bus_shift: self.bus_shift,
-            estimated_delays: self.estimate_delays,
-            epoch,
-            ..ClockConfig::default()
-        };
+        let config = ClockConfig::default()
+            .with_reference(self.reference)
+            .with_bus_shift(self.bus_shift)
+            .with_estimated_delays(self.estimate_delays)
+            .with_epoch(epoch);
         if let Some(words) = in_front(self.reference, found, declaration) {
             warn(words);
         }
@@ -107,7 +105,6 @@ impl ClockOptions {
             ));
         }
         match self.reference {
-            ReferenceClock::FirstWithClock => Ok(()),
             ReferenceClock::FirstConfigured if signals.iter().any(Option::is_some) => Ok(()),
             ReferenceClock::FirstConfigured => {
                 Err("--reference sync: no SubDevice has SYNC signals; add --sync".into())
@@ -121,6 +118,7 @@ impl ClockOptions {
                     info.name
                 )),
             },
+            _ => Ok(()),
         }
     }
 
@@ -148,9 +146,9 @@ impl ClockOptions {
 /// A warning where frames reach other clocks before the reference: those receive this host's estimate of its time.
 fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &Declaration) -> Option<String> {
     let position = match reference {
-        ReferenceClock::FirstWithClock => return None,
         ReferenceClock::FirstConfigured => declaration.subdevices.iter().position(|config| config.sync.is_some())?,
         ReferenceClock::Declared(SubDeviceId(position)) => position,
+        _ => return None,
     };
     let first = found[..position].iter().position(|info| info.controller.features.dc)?;
     Some(format!(
@@ -232,12 +230,7 @@ mod tests {
     #[test]
     fn signals_are_printed_in_microseconds() {
         assert_eq!(signals_in_words(&SyncSignals::sync0(62_500, -100_000)), "SYNC0 62.5-100");
-        let both = SyncSignals {
-            assign_activate: 0x0700,
-            sync1_cycle_ns: 2_000_000,
-            sync1_shift_ns: 5_000,
-            ..SyncSignals::sync0(1_000_000, 0)
-        };
+        let both = SyncSignals::sync0(1_000_000, 0).with_assign_activate(0x0700).with_sync1(2_000_000, 5_000);
         assert_eq!(signals_in_words(&both), "SYNC0 1000, SYNC1 2000+5");
     }
 }

@@ -47,7 +47,7 @@ pub struct EniArguments {
 
 /// Reads the file and prints what follows.
 pub fn run(arguments: &EniArguments) -> Result<Report, Failure> {
-    let EniFile { eni: model, configuration } =
+    let EniFile { eni: model, configuration, .. } =
         EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
     summary(&model, &configuration).iter().for_each(|line| say!("{line}"));
     if arguments.details {
@@ -101,7 +101,7 @@ fn summary(model: &Eni, configuration: &Configuration) -> Vec<String> {
     if let Some(clocks) = &declaration.clocks {
         let reference = match clocks.reference {
             ReferenceClock::Declared(index) => format!("SubDevice {index}"),
-            ReferenceClock::FirstWithClock | ReferenceClock::FirstConfigured => "the first one with a clock".to_owned(),
+            _ => "the first one with a clock".to_owned(),
         };
         let follows = if clocks.bus_shift { "follows this computer (bus shift)" } else { "runs free" };
         lines.push(format!("clocks      {reference} is the reference and {follows}"));
@@ -155,6 +155,7 @@ fn place(address: ConfigAddress) -> String {
         ConfigAddress::Position(position) => format!("position {position}"),
         ConfigAddress::Alias { alias, offset } => format!("alias {alias} + {offset}"),
         ConfigAddress::Identification { value, offset } => format!("id {value} + {offset}"),
+        other => other.to_string(),
     }
 }
 
@@ -183,7 +184,7 @@ mod tests {
     const SMALL: &str = include_str!("../files/small.eni.xml");
 
     fn small() -> (Eni, Configuration) {
-        let EniFile { eni, configuration } = EniFile::from_bytes(SMALL.as_bytes()).unwrap();
+        let EniFile { eni, configuration, .. } = EniFile::from_bytes(SMALL.as_bytes()).unwrap();
         (eni, configuration)
     }
 

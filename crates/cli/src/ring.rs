@@ -82,10 +82,10 @@ fn verdict(look: &RingLook, two_links: bool) -> Verdict {
 }
 
 fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
-    CableErrors {
-        invalid_frames: now.invalid_frames.saturating_sub(before.invalid_frames),
-        lost_links: now.lost_links.saturating_sub(before.lost_links),
-    }
+    let mut gained = CableErrors::default();
+    gained.invalid_frames = now.invalid_frames.saturating_sub(before.invalid_frames);
+    gained.lost_links = now.lost_links.saturating_sub(before.lost_links);
+    gained
 }
 
 /// The station address of a position, where the MainDevice in charge has given one.
@@ -95,7 +95,7 @@ fn station(look: &RingLook, node: usize) -> Option<StationAddress> {
 
 /// The SubDevices at both ends of a cable. This command knows no declaration.
 fn ends(look: &RingLook, cable: Cable) -> [Option<Occupant>; 2] {
-    cable.positions().map(|node| Some(Occupant { station: station(look, node?)?, declared: None }))
+    cable.positions().map(|node| Some(Occupant::new(station(look, node?)?, None)))
 }
 
 fn lines(look: &RingLook, two_links: bool) -> Vec<String> {

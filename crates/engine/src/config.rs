@@ -45,6 +45,7 @@ pub use sync_modes::ModeError;
 
 /// Expected identity; `None` matches any value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Expected {
     /// Vendor id.
     pub vendor_id: Option<u32>,
@@ -81,6 +82,7 @@ impl Expected {
 
 /// Whether writes to a SyncManager retrigger the process data watchdog.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Watchdog {
     /// As in the SII.
     #[default]
@@ -93,6 +95,7 @@ pub enum Watchdog {
 
 /// Settings of a SyncManager that override the SII.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct SyncManagerOverride {
     /// Its number.
     pub index: u8,
@@ -105,6 +108,7 @@ pub struct SyncManagerOverride {
 /// Declaration of one SubDevice. The default expects a SubDevice of any identity at position 0, with everything else
 /// from the SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SubDeviceConfig {
     /// Expected place.
     pub address: ConfigAddress,

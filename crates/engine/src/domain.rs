@@ -26,6 +26,7 @@ pub enum DomainState {
 
 /// Result of a domain's last evaluated cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DomainStatus {
     /// Sum of the working counters of all datagrams and both copies, for the commands in use (LRW, or LWR and LRD).
     pub wkc: u32,

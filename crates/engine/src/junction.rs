@@ -19,6 +19,7 @@ const PORTS: u8 = 4;
 
 /// Handling of local rings (JR-03).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum JunctionMode {
     /// Local rings are not known: a break in one is reported as a crossed line (JR-04).
     #[default]
@@ -42,6 +43,7 @@ impl fmt::Display for JunctionMode {
 /// The closing cable of a local ring, as the application declares it. SubDevices are named by their index in the
 /// declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct JunctionConnection {
     /// The junction.
     pub head: SubDeviceId,
@@ -101,6 +103,7 @@ pub enum JunctionError {
 /// Evidence that no cable connects the declared ports, from closing both ports for a moment. An intact ring then loses
 /// no SubDevice; a ring that is broken elsewhere loses the SubDevices behind its break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ClosingEvidence {
     /// A SubDevice did not answer, although it would be reached if the cable existed.
     CutOff {
@@ -159,6 +162,11 @@ impl fmt::Display for JunctionError {
 impl core::error::Error for JunctionError {}
 
 impl JunctionConnection {
+    /// The cable from a port of the junction to a port of the last SubDevice.
+    pub const fn new(head: SubDeviceId, head_port: u8, tail: SubDeviceId, tail_port: u8) -> JunctionConnection {
+        JunctionConnection { head, head_port, tail, tail_port }
+    }
+
     /// Checks a connection against earlier ones and against the number of declared SubDevices (JR-06).
     pub fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
         if self.head >= SubDeviceId(declared) {

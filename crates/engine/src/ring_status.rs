@@ -49,6 +49,7 @@ impl fmt::Display for Cable {
 /// Positions are not indices of the declaration: declared SubDevices may be missing, in another order, or in a hot
 /// connect group, and undeclared ones may be between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Occupant {
     /// Station address.
     pub station: StationAddress,
@@ -56,8 +57,16 @@ pub struct Occupant {
     pub declared: Option<SubDeviceId>,
 }
 
+impl Occupant {
+    /// A SubDevice by its station address, and its index in the declaration if it is declared.
+    pub const fn new(station: StationAddress, declared: Option<SubDeviceId>) -> Occupant {
+        Occupant { station, declared }
+    }
+}
+
 /// Whether the ring tolerates a further break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Redundancy {
     /// There is one link.
     #[default]
@@ -77,6 +86,7 @@ pub enum Redundancy {
 
 /// Why redundancy is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RedundancyLoss {
     /// The ring is open.
     Open,
@@ -95,6 +105,7 @@ impl fmt::Display for RedundancyLoss {
 
 /// One link (`ecrt_master_link_state` of the IgH manual).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LinkStatus {
     /// Whether the interface has a carrier; `None` if the link layer does not report it.
     pub carrier: Option<bool>,
@@ -127,6 +138,7 @@ impl Cable {
 
 /// The ring and both links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RingStatus {
     /// Closed or open, as proved by frames.
     pub state: RingState,

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 /// How to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ReceiveMode {
     /// Sleeps in the kernel.
     #[default]

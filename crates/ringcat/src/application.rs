@@ -40,6 +40,7 @@ const LAST_CYCLES: u32 = 3;
 
 /// What outputs show at an orderly stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LastOutputs {
     /// Zero.
     Zero,

@@ -102,7 +102,7 @@ impl Cyclic {
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         let of_domain = |rule: &CopyRule| {
             let divider = self.rates.get(rule.source.domain.0).map_or(1, |rate| rate.divider);
-            CopyRule { max_age: rule.max_age.saturating_add(divider - 1), ..*rule }
+            rule.with_max_age(rule.max_age.saturating_add(divider - 1))
         };
         let rules: Vec<CopyRule> = rules.iter().map(of_domain).collect();
         self.exchange.set_copies(&rules)

@@ -36,6 +36,7 @@ pub type Ended<L> = Result<Application<L, SupervisorThread>, Box<Panicked<L>>>;
 
 /// The closure of the cycles has panicked. The application is as it was, with all outputs zero: it can be stopped in
 /// order, or run cycles with another closure.
+#[non_exhaustive]
 pub struct Panicked<L> {
     /// The panic's message.
     pub message: String,

@@ -105,6 +105,7 @@ impl EthernetOptions {
 
 /// Something that happened to an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EthernetNews {
     /// It was made.
     Made {
@@ -145,6 +146,7 @@ impl fmt::Display for EthernetNews {
 
 /// What passes one interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EthernetInterface {
     /// Its name.
     pub name: String,
@@ -315,7 +317,7 @@ impl Switch {
         let mut name = self.options.name(&subdevice);
         if self.ends.iter().any(|end| end.name == name) {
             // An alias that two of them have names neither.
-            name = self.options.name(&EthernetSubDevice { alias: 0, ..subdevice });
+            name = self.options.name(&EthernetSubDevice::new(subdevice.subdevice, subdevice.position, 0));
         }
         let interface = (self.make)(&name, self.options.mac(&subdevice))?;
         Ok(End { name, subdevice, interface, carrier: false, refused: 0 })
@@ -365,13 +367,13 @@ mod tests {
     #[test]
     fn interfaces_are_named_and_addressed_by_position_or_alias() {
         let options = EthernetOptions::new(0, [0x00, 0x1B, 0x21, 0xAA, 0xBB, 0xCC]);
-        let by_position = EthernetSubDevice { subdevice: SubDeviceId(4), position: Position(2), alias: 0 };
-        let by_alias = EthernetSubDevice { alias: 1000, ..by_position };
+        let by_position = EthernetSubDevice::new(SubDeviceId(4), Position(2), 0);
+        let by_alias = EthernetSubDevice::new(SubDeviceId(4), Position(2), 1000);
         assert_eq!((options.name(&by_position), options.name(&by_alias)), ("eoe0s2".into(), "eoe0a1000".into()));
         assert_eq!(options.mac(&by_position), [0x02, 0xAA, 0xBB, 0xCC, 0, 2]);
         assert_eq!(options.mac(&by_alias), [0x06, 0xAA, 0xBB, 0xCC, 0x03, 0xE8]);
         let longest = EthernetOptions { index: u16::MAX, ..options };
-        let last = EthernetSubDevice { position: Position(u16::MAX), ..by_position };
+        let last = EthernetSubDevice::new(SubDeviceId(4), Position(u16::MAX), 0);
         assert_eq!(longest.name(&last).len(), 14, "the kernel allows 15");
     }
 }

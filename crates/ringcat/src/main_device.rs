@@ -347,6 +347,7 @@ impl<L: Links> MainDevice<L> {
 
 /// A declaration that was not activated. As an error it drops the MainDevice; `?` turns it into an [`Error`] or into a
 /// `Box<dyn std::error::Error>`.
+#[non_exhaustive]
 pub struct Refused<M> {
     /// Why.
     pub error: Error,

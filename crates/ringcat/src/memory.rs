@@ -81,6 +81,7 @@ impl FrameRing {
 
 /// Links whose other end is in the same process.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct MemoryLinks {
     /// Frames that were sent, for the peer to take.
     pub sent: FrameRing,

@@ -91,14 +91,13 @@ impl News {
         let Some(words) = self.domains.get(domain.0) else { return DomainStatus::default() };
         let [counted, state] = load(words);
         let states = [DomainState::Zero, DomainState::Incomplete, DomainState::Complete];
-        DomainStatus {
-            wkc: counted as u32,
-            expected: (counted >> 32) as u32,
-            state: states[(state as usize & 0x7F).min(2)],
-            returned: state >> 7 & 1 != 0,
-            pending: false,
-            skipped: state >> 8,
-        }
+        let mut status = DomainStatus::default();
+        status.wkc = counted as u32;
+        status.expected = (counted >> 32) as u32;
+        status.state = states[(state as usize & 0x7F).min(2)];
+        status.returned = state >> 7 & 1 != 0;
+        status.skipped = state >> 8;
+        status
     }
 
     /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface.

@@ -92,7 +92,7 @@ impl Failures {
             let failed = self.0.get(index).cloned().flatten();
             let reason = match state {
                 SubDeviceState::Absent => Reason::Absent,
-                SubDeviceState::Configuring | SubDeviceState::Settled(_) => Reason::Configuring { failed },
+                _ => Reason::Configuring { failed },
             };
             (name, reason)
         };

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 /// What makes a cycle begin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Trigger {
     /// The time: cycles have a fixed grid of one period.
     #[default]

@@ -199,7 +199,7 @@ impl Links for PacketLinks {
         match self.mode {
             // A processor that is spun on stays awake and answers at once.
             ReceiveMode::BusyPoll => self.wait(until),
-            ReceiveMode::Blocking | ReceiveMode::Hybrid { .. } => monotonic::sleep_until_ns(until.0),
+            _ => monotonic::sleep_until_ns(until.0),
         }
     }
 

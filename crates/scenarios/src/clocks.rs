@@ -71,7 +71,7 @@ pub fn with_clocks(scan: &Scan, config: ClockConfig) -> Declaration {
 
 /// Usual settings of scenarios.
 pub fn config() -> ClockConfig {
-    ClockConfig { epoch: EPOCH, ..ClockConfig::default() }
+    ClockConfig::default().with_epoch(EPOCH)
 }
 
 /// A world in which the clocks begin to synchronise.

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, JunctionConnection, JunctionMode, Options, SubDeviceId};
+use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceId};
 use ringcat_engine::main_device::RawDatagram;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::controller::Wander;
@@ -130,12 +130,7 @@ impl Plan {
         self.connect(end, at(junction, B));
         let port = |port: Port| port.index() as u8;
         let tail = self.devices - 1;
-        self.connections.push(JunctionConnection {
-            head: SubDeviceId(junction),
-            head_port: port(B),
-            tail: SubDeviceId(tail),
-            tail_port: port(B),
-        });
+        self.connections.push(JunctionConnection::new(SubDeviceId(junction), port(B), SubDeviceId(tail), port(B)));
     }
 
     /// A trunk with branches and rings behind junctions; the trunk may be closed to a ring of two links.
@@ -209,7 +204,7 @@ pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
     let network = wired(devices, &plan.cables);
     let junctions = if plan.connections.is_empty() { JunctionMode::Disabled } else { JunctionMode::Strict };
     let options = Options::default().with_junctions(junctions);
-    let config = ClockConfig { drift_distributions: 500, ..config() };
+    let config = config().with_drift_distributions(500);
     let mut world = World::with_junctions(seed, network, &options, |scan| with_clocks(scan, config), &plan.connections)
         .unwrap_or_else(|error| panic!("seed {seed}, {shape:?}: {error}"));
     world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
@@ -372,12 +367,7 @@ fn truth(world: &mut World) -> Vec<Place> {
     let latched =
         |world: &World| -> Vec<_> { world.network().devices().map(|device| device.controller.latched()).collect() };
     let before = latched(world);
-    let datagram = RawDatagram {
-        command: Command::Bwr,
-        target: Target::Broadcast(map::DC_RECEIVE_TIME),
-        data: vec![0; 4],
-        resend: false,
-    };
+    let datagram = RawDatagram::new(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4]);
     let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
     let _ = world.finish(Duration::from_secs(1), work);
     let mut met: Vec<(u64, u64, usize)> = Vec::new();

@@ -3,6 +3,8 @@
 //! A [`Requester`] writes a unique value, reads it back, and knows the possible values: the last written one, and after
 //! failed writes their possible remains. Any other value is the response to another or an older request, and panics.
 
+use std::net::Ipv4Addr;
+
 use ringcat::Limits;
 use ringcat_engine::mail::aoe::{self, AoeRoute};
 use ringcat_engine::mail::coe::{self, SdoAddress, information};
@@ -182,7 +184,7 @@ impl Requester {
 
     fn route() -> AoeRoute {
         let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
-        AoeRoute { target: address(1000), source: address(0x8000) }
+        AoeRoute::new(address(1000), address(0x8000))
     }
 
     async fn write(&self, value: &[u8]) -> Result<(), String> {
@@ -203,7 +205,7 @@ impl Requester {
             Kind::Memory => aoe::write(mailbox, Self::route(), (MEMORY, 16), value, limits).await.map_err(said),
             Kind::Address => {
                 let address = <[u8; 4]>::try_from(value).ok().map(Into::into);
-                let settings = IpSettings { address, mask: Some([255, 0, 0, 0].into()), ..IpSettings::default() };
+                let settings = IpSettings::default().with_address(address).with_mask(Ipv4Addr::new(255, 0, 0, 0));
                 eoe::set_ip(mailbox, 0, &settings, limits).await.map_err(said)
             }
             Kind::Description | Kind::Vendor => Ok(()),

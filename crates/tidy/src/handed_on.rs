@@ -35,7 +35,7 @@ fn of_crate(tree: &Tree, name: &str) -> Vec<String> {
 }
 
 /// The names in `pub use ringcat_<name>::...` of the library; a renamed one by its name in the lower crate.
-fn re_exported(tree: &Tree, name: &str) -> BTreeSet<String> {
+pub(crate) fn re_exported(tree: &Tree, name: &str) -> BTreeSet<String> {
     let start = format!("pub use ringcat_{name}::");
     let mut names = BTreeSet::new();
     for file in tree.rust().filter(|file| file.path.starts_with(SOURCES)) {

@@ -7,7 +7,7 @@
 //! * [`crates`]: allowed arrows between crates;
 //! * [`dependencies`]: crates that an application gets with the library; examples and the program use only the library;
 //! * [`interface`], [`handed_on`]: the list of public items of the library is kept in the repository;
-//! * [`non_exhaustive`]: public errors, events, counters and options may grow without a break of the interface;
+//! * [`non_exhaustive`]: public types may grow without a break of the interface, or are closed for a reason;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`publishing`]: manifests of crates that are published;
 //! * [`safety`]: files that may contain `unsafe`;

@@ -122,13 +122,8 @@ fn signals(option: &Sync, position: usize, info: &SubDeviceInfo, cycle: Duration
 fn given(sync0: Signal, sync1: Option<Signal>, info: &SubDeviceInfo) -> SyncSignals {
     let plain = if sync1.is_some() { BOTH } else { SYNC0 };
     let same = info.dc_modes.iter().map(|mode| mode.assign_activate).find(|word| word & ACTIVATION == plain);
-    SyncSignals {
-        assign_activate: same.unwrap_or(plain),
-        sync0_cycle_ns: sync0.cycle_ns,
-        sync0_shift_ns: sync0.shift_ns,
-        sync1_cycle_ns: sync1.map_or(0, |signal| signal.cycle_ns),
-        sync1_shift_ns: sync1.map_or(0, |signal| signal.shift_ns),
-    }
+    let signals = SyncSignals::sync0(sync0.cycle_ns, sync0.shift_ns).with_assign_activate(same.unwrap_or(plain));
+    sync1.map_or(signals, |sync1| signals.with_sync1(sync1.cycle_ns, sync1.shift_ns))
 }
 
 /// Refuses signals that would drift against the cycles.
@@ -156,7 +151,8 @@ mod tests {
     const CYCLE: Duration = Duration::from_millis(1);
 
     fn info(dc: bool, modes: &[u16]) -> SubDeviceInfo {
-        let mut info = SubDeviceInfo { name: "drive".to_owned(), ..SubDeviceInfo::default() };
+        let mut info = SubDeviceInfo::default();
+        info.name = "drive".to_owned();
         info.controller.features.dc = dc;
         let mode = |word: &u16| DcMode { assign_activate: *word, sync0_cycle_factor: 1, ..DcMode::default() };
         info.dc_modes = modes.iter().map(mode).collect();

@@ -201,19 +201,10 @@ mod tests {
     }
 
     fn clock(difference_ns: Option<i32>) -> ClockStatus {
-        ClockStatus {
-            position: 0,
-            station: StationAddress(0x1001),
-            subdevice: None,
-            is_reference: false,
-            delay_ns: 0,
-            hidden: None,
-            offset_ns: 0,
-            drift_ppb: 0,
-            difference_ns,
-            worst_ns: 0,
-            is_locked: false,
-        }
+        let mut clock = ClockStatus::default();
+        clock.station = StationAddress(0x1001);
+        clock.difference_ns = difference_ns;
+        clock
     }
 
     // covers: dc-tools

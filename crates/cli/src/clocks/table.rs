@@ -98,19 +98,17 @@ mod tests {
     use ringcat::wire::address::{Position, StationAddress};
 
     fn clock() -> ClockStatus {
-        ClockStatus {
-            position: 3,
-            station: StationAddress(0x1004),
-            subdevice: Some(SubDeviceId(0)),
-            is_reference: false,
-            delay_ns: 1_050,
-            hidden: None,
-            offset_ns: -7,
-            drift_ppb: -12_345,
-            difference_ns: Some(-9),
-            worst_ns: 31,
-            is_locked: true,
-        }
+        let mut clock = ClockStatus::default();
+        clock.position = 3;
+        clock.station = StationAddress(0x1004);
+        clock.subdevice = Some(SubDeviceId(0));
+        clock.delay_ns = 1_050;
+        clock.offset_ns = -7;
+        clock.drift_ppb = -12_345;
+        clock.difference_ns = Some(-9);
+        clock.worst_ns = 31;
+        clock.is_locked = true;
+        clock
     }
 
     // covers: dc-tools
@@ -126,8 +124,15 @@ mod tests {
     // covers: dc-delays
     #[test]
     fn a_delay_that_is_not_known_is_none_and_an_estimate_is_marked() {
-        let hidden = HiddenDelay { fork: Some(Position(2)), range_ns: Some((0, 2_100)), is_estimated: true };
-        let one = |is_estimated| ClockStatus { hidden: Some(HiddenDelay { is_estimated, ..hidden }), ..clock() };
+        let one = |is_estimated| {
+            let mut hidden = HiddenDelay::default();
+            hidden.fork = Some(Position(2));
+            hidden.range_ns = Some((0, 2_100));
+            hidden.is_estimated = is_estimated;
+            let mut clock = clock();
+            clock.hidden = Some(hidden);
+            clock
+        };
         let words = |clock: ClockStatus| {
             let lines = lines(&[clock], &Names::default(), &[None]);
             let clocks = json(&[clock], &Names::default(), &[None], true, &Histogram::default());

@@ -101,8 +101,8 @@ impl Reporter {
         for (subdevice, state) in application.states().iter().enumerate() {
             let state = match state {
                 SubDeviceState::Absent => "does not answer".to_owned(),
-                SubDeviceState::Configuring => "is being configured".to_owned(),
                 SubDeviceState::Settled(state) => state.to_string(),
+                _ => "is being configured".to_owned(),
             };
             let name = names.0.get(subdevice).map_or("", String::as_str);
             self.say(&format!("  SubDevice {subdevice} \"{name}\": {state}"));

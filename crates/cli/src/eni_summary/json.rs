@@ -29,7 +29,7 @@ pub(super) fn json(model: &Eni, configuration: &Configuration) -> eni::EniFile {
     let clocks = declaration.clocks.as_ref().map(|clocks| {
         let reference = match clocks.reference {
             ReferenceClock::Declared(index) => Some(index.0),
-            ReferenceClock::FirstWithClock | ReferenceClock::FirstConfigured => None,
+            _ => None,
         };
         eni::Clocks { reference, bus_shift: clocks.bus_shift }
     });
@@ -128,6 +128,7 @@ fn address(config: &SubDeviceConfig) -> eni::Address {
         ConfigAddress::Identification { value, offset } => {
             eni::Address { identification: Some(value), offset: Some(offset), ..none }
         }
+        _ => none,
     }
 }
 

@@ -33,6 +33,7 @@ pub(super) fn action(action: &StartupAction) -> String {
                 format!("register {} & {} must be {}", register.address, hex(mask), hex(data))
             }
         },
+        _ => "a command".to_owned(),
     }
 }
 

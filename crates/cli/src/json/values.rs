@@ -100,8 +100,8 @@ impl State {
             name: names.get(subdevice).cloned().unwrap_or_default(),
             state: match state {
                 SubDeviceState::Absent => "absent".to_owned(),
-                SubDeviceState::Configuring => "configuring".to_owned(),
                 SubDeviceState::Settled(state) => al_state(*state),
+                _ => "configuring".to_owned(),
             },
         };
         states.iter().enumerate().map(state).collect()

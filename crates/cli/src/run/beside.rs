@@ -88,7 +88,7 @@ impl Beside {
     /// The network interfaces for EoE, as keys of JSON.
     pub fn json_ethernet(&self) -> Vec<run::Ethernet> {
         let interfaces = self.ethernet.iter().flat_map(Ethernet::interfaces);
-        let json = |EthernetInterface { name, subdevice, status, refused }: EthernetInterface| run::Ethernet {
+        let json = |EthernetInterface { name, subdevice, status, refused, .. }: EthernetInterface| run::Ethernet {
             interface: name,
             subdevice: subdevice.subdevice.0,
             sent_frames: status.counters.tx_frames,
@@ -125,7 +125,7 @@ impl Beside {
             if interfaces.is_empty() {
                 say!("  EoE: no network interface");
             }
-            for EthernetInterface { name, subdevice, status, refused } in interfaces {
+            for EthernetInterface { name, subdevice, status, refused, .. } in interfaces {
                 let counters = status.counters;
                 say!(
                     "  {name} (SubDevice {}): to it {} frames, {} bytes, {} dropped; from it {} frames, \

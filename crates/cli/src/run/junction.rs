@@ -45,12 +45,7 @@ impl Connection {
             }),
         };
         let ((head, head_port), (tail, tail_port)) = (self.head, self.tail);
-        Ok(JunctionConnection {
-            head: SubDeviceId(index(head)?),
-            head_port,
-            tail: SubDeviceId(index(tail)?),
-            tail_port,
-        })
+        Ok(JunctionConnection::new(SubDeviceId(index(head)?), head_port, SubDeviceId(index(tail)?), tail_port))
     }
 }
 
@@ -75,7 +70,7 @@ fn connection(text: &str) -> Result<Connection, String> {
     };
     let connection = Connection { head, tail };
     // The number of SubDevices and their station addresses are not known yet.
-    let known = JunctionConnection { head: SubDeviceId(0), head_port: head.1, tail: SubDeviceId(1), tail_port: tail.1 };
+    let known = JunctionConnection::new(SubDeviceId(0), head.1, SubDeviceId(1), tail.1);
     let known = connection.resolve(|_| None).unwrap_or(known);
     known.check(&[], usize::MAX).map_err(|error| error.to_string())?;
     Ok(connection)
@@ -112,7 +107,7 @@ mod tests {
         assert_eq!(junctions("strict=1:1-4:1"), Ok(strict(&[(1, 1, 4, 1)])));
         assert_eq!(junctions("strict=0:1-2:1,3:1-5:3"), Ok(strict(&[(0, 1, 2, 1), (3, 1, 5, 3)])));
         let by_station = junctions("strict=@1002:1-4:1").expect("as a file calls it").connections[0];
-        let resolved = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
+        let resolved = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 1);
         assert_eq!(by_station.resolve(|station| (station == 1002).then_some(1)), Ok(resolved));
         assert!(by_station.resolve(|_| None).is_err_and(|text| text.contains("station address 1002")));
         assert!(junctions("strict=@1002:2-@1004:1").is_err(), "the head's port is 1");

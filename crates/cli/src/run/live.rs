@@ -144,8 +144,8 @@ fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
 pub fn word(state: SubDeviceState) -> String {
     match state {
         SubDeviceState::Absent => "does not answer".to_owned(),
-        SubDeviceState::Configuring => "is being configured".to_owned(),
         SubDeviceState::Settled(state) => state.to_string(),
+        _ => "is being configured".to_owned(),
     }
 }
 
@@ -186,7 +186,8 @@ mod tests {
 
     #[test]
     fn the_ring_is_shown_with_its_break_and_both_links() {
-        let mut status = RingStatus { state: RingState::Closed, ..RingStatus::default() };
+        let mut status = RingStatus::default();
+        status.state = RingState::Closed;
         status.links[0].answering = 3;
         status.links[1].carrier = Some(false);
         let names = Names::default();
@@ -202,8 +203,9 @@ mod tests {
     // covers: dc-tools
     #[test]
     fn clocks_have_a_line() {
-        let clock = ClockStatus { position: 3, is_reference: true, ..ClockStatus::default() };
-        let clocks = [clock, ClockStatus { is_reference: false, ..clock }];
+        let mut clocks = [ClockStatus::default(); 2];
+        clocks.iter_mut().for_each(|clock| clock.position = 3);
+        clocks[0].is_reference = true;
         let expected = "clocks        1 of 2 locked, spread 31 ns, reference 3, cycles -1.5 us from their phase";
         assert_eq!(clock_line(&clocks, Some(31), (-1_500, true)), expected);
         assert_eq!(clock_line(&[], None, (7, false)), "clocks        0 of 0 locked");

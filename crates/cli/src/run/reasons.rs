@@ -154,7 +154,8 @@ mod tests {
     fn subdevices_ring_and_clocks_are_checked_at_the_end() {
         let states = vec![SubDeviceState::Absent, SubDeviceState::Settled(AlState::Op), SubDeviceState::Configuring];
         let mut exchanged = Exchanged { states, all_settled: false, ring: Some(RingState::Open), ..settled() };
-        exchanged.clocks = vec![ClockStatus::default(), ClockStatus { is_reference: true, ..ClockStatus::default() }];
+        exchanged.clocks = vec![ClockStatus::default(); 2];
+        exchanged.clocks[1].is_reference = true;
         exchanged.incomplete = vec!["domain 0: no SubDevice answers, working counter 0 of 3".to_owned()];
         let expected = [
             "at the end domain 0: no SubDevice answers, working counter 0 of 3",

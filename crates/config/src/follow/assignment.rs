@@ -79,7 +79,7 @@ pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Ve
             let pdos: Vec<u16> = object.list()?.into_iter().map(|pdo| pdo as u16).collect();
             let direction = direction(*index, &pdos)?;
             let pdos = pdos.into_iter().map(|pdo| mapping(pdo, &objects, subdevice)).collect();
-            Some(PdoAssignment { sync_manager: (index - ASSIGNMENT) as u8, direction, pdos })
+            Some(PdoAssignment::new((index - ASSIGNMENT) as u8, direction, pdos))
         })
         .collect();
     (!assignments.is_empty()).then_some(assignments)

@@ -51,7 +51,7 @@ fn from_element(clock: &DistributedClock) -> SyncSignals {
 
 /// The SYNC1 register counts from SYNC0: whole cycles are its division, the rest is its shift.
 fn signals(assign_activate: u16, cycle_0: u32, register_1: u32, shift: i32) -> SyncSignals {
-    let mut signals = SyncSignals { assign_activate, ..SyncSignals::sync0(cycle_0, shift) };
+    let mut signals = SyncSignals::sync0(cycle_0, shift).with_assign_activate(assign_activate);
     if assign_activate & SYNC1_ON != 0 && cycle_0 > 0 {
         let cycles = register_1 / cycle_0;
         signals.sync1_cycle_ns = if cycles == 0 { 0 } else { cycle_0.saturating_add(cycles.saturating_mul(cycle_0)) };
@@ -68,5 +68,5 @@ pub(super) fn of_segment(eni: &Eni, configs: &[SubDeviceConfig], cyclic: &Cyclic
         .reference
         .or(by_element)
         .map_or(ReferenceClock::default(), |index| ReferenceClock::Declared(SubDeviceId(index)));
-    used.then(|| ClockConfig { reference, bus_shift: cyclic.bus_shift, ..ClockConfig::default() })
+    used.then(|| ClockConfig::default().with_reference(reference).with_bus_shift(cyclic.bus_shift))
 }

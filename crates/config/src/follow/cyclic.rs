@@ -128,12 +128,12 @@ fn of_process_data(
     }
     if code == Command::Lrw {
         let name = format!("{} ({})", name(at, eni.tasks.len(), command), command.place);
-        cyclic.explicit_lrw.push(ExplicitLrw {
+        cyclic.explicit_lrw.push(ExplicitLrw::new(
             name,
             logical,
-            length: command.datagram.data.len(),
-            subdevices: met.into_iter().map(SubDeviceId).collect(),
-        });
+            command.datagram.data.len(),
+            met.into_iter().map(SubDeviceId).collect(),
+        ));
     }
 }
 
@@ -237,7 +237,7 @@ fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_cover: bool, cyclic: &mut Cyc
     for (subdevice, pieces) in mappings.iter().enumerate() {
         let left_to_sii = !is_complete(&eni.subdevices[subdevice].init_commands);
         if left_to_sii || (!any_cover && !pieces.is_empty()) {
-            members[0].push(DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
+            members[0].push(DomainMember::new(SubDeviceId(subdevice)));
             continue;
         }
         let mut by_task: Vec<(usize, u8)> = Vec::new();
@@ -264,7 +264,7 @@ fn domains(eni: &Eni, mappings: &[Vec<Piece>], any_cover: bool, cyclic: &mut Cyc
         for chunk in by_task.chunk_by(|a, b| a.0 == b.0) {
             let whole = chunk.len() == covered && covered == all.len();
             let sync_managers = (!whole).then(|| chunk.iter().map(|(_, sync_manager)| *sync_manager).collect());
-            members[chunk[0].0].push(DomainMember { subdevice: SubDeviceId(subdevice), sync_managers });
+            members[chunk[0].0].push(DomainMember::new(SubDeviceId(subdevice)).with_sync_managers(sync_managers));
         }
     }
     for (task, members) in members.into_iter().enumerate().filter(|(_, members)| !members.is_empty()) {

@@ -35,10 +35,10 @@ pub(super) fn startup(
     let Some(mailbox) = &eni.subdevices[index].mailbox else { return Ok(()) };
     let mut add =
         |place, transitions: &[Transition], subject: &str, timeout_ms, words: &str, action, notices: &mut Notices| {
-            startup.extend(at_transitions(place, transitions, index, subject, notices, |transition| StartupCommand {
-                limit: limit(timeout_ms),
-                comment: comment(words),
-                ..StartupCommand::new(transition, StartupAction::clone(&action))
+            startup.extend(at_transitions(place, transitions, index, subject, notices, |transition| {
+                StartupCommand::new(transition, StartupAction::clone(&action))
+                    .with_limit(limit(timeout_ms))
+                    .with_comment(comment(words))
             }));
         };
     if bus.ccs_is_reversed && !mailbox.coe.is_empty() {
@@ -91,12 +91,14 @@ fn sdo(command: &CoeCommand, is_reversed: bool) -> Result<StartupAction, &'stati
     let data = command.data.clone();
     if (command.ccs == 2) != is_reversed {
         let expected = (!data.is_empty()).then_some(data);
-        return Ok(StartupAction::Upload(SdoUpload { index, sub_index, complete_access, expected }));
+        return Ok(StartupAction::Upload(
+            SdoUpload::new(index, sub_index).with_complete_access(complete_access).with_expected(expected),
+        ));
     }
     if data.is_empty() {
         return Err("Data to download");
     }
-    Ok(StartupAction::Sdo(SdoDownload { index, sub_index, complete_access, data }))
+    Ok(StartupAction::Sdo(SdoDownload::new(index, sub_index, data).with_complete_access(complete_access)))
 }
 
 fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
@@ -109,7 +111,7 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     if command.drive >= SOE_DRIVES {
         return Err(format!("DriveNo {}: a SubDevice has drives 0 to 7", command.drive));
     }
-    Ok(StartupAction::Idn(IdnWrite { drive: command.drive, idn: Idn(command.idn), data: command.data.clone() }))
+    Ok(StartupAction::Idn(IdnWrite::new(command.drive, Idn(command.idn), command.data.clone())))
 }
 
 /// The Set IP Parameter message. Some tools write only the part after the EoE header (protocol 6.5) and leave the
@@ -141,14 +143,13 @@ fn are_addresses(data: &[u8]) -> bool {
 fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
     if !command.data.is_empty() {
         return match EoeMessage::decode(&with_header(&command.data)) {
-            Ok(EoeMessage { body: EoeBody::SetIp(found), .. }) => Ok(IpSettings {
-                mac: found.mac,
-                address: found.address,
-                mask: found.mask,
-                gateway: found.gateway,
-                dns: found.dns,
-                name: found.name.map(<[u8]>::to_vec),
-            }),
+            Ok(EoeMessage { body: EoeBody::SetIp(found), .. }) => Ok(IpSettings::default()
+                .with_mac(found.mac)
+                .with_address(found.address)
+                .with_mask(found.mask)
+                .with_gateway(found.gateway)
+                .with_dns(found.dns)
+                .with_name(found.name.map(<[u8]>::to_vec))),
             Ok(_) | Err(_) => Err("a message that does not set addresses (EoE type 2) is not sent"),
         };
     }
@@ -168,13 +169,12 @@ fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
     if name.as_ref().is_some_and(|name| name.len() > EOE_NAME) {
         return Err("a name of more than 32 bytes: not sent");
     }
-    let settings = IpSettings {
-        mac,
-        address: address(&command.ip)?,
-        mask: address(&command.subnet)?,
-        gateway: address(&command.gateway)?,
-        dns: address(&command.server)?,
-        name,
-    };
+    let settings = IpSettings::default()
+        .with_mac(mac)
+        .with_address(address(&command.ip)?)
+        .with_mask(address(&command.subnet)?)
+        .with_gateway(address(&command.gateway)?)
+        .with_dns(address(&command.server)?)
+        .with_name(name);
     if settings == IpSettings::default() { Err("no address in it: not sent") } else { Ok(settings) }
 }

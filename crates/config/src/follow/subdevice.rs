@@ -32,7 +32,7 @@ pub(super) fn follow(
     let commands = &subdevice.init_commands;
     let registers = Registers::after(commands, &UP);
     let complete = is_complete(commands);
-    let mut config = SubDeviceConfig { address: bus.addresses[index], ..SubDeviceConfig::default() };
+    let mut config = SubDeviceConfig::at(bus.addresses[index]);
     config.expected = identity::expected(eni, index, complete)?;
     config.watchdog_divider = registers.word(map::WATCHDOG_DIVIDER);
     config.pdi_watchdog_intervals = registers.word(map::WATCHDOG_TIME_PDI);
@@ -215,7 +215,7 @@ fn time_limits(eni: &Eni, index: usize, command: &EcatCommand) -> Result<Vec<Sta
             && validate.timeout_ms > 0
             && validate.data.first().is_some_and(|state| state & AL_STATE == to.code())
         {
-            limits.push(StateTimeout { from, to, limit: Duration::from_millis(validate.timeout_ms.into()) });
+            limits.push(StateTimeout::new(from, to, Duration::from_millis(validate.timeout_ms.into())));
         }
     }
     Ok(limits)
@@ -255,17 +255,12 @@ fn raw(
         let got = format!("{} bytes at {ado}", command.datagram.data.len());
         return Err(contradiction(eni, index, command.place, what, "an end within 64 KiB", got, ""));
     }
-    let register = RegisterCommand {
-        address: ado,
-        access,
-        retries: u8::try_from(command.retries).unwrap_or(u8::MAX),
-        required: command.datagram.count.is_some_and(|count| count > 0),
-    };
+    let register = RegisterCommand::new(ado, access)
+        .with_retries(u8::try_from(command.retries).unwrap_or(u8::MAX))
+        .with_required(command.datagram.count.is_some_and(|count| count > 0));
     startup.extend(at_transitions(command.place, &command.transitions, index, &subject, notices, |transition| {
-        StartupCommand {
-            comment: comment(&command.comment),
-            ..StartupCommand::new(transition, StartupAction::Register(register.clone()))
-        }
+        StartupCommand::new(transition, StartupAction::Register(register.clone()))
+            .with_comment(comment(&command.comment))
     }));
     Ok(())
 }

@@ -63,7 +63,7 @@ pub(super) fn declared(
 fn declare(index: u8, role: SyncManagerRole, register: SyncManager) -> DeclaredSyncManager {
     let register =
         SyncManager { status: SyncManagerStatus::default(), pdi_control: SyncManagerPdiControl::default(), ..register };
-    DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
+    DeclaredSyncManager::new(index, role, register)
 }
 
 /// The role by `Type`; without it by the control byte.

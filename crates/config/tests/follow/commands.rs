@@ -137,13 +137,7 @@ fn long_entries_are_split_and_pdos_that_do_not_fit_have_no_positions() {
 #[test]
 fn sync_signals_result_from_the_registers_and_the_shift_from_the_element() {
     let configuration = configured(SMALL);
-    let expected = SyncSignals {
-        assign_activate: 0x0700,
-        sync0_cycle_ns: 1_000_000,
-        sync0_shift_ns: -20_000,
-        sync1_cycle_ns: 0,
-        sync1_shift_ns: 250_000,
-    };
+    let expected = SyncSignals::sync0(1_000_000, -20_000).with_assign_activate(0x0700).with_sync1(0, 250_000);
     assert_eq!(drive(&configuration).sync, Some(expected));
     assert_eq!(expected.sync1_register_ns(), 250_000);
     // 2,250,000 ns: SYNC1 occurs with every third SYNC0, a quarter of a cycle later.
@@ -160,21 +154,19 @@ fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     let drive = drive(&configured(SMALL));
     let mail: Vec<_> = drive.startup.iter().filter(|c| !matches!(c.action, StartupAction::Register(_))).collect();
     let sdo = |sub_index, complete_access, data: &[u8]| {
-        StartupAction::Sdo(SdoDownload { index: 0x1C12, sub_index, complete_access, data: data.to_vec() })
+        StartupAction::Sdo(SdoDownload::new(0x1C12, sub_index, data.to_vec()).with_complete_access(complete_access))
     };
     let found: Vec<_> = mail.iter().map(|command| (command.transition, &command.action)).collect();
-    let upload = SdoUpload { index: 0x1018, sub_index: 1, complete_access: false, expected: Some(vec![0x9A, 0, 0, 0]) };
-    let addresses = IpSettings {
-        mac: Some([2, 0, 0, 0, 0, 4]),
-        address: Some(Ipv4Addr::new(192, 168, 1, 4)),
-        mask: Some(Ipv4Addr::new(255, 255, 255, 0)),
-        ..IpSettings::default()
-    };
+    let upload = SdoUpload::new(0x1018, 1).with_expected(vec![0x9A, 0, 0, 0]);
+    let addresses = IpSettings::default()
+        .with_mac([2, 0, 0, 0, 0, 4])
+        .with_address(Ipv4Addr::new(192, 168, 1, 4))
+        .with_mask(Ipv4Addr::new(255, 255, 255, 0));
     let expected = [
         (Transition::Ps, &sdo(0, false, &[0])),
         (Transition::Ps, &sdo(0, true, &[1, 0, 0, 0x16])),
         (Transition::Ps, &StartupAction::Upload(upload)),
-        (Transition::Ip, &StartupAction::Idn(IdnWrite { drive: 1, idn: Idn(2), data: vec![0xE8, 0x03] })),
+        (Transition::Ip, &StartupAction::Idn(IdnWrite::new(1, Idn(2), vec![0xE8, 0x03]))),
         (Transition::Ip, &StartupAction::Ip(addresses)),
     ];
     assert_eq!(found, expected, "and not what is disabled");
@@ -200,18 +192,13 @@ fn a_file_with_only_ccs_2_means_downloads() {
 fn other_registers_are_written_and_compared_as_in_the_file() {
     let configuration = configured(SMALL);
     let commands = registers(&drive(&configuration));
-    let write = RegisterCommand {
-        address: RegisterAddress(0x0F00),
-        access: RegisterAccess::Write(vec![0xC0, 0xDE]),
-        retries: 5,
-        required: true,
-    };
-    let check = RegisterCommand {
-        address: RegisterAddress(0x0F04),
-        access: RegisterAccess::Check { data: vec![1, 0], mask: Some(vec![3, 0]), limit: Duration::from_millis(40) },
-        retries: 0,
-        required: false,
-    };
+    let write = RegisterCommand::new(RegisterAddress(0x0F00), RegisterAccess::Write(vec![0xC0, 0xDE]))
+        .with_retries(5)
+        .with_required(true);
+    let check = RegisterCommand::new(
+        RegisterAddress(0x0F04),
+        RegisterAccess::Check { data: vec![1, 0], mask: Some(vec![3, 0]), limit: Duration::from_millis(40) },
+    );
     assert_eq!(commands, [(Transition::Ps, write.clone()), (Transition::Sp, write), (Transition::So, check)]);
     assert!(has_notice(&configuration, &["own register", "not sent at OI"]));
 }

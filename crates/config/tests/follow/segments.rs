@@ -145,7 +145,7 @@ fn a_file_with_only_coe_commands_defines_the_length_of_process_data() {
     );
     let config = &configured(&text).declaration.subdevices[0];
     let assigned =
-        |sync_manager, direction, pdos: [PdoMapping; 2]| PdoAssignment { sync_manager, direction, pdos: pdos.to_vec() };
+        |sync_manager, direction, pdos: [PdoMapping; 2]| PdoAssignment::new(sync_manager, direction, pdos.to_vec());
     let drive = PdoMapping::of(0x1601, [PdoEntry::new(0x6040, 0, 16), PdoEntry::new(0x607A, 0, 32)]);
     let mode = PdoMapping::of(0x1A05, [PdoEntry::new(0x6061, 0, 8)]);
     let expected = vec![

@@ -47,6 +47,7 @@ pub struct Segment<'a> {
 /// Time of a frame through a SubDevice from port to port, with fraction, beyond a base time that all SubDevices have in
 /// common (protocol 7.1: tDiff is the difference between both fields).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Passage {
     /// Path through the processing unit.
     pub processed: i64,

@@ -6,6 +6,7 @@ use crate::info::SubDeviceInfo;
 
 /// Expected place of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ConfigAddress {
     /// Position in the configured order, from 0. If an optional SubDevice is absent, the following ones are expected
     /// one position nearer to the start of the segment. Members of [groups](super::Group) are not counted.

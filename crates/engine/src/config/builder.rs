@@ -7,25 +7,31 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::{
-    ConfigAddress, IdnWrite, IpSettings, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction,
-    StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
+    ConfigAddress, DeclaredSyncManager, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping,
+    SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals,
+    Timeouts, Transition, Watchdog,
 };
 use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
 
 impl SubDeviceConfig {
+    /// A SubDevice of any identity at this place.
+    pub fn at(address: ConfigAddress) -> SubDeviceConfig {
+        SubDeviceConfig { address, ..SubDeviceConfig::default() }
+    }
+
     /// A SubDevice of any identity at a position.
     pub fn at_position(position: u16) -> SubDeviceConfig {
-        SubDeviceConfig { address: ConfigAddress::Position(position), ..SubDeviceConfig::default() }
+        SubDeviceConfig::at(ConfigAddress::Position(position))
     }
 
     /// A SubDevice of any identity, `offset` places behind the one with an alias.
     pub fn at_alias(alias: u16, offset: u16) -> SubDeviceConfig {
-        SubDeviceConfig { address: ConfigAddress::Alias { alias, offset }, ..SubDeviceConfig::default() }
+        SubDeviceConfig::at(ConfigAddress::Alias { alias, offset })
     }
 
     /// A SubDevice of any identity with an explicit device identification, at any place.
     pub fn at_identification(value: u16) -> SubDeviceConfig {
-        SubDeviceConfig { address: ConfigAddress::Identification { value, offset: 0 }, ..SubDeviceConfig::default() }
+        SubDeviceConfig::at(ConfigAddress::Identification { value, offset: 0 })
     }
 
     /// The SubDevice that a scan found: at its position, with its vendor and product; everything else from its SII.
@@ -105,6 +111,13 @@ impl SubDeviceConfig {
             let pdos = pdos.map(mapping).collect();
             self = self.assign(sync_manager, direction, pdos);
         }
+        self
+    }
+
+    /// Takes all SyncManagers from a configuration file: [`SubDeviceConfig::declared`].
+    #[must_use]
+    pub fn declared(mut self, sync_managers: Vec<DeclaredSyncManager>) -> SubDeviceConfig {
+        self.declared = Some(sync_managers);
         self
     }
 
@@ -201,6 +214,13 @@ impl SubDeviceConfig {
     #[must_use]
     pub fn sync(mut self, signals: SyncSignals) -> SubDeviceConfig {
         self.sync = Some(signals);
+        self
+    }
+
+    /// Sets the time that frames take through it.
+    #[must_use]
+    pub fn passage(mut self, passage: Passage) -> SubDeviceConfig {
+        self.passage = Some(passage);
         self
     }
 

@@ -5,6 +5,7 @@ use core::time::Duration;
 
 /// The reference clock that all other clocks follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ReferenceClock {
     /// The first SubDevice with a clock, declared or not.
     #[default]
@@ -21,6 +22,7 @@ pub enum ReferenceClock {
 /// SubDevices count: a part that all SubDevices have in common is measured with the cables. A missing part of single
 /// SubDevices makes the delay to the next SubDevice wrong by half of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Passage {
     /// Nanoseconds through the processing unit.
     pub processing_ns: u16,
@@ -29,8 +31,16 @@ pub struct Passage {
     pub forwarding_ns: u16,
 }
 
+impl Passage {
+    /// Times with and without the processing unit, in nanoseconds.
+    pub const fn new(processing_ns: u16, forwarding_ns: u16) -> Passage {
+        Passage { processing_ns, forwarding_ns }
+    }
+}
+
 /// Distributed clocks of the segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ClockConfig {
     /// The reference clock that all other clocks follow. When it is lost, the next SubDevice with a clock takes over.
     pub reference: ReferenceClock,
@@ -64,6 +74,92 @@ pub struct ClockConfig {
     pub estimated_delays: bool,
 }
 
+impl ClockConfig {
+    /// Sets [`ClockConfig::reference`].
+    #[must_use]
+    pub const fn with_reference(mut self, reference: ReferenceClock) -> ClockConfig {
+        self.reference = reference;
+        self
+    }
+
+    /// Sets [`ClockConfig::epoch`].
+    #[must_use]
+    pub const fn with_epoch(mut self, epoch: u64) -> ClockConfig {
+        self.epoch = epoch;
+        self
+    }
+
+    /// Sets [`ClockConfig::bus_shift`].
+    #[must_use]
+    pub const fn with_bus_shift(mut self, bus_shift: bool) -> ClockConfig {
+        self.bus_shift = bus_shift;
+        self
+    }
+
+    /// Sets [`ClockConfig::measurements`].
+    #[must_use]
+    pub const fn with_measurements(mut self, measurements: u32) -> ClockConfig {
+        self.measurements = measurements;
+        self
+    }
+
+    /// Sets [`ClockConfig::passage`].
+    #[must_use]
+    pub const fn with_passage(mut self, passage: Passage) -> ClockConfig {
+        self.passage = passage;
+        self
+    }
+
+    /// Sets [`ClockConfig::drift_distributions`].
+    #[must_use]
+    pub const fn with_drift_distributions(mut self, drift_distributions: u32) -> ClockConfig {
+        self.drift_distributions = drift_distributions;
+        self
+    }
+
+    /// Sets [`ClockConfig::lock_window_ns`].
+    #[must_use]
+    pub const fn with_lock_window_ns(mut self, lock_window_ns: u32) -> ClockConfig {
+        self.lock_window_ns = lock_window_ns;
+        self
+    }
+
+    /// Sets [`ClockConfig::lock_samples`].
+    #[must_use]
+    pub const fn with_lock_samples(mut self, lock_samples: u32) -> ClockConfig {
+        self.lock_samples = lock_samples;
+        self
+    }
+
+    /// Sets [`ClockConfig::lock_limit`].
+    #[must_use]
+    pub const fn with_lock_limit(mut self, lock_limit: Duration) -> ClockConfig {
+        self.lock_limit = lock_limit;
+        self
+    }
+
+    /// Sets [`ClockConfig::sync_window_ns`].
+    #[must_use]
+    pub const fn with_sync_window_ns(mut self, sync_window_ns: u32) -> ClockConfig {
+        self.sync_window_ns = sync_window_ns;
+        self
+    }
+
+    /// Sets [`ClockConfig::pauses`].
+    #[must_use]
+    pub const fn with_pauses(mut self, pauses: bool) -> ClockConfig {
+        self.pauses = pauses;
+        self
+    }
+
+    /// Sets [`ClockConfig::estimated_delays`].
+    #[must_use]
+    pub const fn with_estimated_delays(mut self, estimated_delays: bool) -> ClockConfig {
+        self.estimated_delays = estimated_delays;
+        self
+    }
+}
+
 impl Default for ClockConfig {
     fn default() -> ClockConfig {
         ClockConfig {
@@ -85,6 +181,7 @@ impl Default for ClockConfig {
 
 /// SYNC signals of one SubDevice (protocol 7.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct SyncSignals {
     /// Registers 0x0980 (low byte) and 0x0981 (high byte), as AssignActivate in ESI and SII: 0x0300, 0x0700.
     pub assign_activate: u16,
@@ -108,6 +205,21 @@ impl SyncSignals {
             sync1_cycle_ns: 0,
             sync1_shift_ns: 0,
         }
+    }
+
+    /// Sets [`SyncSignals::assign_activate`].
+    #[must_use]
+    pub const fn with_assign_activate(mut self, assign_activate: u16) -> SyncSignals {
+        self.assign_activate = assign_activate;
+        self
+    }
+
+    /// Sets cycle and shift of SYNC1 in nanoseconds.
+    #[must_use]
+    pub const fn with_sync1(mut self, cycle_ns: u32, shift_ns: i32) -> SyncSignals {
+        self.sync1_cycle_ns = cycle_ns;
+        self.sync1_shift_ns = shift_ns;
+        self
     }
 
     /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1; a whole cycle or more divides the rate of SYNC1.

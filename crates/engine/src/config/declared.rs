@@ -34,6 +34,7 @@ impl SyncManagerRole {
 /// A SyncManager from a configuration file. Its registers are written as given; PDO assignment and mapping are part of
 /// the start-up commands of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DeclaredSyncManager {
     /// Its number.
     pub index: u8,
@@ -50,6 +51,25 @@ pub struct DeclaredSyncManager {
 }
 
 impl DeclaredSyncManager {
+    /// A SyncManager without PDOs.
+    pub const fn new(index: u8, role: SyncManagerRole, register: SyncManager) -> DeclaredSyncManager {
+        DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
+    }
+
+    /// Sets [`DeclaredSyncManager::op_only`].
+    #[must_use]
+    pub const fn with_op_only(mut self, op_only: bool) -> DeclaredSyncManager {
+        self.op_only = op_only;
+        self
+    }
+
+    /// Sets [`DeclaredSyncManager::pdos`].
+    #[must_use]
+    pub fn with_pdos(mut self, pdos: Vec<PdoMapping>) -> DeclaredSyncManager {
+        self.pdos = pdos;
+        self
+    }
+
     /// Number, direction and length in bytes of its process data; `None` for mailboxes.
     pub fn area(&self) -> Option<(u8, Direction, u16)> {
         let length = if self.register.activate.enable { self.register.length } else { 0 };

@@ -6,6 +6,7 @@ use crate::info::Direction;
 
 /// An entry of a PDO mapping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct PdoEntry {
     /// Index of the object; 0 is a gap.
     pub index: u16,
@@ -17,6 +18,7 @@ pub struct PdoEntry {
 
 /// A PDO and its mapping.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PdoMapping {
     /// Index of the PDO mapping object.
     pub index: u16,
@@ -26,6 +28,7 @@ pub struct PdoMapping {
 
 /// The PDOs of one SyncManager.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PdoAssignment {
     /// The SyncManager.
     pub sync_manager: u8,
@@ -33,6 +36,13 @@ pub struct PdoAssignment {
     pub direction: Direction,
     /// Its PDOs in order; an empty list disables it.
     pub pdos: Vec<PdoMapping>,
+}
+
+impl PdoAssignment {
+    /// The PDOs of a SyncManager, in order.
+    pub fn new(sync_manager: u8, direction: Direction, pdos: Vec<PdoMapping>) -> PdoAssignment {
+        PdoAssignment { sync_manager, direction, pdos }
+    }
 }
 
 impl PdoMapping {

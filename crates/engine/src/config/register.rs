@@ -25,6 +25,7 @@ pub enum RegisterAccess {
 
 /// A command to a register of one SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RegisterCommand {
     /// Address of the first register.
     pub address: RegisterAddress,
@@ -38,6 +39,25 @@ pub struct RegisterCommand {
 }
 
 impl RegisterCommand {
+    /// A command without retries, which the SubDevice need not process.
+    pub const fn new(address: RegisterAddress, access: RegisterAccess) -> RegisterCommand {
+        RegisterCommand { address, access, retries: 0, required: false }
+    }
+
+    /// Sets [`RegisterCommand::retries`].
+    #[must_use]
+    pub const fn with_retries(mut self, retries: u8) -> RegisterCommand {
+        self.retries = retries;
+        self
+    }
+
+    /// Sets [`RegisterCommand::required`].
+    #[must_use]
+    pub const fn with_required(mut self, required: bool) -> RegisterCommand {
+        self.required = required;
+        self
+    }
+
     /// Length of data and mask in bytes.
     pub fn lengths(&self) -> (usize, Option<usize>) {
         match &self.access {

@@ -51,6 +51,7 @@ impl fmt::Display for Transition {
 
 /// An SDO download.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SdoDownload {
     /// Index of the object.
     pub index: u16,
@@ -62,8 +63,23 @@ pub struct SdoDownload {
     pub data: Vec<u8>,
 }
 
+impl SdoDownload {
+    /// A download of one subindex.
+    pub fn new(index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SdoDownload {
+        SdoDownload { index, sub_index, complete_access: false, data: data.into() }
+    }
+
+    /// Sets [`SdoDownload::complete_access`].
+    #[must_use]
+    pub const fn with_complete_access(mut self, complete_access: bool) -> SdoDownload {
+        self.complete_access = complete_access;
+        self
+    }
+}
+
 /// An SDO upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SdoUpload {
     /// Index of the object.
     pub index: u16,
@@ -76,8 +92,30 @@ pub struct SdoUpload {
     pub expected: Option<Vec<u8>>,
 }
 
+impl SdoUpload {
+    /// An upload of one subindex; any value is accepted.
+    pub const fn new(index: u16, sub_index: u8) -> SdoUpload {
+        SdoUpload { index, sub_index, complete_access: false, expected: None }
+    }
+
+    /// Sets [`SdoUpload::complete_access`].
+    #[must_use]
+    pub const fn with_complete_access(mut self, complete_access: bool) -> SdoUpload {
+        self.complete_access = complete_access;
+        self
+    }
+
+    /// Sets [`SdoUpload::expected`].
+    #[must_use]
+    pub fn with_expected(mut self, expected: impl Into<Option<Vec<u8>>>) -> SdoUpload {
+        self.expected = expected.into();
+        self
+    }
+}
+
 /// A write of an IDN's value.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct IdnWrite {
     /// Drive of the SubDevice, 0..=7.
     pub drive: u8,
@@ -87,8 +125,16 @@ pub struct IdnWrite {
     pub data: Vec<u8>,
 }
 
+impl IdnWrite {
+    /// A write of the value of an IDN.
+    pub fn new(drive: u8, idn: Idn, data: impl Into<Vec<u8>>) -> IdnWrite {
+        IdnWrite { drive, idn, data: data.into() }
+    }
+}
+
 /// Action of a start-up command.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum StartupAction {
     /// SDO download.
     Sdo(SdoDownload),
@@ -104,6 +150,7 @@ pub enum StartupAction {
 
 /// A start-up command.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StartupCommand {
     /// The transition.
     pub transition: Transition,
@@ -116,6 +163,20 @@ pub struct StartupCommand {
 }
 
 impl StartupCommand {
+    /// Sets [`StartupCommand::limit`].
+    #[must_use]
+    pub fn with_limit(mut self, limit: impl Into<Option<Duration>>) -> StartupCommand {
+        self.limit = limit.into();
+        self
+    }
+
+    /// Sets [`StartupCommand::comment`].
+    #[must_use]
+    pub fn with_comment(mut self, comment: impl Into<Option<String>>) -> StartupCommand {
+        self.comment = comment.into();
+        self
+    }
+
     /// A command with the default time limit and without a comment.
     pub const fn new(transition: Transition, action: StartupAction) -> StartupCommand {
         StartupCommand { transition, action, limit: None, comment: None }

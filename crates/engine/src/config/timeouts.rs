@@ -6,6 +6,7 @@ use ringcat_wire::al::AlState;
 
 /// Time limits (protocol 5.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Timeouts {
     /// INIT to PREOP or BOOT.
     pub preop: Duration,
@@ -41,6 +42,62 @@ impl Default for Timeouts {
 }
 
 impl Timeouts {
+    /// Sets [`Timeouts::preop`].
+    #[must_use]
+    pub const fn with_preop(mut self, preop: Duration) -> Timeouts {
+        self.preop = preop;
+        self
+    }
+
+    /// Sets [`Timeouts::safeop_op`].
+    #[must_use]
+    pub const fn with_safeop_op(mut self, safeop_op: Duration) -> Timeouts {
+        self.safeop_op = safeop_op;
+        self
+    }
+
+    /// Sets [`Timeouts::back_to_init`].
+    #[must_use]
+    pub const fn with_back_to_init(mut self, back_to_init: Duration) -> Timeouts {
+        self.back_to_init = back_to_init;
+        self
+    }
+
+    /// Sets [`Timeouts::back_to_safeop`].
+    #[must_use]
+    pub const fn with_back_to_safeop(mut self, back_to_safeop: Duration) -> Timeouts {
+        self.back_to_safeop = back_to_safeop;
+        self
+    }
+
+    /// Sets [`Timeouts::mailbox_request`].
+    #[must_use]
+    pub const fn with_mailbox_request(mut self, mailbox_request: Duration) -> Timeouts {
+        self.mailbox_request = mailbox_request;
+        self
+    }
+
+    /// Sets [`Timeouts::sdo`].
+    #[must_use]
+    pub const fn with_sdo(mut self, sdo: Duration) -> Timeouts {
+        self.sdo = sdo;
+        self
+    }
+
+    /// Sets [`Timeouts::soe`].
+    #[must_use]
+    pub const fn with_soe(mut self, soe: Duration) -> Timeouts {
+        self.soe = soe;
+        self
+    }
+
+    /// Sets [`Timeouts::eoe`].
+    #[must_use]
+    pub const fn with_eoe(mut self, eoe: Duration) -> Timeouts {
+        self.eoe = eoe;
+        self
+    }
+
     /// Limit of a state change.
     pub const fn transition(&self, from: AlState, to: AlState) -> Duration {
         match (from, to) {
@@ -54,6 +111,7 @@ impl Timeouts {
 
 /// The limit of one state change, if it differs from [`Timeouts`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StateTimeout {
     /// State before.
     pub from: AlState,
@@ -61,4 +119,11 @@ pub struct StateTimeout {
     pub to: AlState,
     /// Limit.
     pub limit: Duration,
+}
+
+impl StateTimeout {
+    /// The limit of the change from one state to another.
+    pub const fn new(from: AlState, to: AlState, limit: Duration) -> StateTimeout {
+        StateTimeout { from, to, limit }
+    }
 }

@@ -23,6 +23,7 @@ const SETTINGS: u16 = DiagnosisFlags::NO_INFORMATION
 
 /// One message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Incident {
     /// Time.
     pub at: Instant,

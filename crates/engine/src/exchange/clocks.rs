@@ -41,6 +41,7 @@ pub struct ClockSetup {
 
 /// A reading of the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ReferenceTime {
     /// System time when the frame passed the reference clock, in nanoseconds.
     pub time: u64,

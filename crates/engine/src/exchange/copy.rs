@@ -17,6 +17,7 @@ use super::image::InputNumber;
 
 /// Value of the outputs while their source is stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WhenStale {
     /// The last copied value; zero before the first copy.
     #[default]
@@ -27,6 +28,7 @@ pub enum WhenStale {
 
 /// Inputs that are copied to outputs in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct CopyRule {
     /// The inputs: any bits of one area of a SubDevice.
     pub source: Entry,
@@ -39,6 +41,20 @@ pub struct CopyRule {
 }
 
 impl CopyRule {
+    /// Sets [`CopyRule::max_age`].
+    #[must_use]
+    pub const fn with_max_age(mut self, max_age: u64) -> CopyRule {
+        self.max_age = max_age;
+        self
+    }
+
+    /// Sets [`CopyRule::when_stale`].
+    #[must_use]
+    pub const fn with_when_stale(mut self, when_stale: WhenStale) -> CopyRule {
+        self.when_stale = when_stale;
+        self
+    }
+
     /// A copy that is refused where its source was not received for this cycle; the outputs hold their value then.
     pub const fn new(source: Entry, target: Entry) -> CopyRule {
         CopyRule { source, target, when_stale: WhenStale::Hold, max_age: 0 }

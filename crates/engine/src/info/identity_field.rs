@@ -4,6 +4,7 @@ use core::fmt;
 
 /// A field of a SubDevice's identity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum IdentityField {
     /// Vendor id.
     VendorId,

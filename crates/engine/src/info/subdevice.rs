@@ -15,6 +15,7 @@ use crate::direction::Direction;
 
 /// Type and features of a SubDevice's controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ControllerInfo {
     /// TYPE.
     pub type_code: u8,
@@ -66,6 +67,7 @@ pub struct PdoEntryInfo {
 
 /// A PDO as the SII describes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PdoInfo {
     /// Index of the PDO mapping object.
     pub index: u16,
@@ -107,6 +109,7 @@ pub struct Readout {
 
 /// Information about one SubDevice from a scan.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct SubDeviceInfo {
     /// Position in the scan: the order of the processing units.
     pub position: Position,

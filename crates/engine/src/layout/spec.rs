@@ -21,6 +21,7 @@ pub struct AreaSpec {
 
 /// Use of LRW instead of LWR and LRD (protocol 9.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LrwPolicy {
     /// On one link, where every SubDevice of a domain supports it; never on two links.
     #[default]

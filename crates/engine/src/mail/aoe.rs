@@ -14,11 +14,19 @@ use super::{Mailbox, MailboxError};
 
 /// Source and target of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AoeRoute {
     /// NetId and port in the SubDevice.
     pub target: AmsAddress,
     /// NetId and port of the MainDevice.
     pub source: AmsAddress,
+}
+
+impl AoeRoute {
+    /// A request from `source` to `target`.
+    pub const fn new(target: AmsAddress, source: AmsAddress) -> AoeRoute {
+        AoeRoute { target, source }
+    }
 }
 
 /// Why a request failed.
@@ -65,6 +73,7 @@ impl From<MailboxError> for AoeError {
 
 /// Name and version of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AoeDeviceInfo {
     /// Major version.
     pub major: u8,

@@ -74,6 +74,7 @@ impl FoeOptions {
 
 /// Progress of a transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FoeProgress {
     /// Bytes transferred.
     Bytes(u64),

@@ -20,6 +20,7 @@ const UNANSWERED_LIMIT: Duration = Duration::from_secs(1);
 
 /// A lane holds one conversation at a time; the lanes work in parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Lane {
     /// SDO and SDO information.
     Coe,

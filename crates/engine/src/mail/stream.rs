@@ -13,6 +13,7 @@ pub trait Source {
 
 /// The receiver's limit is exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Overflow {
     /// Bytes needed.
     pub bytes: u64,

@@ -26,6 +26,7 @@ pub struct Directory {
 
 /// An area with its entries.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct AreaEntries {
     /// The domain.
     pub domain: DomainId,

@@ -25,6 +25,7 @@ pub const MAX_DATAGRAMS: usize = 1024;
 
 /// A datagram of the application.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RawDatagram {
     /// The command.
     pub command: Command,
@@ -38,6 +39,20 @@ pub struct RawDatagram {
     pub data: Vec<u8>,
     /// Whether it may be sent again if its frame is lost.
     pub resend: bool,
+}
+
+impl RawDatagram {
+    /// A datagram that is not sent again if its frame is lost.
+    pub fn new(command: Command, target: Target, data: impl Into<Vec<u8>>) -> RawDatagram {
+        RawDatagram { command, target, data: data.into(), resend: false }
+    }
+
+    /// Sets [`RawDatagram::resend`].
+    #[must_use]
+    pub const fn with_resend(mut self, resend: bool) -> RawDatagram {
+        self.resend = resend;
+        self
+    }
 }
 
 impl MainDevice {

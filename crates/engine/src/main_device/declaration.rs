@@ -15,6 +15,7 @@ pub const MAX_UNDER_WAY: u8 = 4;
 
 /// A domain as the application declares it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct DomainConfig {
     /// Interval at which the application will exchange it.
     pub period: Duration,
@@ -28,6 +29,13 @@ pub struct DomainConfig {
 }
 
 impl DomainConfig {
+    /// Sets [`DomainConfig::under_way`].
+    #[must_use]
+    pub const fn with_under_way(mut self, under_way: u8) -> DomainConfig {
+        self.under_way = under_way;
+        self
+    }
+
     /// A domain with one cycle under way.
     pub const fn new(period: Duration, members: Vec<DomainMember>) -> DomainConfig {
         DomainConfig { period, under_way: 1, members }
@@ -36,11 +44,26 @@ impl DomainConfig {
 
 /// Process data of a SubDevice in a domain.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct DomainMember {
     /// Index of the SubDevice in the declaration.
     pub subdevice: SubDeviceId,
     /// SyncManagers whose process data belongs to the domain; `None` for all.
     pub sync_managers: Option<Vec<u8>>,
+}
+
+impl DomainMember {
+    /// All process data of a SubDevice.
+    pub const fn new(subdevice: SubDeviceId) -> DomainMember {
+        DomainMember { subdevice, sync_managers: None }
+    }
+
+    /// Sets [`DomainMember::sync_managers`].
+    #[must_use]
+    pub fn with_sync_managers(mut self, sync_managers: impl Into<Option<Vec<u8>>>) -> DomainMember {
+        self.sync_managers = sync_managers.into();
+        self
+    }
 }
 
 /// The declaration of the application.
@@ -65,6 +88,7 @@ pub struct Declaration {
 /// SubDevices that must answer, with the expected identity, for an activation. Each other absent SubDevice is reported
 /// by an event, and is configured when it comes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Required {
     /// All that are declared, optional or not.
     All,
@@ -98,6 +122,7 @@ impl Declaration {
 
 /// An LRW datagram of a configuration file. The MainDevice lays out its own datagrams.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ExplicitLrw {
     /// Its designation in the file: frame, place in the frame, comment.
     pub name: String,
@@ -107,4 +132,11 @@ pub struct ExplicitLrw {
     pub length: usize,
     /// Indices in the declaration of the SubDevices that it addresses.
     pub subdevices: Vec<SubDeviceId>,
+}
+
+impl ExplicitLrw {
+    /// An LRW datagram by its name, logical address, length in bytes and SubDevices.
+    pub fn new(name: String, logical: LogicalAddress, length: usize, subdevices: Vec<SubDeviceId>) -> ExplicitLrw {
+        ExplicitLrw { name, logical, length, subdevices }
+    }
 }

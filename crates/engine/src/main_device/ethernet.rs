@@ -11,6 +11,7 @@ use crate::mail::eoe::EthernetPort;
 
 /// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EthernetSubDevice {
     /// Index in the declaration.
     pub subdevice: SubDeviceId,
@@ -18,6 +19,13 @@ pub struct EthernetSubDevice {
     pub position: Position,
     /// Alias; 0 is none.
     pub alias: u16,
+}
+
+impl EthernetSubDevice {
+    /// A SubDevice by its index, its position and its alias (0: none).
+    pub const fn new(subdevice: SubDeviceId, position: Position, alias: u16) -> EthernetSubDevice {
+        EthernetSubDevice { subdevice, position, alias }
+    }
 }
 
 impl MainDevice {

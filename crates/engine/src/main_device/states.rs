@@ -6,6 +6,7 @@ use crate::segment::member::Phase;
 
 /// State of a declared SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SubDeviceState {
     /// It does not answer.
     Absent,
@@ -17,6 +18,7 @@ pub enum SubDeviceState {
 
 /// State of a hot connect group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GroupState {
     /// SubDevices of it that answer.
     pub present: usize,

@@ -25,6 +25,7 @@ pub struct PlanError {
 
 /// Part that must be corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlanFault {
     /// The declaration.
     Declaration,

@@ -12,6 +12,7 @@ use crate::info::Direction;
 
 /// A SyncManager to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SmPlan {
     /// Its number.
     pub index: u8,
@@ -21,6 +22,7 @@ pub struct SmPlan {
 
 /// An entry of a PDO and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MappedEntry {
     /// Index of the object; 0 is a gap.
     pub index: u16,
@@ -34,6 +36,7 @@ pub struct MappedEntry {
 
 /// A PDO in an area.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MappedPdo {
     /// Index of the PDO mapping object.
     pub index: u16,
@@ -43,6 +46,7 @@ pub struct MappedPdo {
 
 /// The process data of one SyncManager.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AreaPlan {
     /// The SyncManager.
     pub sync_manager: u8,
@@ -62,6 +66,7 @@ pub struct AreaPlan {
 
 /// Values to write to a SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SubDevicePlan {
     /// Its station address.
     pub station: StationAddress,

@@ -27,6 +27,7 @@ const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_se
 
 /// Dictionaries that are read for PDOs after a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ReadPdos {
     /// None.
     Never,

@@ -19,6 +19,7 @@ pub(super) const WATCHDOGS: usize = 2;
 
 /// Error counts of a port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PortErrors {
     /// Frames with a bad check sequence that this port detected first.
     pub invalid_frames: u64,
@@ -32,6 +33,7 @@ pub struct PortErrors {
 
 /// Error counts of a SubDevice since the beginning, or since its counters were cleared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Port 0..3.
     pub ports: [PortErrors; 4],

@@ -16,6 +16,7 @@ use crate::topology::{NodeStatus, PortOf, Topology, ends_of_earlier_break};
 
 /// Result of an examination.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RingLook {
     /// Closed or open.
     pub state: RingState,

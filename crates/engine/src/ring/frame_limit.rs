@@ -7,11 +7,19 @@ pub const MIN_DATAGRAMS_PER_FRAME: u16 = 3;
 
 /// The segment processes fewer datagrams than fit into a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FrameLimit {
     /// Largest number of datagrams in a frame.
     pub datagrams: u16,
     /// Whether a longer frame comes back, with the further datagrams unprocessed; otherwise it does not come back.
     pub returns: bool,
+}
+
+impl FrameLimit {
+    /// A limit, and whether longer frames come back.
+    pub const fn new(datagrams: u16, returns: bool) -> FrameLimit {
+        FrameLimit { datagrams, returns }
+    }
 }
 
 impl fmt::Display for FrameLimit {

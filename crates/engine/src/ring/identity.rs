@@ -92,6 +92,7 @@ pub struct FrameCopy {
 
 /// Classification of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Classified {
     /// A copy of a frame of this MainDevice.
     Ours(FrameCopy),

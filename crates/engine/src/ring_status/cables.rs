@@ -15,6 +15,7 @@ use crate::topology::{PortOf, Topology};
 
 /// Errors counted by the ports at both ends of a cable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct CableErrors {
     /// Damaged frames received at either end: damaged on this cable.
     pub invalid_frames: u64,

@@ -9,6 +9,7 @@ use ringcat_wire::register::DlControl;
 
 /// A port that was closed to cut a SubDevice off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct BlockedPort {
     /// Station address of the neighbour whose port it is.
     pub station: StationAddress,

@@ -11,6 +11,7 @@ use crate::time::Instant;
 
 /// The reply to a datagram, merged from all copies.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Reply {
     /// The data; for writes, as sent.
     pub data: Vec<u8>,

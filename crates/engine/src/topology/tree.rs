@@ -39,6 +39,7 @@ pub struct Node {
 
 /// The tree of a segment, or the two trees of a broken ring.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Topology {
     /// SubDevices by position.
     pub nodes: Vec<Node>,

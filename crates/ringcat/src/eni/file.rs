@@ -22,6 +22,7 @@ use crate::text::Names;
 
 /// A file with what follows from it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct EniFile {
     /// What it says.
     pub eni: Eni,
@@ -53,6 +54,7 @@ pub enum LoadFailure {
 
 /// Where a network is not that of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Difference {
     /// Index in the file; `None` for a SubDevice that is not in it.
     pub subdevice: Option<SubDeviceId>,

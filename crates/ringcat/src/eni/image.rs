@@ -35,6 +35,7 @@ pub struct EniImage {
 
 /// A variable of the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EniVariable {
     /// Its name.
     pub name: String,

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// What a variable's type makes of its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VariableType {
     /// `BOOL`, `BIT`.
     Bool,
@@ -21,6 +22,7 @@ pub enum VariableType {
 
 /// The value of a variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Value {
     /// A bit.
     Bool(bool),

@@ -12,6 +12,7 @@ pub struct OutputBits {
 
 /// A value that has more bits than its place in the process data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DoesNotFit {
     /// The value.
     pub value: i128,

@@ -53,7 +53,7 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let (main_device, good) = scanned(SEGMENT);
 
     let mut twice = good.clone();
-    let again = vec![DomainMember { subdevice: SubDeviceId(1), sync_managers: None }];
+    let again = vec![DomainMember::new(SubDeviceId(1))];
     twice.domains.push(DomainConfig::new(MILLISECOND, again));
     let (text, main_device) = refusal(main_device, twice);
     assert_eq!(text, "activation: declaration 1: process data of SyncManager 0 is in domain 0 and in domain 1");
@@ -155,7 +155,7 @@ fn an_absent_optional_subdevice_has_its_place_and_leaves_the_domain_complete() -
         SubDeviceConfig::at_position(3).expect_product(0xC47, 0x4711).optional().assign(0, Direction::Inputs, pdos);
     declaration.subdevices.push(absent);
     declaration.subdevices.push(SubDeviceConfig::at_position(4).expect_product(0xC47, 0x4712).optional());
-    let members = [3, 4].map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
+    let members = [3, 4].map(|subdevice| DomainMember::new(SubDeviceId(subdevice)));
     declaration.domains[0].members.extend(members);
     let mut application = main_device.activate(declaration)?;
     let entry = application.entry(SubDeviceId(3), 0x6000, 3).expect("the declaration says where it lies");

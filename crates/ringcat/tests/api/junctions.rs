@@ -13,8 +13,7 @@ use ringcat_wire::address::StationAddress;
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
 /// The junction is number 1, the members of its ring are 2 to 4.
-const GOOD: JunctionConnection =
-    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
+const GOOD: JunctionConnection = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 1);
 
 fn requested(junctions: JunctionMode) -> MainDevice<SimulatedSegment> {
     let segment = SimulatedSegment::from_toml(SEGMENT).expect("the example is a segment");
@@ -33,7 +32,7 @@ fn refused<T: std::fmt::Debug>(
 ) -> (ActivateError, MainDevice<SimulatedSegment>) {
     match result {
         Err(refused) => match *refused {
-            Refused { error: Error::Activate(error), main_device } => (error, main_device),
+            Refused { error: Error::Activate(error), main_device, .. } => (error, main_device),
             other => panic!("{other:?}"),
         },
         Ok(application) => panic!("applied: {application:?}"),
@@ -58,11 +57,11 @@ fn each_misuse_of_load_add_and_apply_is_an_error_of_its_own() {
     let (error, mut main_device) = refused(main_device.apply());
     assert_eq!(error, ActivateError::Junction(JunctionError::NoConnection));
 
-    let head = JunctionConnection { head_port: 2, ..GOOD };
+    let head = JunctionConnection::new(SubDeviceId(1), 2, SubDeviceId(4), 1);
     assert_eq!(junction_error(main_device.add_junction_connection(head)), JunctionError::HeadPort(head));
-    let tail = JunctionConnection { tail_port: 0, ..GOOD };
+    let tail = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 0);
     assert_eq!(junction_error(main_device.add_junction_connection(tail)), JunctionError::TailPort(tail));
-    let unknown = JunctionConnection { tail: SubDeviceId(6), ..GOOD };
+    let unknown = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(6), 1);
     assert_eq!(junction_error(main_device.add_junction_connection(unknown)), JunctionError::UnknownTail(unknown));
     main_device.add_junction_connection(GOOD).expect("it fits");
     assert_eq!(junction_error(main_device.add_junction_connection(GOOD)), JunctionError::Taken(GOOD));
@@ -76,9 +75,9 @@ fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_
     let declaration = automatic(&scan.subdevices, Duration::from_millis(1));
     // Loading again discards the connections that were added before.
     for (wrong, error) in [
-        (JunctionConnection { tail: SubDeviceId(0), tail_port: 2, ..GOOD }, None),
-        (JunctionConnection { head: SubDeviceId(2), ..GOOD }, Some((2, 3))),
-        (JunctionConnection { tail_port: 3, ..GOOD }, Some((4, 3))),
+        (JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(0), 2), None),
+        (JunctionConnection::new(SubDeviceId(2), 1, SubDeviceId(4), 1), Some((2, 3))),
+        (JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 3), Some((4, 3))),
     ] {
         main_device.load(declaration.clone()).expect("it is what was found");
         main_device.add_junction_connection(wrong).expect("it looks as it should");
@@ -93,7 +92,7 @@ fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_
         main_device = back;
     }
     // The ports alone allow this connection; apply closes them for a moment to see whether the cable exists.
-    let wrong = JunctionConnection { tail: SubDeviceId(3), ..GOOD };
+    let wrong = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1);
     main_device.load(declaration.clone()).expect("it is what was found");
     main_device.add_junction_connection(wrong).expect("it looks as it should");
     let (got, mut main_device) = refused(main_device.apply());

@@ -25,7 +25,8 @@ fn a_break_is_reported_with_names_and_station_of_the_subdevices_at_its_ends() {
     let mut main_device = MainDevice::request(segment, &Options::default());
     let found = main_device.scan().expect("it is whole").subdevices;
     let mut declaration = automatic(&found, std::time::Duration::from_millis(1));
-    let absent = SubDeviceConfig { pdos: Some(Vec::new()), ..SubDeviceConfig::at_alias(ABSENT, 0).optional() };
+    let mut absent = SubDeviceConfig::at_alias(ABSENT, 0).optional();
+    absent.pdos = Some(Vec::new());
     declaration.subdevices.insert(0, absent);
     declaration.domains.iter_mut().flat_map(|domain| &mut domain.members).for_each(|member| member.subdevice.0 += 1);
     let names = Names(["absent", "head", "lamps", "buttons"].map(str::to_owned).to_vec());
@@ -62,8 +63,7 @@ fn positions_with_an_unknown_subdevice_have_no_names() {
     assert_eq!(unexpected, "position 1: not declared: vendor 0x00000000, product 0x00000000");
     let crossed = Event::LineCrossed { position: Some(position), entry_port: Some(1) };
     assert_eq!(line(crossed.clone()), "position 1: line crossed, frames enter at port 1");
-    let pump =
-        ringcat::Occupant { station: ringcat_wire::address::StationAddress(0x1002), declared: Some(SubDeviceId(0)) };
+    let pump = ringcat::Occupant::new(ringcat_wire::address::StationAddress(0x1002), Some(SubDeviceId(0)));
     let timed = ringcat::TimedEvent::new(ringcat::Instant(0), crossed).with_occupants([Some(pump), None]);
     assert_eq!(describe(&timed, &names), "position 1 \"pump\" (0x1002): line crossed, frames enter at port 1");
 }

@@ -126,7 +126,7 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     assert_eq!(handle.subdevice(SPEAKER).port(0)?, LoopControl::Auto);
     let rescan = handle.rescan(LIMIT)?;
     assert!(rescan.is_complete() && rescan.subdevices.len() == 2 && rescan.missing.is_empty(), "{rescan:?}");
-    let read = RawDatagram { command: Command::Brd, target: Target::Broadcast(map::TYPE), data: vec![0], resend: true };
+    let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::TYPE), vec![0]).with_resend(true);
     let replies = handle.datagrams(vec![read.clone(), read])?;
     assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.wkc().0 == 2)), "{replies:?}");
     // Jobs: one that is waited for, one that is aborted, and one that is dropped.

@@ -30,7 +30,7 @@ fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
     let head = SubDeviceConfig::at_alias(5, 0).pdos_of(&scan.subdevices[2]);
     let (group, members) = declaration.add_group(Group::new(head));
     assert_eq!((group, members.as_slice()), (GroupId(0), [SubDeviceId(2)].as_slice()));
-    let members = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
+    let members = members.into_iter().map(DomainMember::new);
     declaration.domains[0].members.extend(members);
     let application = supervisor.activate(declaration, cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
@@ -45,7 +45,8 @@ fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
         assert!(Instant::now() < end, "the states are published");
         sleep(Duration::from_millis(1));
     }
-    assert_eq!(cycles.supervisor().groups()?, [GroupState { present: 1, settled: 0, members: 1 }]);
+    let groups = cycles.supervisor().groups()?;
+    let [GroupState { present: 1, settled: 0, members: 1, .. }] = groups[..] else { panic!("{groups:?}") };
     let refused = cycles.supervisor().subdevice(SubDeviceId(1)).request_state(AlState::Boot);
     let Err(Error::SubDevice(refused)) = refused else { panic!("it has no boot loader: {refused:?}") };
     assert!(matches!(refused.failure, SubDeviceFailure::State(_)), "{refused}");

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
-use ringcat::{Application, ClockConfig, JunctionMode, MainDevice, Options};
+use ringcat::{Application, JunctionMode, MainDevice, Options};
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_link::Recorder;
 use ringcat_link::pcapng::{Direction, Writer};
@@ -43,7 +43,7 @@ fn recorded(options: &Options, network: Network, path: &Path, work: impl FnOnce(
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, options);
     let scan = main_device.scan().expect("a segment");
-    let config = ClockConfig { drift_distributions: 100, ..config() };
+    let config = config().with_drift_distributions(100);
     let mut application = main_device.activate(with_clocks(&scan, config)).expect("it fits");
     settle(&mut application);
     work(&mut application);

@@ -222,7 +222,7 @@ fn tree() -> Network {
 
 #[test]
 fn clocks_lock_with_random_frame_loss_from_the_start() {
-    let mut world = begun(8, tree(), ClockConfig { drift_distributions: 20_000, ..config() });
+    let mut world = begun(8, tree(), config().with_drift_distributions(20_000));
     let mut dice = Dice::new(8);
     for _ in 0..150 {
         world.drop(CableId(dice.below(9) as usize), 1);
@@ -348,9 +348,7 @@ fn a_group_that_joins_late_or_elsewhere_has_the_clocks_of_its_place() {
     let mut world = World::with(7, two_places(), &Options::default(), |_| {
         let mut declaration = automatic(&infos, CYCLE);
         let (_, members) = declaration.add_group(group);
-        declaration.domains[0]
-            .members
-            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration.clocks = Some(config());
         declaration.subdevices.iter_mut().for_each(|config| config.sync = Some(SyncSignals::sync0(1_000_000, 0)));
         declaration
@@ -396,19 +394,17 @@ fn the_first_clocks_of_a_segment_may_join_with_a_group() {
     let infos = { infos }.scan().expect("a scan").subdevices;
     let mut network = wired(descriptions, &cables);
     (3..6).for_each(|device| network.power_off(DeviceIndex(device)));
-    let signals = Some(SyncSignals::sync0(1_000_000, 0));
+    let signals = SyncSignals::sync0(1_000_000, 0);
     let mut world = World::with(10, network, &Options::default(), |scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
-        let head = SubDeviceConfig { sync: signals, ..SubDeviceConfig::at_alias(TOOL, 0) };
+        let head = SubDeviceConfig::at_alias(TOOL, 0).sync(signals);
         let member = |config: SubDeviceConfig, info: &SubDeviceInfo| {
             config.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(info)
         };
         let group = Group::new(member(head, &infos[0])).then(member(SubDeviceConfig::default(), &infos[0]));
-        let last = SubDeviceConfig { sync: signals, ..SubDeviceConfig::default() };
+        let last = SubDeviceConfig::default().sync(signals);
         let (_, members) = declaration.add_group(group.then(member(last, &infos[0])));
-        declaration.domains[0]
-            .members
-            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration.clocks = Some(config());
         declaration
     })

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Options, Passage};
+use ringcat::{Options, Passage};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::NetworkOptions;
 use scenarios::clocks::{clocked, config, delay, with_clocks, world};
@@ -43,7 +43,7 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
     options.processing_delay = options.forwarding_delay + Duration::from_nanos(LONGER);
     let hop = HOP_NS - 300 + options.processing_delay.as_nanos() as i64;
     for (told, systematic) in [(0, 20), (LONGER as u16, 0)] {
-        let config = ClockConfig { passage: Passage { processing_ns: told, forwarding_ns: 0 }, ..config() };
+        let config = config().with_passage(Passage::new(told, 0));
         let mut world = world(1, line(clocked(COUNT, 50), options.clone()), config);
         world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), COUNT - 1) != 0);
         world.run_cycles(10);
@@ -76,7 +76,7 @@ fn types_with_configured_passage_times_have_exact_delays() {
         let mut world = World::with(1, network, &Options::default(), |scan| {
             let mut declaration = with_clocks(scan, config());
             for (subdevice, (processing, forwarding)) in declaration.subdevices.iter_mut().zip(told) {
-                let passage = Passage { processing_ns: *processing as u16, forwarding_ns: *forwarding as u16 };
+                let passage = Passage::new(*processing as u16, *forwarding as u16);
                 subdevice.passage = Some(passage);
             }
             declaration
@@ -102,7 +102,7 @@ fn types_with_configured_passage_times_have_exact_delays() {
 #[test]
 fn two_hundred_clocks_in_a_line_have_their_delays() {
     const COUNT: usize = 200;
-    let short = ClockConfig { drift_distributions: 0, ..config() };
+    let short = config().with_drift_distributions(0);
     let mut world = world(15, line(clocked(COUNT, 100), NetworkOptions::default()), short);
     world.until(Duration::from_secs(2), "set up", |world| delay(world.network(), COUNT - 1) != 0);
     world.run_cycles(5);

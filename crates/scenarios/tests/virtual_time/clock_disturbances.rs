@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, Options, Trigger};
+use ringcat::{Event, Options, Trigger};
 use ringcat_sim::cable::CableId;
 use ringcat_sim::network::NetworkOptions;
 use scenarios::clocks::{clocked, config, delay, lock, with_clocks, world};
@@ -65,7 +65,7 @@ fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
         let passages =
             NetworkOptions { processing_delay: PASSAGE, forwarding_delay: PASSAGE, ..NetworkOptions::default() };
         let network = ring(clocked(COUNT, 0), passages);
-        let config = ClockConfig { pauses, drift_distributions: 200, ..config() };
+        let config = config().with_pauses(pauses).with_drift_distributions(200);
         let mut world = World::with(21, network, &Options::default(), |scan| {
             let mut declaration = with_clocks(scan, config);
             declaration.domains[0].under_way = under_way;

@@ -84,7 +84,7 @@ fn an_unknown_delay_behind_a_splitter_at_the_head_is_reported() {
     let cables =
         [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(0, B), at(3, A)), (at(3, B), at(4, A))];
     for estimated_delays in [false, true] {
-        let mut world = world(&cables, &[0], ClockConfig { estimated_delays, ..config() });
+        let mut world = world(&cables, &[0], config().with_estimated_delays(estimated_delays));
         world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
         lock(&mut world, Duration::from_secs(8));
         let hidden: Vec<_> = [3, 4].map(|position| (Position(position), Some(Position(0)))).to_vec();
@@ -113,7 +113,7 @@ fn a_delay_with_known_limits_is_estimated_on_request() {
         let scan = main_device.scan().expect("all are there");
         let late = [CableId(2), CableId(4)];
         late.into_iter().for_each(|cable| main_device.links_mut().network_mut().cut(cable));
-        let declaration = with_clocks(&scan, ClockConfig { estimated_delays, ..config() });
+        let declaration = with_clocks(&scan, config().with_estimated_delays(estimated_delays));
         let mut application = main_device.activate(declaration).map_err(|it| it.error).expect("it fits");
         (0..8_000).for_each(|_| application.cycle(|_| ()));
         late.into_iter().for_each(|cable| application.links_mut().network_mut().heal(cable));
@@ -150,7 +150,7 @@ fn a_subdevice_with_sync0_and_unknown_delay_stays_in_safeop() {
     let mut descriptions = clocked(3, 50);
     descriptions[0].dc = None;
     let network = wired(descriptions, &cables);
-    let config = ClockConfig { lock_limit: Duration::from_millis(500), ..config() };
+    let config = config().with_lock_limit(Duration::from_millis(500));
     let mut world = World::with(4, network, &Options::default(), |scan| {
         let mut declaration = with_clocks(scan, config);
         [1, 2].into_iter().for_each(|index| {

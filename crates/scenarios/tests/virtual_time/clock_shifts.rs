@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, Follower, Trigger, phase_error};
+use ringcat::{Event, Follower, Trigger, phase_error};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::time::SimTime;
@@ -19,7 +19,7 @@ fn all(count: usize) -> Vec<usize> {
 // covers: 7.4, dc-reference
 #[test]
 fn with_bus_shift_the_reference_follows_the_host() {
-    let shift = ClockConfig { bus_shift: true, ..config() };
+    let shift = config().with_bus_shift(true);
     let mut world = world(6, line(clocked(5, 50), NetworkOptions::default()), shift);
     world.run_cycles(6_000);
     let network = world.network();
@@ -39,7 +39,7 @@ fn the_reference_follows_the_application_time_and_a_single_given_time() {
         host.wrapping_add(host / 1_000_000 * 30).wrapping_add(EPOCH)
     };
     for every_cycle in [false, true] {
-        let config = ClockConfig { bus_shift: !every_cycle, ..config() };
+        let config = config().with_bus_shift(!every_cycle);
         let mut world = world(12, line(clocked(3, 50), NetworkOptions::default()), config);
         lock(&mut world, Duration::from_secs(5));
         for _ in 0..5_000 {
@@ -67,7 +67,7 @@ fn the_reference_follows_the_application_time_and_a_single_given_time() {
 #[test]
 fn bus_shift_and_master_shift_continue_through_a_cut_and_a_repair() {
     for cable in [0, 2] {
-        let shift = ClockConfig { bus_shift: true, ..config() };
+        let shift = config().with_bus_shift(true);
         let mut world = world(11, ring(clocked(4, 50), NetworkOptions::default()), shift);
         world.run_cycles(4_000);
         for heal in [false, true] {
@@ -142,7 +142,7 @@ fn cycles_follow_the_reference_clock_with_a_late_host() {
 #[test]
 fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
     const COUNT: usize = 5;
-    let shift = ClockConfig { bus_shift: true, ..config() };
+    let shift = config().with_bus_shift(true);
     for reference in [50_000, -100_000] {
         let mut descriptions = clocked(COUNT, 50);
         descriptions[0].clock_drift_ppb = reference;
@@ -176,7 +176,7 @@ fn with_bus_shift_clocks_lock_and_keep_their_window_with_a_host_50_us_late() {
 #[test]
 fn clocks_that_leave_their_window_and_return_are_reported() {
     for bus_shift in [false, true] {
-        let shift = ClockConfig { bus_shift, ..config() };
+        let shift = config().with_bus_shift(bus_shift);
         let mut world = world(20, line(clocked(3, 30), NetworkOptions::default()), shift);
         lock(&mut world, Duration::from_secs(8));
         world.run_cycles(1_000);

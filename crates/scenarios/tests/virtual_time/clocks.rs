@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Event, Options, ReferenceClock, SubDeviceId, SyncSignals, automatic};
+use ringcat::{Event, Options, ReferenceClock, SubDeviceId, SyncSignals, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::al::AlStatusCode;
@@ -107,7 +107,7 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
     descriptions[2].clock_drift_ppb = 900_000;
     let mut world = World::with(4, line(descriptions, NetworkOptions::default()), &Options::default(), |scan| {
         let limit = Duration::from_secs(2);
-        let mut declaration = with_clocks(scan, ClockConfig { lock_limit: limit, ..config() });
+        let mut declaration = with_clocks(scan, config().with_lock_limit(limit));
         declaration.subdevices[0].sync = Some(SyncSignals::sync0(1_000_000, 0));
         declaration
     })
@@ -127,7 +127,7 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
 // covers: dc-reference
 #[test]
 fn a_reference_that_the_application_chooses_is_followed() {
-    let chosen = ClockConfig { reference: ReferenceClock::Declared(SubDeviceId(2)), ..config() };
+    let chosen = config().with_reference(ReferenceClock::Declared(SubDeviceId(2)));
     let mut world = world(5, line(clocked(6, 30), NetworkOptions::default()), chosen);
     let mark = world.beginning();
     world.run_cycles(2_500);
@@ -144,7 +144,7 @@ fn a_reference_that_the_application_chooses_is_followed() {
 fn the_first_subdevice_with_sync_is_the_reference_on_request() {
     let network = line(clocked(4, 30), NetworkOptions::default());
     let mut world = World::with(13, network, &Options::default(), |scan| {
-        let wanted = ClockConfig { reference: ReferenceClock::FirstConfigured, ..config() };
+        let wanted = config().with_reference(ReferenceClock::FirstConfigured);
         let mut declaration = with_clocks(scan, wanted);
         declaration.subdevices[1].sync = Some(SyncSignals::sync0(1_000_000, 0));
         declaration.subdevices[3].sync = Some(SyncSignals::sync0(1_000_000, 0));

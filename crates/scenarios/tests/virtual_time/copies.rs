@@ -22,7 +22,7 @@ fn world(seed: u64) -> World {
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
-        let member = |subdevice| DomainMember { subdevice, sync_managers: None };
+        let member = DomainMember::new;
         declaration.domains = vec![
             DomainConfig::new(
                 CYCLE,
@@ -101,7 +101,7 @@ fn outputs_hold_or_are_zero_while_their_source_is_away_and_follow_it_again() {
     let mut world = world(2);
     let (fast, slow) = (whole(&world, FAST_IN), whole(&world, SLOW_IN));
     let (out, wide) = (whole(&world, FAST_OUT), whole(&world, OUT_16));
-    let zero = CopyRule { when_stale: WhenStale::Zero, ..CopyRule::new(slow, wide) };
+    let zero = CopyRule::new(slow, wide).with_when_stale(WhenStale::Zero);
     world.application_mut().set_copies(&[CopyRule::new(fast, out), zero]).expect("inputs to outputs");
     world.settle();
     let feed = |world: &mut World, value: u8| {

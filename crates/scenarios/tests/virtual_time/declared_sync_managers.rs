@@ -27,7 +27,7 @@ fn declared(index: u8, role: SyncManagerRole, start: u16, length: u16, control: 
     let mut register =
         SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
     register.activate.enable = true;
-    DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() }
+    DeclaredSyncManager::new(index, role, register)
 }
 
 fn outputs() -> Vec<PdoMapping> {
@@ -48,8 +48,8 @@ fn of_file() -> Vec<DeclaredSyncManager> {
     vec![
         declared(0, SyncManagerRole::MailboxOut, out.start, out.length, 0x26),
         declared(1, SyncManagerRole::MailboxIn, inward.start, inward.length, 0x22),
-        DeclaredSyncManager { pdos: outputs(), ..declared(2, SyncManagerRole::Outputs, write.start, 6, 0x64) },
-        DeclaredSyncManager { pdos: inputs(), ..declared(3, SyncManagerRole::Inputs, read.start, 6, 0x20) },
+        declared(2, SyncManagerRole::Outputs, write.start, 6, 0x64).with_pdos(outputs()),
+        declared(3, SyncManagerRole::Inputs, read.start, 6, 0x20).with_pdos(inputs()),
     ]
 }
 
@@ -58,7 +58,7 @@ fn downloads() -> Vec<(u16, u8, Vec<u8>)> {
     let mut all = Vec::new();
     for (assignment, pdos) in [(0x1C13, inputs()), (0x1C12, outputs())] {
         all.push((assignment, 0, vec![0]));
-        for PdoMapping { index, entries } in pdos {
+        for PdoMapping { index, entries, .. } in pdos {
             all.push((index, 0, vec![0]));
             let entries = entries.expect("they are declared");
             for (sub_index, entry) in (1..).zip(&entries) {
@@ -74,7 +74,7 @@ fn downloads() -> Vec<(u16, u8, Vec<u8>)> {
 }
 
 fn follow(config: SubDeviceConfig) -> SubDeviceConfig {
-    let config = SubDeviceConfig { declared: Some(of_file()), ..config };
+    let config = config.declared(of_file());
     let downloads = downloads().into_iter();
     downloads.fold(config, |config, (index, sub_index, data)| config.sdo_at(Transition::Ps, index, sub_index, data))
 }
@@ -86,7 +86,7 @@ fn world(network: Network, change: impl Fn(SubDeviceConfig) -> SubDeviceConfig) 
         let drive = &declaration.subdevices[DRIVE];
         if drive.declared.is_some() && !declaration.domains[0].members.iter().any(|m| m.subdevice == SubDeviceId(DRIVE))
         {
-            declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(DRIVE), sync_managers: None });
+            declaration.domains[0].members.push(DomainMember::new(SubDeviceId(DRIVE)));
         }
         declaration
     };

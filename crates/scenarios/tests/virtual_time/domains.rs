@@ -51,9 +51,7 @@ fn in_turn(scan: &Scan, periods: &[u32]) -> Declaration {
         .enumerate()
         .map(|(number, period)| {
             let members = (number..scan.subdevices.len()).step_by(periods.len());
-            let members = members
-                .into_iter()
-                .map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
+            let members = members.into_iter().map(|subdevice| DomainMember::new(SubDeviceId(subdevice)));
             DomainConfig::new(*period * CYCLE, members.collect())
         })
         .collect();
@@ -90,9 +88,8 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
     let kinds = ["block", "servo", "digital-input-8"];
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
-        let member = |subdevice, sync_managers: &[u8]| DomainMember {
-            subdevice,
-            sync_managers: (!sync_managers.is_empty()).then(|| sync_managers.to_vec()),
+        let member = |subdevice, sync_managers: &[u8]| {
+            DomainMember::new(subdevice).with_sync_managers((!sync_managers.is_empty()).then(|| sync_managers.to_vec()))
         };
         declaration.domains = vec![
             DomainConfig::new(CYCLE, vec![member(SubDeviceId(0), &[0]), member(SubDeviceId(1), &[2])]),
@@ -134,7 +131,7 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.subdevices.push(optional_analog_input(2));
-        declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(2), sync_managers: None });
+        declaration.domains[0].members.push(DomainMember::new(SubDeviceId(2)));
         declaration
     };
     let mut network = line(descriptions(&kinds), NetworkOptions::default());

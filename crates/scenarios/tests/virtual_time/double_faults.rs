@@ -147,9 +147,7 @@ fn declare(scan: &Scan, dice: &mut Dice) -> Declaration {
         let periods = *dice.pick(&PERIODS);
         let members = |first: usize| {
             let subdevices = (first..scan.subdevices.len()).step_by(periods.len());
-            subdevices
-                .map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None })
-                .collect::<Vec<_>>()
+            subdevices.map(|subdevice| DomainMember::new(SubDeviceId(subdevice))).collect::<Vec<_>>()
         };
         let domain = |(first, period): (usize, &u32)| DomainConfig::new(*period * CYCLE, members(first));
         declaration.domains = periods.iter().enumerate().map(domain).filter(|it| !it.members.is_empty()).collect();

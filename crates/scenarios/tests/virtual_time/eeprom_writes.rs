@@ -45,12 +45,12 @@ fn an_eeprom_image_is_written_beside_process_data_and_verified() {
     let read = world.application_mut().engine_mut().start_sii_read(DEVICE.0);
     assert_eq!(world.finish(LIMIT, read), Ok(new.clone()));
     let words = new.len() / 2;
-    assert_eq!(write(&mut world, &new, false), Ok(SiiWritten { written: 0, unchanged: words }));
+    assert_eq!(write(&mut world, &new, false), Ok(SiiWritten::new(0, words)));
     // The serial number, and a word of a category.
     new[0x1C..0x20].copy_from_slice(&0x1234_5678u32.to_le_bytes());
     new[0x90] ^= 0x20;
     let result = write(&mut world, &new, false);
-    assert_eq!(result, Ok(SiiWritten { written: 3, unchanged: words - 3 }));
+    assert_eq!(result, Ok(SiiWritten::new(3, words - 3)));
     assert_eq!(image(&world), new);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
 }
@@ -127,7 +127,7 @@ fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     // The PDI has the EEPROM, and gets it back.
     let to_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![1]);
     assert_eq!(world.finish(LIMIT, to_pdi), Ok(()));
-    assert_eq!(alias(&mut world, false), Ok(SiiWritten { written: 2, unchanged: 6 }));
+    assert_eq!(alias(&mut world, false), Ok(SiiWritten::new(2, 6)));
     let register = |world: &World, at| world.network().device(DEVICE).controller.register(at, 2).to_vec();
     assert_eq!(register(&world, map::SII_CONFIGURATION)[0], 1);
     let of_image = image(&world);

@@ -211,12 +211,10 @@ fn addresses_and_filter_are_set_and_read_beside_frames() {
     let mut world = world(6, 256, EoeEnd::Stack);
     let work = start_download(&mut world, TERMINAL, 20_000);
     let mailbox = world.mailbox(TERMINAL);
-    let settings = IpSettings {
-        gateway: Some(Ipv4Addr::new(10, 0, 0, 254)),
-        dns: Some(Ipv4Addr::new(9, 9, 9, 9)),
-        name: Some(b"drive".to_vec()),
-        ..IpSettings::default()
-    };
+    let settings = IpSettings::default()
+        .with_gateway(Ipv4Addr::new(10, 0, 0, 254))
+        .with_dns(Ipv4Addr::new(9, 9, 9, 9))
+        .with_name(b"drive".to_vec());
     let (own, sent) = (mailbox.clone(), settings.clone());
     let told = world.run(async move {
         eoe::set_ip(&own, 0, &sent, LIMITS).await?;
@@ -233,11 +231,11 @@ fn addresses_and_filter_are_set_and_read_beside_frames() {
     });
     assert_eq!(back, Ok(filter));
     let own = mailbox.clone();
-    let multicast = IpSettings { address: Some(Ipv4Addr::new(224, 0, 0, 1)), ..IpSettings::default() };
+    let multicast = IpSettings::default().with_address(Ipv4Addr::new(224, 0, 0, 1));
     let refused = world.run(async move { eoe::set_ip(&own, 0, &multicast, LIMITS).await }).expect_err("no address");
     assert_eq!(refused.cause, EoeFailure::Refused(EoeResult::UNSPECIFIED));
     assert!(refused.to_string().contains("EoE port 0: the SubDevice refused: 0x0001 Unspecified"), "{refused}");
-    let long = IpSettings { name: Some(vec![b'x'; 33]), ..IpSettings::default() };
+    let long = IpSettings::default().with_name(vec![b'x'; 33]);
     let refused = world.run(async move { eoe::set_ip(&mailbox, 0, &long, LIMITS).await }).expect_err("too long");
     assert_eq!(refused.cause, EoeFailure::LongName { bytes: 33 });
     world.finish(Duration::from_secs(10), work).0.expect("all of it");
@@ -266,7 +264,7 @@ fn a_time_stamp_comes_with_the_number_of_its_frame() {
 #[test]
 fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
     let address = Some(Ipv4Addr::new(10, 0, 0, 7));
-    let settings = IpSettings { address, name: Some(b"axis".to_vec()), ..IpSettings::default() };
+    let settings = IpSettings::default().with_address(address).with_name(b"axis".to_vec());
     let start = |settings: &IpSettings, subdevice: usize| {
         let network = line(segment(256, EoeEnd::Stack), NetworkOptions::default());
         World::with(8, network, &Options::default(), |scan| {
@@ -286,7 +284,7 @@ fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
         world.run_cycles(20);
         world.power_on(DeviceIndex(TERMINAL));
     }
-    let multicast = IpSettings { address: Some(Ipv4Addr::new(224, 0, 0, 1)), ..IpSettings::default() };
+    let multicast = IpSettings::default().with_address(Ipv4Addr::new(224, 0, 0, 1));
     let mut world = start(&multicast, TERMINAL).expect("it can be activated");
     let mark = world.mark();
     world.run_cycles(200);

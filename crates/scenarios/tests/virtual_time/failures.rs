@@ -101,7 +101,7 @@ fn a_hanging_subdevice_application_in_op_does_not_affect_others() {
 /// All SubDevices as found, with short time limits.
 fn impatient(scan: &Scan) -> Declaration {
     let short = Duration::from_millis(40);
-    let timeouts = Timeouts { preop: short, safeop_op: short, back_to_init: short, sdo: short, ..Timeouts::default() };
+    let timeouts = Timeouts::default().with_preop(short).with_safeop_op(short).with_back_to_init(short).with_sdo(short);
     let mut declaration = automatic(&scan.subdevices, CYCLE);
     for config in &mut declaration.subdevices {
         *config = config.clone().timeouts(timeouts);

@@ -80,12 +80,8 @@ fn a_file_and_a_datagram_flood_leave_others_their_share_of_the_budget() {
     });
     // 1,024 datagrams of 400 bytes to the first one.
     let station = StationAddress(world.station_of(0));
-    let read = RawDatagram {
-        command: Command::Fprd,
-        target: Target::Station(station, RegisterAddress(0)),
-        data: vec![0; 388],
-        resend: true,
-    };
+    let read =
+        RawDatagram::new(Command::Fprd, Target::Station(station, RegisterAddress(0)), vec![0; 388]).with_resend(true);
     let flood = world.application_mut().engine_mut().start_datagrams(vec![read; 1024]);
     let (beside, most) = answered(&mut world);
     assert!(most <= BUDGET as u64, "{most} bytes in a cycle");

@@ -64,7 +64,7 @@ fn a_scan_that_exceeds_the_datagram_limit_reports_the_limit() {
                     Ok(scan) => panic!("{what}: {} found", scan.subdevices.len()),
                 };
                 let returns = beyond == Beyond::Unprocessed;
-                assert_eq!(error, ScanError::FrameLimit(FrameLimit { datagrams, returns }), "{what}");
+                assert_eq!(error, ScanError::FrameLimit(FrameLimit::new(datagrams, returns)), "{what}");
                 let text = error.to_string();
                 assert!(text.contains(&format!("set max_datagrams_per_frame to {datagrams} (")), "{text}");
             }
@@ -184,11 +184,7 @@ fn joining_subdevices_that_exceed_the_limit_are_explained_once() {
         };
         (PRESENT..40).for_each(|device| world.power_on(DeviceIndex(device)));
         world.run_cycles(2_500);
-        assert_eq!(
-            limits(&world),
-            [FrameLimit { datagrams: 15, returns: beyond == Beyond::Unprocessed }],
-            "{beyond:?}"
-        );
+        assert_eq!(limits(&world), [FrameLimit::new(15, beyond == Beyond::Unprocessed)], "{beyond:?}");
     }
 }
 

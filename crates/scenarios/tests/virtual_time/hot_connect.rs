@@ -56,9 +56,7 @@ fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
     let (number, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
     assert_eq!((number, members.as_slice()), (GroupId(0), [4, 5].map(SubDeviceId).as_slice()));
-    declaration.domains[0]
-        .members
-        .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
     declaration
 }
 
@@ -183,9 +181,7 @@ fn a_group_joins_at_another_place_than_it_left() {
         let base = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"];
         let mut declaration = automatic(&infos(&base), CYCLE);
         let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-        declaration.domains[0]
-            .members
-            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };
     let mut world = World::with(2, network, &Options::default(), declare).expect("scan and activation");
@@ -243,9 +239,7 @@ fn a_group_present_at_the_start_is_found_by_its_identification() {
     let declare = |_: &Scan| {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
         let (_, members) = declaration.add_group(group(SubDeviceConfig::at_identification(4711)));
-        declaration.domains[0]
-            .members
-            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };
     let network = line(all, NetworkOptions::default());
@@ -293,7 +287,7 @@ fn adjacent_groups_separated_by_a_break_continue_and_join_again() {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
         for alias in [TOOL, TOOL + 1] {
             let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(alias, 0)));
-            let joined = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            let joined = members.into_iter().map(DomainMember::new);
             declaration.domains[0].members.extend(joined);
         }
         declaration

@@ -28,8 +28,7 @@ type Setting<'a> = (JunctionMode, &'a [JunctionConnection]);
 /// Devices of [`RING_BEHIND_JUNCTION`]: an output, the junction. Only some of them have clocks.
 const ONE: [&str; 7] =
     ["digital-output-8", "junction", "servo", "digital-input-8", "block", "coupler", "analog-input-4"];
-const STRICT: JunctionConnection =
-    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(4), tail_port: 1 };
+const STRICT: JunctionConnection = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 1);
 
 fn one_ring() -> Network {
     wired(&ONE, &RING_BEHIND_JUNCTION)

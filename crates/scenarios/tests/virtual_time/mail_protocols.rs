@@ -45,7 +45,7 @@ fn pattern(length: usize) -> Vec<u8> {
 
 fn route() -> AoeRoute {
     let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
-    AoeRoute { target: address(1000), source: address(0x8000) }
+    AoeRoute::new(address(1000), address(0x8000))
 }
 
 async fn objects(mailbox: Mailbox) {

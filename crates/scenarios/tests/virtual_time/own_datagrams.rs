@@ -28,7 +28,7 @@ fn segment() -> Network {
 }
 
 fn send(world: &mut World, command: Command, target: Target, data: Vec<u8>) -> Result<Reply, BusError> {
-    let datagram = RawDatagram { command, target, data, resend: true };
+    let datagram = RawDatagram::new(command, target, data).with_resend(true);
     let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
     world.finish(LIMIT, work).expect("it is taken").pop().expect("one reply")
 }
@@ -159,7 +159,7 @@ fn refused(result: Result<World, Error>) -> (Vec<usize>, String) {
 #[test]
 fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_too() {
     let kinds = ["digital-output-8", "junction", "servo", "digital-input-8", "analog-input-4"];
-    let connection = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
+    let connection = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1);
     for (junctions, connections) in [(JunctionMode::Strict, &[connection][..]), (JunctionMode::Automatic, &[])] {
         let options = Options::default().with_junctions(junctions);
         let network = wired(&kinds, &RING_IN_RING);
@@ -174,9 +174,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
         let head = SubDeviceConfig::at_alias(7, 0);
         let head = head.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(&info);
         let (_, members) = declaration.add_group(Group::new(head));
-        declaration.domains[0]
-            .members
-            .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+        declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };
     let (subdevices, text) = refused(World::with(4, segment(), &Options::default(), with_group));
@@ -187,11 +185,8 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
 #[test]
 fn an_application_lrw_addresses_one_subdevice_on_two_links() {
     let mut world = World::in_op(5, segment());
-    let lrw = |logical: u32, length: usize| RawDatagram {
-        command: Command::Lrw,
-        target: Target::Logical(LogicalAddress(logical)),
-        data: vec![0; length],
-        resend: false,
+    let lrw = |logical: u32, length: usize| {
+        RawDatagram::new(Command::Lrw, Target::Logical(LogicalAddress(logical)), vec![0; length])
     };
     let work = world.application_mut().engine_mut().start_datagrams(vec![lrw(0, 32)]);
     let error = world.finish(LIMIT, work).expect_err("it covers process data of several");

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, SubDeviceConfig,
-    SubDeviceId, Transition, automatic,
+    Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, SubDeviceId,
+    Transition, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -29,7 +29,7 @@ fn world_of(change: impl FnOnce(&mut DeviceDescription), commands: &[StartupComm
     let declare = |scan: &Scan| {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         let config = &mut declaration.subdevices[DRIVE];
-        *config = SubDeviceConfig { startup: commands.to_vec(), ..config.clone() };
+        config.startup = commands.to_vec();
         declaration
     };
     let network = line(devices, NetworkOptions::default());
@@ -41,7 +41,7 @@ fn world(commands: &[StartupCommand]) -> World {
 }
 
 fn command(transition: Transition, address: RegisterAddress, access: RegisterAccess) -> StartupCommand {
-    let command = RegisterCommand { address, access, retries: 3, required: true };
+    let command = RegisterCommand::new(address, access).with_retries(3).with_required(true);
     StartupCommand::new(transition, StartupAction::Register(command))
 }
 
@@ -154,9 +154,9 @@ fn impossible_register_commands_are_refused_before_anything_is_sent() {
 
 fn upload(index: u16, sub_index: u8, expected: Option<&[u8]>) -> StartupCommand {
     let expected = expected.map(<[u8]>::to_vec);
-    let upload = SdoUpload { index, sub_index, complete_access: false, expected };
+    let upload = SdoUpload::new(index, sub_index).with_expected(expected);
     let command = StartupCommand::new(Transition::Ps, StartupAction::Upload(upload));
-    StartupCommand { comment: Some("a look".to_owned()), ..command }
+    command.with_comment("a look".to_owned())
 }
 
 // covers: 8.2, startup-commands
@@ -183,9 +183,9 @@ fn a_command_may_have_its_own_time_limit() {
         device.mailbox.as_mut().expect("it has one").response_time = Duration::from_millis(60);
     };
     let download = |limit: Option<u64>| {
-        let sdo = ringcat::SdoDownload { index: 0x2001, sub_index: 1, complete_access: false, data: vec![1, 0] };
+        let sdo = ringcat::SdoDownload::new(0x2001, 1, vec![1, 0]);
         let command = StartupCommand::new(Transition::Ps, StartupAction::Sdo(sdo));
-        [StartupCommand { limit: limit.map(Duration::from_millis), ..command }]
+        [command.with_limit(limit.map(Duration::from_millis))]
     };
     let mut usual = world_of(slow, &download(None));
     usual.settle();

@@ -128,7 +128,7 @@ fn send(world: &mut World, datagram: Random) -> Reply {
     if matches!(target, Target::Position(..)) {
         // Only datagrams of the application use the positions of the scan.
         let resend = command == Command::Armw;
-        let datagram = RawDatagram { command, target, data, resend };
+        let datagram = RawDatagram::new(command, target, data).with_resend(resend);
         let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
         let replies = world.finish(Duration::from_secs(1), work).expect("one is not too many");
         return replies.into_iter().next().expect("one answer").expect("it comes back");

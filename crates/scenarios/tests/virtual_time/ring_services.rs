@@ -57,7 +57,7 @@ async fn all_services(mailbox: Mailbox) {
     let list = soe::read(&mailbox, SoeAddress::value(0, Idn::product(0, 1)), LIMITS, 30_000).await.unwrap();
     assert!(list.len() >= 5000);
     let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
-    let route = AoeRoute { target: address(1000), source: address(0x8000) };
+    let route = AoeRoute::new(address(1000), address(0x8000));
     aoe::write(&mailbox, route, (MEMORY, 16), &data[..500], LIMITS).await.unwrap();
     assert_eq!(aoe::read(&mailbox, route, (MEMORY, 16), 500, LIMITS).await.unwrap(), data[..500]);
     let message = Voe { vendor_id: 0x0C47, vendor_type: 1, data: data[..100].to_vec() };
@@ -170,7 +170,7 @@ fn an_optional_subdevice_joins_on_either_side_of_a_break() {
             declaration.subdevices[2].address = ConfigAddress::Position(3);
             declaration.subdevices[3].address = ConfigAddress::Position(4);
             declaration.subdevices.insert(2, optional_analog_input(2));
-            declaration.domains[0].members.push(DomainMember { subdevice: SubDeviceId(4), sync_managers: None });
+            declaration.domains[0].members.push(DomainMember::new(SubDeviceId(4)));
             declaration
         };
         let mut world = World::with(9, network, &Options::default(), declare).expect("activation");
@@ -269,11 +269,13 @@ fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each() {
 // covers: CR-16, 9.2.2, ring-lrw
 #[test]
 fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
-    let named = |subdevices: &[usize]| ringcat::ExplicitLrw {
-        name: format!("frame 1, command {} \"cyclic cmd\"", subdevices[0]),
-        logical: LogicalAddress(0x0100_0000),
-        length: 12,
-        subdevices: subdevices.iter().copied().map(SubDeviceId).collect(),
+    let named = |subdevices: &[usize]| {
+        ringcat::ExplicitLrw::new(
+            format!("frame 1, command {} \"cyclic cmd\"", subdevices[0]),
+            LogicalAddress(0x0100_0000),
+            12,
+            subdevices.iter().copied().map(SubDeviceId).collect(),
+        )
     };
     let declare = |explicit_lrw: Vec<ringcat::ExplicitLrw>| {
         move |scan: &Scan| {

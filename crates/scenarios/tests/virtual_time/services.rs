@@ -161,7 +161,7 @@ fn a_controller_reset_works_also_when_frames_are_lost() {
 fn datagrams_of_the_application_return_data_and_working_counter() {
     let mut world = in_ring(5);
     let station = StationAddress(world.station_of(1));
-    let datagram = |command, target, data: &[u8]| RawDatagram { command, target, data: data.to_vec(), resend: true };
+    let datagram = |command, target, data: &[u8]| RawDatagram::new(command, target, data.to_vec()).with_resend(true);
     let at = Target::Station(station, ringcat_wire::address::RegisterAddress(0x0F80));
     let datagrams = vec![
         datagram(Command::Brd, Target::Broadcast(map::TYPE), &[0]),

@@ -233,7 +233,7 @@ fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
         declaration.subdevices[1].address = ConfigAddress::Position(2);
         declaration.subdevices[2].address = ConfigAddress::Position(3);
         declaration.subdevices.insert(1, twin);
-        let members = (0..4).map(|subdevice| DomainMember { subdevice: SubDeviceId(subdevice), sync_managers: None });
+        let members = (0..4).map(|subdevice| DomainMember::new(SubDeviceId(subdevice)));
         declaration.domains[0].members = members.collect();
         declaration
     })

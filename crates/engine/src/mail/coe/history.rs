@@ -13,6 +13,7 @@ const LONGEST: usize = 4096;
 
 /// The diagnosis history of a SubDevice.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct History {
     /// Largest number of messages.
     pub maximum: u8,

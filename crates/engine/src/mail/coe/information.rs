@@ -79,6 +79,7 @@ impl From<PayloadError> for InformationError {
 
 /// An object of the dictionary.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Object {
     /// Index.
     pub index: u16,
@@ -94,6 +95,7 @@ pub struct Object {
 
 /// An entry of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Entry {
     /// Index.
     pub index: u16,

@@ -97,6 +97,7 @@ pub struct EthernetCounters {
 
 /// Status of the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EthernetStatus {
     /// Frames can be sent and received.
     pub up: bool,

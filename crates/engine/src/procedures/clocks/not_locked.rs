@@ -8,6 +8,7 @@ use crate::supervisor::BusError;
 
 /// A clock did not reach its window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct NotLocked {
     /// The time limit.
     pub waited: Duration,

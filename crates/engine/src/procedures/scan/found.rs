@@ -7,6 +7,7 @@ use crate::topology::Topology;
 
 /// Result of a scan.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Scan {
     /// The SubDevices in the order of the processing units.
     pub subdevices: Vec<SubDeviceInfo>,

@@ -150,11 +150,19 @@ impl From<SiiReadError> for SiiProgramError {
 
 /// What a write did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SiiWritten {
     /// Words that were written and read back.
     pub written: usize,
     /// Words that were right already.
     pub unchanged: usize,
+}
+
+impl SiiWritten {
+    /// Numbers of words that were written and that were right already.
+    pub const fn new(written: usize, unchanged: usize) -> SiiWritten {
+        SiiWritten { written, unchanged }
+    }
 }
 
 /// Checks whether bytes may be written as an SII: an image with checksum, categories and end marker; with `force` any

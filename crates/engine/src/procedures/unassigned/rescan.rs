@@ -39,6 +39,7 @@ const LONGEST: Duration = Duration::from_secs(2);
 
 /// The identity of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Identified {
     /// A declared one, by its index in the declaration.
     Declared(SubDeviceId),
@@ -50,6 +51,7 @@ pub enum Identified {
 
 /// A SubDevice at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Found {
     /// Its place now.
     pub position: Position,
@@ -63,6 +65,7 @@ pub struct Found {
 
 /// Result of a scan of the whole segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Rescan {
     /// SubDevices passed by the main copy and by the redundant copy.
     pub counts: (Wkc, Wkc),

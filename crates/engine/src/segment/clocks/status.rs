@@ -6,6 +6,7 @@ use crate::declared::SubDeviceId;
 
 /// Status of the clock of one SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ClockStatus {
     /// Position in the scan, or at which it was found later.
     pub position: u16,
@@ -35,7 +36,8 @@ pub struct ClockStatus {
 
 /// Why the delay of a SubDevice is unknown (protocol 7.1): it is behind a fork without a clock, and the latched receive
 /// times show only the sum of that fork's branches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct HiddenDelay {
     /// Position of the fork; `None` if the SubDevices between this one and the reference are unknown.
     pub fork: Option<Position>,

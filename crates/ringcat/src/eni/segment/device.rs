@@ -200,7 +200,7 @@ fn guessed(
             SyncManager { start, length, control: SyncManagerControl::from_bits(control), ..SyncManager::default() };
         register.activate.enable = true;
         let index = declared.len() as u8;
-        declared.push(DeclaredSyncManager { index, role, register, op_only: false, pdos: Vec::new() });
+        declared.push(DeclaredSyncManager::new(index, role, register));
     };
     if let Some(mailbox) = mailbox {
         let MailboxLayout { receive_offset, receive_size, send_offset, send_size } = mailbox.standard;
@@ -252,7 +252,7 @@ fn assigned(config: &SubDeviceConfig) -> Vec<DeclaredSyncManager> {
         register.activate.enable = length > 0;
         // Three buffers, and the next one begins with a word.
         start = start.saturating_add(length.saturating_mul(3).saturating_add(7) & !7);
-        DeclaredSyncManager { index: assignment.sync_manager, role, register, op_only: false, pdos }
+        DeclaredSyncManager::new(assignment.sync_manager, role, register).with_pdos(pdos)
     };
     config.pdos.iter().flatten().map(sync_manager).collect()
 }

@@ -133,8 +133,7 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
     let found = main_device.scan().expect("a scan").subdevices;
     main_device.load(file.declaration(false)).expect("it is sound");
     let at = |station| file.configuration.at_station(station).expect("it is in the file");
-    let connection =
-        JunctionConnection { head: SubDeviceId(at(1001)), head_port: 1, tail: SubDeviceId(at(1004)), tail_port: 1 };
+    let connection = JunctionConnection::new(SubDeviceId(at(1001)), 1, SubDeviceId(at(1004)), 1);
     main_device.add_junction_connection(connection).expect("it fits");
     let application = main_device.apply().map_err(ringcat::Error::from).expect("it fits");
     let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");

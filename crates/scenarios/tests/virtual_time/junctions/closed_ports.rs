@@ -87,7 +87,7 @@ fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>>
         }
         _ => {
             let target = Target::Position(Position(3), register);
-            let order = RawDatagram { command: Command::Apwr, target, data: loops, resend: false };
+            let order = RawDatagram::new(Command::Apwr, target, loops);
             let mut work = engine.start_datagrams(vec![order]);
             Box::new(move || work.take().map(|result| matches!(result.as_deref(), Ok([Ok(_)]))))
         }

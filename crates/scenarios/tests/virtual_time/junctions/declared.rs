@@ -13,7 +13,7 @@ use super::plans::Plan;
 use super::{ONE, STRICT, changed, edge, in_op, one_ring, told};
 
 fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection {
-    JunctionConnection { head: SubDeviceId(head), head_port: 1, tail: SubDeviceId(tail), tail_port }
+    JunctionConnection::new(SubDeviceId(head), 1, SubDeviceId(tail), tail_port)
 }
 
 /// The connection that is refused as missing.

@@ -21,8 +21,7 @@ use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
 
 /// Permanent SubDevices: the second is the junction, the fourth the tail of its ring.
 const BASE: [&str; 5] = ["digital-output-8", "junction", "junction", "digital-input-8", "coupler"];
-const STRICT: JunctionConnection =
-    JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
+const STRICT: JunctionConnection = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1);
 /// The group's devices.
 const GROUP: [DeviceIndex; 2] = [DeviceIndex(5), DeviceIndex(6)];
 
@@ -37,9 +36,7 @@ fn network(cables: &[(Endpoint, Endpoint)], two_links: bool) -> Network {
 fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
     let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-    declaration.domains[0]
-        .members
-        .extend(members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None }));
+    declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
     declaration
 }
 

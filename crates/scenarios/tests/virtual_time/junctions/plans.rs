@@ -102,12 +102,12 @@ impl Plan {
         self.local.extend((begin..self.cables.len()).filter(|cable| !inner.contains(cable)));
         let Endpoint::Device(DeviceIndex(tail), tail_port) = last else { unreachable!("a ring has members") };
         let number = |port: Port| port.index() as u8;
-        self.connections.push(JunctionConnection {
-            head: SubDeviceId(junction),
-            head_port: number(ports.1),
-            tail: SubDeviceId(tail),
-            tail_port: number(tail_port),
-        });
+        self.connections.push(JunctionConnection::new(
+            SubDeviceId(junction),
+            number(ports.1),
+            SubDeviceId(tail),
+            number(tail_port),
+        ));
     }
 
     pub fn random(dice: &mut Dice) -> Plan {
@@ -192,7 +192,7 @@ impl Plan {
         let mut declaration = automatic(&infos(&self.kinds), CYCLE);
         if self.has_group {
             let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
-            let of_domain = members.into_iter().map(|subdevice| DomainMember { subdevice, sync_managers: None });
+            let of_domain = members.into_iter().map(DomainMember::new);
             declaration.domains[0].members.extend(of_domain);
         }
         declaration

@@ -24,8 +24,8 @@ pub fn two_rings() -> Network {
 }
 
 const TWO_STRICT: [JunctionConnection; 2] = [
-    JunctionConnection { head: SubDeviceId(0), head_port: 1, tail: SubDeviceId(2), tail_port: 1 },
-    JunctionConnection { head: SubDeviceId(3), head_port: 1, tail: SubDeviceId(5), tail_port: 1 },
+    JunctionConnection::new(SubDeviceId(0), 1, SubDeviceId(2), 1),
+    JunctionConnection::new(SubDeviceId(3), 1, SubDeviceId(5), 1),
 ];
 
 // covers: JR-02, junctions
@@ -168,8 +168,8 @@ fn nested_rings_that_break_at_once_are_reported_with_both_places() {
         (at(0, C), at(5, A)),
     ];
     let strict = [
-        JunctionConnection { head: SubDeviceId(0), head_port: 1, tail: SubDeviceId(4), tail_port: 1 },
-        JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 },
+        JunctionConnection::new(SubDeviceId(0), 1, SubDeviceId(4), 1),
+        JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1),
     ];
     let place = |cable: usize, broken, breaks| {
         let (node, port, far) = match cable {
@@ -253,7 +253,7 @@ fn ring_in_ring() -> Network {
 // covers: JR-02, junctions-in-ring
 #[test]
 fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
-    let strict = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
+    let strict = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1);
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let mut world = in_op(8, ring_in_ring(), setting);
         for cable in 0..7 {
@@ -293,7 +293,7 @@ fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
 // covers: LC-03, LC-06, crossed-enhanced
 #[test]
 fn a_broken_local_ring_is_no_crossed_line_for_enhanced_detection() {
-    let strict = JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(3), tail_port: 1 };
+    let strict = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(3), 1);
     for (mode, connections) in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[strict])] {
         let options = Options::default().with_junctions(mode).with_enhanced_line_crossed(true);
         let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);

@@ -20,7 +20,7 @@ const END: [(Endpoint, Endpoint); 8] = [
 // covers: JR-03, JR-04, junctions
 #[test]
 fn a_group_at_the_end_of_a_local_ring_returns_as_its_end() {
-    let strict = [JunctionConnection { head: SubDeviceId(1), head_port: 1, tail: SubDeviceId(6), tail_port: 1 }];
+    let strict = [JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(6), 1)];
     let settings = [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &strict)];
     for (number, (setting, looks)) in [(0, false), (1, true), (0, true), (1, true)].into_iter().enumerate() {
         let setting = settings[setting];
