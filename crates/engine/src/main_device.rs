@@ -213,7 +213,7 @@ impl MainDevice {
     /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
         let Some(segment) = &self.segment else { return Vec::new() };
-        segment.view().members.iter().map(|member| member.phase.into()).collect()
+        segment.view().members().iter().map(|member| member.phase.into()).collect()
     }
 
     /// Status of each clock of the segment, by position; empty without distributed clocks.
@@ -229,7 +229,7 @@ impl MainDevice {
     /// Station addresses of the declared SubDevices.
     pub fn stations(&self) -> Vec<StationAddress> {
         let Some(segment) = &self.segment else { return Vec::new() };
-        segment.view().members.iter().map(|member| member.station).collect()
+        segment.view().members().iter().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.
@@ -237,7 +237,7 @@ impl MainDevice {
         let Some(segment) = &self.segment else { return false };
         let access = segment.view();
         access
-            .members
+            .members()
             .iter()
             .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
     }
@@ -246,13 +246,13 @@ impl MainDevice {
     pub fn mandatory_settled(&self) -> bool {
         let Some(segment) = &self.segment else { return false };
         let access = segment.view();
-        access.members.iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
+        access.members().iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
     /// The present state of each hot connect group, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
         let Some(segment) = &self.segment else { return Vec::new() };
-        let counts = counts(&segment.view().members);
+        let counts = counts(segment.view().members());
         counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
@@ -348,7 +348,7 @@ impl MainDevice {
 
     /// Every cable of the scan with the error counts of the ports at its ends since activation, read once a second.
     pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
-        self.segment.as_ref().map(|segment| segment.view().cabling.cables.clone()).unwrap_or_default()
+        self.segment.as_ref().map(|segment| segment.view().cabling().cables.clone()).unwrap_or_default()
     }
 
     fn first_ring_status(&self) -> RingStatus {

@@ -8,6 +8,7 @@
 //! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`],
 //! the number of an attempt), and outdated results are refused.
 
+mod addresses;
 mod attention;
 mod breaks;
 mod cabling;
@@ -44,13 +45,14 @@ pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use local_rings::is_down;
 pub use model::{Known, Segment};
-pub use observation::{Observation, ProcessDataStep};
+pub use observation::{MemberFinding, Observation, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
 pub use reading::Reading;
 pub use ring::Words;
 pub use round_result::RoundResult;
 pub use seen::Seen;
+pub use versions::Versions;
 
 #[cfg(test)]
 mod tests;

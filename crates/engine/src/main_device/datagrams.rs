@@ -96,7 +96,7 @@ impl MainDevice {
     /// The station addresses of the last scan, or of the rescan whose cabling was taken over, by position.
     fn stations_by_position(&self) -> Vec<StationAddress> {
         match (&self.segment, &*self.scan.borrow()) {
-            (Some(segment), _) => segment.view().cabling.stations.clone(),
+            (Some(segment), _) => segment.view().cabling().stations.clone(),
             (None, Some(Ok(scan))) => scan.subdevices.iter().map(|info| info.station).collect(),
             (None, Some(Err(_)) | None) => Vec::new(),
         }
@@ -107,7 +107,7 @@ impl MainDevice {
         let Some(segment) = self.segment.as_ref().filter(|_| self.options.links() == LinkSet::Ring) else {
             return Ok(());
         };
-        match covered(&segment.view().layout, logical, datagram.data.len()) {
+        match covered(segment.view().layout(), logical, datagram.data.len()) {
             Some(subdevices) => Err(ServiceError::LrwOnTwoLinks {
                 logical,
                 length: datagram.data.len(),
@@ -124,11 +124,11 @@ fn orders(segment: Option<&SharedSegment>, datagram: &RawDatagram) -> Vec<UnderW
     let Some(known) = segment.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
         return Vec::new();
     };
-    let at = |place: usize| known.view().cabling.stations.get(place).copied();
+    let at = |place: usize| known.view().cabling().stations.get(place).copied();
     let (stations, register) = match datagram.target {
         Target::Station(station, register) => (Vec::from([station]), register),
         Target::Position(Position(place), register) => (at(place.into()).into_iter().collect(), register),
-        Target::Broadcast(register) => (known.view().cabling.stations.clone(), register),
+        Target::Broadcast(register) => (known.view().cabling().stations.clone(), register),
         Target::Logical(_) | Target::None => return Vec::new(),
     };
     stations.into_iter().filter_map(|station| ordering(segment, station, register, &datagram.data)).collect()

@@ -34,7 +34,7 @@ impl MainDevice {
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
         let Some(segment) = &self.segment else { return Vec::new() };
         let access = segment.view();
-        let members = access.members.iter().enumerate();
+        let members = access.members().iter().enumerate();
         members
             .filter_map(|(subdevice, member)| {
                 let info = member.info.as_ref()?;

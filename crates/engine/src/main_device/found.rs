@@ -28,7 +28,7 @@ impl MainDevice {
     pub fn unsettled(&self) -> alloc::vec::Vec<(usize, SubDeviceState)> {
         let Some(segment) = &self.segment else { return alloc::vec::Vec::new() };
         let access = segment.view();
-        let members = access.members.iter().enumerate();
+        let members = access.members().iter().enumerate();
         let states = members.map(|(index, member)| (index, member.phase.into(), member.config.optional));
         let unsettled = states.filter(|(_, state, optional)| match state {
             SubDeviceState::Settled(_) => false,

@@ -61,7 +61,7 @@ impl MainDevice {
 fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipient, u16> {
     let Some(segment) = segment else { return Err(ErrorReply::INVALID_HEADER) };
     let access = segment.view();
-    let member = access.members.iter().find(|member| member.station.0 == message.header.address);
+    let member = access.members().iter().find(|member| member.station.0 == message.header.address);
     let Some((member, info)) = member.and_then(|member| Some((member, member.info.as_ref()?))) else {
         return Err(ErrorReply::INVALID_HEADER);
     };

@@ -24,7 +24,7 @@ impl MainDevice {
     /// Station address of a SubDevice.
     pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
         match (&self.segment, &*self.scan.borrow()) {
-            (Some(segment), _) => segment.view().members.get(subdevice).map(|member| member.station),
+            (Some(segment), _) => segment.view().members().get(subdevice).map(|member| member.station),
             (None, Some(Ok(scan))) => scan.subdevices.get(subdevice).map(|info| info.station),
             (None, _) => None,
         }

@@ -67,10 +67,10 @@ pub(super) async fn examine(bus: Bus, segment: SharedSegment, enhanced: bool) {
         false => None,
     };
     let in_control = turn.is_some();
-    let reported = segment.view().reported_crossings().clone();
+    let (versions, reported) = (segment.view().versions(), segment.view().reported_crossings().clone());
     let found = cabling(&bus, &segment, in_control, &reported).await;
     drop(turn);
-    segment.observe(Observation::LineChecked { found, in_control });
+    segment.observe(Observation::LineChecked { versions, found, in_control });
 }
 
 /// Crossed SubDevices, and unknown rings; `None` if the segment changes too often for a result. `reported` is the
@@ -229,12 +229,12 @@ impl Known for SharedSegment {
 
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let view = self.view();
-        let member = view.members.iter().find(|member| member.station == station);
+        let member = view.members().iter().find(|member| member.station == station);
         member.and_then(|member| member.info.as_ref()).map(|info| info.controller.ports).unwrap_or_default()
     }
 
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
-        retrace::closings(&self.view().cabling, stations)
+        retrace::closings(self.view().cabling(), stations)
     }
 
     fn are_known(&self, stations: &[StationAddress]) -> bool {

@@ -24,7 +24,7 @@ use crate::mail::coe::{self, SdoAddress};
 use crate::mail::{Limits, Mailbox};
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
-use crate::segment::{Observation, ProcessDataStep};
+use crate::segment::{MemberFinding, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
 pub use crate::segment::setup::SetupError;
@@ -43,6 +43,8 @@ pub(super) struct BringUp<'a> {
     pub bus: &'a Bus,
     pub segment: &'a SharedSegment,
     pub index: usize,
+    /// Number of the attempt to which it belongs.
+    pub attempt: u32,
     pub station: StationAddress,
     pub setup: Rc<Setup>,
     pub config: Rc<SubDeviceConfig>,
@@ -201,12 +203,12 @@ impl BringUp<'_> {
     }
 
     /// How the SubDevice takes part in process data from now on.
-    fn process_data(&self, step: ProcessDataStep) {
-        self.segment.observe(Observation::ProcessData { index: self.index, step });
+    pub(super) fn process_data(&self, step: ProcessDataStep) {
+        self.segment.observe_member((self.index, self.attempt), MemberFinding::ProcessData(step));
     }
 
     fn set_configured(&self, is: bool) {
-        self.segment.observe(Observation::Configured { index: self.index, is });
+        self.segment.observe_member((self.index, self.attempt), MemberFinding::Configured(is));
     }
 
     /// Starts the declared SYNC signals, or clears earlier settings.

@@ -14,6 +14,7 @@ use ringcat_wire::register::map;
 use super::shared_segment::SharedSegment;
 use crate::event::Event;
 use crate::ring::FrameLimit;
+use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
@@ -78,13 +79,13 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
 /// In operation: reports the limit once, if there is one. Long frames delay a cycle, so the test has a minimum
 /// interval, whatever else disturbs the segment.
 pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
-    if bus.now() < segment.next_frame_trial() {
+    if bus.now() < segment.view().next_frame_test() {
         return;
     }
     // Set first: the calling procedure may end before the result arrives.
-    segment.set_next_frame_trial(bus.now() + PAUSE);
+    segment.observe(Observation::FramesTested(bus.now() + PAUSE));
     if let Some(limit) = probe(bus).await {
-        segment.set_next_frame_trial(Instant::NEVER);
+        segment.observe(Observation::FramesTested(Instant::NEVER));
         bus.report(Event::FrameLimit { limit });
     }
 }

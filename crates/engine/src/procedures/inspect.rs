@@ -25,7 +25,7 @@ pub(super) async fn read_members(
     is_calm: impl Fn() -> bool,
     mut so_far: impl FnMut(&[Reading]),
 ) -> Vec<Reading> {
-    let stations: Vec<StationAddress> = segment.view().members.iter().map(|member| member.station).collect();
+    let stations: Vec<StationAddress> = segment.view().members().iter().map(|member| member.station).collect();
     let readings = Rc::new(RefCell::new(vec![Reading::Unknown; stations.len()]));
     let mut next = 0;
     while next < stations.len() {
@@ -51,7 +51,7 @@ pub(super) async fn read_members(
 
 /// Scans all SubDevices without a declaration, by their addresses.
 pub(super) async fn read_all_unassigned(bus: &Bus, segment: &SharedSegment) -> Vec<(StationAddress, Reading)> {
-    let stations: Vec<StationAddress> = segment.view().unassigned.iter().map(|it| it.station).collect();
+    let stations: Vec<StationAddress> = segment.view().all_unassigned().iter().map(|it| it.station).collect();
     bus.gather(stations, |bus, station| async move { (station, read_member(&bus, station).await) }).await
 }
 

@@ -56,7 +56,7 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
 
 fn open_mailboxes(segment: &SharedSegment) -> Vec<Open> {
     let view = segment.view();
-    let members = view.members.iter().zip(segment.mailboxes()).enumerate();
+    let members = view.members().iter().zip(segment.mailboxes()).enumerate();
     members
         .filter_map(|(index, (member, mailbox))| {
             let mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());

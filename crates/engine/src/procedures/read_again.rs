@@ -6,12 +6,12 @@ use super::scan::read_one;
 use super::shared_segment::SharedSegment;
 use super::sii::{self, SiiCache};
 use crate::event::Event;
-use crate::segment::Observation;
+use crate::segment::MemberFinding;
 use crate::supervisor::Bus;
 
 /// Reads the SII. If it cannot be read nothing changes.
-pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, index: usize) {
-    let Some(known) = segment.view().members.get(index).and_then(|member| member.info.clone()) else { return };
+pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32)) {
+    let Some(known) = segment.view().members().get(index).and_then(|member| member.info.clone()) else { return };
     let read = async {
         sii::claim(bus, known.station).await?;
         // Cached contents may be outdated.
@@ -22,7 +22,7 @@ pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, index: usize)
         Ok(info) if info.is_blank() => {}
         Ok(mut info) => {
             info.keep_read_online(&known);
-            segment.observe(Observation::ReadAgain { index, info: &info });
+            segment.observe_member((index, attempt), MemberFinding::ReadAgain(&info));
         }
         Err(error) => bus.report(Event::ScanFailed { reason: error.to_string() }),
     }

@@ -7,23 +7,22 @@ use super::presence::prove_inputs;
 use super::recover::bring_up_member;
 use super::shared_segment::SharedSegment;
 use super::supervise::scan_round;
+use super::unassigned::read_unassigned;
 use super::unassigned::rescan::follow_groups;
-use super::unassigned::{Search, read_unassigned};
 use crate::segment::effect::Task;
 use crate::supervisor::Bus;
 
 /// Starts requested procedures. Runs until the MainDevice stops.
 pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
-    let search = Search::default();
     loop {
         let (own_bus, own) = (bus.clone(), segment.clone());
         match segment.next_task().await {
-            Task::Scan { routine } => bus.spawn(scan_round(own_bus, own, routine, search.clone())),
+            Task::Scan { routine } => bus.spawn(scan_round(own_bus, own, routine)),
             Task::BringUp { index, attempt, from, reported, check } => {
                 bus.spawn(bring_up_member(own_bus, own, (index, attempt), from, reported, check));
             }
             Task::ProveInputs { index, mapping } => bus.spawn(prove_inputs(own_bus, own, index, mapping)),
-            Task::ReadUnassigned { station } => bus.spawn(read_unassigned(own_bus, own, station)),
+            Task::ReadUnassigned { station, since } => bus.spawn(read_unassigned(own_bus, own, (station, since))),
             Task::ExamineCabling { in_control } => bus.spawn(examine(own_bus, own, in_control)),
             Task::IsolateRings => bus.spawn(isolate_rings(own_bus, own)),
             Task::CompensateDrift => bus.spawn(compensate_drift(own_bus, own)),

@@ -26,7 +26,7 @@ use crate::mail::soe::SoeFailure;
 use crate::segment::effect::{Check, Shown};
 use crate::segment::member::Member;
 use crate::segment::start::Start;
-use crate::segment::{Observation, ProcessDataStep};
+use crate::segment::{MemberFinding, ProcessDataStep};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first repeated attempt to configure a SubDevice; it doubles with every failure.
@@ -52,15 +52,15 @@ pub(super) async fn keep_up(
     let mut pause = FIRST_PAUSE;
     let mut disturbed = false;
     loop {
-        let result = try_once(bus, segment, index, start, &mut reported).await;
+        let result = try_once(bus, segment, (index, attempt), start, &mut reported).await;
         // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
-            Ok(state) => return segment.observe(Observation::Reached { index, attempt, state }),
+            Ok(state) => return segment.observe_member((index, attempt), MemberFinding::Reached(state)),
             Err(error) if is_of_bus(&error) => {
                 if !is_there(bus, segment, index).await {
                     // The supervision determines the cause.
-                    return segment.observe(Observation::Unreachable { index, attempt });
+                    return segment.observe_member((index, attempt), MemberFinding::Unreachable);
                 }
                 // A single failure may be due to a cut elsewhere, not to this SubDevice.
                 if !core::mem::replace(&mut disturbed, true) {
@@ -108,7 +108,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 
 /// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.
 async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
-    let Some(station) = segment.view().members.get(index).map(|member| member.station) else { return false };
+    let Some(station) = segment.view().members().get(index).map(|member| member.station) else { return false };
     for _ in 0..SCANS {
         match al_state::read_status(bus, station).await {
             Err(BusError::Wkc { .. }) => bus.sleep(READ_PAUSE).await,
@@ -134,14 +134,15 @@ pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
 pub(super) fn bring_up<'a>(
     bus: &'a Bus,
     segment: &'a SharedSegment,
-    index: usize,
+    (index, attempt): (usize, u32),
 ) -> Result<BringUp<'a>, ConfigureError> {
     let access = segment.view();
-    let member = access.members.get(index).ok_or(ConfigureError::NoSetup)?;
+    let member = access.members().get(index).ok_or(ConfigureError::NoSetup)?;
     Ok(BringUp {
         bus,
         segment,
         index,
+        attempt,
         station: member.station,
         setup: member.setup.clone().ok_or_else(|| no_setup(member))?,
         config: member.config.clone(),
@@ -158,11 +159,11 @@ pub(super) fn no_setup(member: &Member) -> ConfigureError {
 async fn try_once(
     bus: &Bus,
     segment: &SharedSegment,
-    index: usize,
+    (index, attempt): (usize, u32),
     start: Start,
     reported: &mut Option<Shown>,
 ) -> Result<AlState, ConfigureError> {
-    let bring_up = bring_up(bus, segment, index)?;
+    let bring_up = bring_up(bus, segment, (index, attempt))?;
     let quickly = start == Start::Unknown && quick(&bring_up, reported).await?;
     // The full start begins with an acknowledgement: an error after it is new.
     let result = if quickly { Ok(()) } else { bring_up.run(start).await.inspect_err(|_| *reported = None) };
@@ -183,17 +184,17 @@ async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<b
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
-        if segment.view().members[*index].exchanges(*target) {
+        if segment.view().members()[*index].exchanges(*target) {
             bring_up.join();
         } else {
-            segment.observe(Observation::ProcessData { index: *index, step: ProcessDataStep::Off });
+            bring_up.process_data(ProcessDataStep::Off);
         }
         mailbox.resume();
         return Ok(true);
     }
     if status.al_state() != Some(AlState::SafeOp)
         || *target != AlState::Op
-        || !segment.view().members[*index].configured
+        || !segment.view().members()[*index].configured
     {
         return Ok(false);
     }
@@ -227,8 +228,8 @@ pub(super) async fn bring_up_member(
         if !is_the_member(&bus, &segment, (index, attempt), check).await {
             return;
         }
-        if segment.view().members[index].unfit.is_some() {
-            read_again(&bus, &segment, index).await;
+        if segment.view().members()[index].unfit.is_some() {
+            read_again(&bus, &segment, (index, attempt)).await;
         }
         keep_up(&bus, &segment, (index, attempt), from, reported).await;
     };
@@ -237,14 +238,14 @@ pub(super) async fn bring_up_member(
 
 /// Whether the SubDevice with the station address of a member is that member.
 async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), check: Check) -> bool {
-    let station = segment.view().members[index].station;
+    let station = segment.view().members()[index].station;
     let is = match check {
         Check::None => Ok(true),
         Check::Identity => Ok(has_identity(bus, segment, index, station).await),
         Check::Return => is_the_lost_one(bus, segment, index, station).await,
     };
     match (is, check) {
-        (Ok(true), Check::Return) => segment.observe(Observation::Returned { index, attempt }),
+        (Ok(true), Check::Return) => segment.observe_member((index, attempt), MemberFinding::Returned),
         (Ok(true), Check::Identity | Check::None) => {}
         (not, check) => {
             if not.is_ok() {
@@ -252,10 +253,11 @@ async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (us
                 let _ = take_away(bus, segment, station).await;
             }
             // A SubDevice at the address of a lost member is handled as unassigned, and reported by its position then.
-            segment.observe(match check {
-                Check::Return => Observation::NotReturned { index, attempt },
-                Check::Identity | Check::None => Observation::Unreachable { index, attempt },
-            });
+            let finding = match check {
+                Check::Return => MemberFinding::NotReturned,
+                Check::Identity | Check::None => MemberFinding::Unreachable,
+            };
+            segment.observe_member((index, attempt), finding);
             return false;
         }
     }
@@ -286,7 +288,7 @@ pub(super) async fn while_current(
 ) {
     let mut procedure = pin!(procedure);
     poll_fn(|context| {
-        if segment.view().members.get(index).is_none_or(|member| member.attempt != attempt) {
+        if segment.view().members().get(index).is_none_or(|member| member.attempt != attempt) {
             return Poll::Ready(());
         }
         procedure.as_mut().poll(context)

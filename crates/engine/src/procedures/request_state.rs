@@ -15,9 +15,9 @@ use super::configure::{BringUp, ConfigureError};
 use super::read_again::read_again;
 use super::recover::{bring_up, failure, is_of_bus, keep_up, no_setup, while_current};
 use super::shared_segment::SharedSegment;
-use crate::segment::Observation;
 use crate::segment::member::Phase;
 use crate::segment::start::Start;
+use crate::segment::{MemberFinding, Observation};
 use crate::supervisor::Bus;
 
 /// Whether process data may be exchanged in a state.
@@ -42,7 +42,7 @@ pub(crate) fn request_state(
     async move {
         segment
             .until(|model| {
-                let is_over = model.members.get(index).is_none_or(|member| member.attempt != attempt);
+                let is_over = model.members().get(index).is_none_or(|member| member.attempt != attempt);
                 result.borrow_mut().take().or_else(|| is_over.then_some(Err(ConfigureError::Interrupted)))
             })
             .await
@@ -50,13 +50,13 @@ pub(crate) fn request_state(
 }
 
 fn attempt_of(segment: &SharedSegment, index: usize) -> u32 {
-    segment.view().members.get(index).map_or(0, |member| member.attempt)
+    segment.view().members().get(index).map_or(0, |member| member.attempt)
 }
 
 /// Errors that are detected before anything is changed.
 fn check(segment: &SharedSegment, index: usize, state: AlState) -> Result<(), ConfigureError> {
     let view = segment.view();
-    let member = view.members.get(index).ok_or(ConfigureError::NoSetup)?;
+    let member = view.members().get(index).ok_or(ConfigureError::NoSetup)?;
     match &member.setup {
         Some(setup) if state == AlState::Boot && setup.plan.bootstrap.is_empty() => Err(ConfigureError::NoBoot),
         None if member.unfit.is_some() => Err(no_setup(member)),
@@ -69,7 +69,7 @@ type Slot = Rc<RefCell<Option<Result<(), ConfigureError>>>>;
 fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, result: &Slot) {
     let (phase, before) = {
         let view = segment.view();
-        (view.members[index].phase, view.members[index].target)
+        (view.members()[index].phase, view.members()[index].target)
     };
     segment.observe(Observation::Requested { index, state });
     match phase {
@@ -87,10 +87,10 @@ fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, resul
 }
 
 async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), before: AlState, result: &Slot) {
-    match travel(bus, segment, index, before).await {
+    match travel(bus, segment, (index, attempt), before).await {
         Ok(state) => {
             *result.borrow_mut() = Some(Ok(()));
-            segment.observe(Observation::Reached { index, attempt, state });
+            segment.observe_member((index, attempt), MemberFinding::Reached(state));
         }
         Err(error) => {
             bus.report(failure(index, &error));
@@ -98,7 +98,7 @@ async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), 
             let has_refused = !is_of_bus(&error);
             *result.borrow_mut() = Some(Err(error));
             if has_refused {
-                segment.observe(Observation::Refused { index, attempt, before });
+                segment.observe_member((index, attempt), MemberFinding::Refused(before));
             } else {
                 segment.notify();
             }
@@ -107,12 +107,17 @@ async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), 
     }
 }
 
-async fn travel(bus: &Bus, segment: &SharedSegment, index: usize, before: AlState) -> Result<AlState, ConfigureError> {
+async fn travel(
+    bus: &Bus,
+    segment: &SharedSegment,
+    member: (usize, u32),
+    before: AlState,
+) -> Result<AlState, ConfigureError> {
     if before == AlState::Boot {
-        let to_init = BringUp { target: AlState::Init, ..bring_up(bus, segment, index)? };
+        let to_init = BringUp { target: AlState::Init, ..bring_up(bus, segment, member)? };
         to_init.run(Start::Unknown).await?;
-        read_again(bus, segment, index).await;
+        read_again(bus, segment, member).await;
     }
-    let bring_up = bring_up(bus, segment, index)?;
+    let bring_up = bring_up(bus, segment, member)?;
     bring_up.travel().await.map(|()| bring_up.target)
 }

@@ -15,7 +15,7 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Observation, Segment, Words};
+use crate::segment::{MemberFinding, Observation, Segment, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -33,10 +33,6 @@ pub struct SharedSegment {
     changed: Signal,
     /// Disturbances requested so far.
     disturbances: Rc<Cell<u32>>,
-    /// Number of the next temporary station address.
-    next_temporary: Rc<Cell<u16>>,
-    /// Earliest time of the next test of how many datagrams a frame may hold.
-    next_frame_trial: Rc<Cell<Instant>>,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
     /// SII contents read before.
@@ -67,8 +63,6 @@ impl SharedSegment {
             news: Rc::default(),
             changed: bus.signal(),
             disturbances: Rc::default(),
-            next_temporary: Rc::default(),
-            next_frame_trial: Rc::default(),
             bus,
             board,
             cache,
@@ -98,6 +92,11 @@ impl SharedSegment {
         }
         self.news.set(self.news.get() || !is_apart);
         self.changed.notify();
+    }
+
+    /// Passes a finding of an attempt to bring up a member to the model.
+    pub(super) fn observe_member(&self, (index, attempt): (usize, u32), finding: MemberFinding<'_>) {
+        self.observe(Observation::OfMember { index, attempt, finding });
     }
 
     /// Makes waiting procedures check their conditions again, for changes outside the model.
@@ -173,21 +172,6 @@ impl SharedSegment {
     /// Mailboxes by member.
     pub fn mailboxes(&self) -> &[Mailbox] {
         &self.mailboxes
-    }
-
-    /// Number of the next temporary station address.
-    pub(super) fn next_temporary(&self) -> u16 {
-        self.next_temporary.replace(self.next_temporary.get().wrapping_add(1))
-    }
-
-    /// Earliest time of the next test of how many datagrams a frame may hold.
-    pub(super) fn next_frame_trial(&self) -> Instant {
-        self.next_frame_trial.get()
-    }
-
-    /// Sets the earliest time of the next test.
-    pub(super) fn set_next_frame_trial(&self, at: Instant) {
-        self.next_frame_trial.set(at);
     }
 }
 

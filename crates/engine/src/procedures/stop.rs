@@ -98,8 +98,8 @@ pub(crate) type ToStop = (Option<usize>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
 pub(crate) fn all_known(segment: &Segment) -> Vec<ToStop> {
-    let members = segment.members.iter().enumerate().map(|(index, member)| (Some(index), member.station));
-    members.chain(segment.unassigned.iter().map(|it| (None, it.station))).collect()
+    let members = segment.members().iter().enumerate().map(|(index, member)| (Some(index), member.station));
+    members.chain(segment.all_unassigned().iter().map(|it| (None, it.station))).collect()
 }
 
 /// Brings SubDevices to a state below their present one. SubDevices in a lower state stay there, and so do those in

@@ -13,7 +13,7 @@ use super::frame_limit;
 use super::inspect::{read_all_unassigned, read_members};
 use super::junction::note_controls;
 use super::shared_segment::SharedSegment;
-use super::unassigned::{self, Search};
+use super::unassigned;
 use crate::segment::member::Phase;
 use crate::segment::{Observation, Reading, RoundResult};
 use crate::supervisor::Bus;
@@ -36,14 +36,14 @@ pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
 }
 
 /// One round of scans, and the procedures on the bus that follow from it.
-pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool, search: Search) {
+pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool) {
     scan_all(&bus, &segment, routine).await;
     let round = segment.view().round();
     if round.is_blind {
         frame_limit::explain(&bus, &segment).await;
     }
     if round.counts {
-        follow_up(&bus, &segment, &search).await;
+        follow_up(&bus, &segment).await;
     }
     let number = segment.board.supervision().map(|(number, _)| number);
     segment.observe(Observation::RoundEnded(number));
@@ -51,7 +51,7 @@ pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool, 
 
 async fn scan_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     let versions = segment.view().versions();
-    let before: Vec<Phase> = segment.view().members.iter().map(|member| member.phase).collect();
+    let before: Vec<Phase> = segment.view().members().iter().map(|member| member.phase).collect();
     let unassigned = read_all_unassigned(bus, segment).await;
     let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
@@ -65,7 +65,7 @@ async fn scan_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     segment.observe(Observation::Round(round_result));
 }
 
-async fn follow_up(bus: &Bus, segment: &SharedSegment, search: &Search) {
+async fn follow_up(bus: &Bus, segment: &SharedSegment) {
     let round = segment.view().round();
     if round.is_certain && segment.view().has_local_rings() {
         note_controls(bus, segment).await;
@@ -73,7 +73,7 @@ async fn follow_up(bus: &Bus, segment: &SharedSegment, search: &Search) {
     // The other SubDevices must be known before any place can be determined.
     let mut is_complete = round.is_complete;
     if round.finds_others {
-        is_complete = search.run(bus, segment).await;
+        is_complete = unassigned::search(bus, segment).await;
         // Clears the ECAT events of SubDevices that are not scanned.
         if bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
             segment.observe(Observation::ScanAgainIn(PAUSE));

@@ -12,7 +12,6 @@ use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::cell::Cell;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
@@ -27,7 +26,6 @@ use self::rescan::ports_of;
 use super::frame_limit;
 use super::scan::{ScanError, read_one};
 use super::shared_segment::SharedSegment;
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::Observation;
 use crate::segment::disturbance::Disturbance;
@@ -39,71 +37,54 @@ use crate::supervisor::{Bus, BusError};
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Consecutive failed searches before an event reports them.
-const PATIENCE: u32 = 100;
-/// Consecutive failed searches before it is tested whether frames hold too many datagrams.
-const DOUBT: u32 = 3;
 /// Maximum wait of a search for the end of another disturbance; then it is repeated.
 const LIMIT: Duration = Duration::from_millis(20);
 /// Consecutive failures of the bus before an event reports them.
 const BUS_PATIENCE: u32 = 3;
 
-/// The search for SubDevices without an assigned station address.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Search {
-    /// Consecutive failures.
-    failures: Rc<Cell<u32>>,
-}
-
-impl Search {
-    /// Finds SubDevices without a known station address, assigns one to each and has them read. True if all SubDevices
-    /// are known.
-    pub(super) async fn run(&self, bus: &Bus, segment: &SharedSegment) -> bool {
-        let Some(turn) = segment.disturb(Disturbance::Readdress, LIMIT).await else { return false };
-        let found = find(bus, segment).await;
-        drop(turn);
-        let (complete, reason) = match found {
-            Ok(complete) => (complete, "SubDevices answer that cannot be distinguished".into()),
-            Err(error) => (false, error.to_string()),
-        };
-        if complete {
-            self.failures.set(0);
-            return true;
-        }
-        let failures = self.failures.get().saturating_add(1);
-        self.failures.set(failures);
-        if failures == DOUBT {
-            frame_limit::explain(bus, segment).await;
-        }
-        if failures == PATIENCE {
-            bus.report(Event::ScanFailed { reason });
-        }
-        false
+/// Finds SubDevices without a known station address, assigns one to each and has them read. True if all SubDevices are
+/// known.
+pub(super) async fn search(bus: &Bus, segment: &SharedSegment) -> bool {
+    let Some(turn) = segment.disturb(Disturbance::Readdress, LIMIT).await else { return false };
+    let found = find(bus, segment).await;
+    drop(turn);
+    let result = match found {
+        Ok(true) => Ok(()),
+        Ok(false) => Err("SubDevices answer that cannot be distinguished".into()),
+        Err(error) => Err(error.to_string()),
+    };
+    let is_complete = result.is_ok();
+    segment.observe(Observation::Searched(result));
+    if segment.view().are_frames_doubtful() {
+        frame_limit::explain(bus, segment).await;
     }
+    is_complete
 }
 
 /// True if all SubDevices are known.
 async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
+    let versions = segment.view().versions();
     let Some(before) = view(bus).await? else { return Ok(false) };
     let old = segment.view().unknown(&before);
     if old.is_empty() {
-        segment.observe(Observation::Places(&before));
+        segment.observe(Observation::Places { versions, view: &before });
         return Ok(true);
     }
     // A SubDevice with a new address is read again.
     segment.observe(Observation::Readdressing(&old));
     let (given, complete) = give(bus, segment, &before, &old).await?;
+    let versions = segment.view().versions();
     let Some(mut after) = view(bus).await? else { return Ok(false) };
     let owners = segment.view().owners(&before.stations);
     restore(bus, segment, &owners, &before, &mut after).await?;
-    segment.observe(Observation::Places(&after));
-    segment.observe(Observation::Given { view: &after, given: &given });
+    segment.observe(Observation::Places { versions, view: &after });
+    segment.observe(Observation::Given { versions, view: &after, given: &given });
     let is_known = segment.view().unknown(&after).is_empty();
     Ok(complete && is_known)
 }
 
 /// Reads a SubDevice, repeatedly until it succeeds or the SubDevice is no longer unassigned.
-pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: StationAddress) {
+pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, (station, since): (StationAddress, u32)) {
     let mut pause = FIRST_PAUSE;
     let mut bus_failures = 0;
     loop {
@@ -120,7 +101,7 @@ pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, station: S
         let is_patient = failed_on_bus && bus_failures < BUS_PATIENCE;
         let is_read = result.is_ok();
         let reason = |error: ScanError| (!is_patient).then(|| error.to_string());
-        segment.observe(Observation::Read { station, read: result.map(Rc::new).map_err(reason) });
+        segment.observe(Observation::Read { station, since, read: result.map(Rc::new).map_err(reason) });
         if is_read {
             return;
         }
@@ -143,13 +124,14 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) 
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
     let Some(identified) = find_places(bus, segment).await else { return false };
     let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
+    let attempts: Vec<u32> = segment.view().members().iter().map(|member| member.attempt).collect();
     for (station, index) in held {
         segment.observe(Observation::Held { station, index });
     }
     for (unassigned, member) in matched {
         let Knowledge::Known(info) = &unassigned.knowledge else { continue };
         match member {
-            Some(index) => admit(bus, segment, &unassigned, info, index).await,
+            Some(index) => admit(bus, segment, &unassigned, info, (index, attempts[index])).await,
             None => segment.observe(Observation::Unexpected(unassigned.station)),
         }
     }
@@ -162,23 +144,27 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
 async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
     let is_one_missed = {
         let view = segment.view();
-        !view.unassigned.is_empty() && view.members.iter().any(|member| member.phase == Phase::Absent)
+        !view.all_unassigned().is_empty() && view.members().iter().any(|member| member.phase == Phase::Absent)
     };
     if !is_one_missed {
         return Some(Vec::new());
     }
+    let versions = segment.view().versions();
     let seen = view(bus).await.ok()??;
     // A SubDevice that was added since may be the first of several of the same type.
     if !segment.view().unknown(&seen).is_empty() {
         return None;
     }
-    segment.observe(Observation::Places(&seen));
+    if !segment.view().are_places_valid(versions) {
+        return None;
+    }
+    segment.observe(Observation::Places { versions, view: &seen });
     if !segment.view().needs_cables() {
         return Some(Vec::new());
     }
     let ports = ports_of(bus, &seen).await.ok()??;
-    let identified = segment.view().identified_by_cables(&seen, &ports);
-    Some(identified)
+    let view = segment.view();
+    view.are_places_valid(versions).then(|| view.identified_by_cables(&seen, &ports))
 }
 
 /// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.
@@ -187,7 +173,7 @@ async fn admit(
     segment: &SharedSegment,
     unassigned: &UnassignedSubDevice,
     info: &SubDeviceInfo,
-    index: usize,
+    (index, attempt): (usize, u32),
 ) {
     let station = unassigned.station;
     let fitted = segment.view().as_member(unassigned, info, index);
@@ -200,5 +186,5 @@ async fn admit(
     if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return;
     }
-    segment.observe(Observation::Admitted { station, index, info: Box::new(info) });
+    segment.observe(Observation::Admitted { station, index, attempt, info: Box::new(info) });
 }

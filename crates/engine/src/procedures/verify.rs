@@ -15,7 +15,7 @@ use ringcat_wire::address::StationAddress;
 
 use self::held::{Held, registers};
 use super::shared_segment::SharedSegment;
-use crate::segment::Observation;
+use crate::segment::MemberFinding;
 use crate::segment::member::Phase;
 use crate::supervisor::Bus;
 
@@ -50,7 +50,7 @@ struct Remedy {
 
 /// Runs until the MainDevice stops.
 pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
-    let mut remedies = alloc::vec![Remedy::default(); segment.view().members.len()];
+    let mut remedies = alloc::vec![Remedy::default(); segment.view().members().len()];
     loop {
         bus.sleep(PAUSE).await;
         let all = bus.gather_in_turns(settled(&segment), check).await;
@@ -69,9 +69,9 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
                     *remedy = Remedy { reason: reason.clone(), tries: 0 };
                 }
                 let (index, attempt) = (suspect.index, suspect.attempt);
-                if remedy.tries < ATTEMPTS && segment.view().members[index].attempt == attempt {
+                if remedy.tries < ATTEMPTS && segment.view().members()[index].attempt == attempt {
                     remedy.tries += 1;
-                    segment.observe(Observation::Undone { index, attempt, reason });
+                    segment.observe_member((index, attempt), MemberFinding::Undone(reason));
                 }
             }
         }
@@ -81,7 +81,7 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
 /// Members in their target state, with the registers written for it.
 fn settled(segment: &SharedSegment) -> Vec<Suspect> {
     let access = segment.view();
-    let members = access.members.iter().enumerate();
+    let members = access.members().iter().enumerate();
     members
         .filter_map(|(index, member)| {
             let Phase::Settled(state) = member.phase else { return None };

@@ -78,6 +78,8 @@ pub enum Task {
     ReadUnassigned {
         /// Its temporary address.
         station: StationAddress,
+        /// The version of the addresses in which it got this address.
+        since: u32,
     },
     /// Scans the segment for crossed lines.
     ExamineCabling {

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
+use super::addresses::Addresses;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cabling::Cabling;
@@ -50,17 +51,17 @@ pub struct Known {
 #[derive(Debug)]
 pub struct Segment {
     /// The declared SubDevices.
-    pub members: Vec<Member>,
+    pub(super) members: Vec<Member>,
     /// SubDevices that answer and have no declaration, or are not yet identified.
-    pub unassigned: Vec<UnassignedSubDevice>,
+    pub(super) unassigned: Vec<UnassignedSubDevice>,
     /// Layout of process data.
-    pub layout: Layout,
+    pub(super) layout: Layout,
     /// Connections according to the scan or a later rescan.
-    pub cabling: Cabling,
+    pub(super) cabling: Cabling,
     /// Ports that were closed to cut SubDevices off.
-    pub blocked: Vec<BlockedPort>,
+    pub(super) blocked: Vec<BlockedPort>,
     /// Commands to junctions of local rings about their ports.
-    pub port_controls: Vec<PortControl>,
+    pub(super) port_controls: Vec<PortControl>,
     pub(super) board: Arc<Board>,
     pub(super) choices: Choices,
     pub(super) ring: Ring,
@@ -72,8 +73,11 @@ pub struct Segment {
     pub(super) hot_connect: HotConnect,
     pub(super) attention: Attention,
     pub(super) slot: Slot,
+    pub(super) addresses: Addresses,
     /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
+    /// Until this time it is not necessary to test how many datagrams a frame may hold.
+    pub(super) frames_tested_until: Instant,
 }
 
 impl Segment {
@@ -89,7 +93,9 @@ impl Segment {
             hot_connect: HotConnect::new(&members, choices.follow_groups),
             attention: Attention::default(),
             slot: Slot::default(),
+            addresses: Addresses::default(),
             adoptions: 0,
+            frames_tested_until: Instant::default(),
             blocked: Vec::new(),
             port_controls: Vec::new(),
             members,
@@ -100,6 +106,31 @@ impl Segment {
             board,
             choices,
         }
+    }
+
+    /// The declared SubDevices, by their indices in the declaration.
+    pub fn members(&self) -> &[Member] {
+        &self.members
+    }
+
+    /// SubDevices that answer and have no declaration, or are not yet identified.
+    pub fn all_unassigned(&self) -> &[UnassignedSubDevice] {
+        &self.unassigned
+    }
+
+    /// Layout of process data.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Connections according to the scan or a later rescan.
+    pub fn cabling(&self) -> &Cabling {
+        &self.cabling
+    }
+
+    /// Ports that were closed to cut SubDevices off.
+    pub fn blocked(&self) -> &[BlockedPort] {
+        &self.blocked
     }
 
     /// Time of the next evaluation if no words are posted before.
@@ -145,7 +176,27 @@ impl Segment {
 
     /// The version of the model, for a procedure that starts now.
     pub fn versions(&self) -> Versions {
-        Versions { cabling: self.cabling.version, isolations: self.slot.isolations() }
+        Versions {
+            cabling: self.cabling.version,
+            isolations: self.slot.isolations(),
+            addresses: self.addresses.version(),
+        }
+    }
+
+    /// Whether positions and station addresses that were requested in this version are still those of the segment.
+    pub fn are_places_valid(&self, versions: Versions) -> bool {
+        let is_isolating = self.slot.running() == Some(Disturbance::IsolateRings);
+        !is_isolating && versions.isolations == self.slot.isolations() && versions.addresses == self.addresses.version()
+    }
+
+    /// Whether so many searches for SubDevices failed that the number of datagrams per frame is to be tested.
+    pub fn are_frames_doubtful(&self) -> bool {
+        self.addresses.are_frames_doubtful()
+    }
+
+    /// Earliest time of the next test of how many datagrams a frame may hold.
+    pub fn next_frame_test(&self) -> Instant {
+        self.frames_tested_until
     }
 
     /// The last round of scans.

@@ -22,6 +22,7 @@ use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
 use crate::ring_status::CableErrors;
+use crate::time::Instant;
 use crate::topology::NodeStatus;
 
 /// How a SubDevice takes part in process data from now on.
@@ -37,6 +38,29 @@ pub enum ProcessDataStep {
     Mapped,
     /// The working counter expects it; its inputs as soon as they were proven.
     Joined,
+}
+
+/// What an attempt to bring up a member has found.
+#[derive(Debug)]
+pub enum MemberFinding<'a> {
+    /// It reached this state.
+    Reached(AlState),
+    /// The SubDevice at the lost member's address is the member.
+    Returned,
+    /// The SubDevice at the lost member's address is another one, or cannot be identified.
+    NotReturned,
+    /// It does not answer.
+    Unreachable,
+    /// Its registers hold its configuration, or no longer do.
+    Configured(bool),
+    /// Its registers do not hold the written values; the missing value.
+    Undone(String),
+    /// How it takes part in process data from now on.
+    ProcessData(ProcessDataStep),
+    /// It refused the requested state; the previous target state.
+    Refused(AlState),
+    /// Its SII was read again.
+    ReadAgain(&'a SubDeviceInfo),
 }
 
 /// An observation.
@@ -63,63 +87,22 @@ pub enum Observation<'a> {
     ScanAgain,
     /// Another round is requested after a pause.
     ScanAgainIn(Duration),
+    /// It was tested how many datagrams a frame may hold. Until this time no other test is necessary.
+    FramesTested(Instant),
 
     /// The configuration of all present members may begin.
     Started(Start),
     /// They will be configured later: an answer meanwhile is not a return.
     Delayed,
-    /// A member reached a state.
-    Reached {
+    /// A finding of an attempt to bring up a member. It is refused if that is no longer the current attempt: the member
+    /// was lost, or another attempt has begun.
+    OfMember {
         /// The member.
         index: usize,
         /// The attempt.
         attempt: u32,
-        /// The state.
-        state: AlState,
-    },
-    /// The SubDevice at a lost member's address is that member.
-    Returned {
-        /// The member.
-        index: usize,
-        /// The attempt that identified it.
-        attempt: u32,
-    },
-    /// The SubDevice at a lost member's address is another one, or cannot be identified.
-    NotReturned {
-        /// The member.
-        index: usize,
-        /// The attempt that identified it.
-        attempt: u32,
-    },
-    /// A member does not answer.
-    Unreachable {
-        /// The member.
-        index: usize,
-        /// The attempt that detected it.
-        attempt: u32,
-    },
-    /// A member's registers hold its configuration, or no longer do.
-    Configured {
-        /// The member.
-        index: usize,
-        /// They hold it.
-        is: bool,
-    },
-    /// A member's registers do not hold the written values.
-    Undone {
-        /// The member.
-        index: usize,
-        /// Its attempt when they were read.
-        attempt: u32,
-        /// The missing value.
-        reason: String,
-    },
-    /// How a member takes part in process data from now on.
-    ProcessData {
-        /// The member.
-        index: usize,
-        /// The step.
-        step: ProcessDataStep,
+        /// The finding.
+        finding: MemberFinding<'a>,
     },
     /// A member has delivered all its inputs.
     Proven {
@@ -135,41 +118,38 @@ pub enum Observation<'a> {
         /// The state.
         state: AlState,
     },
-    /// A member has refused the requested state.
-    Refused {
-        /// The member.
-        index: usize,
-        /// The attempt.
-        attempt: u32,
-        /// The previous target state.
-        before: AlState,
-    },
-    /// A member's SII was read again.
-    ReadAgain {
-        /// The member.
-        index: usize,
-        /// The data read.
-        info: &'a SubDeviceInfo,
-    },
 
     /// The incident counters of members are reset.
     IncidentsForgotten,
 
     /// Positions of SubDevices, all of which are known.
-    Places(&'a View),
+    Places {
+        /// Version of the model at the request.
+        versions: Versions,
+        /// Their positions.
+        view: &'a View,
+    },
     /// These addresses are taken away from the SubDevices that have them.
     Readdressing(&'a [StationAddress]),
+    /// This temporary address is about to be assigned, or was not needed: it is not used again before all others.
+    Offered(StationAddress),
     /// Temporary addresses were assigned.
     Given {
+        /// Version of the model when the positions were requested.
+        versions: Versions,
         /// Positions of the SubDevices with these addresses.
         view: &'a View,
         /// The addresses.
         given: &'a [StationAddress],
     },
+    /// A search for SubDevices without a known address has ended; the reason if not all are known.
+    Searched(Result<(), String>),
     /// An unassigned SubDevice was read, or could not be: then with the reason, if it is to be reported.
     Read {
         /// Its address.
         station: StationAddress,
+        /// The version of the addresses in which it got the address.
+        since: u32,
         /// Its data.
         read: Result<Rc<SubDeviceInfo>, Option<String>>,
     },
@@ -197,12 +177,16 @@ pub enum Observation<'a> {
         station: StationAddress,
         /// The member.
         index: usize,
+        /// The member's attempt when it was identified.
+        attempt: u32,
         /// Its data.
         info: Box<SubDeviceInfo>,
     },
 
     /// A check for crossed lines has ended.
     LineChecked {
+        /// Version of the model at the request.
+        versions: Versions,
         /// The result; `None` if the segment changed too often for a result.
         found: Option<LineCheck>,
         /// The redundant link was down during the check.
@@ -210,6 +194,8 @@ pub enum Observation<'a> {
     },
     /// A rescan of the whole segment has ended.
     Rescanned {
+        /// Version of the model at the request.
+        versions: Versions,
         /// The result.
         seen: Seen<'a>,
         /// Words posted at that time.

@@ -1,6 +1,7 @@
 //! Tests from posted words and observations to events, without a bus.
 
 mod clocks;
+mod stale;
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -168,6 +169,10 @@ impl Ring {
     }
 }
 
+const fn of_member((index, attempt): (usize, u32), finding: MemberFinding<'_>) -> Observation<'_> {
+    Observation::OfMember { index, attempt, finding }
+}
+
 fn reports(effects: &[Effect]) -> Vec<Event> {
     let event = |effect: &Effect| match effect {
         Effect::Report(event) | Effect::ReportOf(event, _) => Some(event.clone()),
@@ -264,7 +269,7 @@ fn a_member_is_lost_when_counts_confirm_it_or_after_two_silent_scans() {
     let check = Check::Return;
     let task = Task::BringUp { index: 2, attempt: 2, from: Start::Unknown, reported: None, check };
     assert!(back.contains(&Effect::Start(task)), "{back:?}");
-    let back = ring.observe(Observation::Returned { index: 2, attempt: 2 });
+    let back = ring.observe(of_member((2, 2), MemberFinding::Returned));
     assert_eq!(reports(&back), [Event::Returned { subdevice: SubDeviceId(2) }]);
 }
 
@@ -291,25 +296,25 @@ fn scans_during_an_isolation_do_not_change_member_states() {
 #[test]
 fn results_of_an_ended_attempt_are_ignored() {
     let mut ring = Ring::closed(1);
-    ring.observe(Observation::Undone { index: 0, attempt: 0, reason: "FMMUs".into() });
+    ring.observe(of_member((0, 0), MemberFinding::Undone("FMMUs".into())));
     assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
     for late in [
-        Observation::Reached { index: 0, attempt: 0, state: AlState::Op },
-        Observation::Unreachable { index: 0, attempt: 0 },
-        Observation::Undone { index: 0, attempt: 0, reason: "FMMUs".into() },
-        Observation::Reached { index: 7, attempt: 0, state: AlState::Op },
+        of_member((0, 0), MemberFinding::Reached(AlState::Op)),
+        of_member((0, 0), MemberFinding::Unreachable),
+        of_member((0, 0), MemberFinding::Undone("FMMUs".into())),
+        of_member((7, 0), MemberFinding::Reached(AlState::Op)),
     ] {
         assert_eq!(ring.observe(late), []);
         assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
     }
-    let effects = ring.observe(Observation::Reached { index: 0, attempt: 1, state: AlState::Op });
+    let effects = ring.observe(of_member((0, 1), MemberFinding::Reached(AlState::Op)));
     assert_eq!(reports(&effects), [Event::StateReached { subdevice: SubDeviceId(0), state: AlState::Op }]);
 }
 
 #[test]
 fn inputs_read_before_a_mapping_do_not_prove_it() {
     let mut ring = Ring::closed(1);
-    let step = |step| Observation::ProcessData { index: 0, step };
+    let step = |step| of_member((0, 0), MemberFinding::ProcessData(step));
     ring.observe(step(ProcessDataStep::Joined));
     let before = ring.segment.members[0].mapping;
     ring.observe(step(ProcessDataStep::Left));

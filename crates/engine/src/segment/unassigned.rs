@@ -31,6 +31,8 @@ pub enum Knowledge {
 pub struct UnassignedSubDevice {
     /// Its temporary address.
     pub station: StationAddress,
+    /// The version of the addresses in which it got this address.
+    pub(super) since: u32,
     /// Index of the nearest member before it, and behind it, in the order of positions. Those of groups are left out.
     pub(super) between: (Option<usize>, Option<usize>),
     /// Index of the member directly before it.
@@ -62,18 +64,20 @@ impl UnassignedSubDevice {
     pub fn new(info: SubDeviceInfo, owners: &Owners, main_count: usize, reported: bool) -> UnassignedSubDevice {
         let (station, position) = (info.station, usize::from(info.position.0));
         let knowledge = Knowledge::Known(Rc::new(info));
-        UnassignedSubDevice::at(station, &At { position, owners, main_count }, reported, knowledge)
+        UnassignedSubDevice::at((station, 0), &At { position, owners, main_count }, reported, knowledge)
     }
 
+    /// `station` contains its address, and the version of the addresses in which it got the address.
     pub(super) fn at(
-        station: StationAddress,
+        (station, since): (StationAddress, u32),
         at: &At<'_>,
         reported: bool,
         knowledge: Knowledge,
     ) -> UnassignedSubDevice {
         let (between, behind) = (at.owners.neighbours(at.position), at.owners.before(at.position));
         let (position, from_main) = (Position(at.position as u16), at.position < at.main_count);
-        UnassignedSubDevice { station, between, behind, position, from_main, reported, held_since: None, knowledge }
+        let held_since = None;
+        UnassignedSubDevice { station, since, between, behind, position, from_main, reported, held_since, knowledge }
     }
 
     /// It is known to be undeclared, or cannot be read.

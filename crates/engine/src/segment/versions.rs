@@ -7,4 +7,6 @@ pub struct Versions {
     pub cabling: u32,
     /// Number of times that SubDevices had been put out of reach on purpose.
     pub isolations: u32,
+    /// Number of times that station addresses had been assigned or taken away.
+    pub addresses: u32,
 }

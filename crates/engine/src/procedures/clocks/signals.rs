@@ -54,7 +54,7 @@ fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
     let has_clock = |info: &SubDeviceInfo| info.controller.features.dc;
     {
         let view = segment.view();
-        view.members.get(member)?.info.as_ref().filter(|info| has_clock(info))?;
+        view.members().get(member)?.info.as_ref().filter(|info| has_clock(info))?;
         if let Some(index) = view.clocks().index_of(member) {
             return view.clocks().are_set_up().then_some(index);
         }

@@ -71,7 +71,7 @@ impl Ring {
     fn new(segment: &Segment, ring: &LocalRing) -> Option<Ring> {
         let Closing { head: PortOf { node: head, port: closes }, tail } = ring.closing;
         let junction = segment.station_of(head)?;
-        let children = segment.cabling.topology.nodes.get(head)?.children;
+        let children = segment.cabling().topology.nodes.get(head)?.children;
         let begins = (0..4).filter(|port| {
             let child = children[usize::from(*port)];
             child.is_some_and(|child| head < child && child <= tail.node)
@@ -112,7 +112,7 @@ pub(in super::super) async fn isolate_rings(bus: Bus, segment: SharedSegment) {
 async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeStatus>> {
     let (rings, count) = {
         let view = segment.view();
-        let topology = &view.cabling.topology;
+        let topology = &view.cabling().topology;
         let rings = topology.local_rings.iter().map(|ring| Ring::new(&view, ring));
         let mut rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
         // Outer rings first.
@@ -193,7 +193,7 @@ fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides
 async fn read(bus: &Bus, segment: &SharedSegment, ring: &Ring, found: &mut [Option<NodeStatus>]) {
     let members: Vec<_> = {
         let access = segment.view();
-        let of_ring = access.members.iter().filter_map(|member| {
+        let of_ring = access.members().iter().filter_map(|member| {
             let node = member.node.filter(|node| *node == ring.head || ring.holds(*node))?;
             let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
             Some((node, member.station, ports))

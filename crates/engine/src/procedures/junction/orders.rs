@@ -57,7 +57,7 @@ pub(crate) fn ordering(
 pub(in super::super) async fn note_controls(bus: &Bus, segment: &SharedSegment) {
     let before: Vec<(StationAddress, u32)> = {
         let view = segment.view();
-        let junctions = if view.cabling.topology.local_rings.len() > 1 { view.junctions() } else { Vec::new() };
+        let junctions = if view.cabling().topology.local_rings.len() > 1 { view.junctions() } else { Vec::new() };
         let orders = |station| view.port_control(station).map_or(0, |entry| entry.orders);
         junctions.into_iter().map(|station| (station, orders(station))).collect()
     };

@@ -86,7 +86,7 @@ pub(crate) async fn block(
 /// Opens all ports that were closed to cut SubDevices off; returns their number. If a port cannot be reached now, all
 /// are kept for the next attempt.
 pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
-    let blocked = segment.view().blocked.clone();
+    let blocked = segment.view().blocked().to_vec();
     segment.observe(Observation::Unblocking);
     let opened = set_all(bus, segment, &blocked, LoopControl::Auto).await;
     if opened.is_err() {
@@ -129,8 +129,8 @@ async fn set_all(
 fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
     let access = segment.view();
     let missing = ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() };
-    let node = access.members.get(subdevice).and_then(|member| member.node).ok_or(missing)?;
-    let here = access.cabling.topology.nodes.get(node).ok_or(missing)?;
+    let node = access.members().get(subdevice).and_then(|member| member.node).ok_or(missing)?;
+    let here = access.cabling().topology.nodes.get(node).ok_or(missing)?;
     let port = |node: usize, port: u8| access.station_of(node).map(|station| BlockedPort { station, port });
     let parent = here
         .parent
@@ -139,7 +139,7 @@ fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Ve
     let mut ports = Vec::new();
     if bus.ring() == RingState::Closed && bus.links() == crate::link::LinkSet::Ring {
         let behind = here.children.iter().flatten();
-        ports.extend(behind.filter_map(|child| port(*child, access.cabling.topology.nodes.get(*child)?.entry_port)));
+        ports.extend(behind.filter_map(|child| port(*child, access.cabling().topology.nodes.get(*child)?.entry_port)));
     }
     ports.push(parent);
     Ok(ports)

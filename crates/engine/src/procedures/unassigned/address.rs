@@ -7,7 +7,6 @@
 //! write the address that they have.
 
 use alloc::vec::Vec;
-use core::ops::RangeInclusive;
 
 use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::command::Command;
@@ -16,12 +15,10 @@ use ringcat_wire::register::map;
 
 use super::super::scan::MAX_SUBDEVICES;
 use super::super::shared_segment::SharedSegment;
+use crate::segment::Observation;
 use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 
-/// Temporary station addresses, used in turn: a SubDevice that was out of reach for a while must not be taken for
-/// another one.
-const TEMPORARY: RangeInclusive<u16> = 0xC000..=0xFFFE;
 /// Addresses assigned in one round, before all others are scanned again.
 const ROUND: usize = 64;
 /// Working counter of a SubDevice that reads and writes.
@@ -57,18 +54,8 @@ pub(in super::super) async fn view(bus: &Bus) -> Result<Option<View>, BusError> 
 
 /// A temporary address that no SubDevice has.
 fn fresh(segment: &SharedSegment, present: &[StationAddress]) -> StationAddress {
-    let view = segment.view();
-    let mut address = StationAddress(*TEMPORARY.start());
-    for _ in TEMPORARY {
-        address = StationAddress(TEMPORARY.start() + segment.next_temporary() % TEMPORARY.len() as u16);
-        let is_taken = present.contains(&address)
-            || view.cabling.stations.contains(&address)
-            || view.member_of(address).is_some()
-            || view.unassigned(address).is_some();
-        if !is_taken {
-            break;
-        }
-    }
+    let address = segment.view().free_address(present);
+    segment.observe(Observation::Offered(address));
     address
 }
 
@@ -107,7 +94,10 @@ pub(in super::super) async fn take_away(
     station: StationAddress,
 ) -> Result<(), BusError> {
     let new = [fresh(segment, &[]), fresh(segment, &[])];
-    exchange(bus, station, new, true).await.map(drop)
+    let result = exchange(bus, station, new, true).await;
+    // Positions that were read before show a member here.
+    segment.observe(Observation::Readdressing(&[station]));
+    result.map(drop)
 }
 
 /// Gives the first SubDevice with an address on each link a new one. Returns the links on which a SubDevice took it.

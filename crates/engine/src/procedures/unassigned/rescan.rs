@@ -21,7 +21,7 @@ use crate::ring::RingState;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::unassigned::Knowledge;
 use crate::segment::view::View;
-use crate::segment::{Observation, Seen, retrace};
+use crate::segment::{Observation, Seen, Versions, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -138,16 +138,16 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
     segment.observe(Observation::ScanAgain);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
-        let scanned = match segment.disturb(Disturbance::Rescan, LIMIT).await {
-            Some(_turn) => scan_once(bus, segment).await,
-            None => Ok(None),
-        };
+        let turn = segment.disturb(Disturbance::Rescan, LIMIT).await;
+        let versions = segment.view().versions();
+        let scanned = if turn.is_some() { scan_once(bus, segment).await } else { Ok(None) };
+        drop(turn);
         // This scan has cleared the ECAT events of ports that changed before.
         segment.observe(Observation::ScanAgain);
         let is_last = bus.now() >= until;
         match scanned {
-            Ok(Some(rescan)) if is_last || rescan.is_complete() => {
-                let is_adopted = rescan.is_complete() && adopt(segment, &rescan);
+            Ok(Some(rescan)) if is_last || (rescan.is_complete() && segment.view().are_places_valid(versions)) => {
+                let is_adopted = rescan.is_complete() && adopt(segment, versions, &rescan);
                 return Ok((rescan, is_adopted));
             }
             Ok(None) if is_last => return Err(ServiceError::Unsteady),
@@ -158,13 +158,13 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
 }
 
 /// Passes a complete scan to the model. True if its cabling is taken over.
-fn adopt(segment: &SharedSegment, rescan: &Rescan) -> bool {
+fn adopt(segment: &SharedSegment, versions: Versions, rescan: &Rescan) -> bool {
     let stations: Vec<StationAddress> = rescan.subdevices.iter().map(|found| found.station).collect();
     let member = |found: &Found| if let Identified::Declared(index) = found.identified { Some(index.0) } else { None };
     let members: Vec<Option<usize>> = rescan.subdevices.iter().map(member).collect();
     let seen = Seen { topology: &rescan.topology, stations: &stations, members: &members };
     let before = segment.view().adoptions();
-    segment.observe(Observation::Rescanned { seen, words: segment.words() });
+    segment.observe(Observation::Rescanned { versions, seen, words: segment.words() });
     segment.view().adoptions() != before
 }
 
@@ -179,7 +179,7 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
     for (at, station) in seen.stations.iter().enumerate() {
         let unassigned = access.unassigned(*station);
         let known = match (owners.at(at), unassigned.map(|it| &it.knowledge)) {
-            (Some(index), _) => access.members[index].info.as_ref(),
+            (Some(index), _) => access.members()[index].info.as_ref(),
             (None, Some(Knowledge::Known(info))) => Some(&**info),
             (None, _) => None,
         };
@@ -191,10 +191,10 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
         };
         subdevices.push(Found { position: Position(at as u16), station: *station, identified, moved_from: None });
     }
-    let place_at_scan = |index: usize| access.members[index].node;
+    let place_at_scan = |index: usize| access.members()[index].node;
     // If a ring is open at another place than at the scan, or was open then and has branches, frames pass its
     // SubDevices in another order (CR-09): not a move.
-    let scanned = &access.cabling.topology;
+    let scanned = &access.cabling().topology;
     let was_open = scanned.redundant_head.is_some();
     let is_comparable = match bus.ring() {
         RingState::Open => was_open && usize::from(seen.counts.0.0) == scanned.main_count,
@@ -205,8 +205,8 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
         mark_moved(&mut subdevices, place_at_scan);
     }
     let is_found = |it: &SubDeviceId| subdevices.iter().any(|found| found.identified == Identified::Declared(*it));
-    let missing = (0..access.members.len()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
-    let topology = retrace::cabling(&access.cabling, &seen.stations, &nodes, usize::from(seen.counts.0.0));
+    let missing = (0..access.members().len()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
+    let topology = retrace::cabling(access.cabling(), &seen.stations, &nodes, usize::from(seen.counts.0.0));
     Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
 }
 

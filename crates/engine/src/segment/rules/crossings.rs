@@ -16,6 +16,7 @@ use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::reading::Reading;
 use crate::segment::unassigned::UnassignedSubDevice;
+use crate::segment::versions::Versions;
 
 impl Segment {
     /// Processes port states of all members; after a change of ports the segment is scanned.
@@ -48,13 +49,17 @@ impl Segment {
     /// it, an early repetition is useless.
     pub(in crate::segment) fn observe_line_check(
         &mut self,
+        versions: Versions,
         found: Option<LineCheck>,
         in_control: bool,
         effects: &mut Effects,
     ) {
+        let is_valid = self.are_places_valid(versions) && versions.cabling == self.cabling.version;
         // This scan has cleared the ECAT events of ports that changed before.
         self.attention.want();
-        self.crossings.search = if found.is_none() && !in_control { Search::Again } else { Search::Idle };
+        let is_useless = found.is_none() && in_control;
+        let found = found.filter(|_| is_valid);
+        self.crossings.search = if found.is_none() && !is_useless { Search::Again } else { Search::Idle };
         let Some(found) = found else { return };
         self.report_crossings(&found, effects);
         let reported = core::mem::take(&mut self.crossings.reported);

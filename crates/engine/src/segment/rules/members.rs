@@ -17,7 +17,7 @@ use crate::segment::attention::Round;
 use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
 use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
-use crate::segment::observation::ProcessDataStep;
+use crate::segment::observation::{MemberFinding, ProcessDataStep};
 use crate::segment::reading::{Reading, answers};
 use crate::segment::round_result::RoundResult;
 use crate::segment::setup::Setup;
@@ -219,18 +219,40 @@ impl Segment {
         }
     }
 
-    /// The SubDevice that answers at a lost member's address is that member.
-    pub(in crate::segment) fn observe_return(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
-        if let Some(member) = self.current(index, attempt) {
-            member.mistaken = Mistaken::default();
-            effects.report(Event::Returned { subdevice: SubDeviceId(index) });
+    /// Processes a finding of an attempt, if it is the current one.
+    pub(in crate::segment) fn observe_finding(
+        &mut self,
+        (index, attempt): (usize, u32),
+        finding: MemberFinding<'_>,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let Some(member) = self.current(index, attempt) else { return };
+        match finding {
+            MemberFinding::Reached(state) => self.settle(index, state, effects),
+            MemberFinding::Returned => {
+                member.mistaken = Mistaken::default();
+                effects.report(Event::Returned { subdevice: SubDeviceId(index) });
+            }
+            MemberFinding::NotReturned => self.keep_absent(index, now, effects),
+            MemberFinding::Unreachable => self.lose(index, effects),
+            MemberFinding::Configured(is) => member.configured = is,
+            MemberFinding::Undone(reason) => {
+                effects.failed(index, reason);
+                // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier
+                // session.
+                self.start(index, Start::Doubtful, None, Check::Identity, effects);
+            }
+            MemberFinding::ProcessData(step) => self.observe_process_data(index, step, effects),
+            MemberFinding::Refused(before) => self.refuse(index, before),
+            MemberFinding::ReadAgain(info) => self.observe_info(index, info, effects),
         }
     }
 
     /// The SubDevice that answers at a lost member's address is not identified as that member. Its address has been
     /// taken away, and the next scan finds it without one, unless that failed.
-    pub(in crate::segment) fn keep_absent(&mut self, index: usize, attempt: u32, now: Instant, effects: &mut Effects) {
-        let Some(member) = self.current(index, attempt) else { return };
+    fn keep_absent(&mut self, index: usize, now: Instant, effects: &mut Effects) {
+        let member = &mut self.members[index];
         member.phase = Phase::Absent;
         let (pause, station) = (member.mistaken.again(now), member.station);
         if member.mistaken.is_due() {
@@ -247,8 +269,8 @@ impl Segment {
     }
 
     /// A member has reached its requested state.
-    pub(in crate::segment) fn settle(&mut self, index: usize, attempt: u32, state: AlState, effects: &mut Effects) {
-        let Some(member) = self.current(index, attempt) else { return };
+    fn settle(&mut self, index: usize, state: AlState, effects: &mut Effects) {
+        let member = &mut self.members[index];
         member.phase = Phase::Settled(state);
         let is_excused = !member.exchanges(state);
         self.board.set_excused(index, is_excused);
@@ -274,21 +296,16 @@ impl Segment {
     }
 
     /// A member has refused a state, and keeps its previous target.
-    pub(in crate::segment) fn refuse(&mut self, index: usize, attempt: u32, before: AlState) {
-        let Some(member) = self.current(index, attempt) else { return };
+    fn refuse(&mut self, index: usize, before: AlState) {
+        let member = &mut self.members[index];
         member.target = before;
         let is_excused = !member.exchanges(before);
         self.board.set_excused(index, is_excused);
     }
 
     /// How a member takes part in process data from now on.
-    pub(in crate::segment) fn observe_process_data(
-        &mut self,
-        index: usize,
-        step: ProcessDataStep,
-        effects: &mut Effects,
-    ) {
-        let Some(member) = self.members.get_mut(index) else { return };
+    fn observe_process_data(&mut self, index: usize, step: ProcessDataStep, effects: &mut Effects) {
+        let member = &mut self.members[index];
         let is_seen_alone = member.setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
         match step {
             ProcessDataStep::Off => self.board.set_taking_part(index, false),
@@ -322,26 +339,10 @@ impl Segment {
         }
     }
 
-    /// A member's registers no longer hold its configuration.
-    pub(in crate::segment) fn observe_undone(
-        &mut self,
-        index: usize,
-        attempt: u32,
-        reason: &str,
-        effects: &mut Effects,
-    ) {
-        if self.current(index, attempt).is_none() {
-            return;
-        }
-        effects.failed(index, reason.to_string());
-        // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier session.
-        self.start(index, Start::Doubtful, None, Check::Identity, effects);
-    }
-
     /// A member's SII was read again.
-    pub(in crate::segment) fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
+    fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
         let Segment { members, layout, .. } = self;
-        let Some(member) = members.get_mut(index) else { return };
+        let member = &mut members[index];
         match Setup::new(index, &member.config, info, layout) {
             Ok(setup) => {
                 member.take_setup(index, setup, effects);
@@ -363,12 +364,6 @@ impl Segment {
     /// Resets the incident counters of all members.
     pub(in crate::segment) fn forget_incidents(&mut self) {
         self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
-    }
-
-    pub(in crate::segment) fn set_configured(&mut self, index: usize, is: bool) {
-        if let Some(member) = self.members.get_mut(index) {
-            member.configured = is;
-        }
     }
 
     /// The member, if this attempt is the current one.

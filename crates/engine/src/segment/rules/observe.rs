@@ -28,34 +28,34 @@ impl Segment {
             Observation::RoundEnded(number) => self.attention.end(number, now),
             Observation::ScanAgain => self.attention.want(),
             Observation::ScanAgainIn(pause) => self.attention.again_in(pause, now),
+            Observation::FramesTested(until) => self.frames_tested_until = until,
 
             Observation::Started(from) => self.start_all(from, effects),
             Observation::Delayed => self.delay_all(),
-            Observation::Reached { index, attempt, state } => self.settle(index, attempt, state, effects),
-            Observation::Returned { index, attempt } => self.observe_return(index, attempt, effects),
-            Observation::NotReturned { index, attempt } => self.keep_absent(index, attempt, now, effects),
-            Observation::Unreachable { index, attempt } => self.observe_unreachable(index, attempt, effects),
-            Observation::Configured { index, is } => self.set_configured(index, is),
-            Observation::Undone { index, attempt, reason } => self.observe_undone(index, attempt, &reason, effects),
-            Observation::ProcessData { index, step } => self.observe_process_data(index, step, effects),
+            Observation::OfMember { index, attempt, finding } => {
+                self.observe_finding((index, attempt), finding, now, effects);
+            }
             Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
             Observation::Requested { index, state } => self.request(index, state),
-            Observation::Refused { index, attempt, before } => self.refuse(index, attempt, before),
-            Observation::ReadAgain { index, info } => self.observe_info(index, info, effects),
-
             Observation::IncidentsForgotten => self.forget_incidents(),
 
-            Observation::Places(view) => self.observe_places(view),
-            Observation::Readdressing(old) => self.unassigned.retain(|it| !old.contains(&it.station)),
-            Observation::Given { view, given } => self.observe_given(view, given, now, effects),
-            Observation::Read { station, read } => self.observe_read(station, read, effects),
+            Observation::Places { versions, view } => self.observe_places(versions, view),
+            Observation::Readdressing(old) => self.observe_readdressing(old),
+            Observation::Offered(station) => self.addresses.offered(station),
+            Observation::Given { versions, view, given } => self.observe_given(versions, view, given, now, effects),
+            Observation::Searched(result) => self.observe_search(result, effects),
+            Observation::Read { station, since, read } => self.observe_read((station, since), read, effects),
             Observation::Unexpected(station) => self.observe_unexpected(station, effects),
             Observation::Misfit { station, index, reason } => self.observe_misfit(station, index, reason, effects),
             Observation::Held { station, index } => self.hold(station, index, now, effects),
-            Observation::Admitted { station, index, info } => self.observe_admitted(station, index, *info, effects),
+            Observation::Admitted { station, index, attempt, info } => {
+                self.observe_admitted(station, (index, attempt), *info, effects);
+            }
 
-            Observation::LineChecked { found, in_control } => self.observe_line_check(found, in_control, effects),
-            Observation::Rescanned { seen, words } => self.adopt(seen, &words, effects),
+            Observation::LineChecked { versions, found, in_control } => {
+                self.observe_line_check(versions, found, in_control, effects);
+            }
+            Observation::Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
             Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
 
@@ -72,12 +72,6 @@ impl Segment {
             Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
             Observation::Blocked(ports) => self.blocked.extend(ports),
             Observation::Unblocking => self.blocked.clear(),
-        }
-    }
-
-    fn observe_unreachable(&mut self, index: usize, attempt: u32, effects: &mut Effects) {
-        if self.current(index, attempt).is_some() {
-            self.lose(index, effects);
         }
     }
 

@@ -14,6 +14,7 @@ use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::ring::Words;
 use crate::segment::seen::Seen;
+use crate::segment::versions::Versions;
 use crate::topology::PortOf;
 
 /// The ends of a cable, with the SubDevices there.
@@ -33,7 +34,16 @@ impl Segment {
     /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: the
     /// break would be lost from the model. A ring behind a junction may be broken, because the place where it closes is
     /// known, and its reported breaks stay valid.
-    pub(in crate::segment) fn adopt(&mut self, seen: Seen<'_>, words: &Words, effects: &mut Effects) {
+    pub(in crate::segment) fn adopt(
+        &mut self,
+        versions: Versions,
+        seen: Seen<'_>,
+        words: &Words,
+        effects: &mut Effects,
+    ) {
+        if !self.are_places_valid(versions) || versions.cabling != self.cabling.version {
+            return;
+        }
         let is_single = words.links == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
         let is_there = |index: usize| seen.members.contains(&Some(index));

@@ -15,6 +15,7 @@ use crate::segment::owners::{Owners, owners_of};
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::unassigned::{At, Knowledge, UnassignedSubDevice};
+use crate::segment::versions::Versions;
 use crate::segment::view::View;
 use crate::time::Instant;
 
@@ -47,14 +48,23 @@ impl Segment {
         old
     }
 
+    /// Addresses are taken away.
+    pub(in crate::segment) fn observe_readdressing(&mut self, old: &[StationAddress]) {
+        self.addresses.change();
+        self.unassigned.retain(|it| !old.contains(&it.station));
+    }
+
     /// Stores their present positions.
-    pub(in crate::segment) fn observe_places(&mut self, view: &View) {
+    pub(in crate::segment) fn observe_places(&mut self, versions: Versions, view: &View) {
+        if !self.are_places_valid(versions) {
+            return;
+        }
         let owners = self.owners(&view.stations);
         let main_count = usize::from(view.counts.0.0);
         for it in &mut self.unassigned {
             if let Some(position) = view.position(it.station) {
                 let at = At { position, owners: &owners, main_count };
-                let moved = UnassignedSubDevice::at(it.station, &at, it.reported, it.knowledge.clone());
+                let moved = UnassignedSubDevice::at((it.station, it.since), &at, it.reported, it.knowledge.clone());
                 *it = UnassignedSubDevice { held_since: it.held_since, ..moved };
             }
         }
@@ -63,30 +73,57 @@ impl Segment {
     /// These have got temporary addresses: they are to be read.
     pub(in crate::segment) fn observe_given(
         &mut self,
+        versions: Versions,
         view: &View,
         given: &[StationAddress],
         now: Instant,
         effects: &mut Effects,
     ) {
+        let is_valid = self.are_places_valid(versions);
+        let since = self.addresses.change();
+        // The next search finds them again.
+        if !is_valid {
+            return self.attention.want();
+        }
         let owners = self.owners(&view.stations);
         let main_count = usize::from(view.counts.0.0);
         for station in given.iter().copied() {
             let Some(position) = view.position(station) else { continue };
             let at = At { position, owners: &owners, main_count };
-            self.unassigned.push(UnassignedSubDevice::at(station, &at, false, Knowledge::Reading(now)));
-            effects.start(Task::ReadUnassigned { station });
+            self.unassigned.push(UnassignedSubDevice::at((station, since), &at, false, Knowledge::Reading(now)));
+            effects.start(Task::ReadUnassigned { station, since });
+        }
+    }
+
+    /// A temporary address that no SubDevice has. `present`: addresses that answer.
+    pub fn free_address(&self, present: &[StationAddress]) -> StationAddress {
+        self.addresses.next(|address| {
+            present.contains(&address)
+                || self.cabling.stations.contains(&address)
+                || self.member_of(address).is_some()
+                || self.unassigned(address).is_some()
+        })
+    }
+
+    /// A search for SubDevices without a known address has ended.
+    pub(in crate::segment) fn observe_search(&mut self, result: Result<(), String>, effects: &mut Effects) {
+        let is_due = self.addresses.searched(result.is_ok());
+        if let Err(reason) = result
+            && is_due
+        {
+            effects.report(Event::ScanFailed { reason });
         }
     }
 
     /// A SubDevice was read, or could not be: then with the reason, if it is to be reported.
     pub(in crate::segment) fn observe_read(
         &mut self,
-        station: StationAddress,
+        (station, since): (StationAddress, u32),
         read: Result<Rc<SubDeviceInfo>, Option<String>>,
         effects: &mut Effects,
     ) {
         self.attention.want();
-        let Some(it) = self.unassigned_mut(station) else { return };
+        let Some(it) = self.unassigned_mut(station).filter(|it| it.since == since) else { return };
         match read {
             Ok(info) => it.knowledge = Knowledge::Known(info),
             Err(None) => {}
@@ -127,14 +164,19 @@ impl Segment {
         }
     }
 
-    /// A SubDevice has got the station address of the member that it is.
+    /// A SubDevice has got the station address of the member that it is. If it has left since, or another SubDevice was
+    /// found to be the member, the next round finds the address at a SubDevice that is not the member.
     pub(in crate::segment) fn observe_admitted(
         &mut self,
         station: StationAddress,
-        index: usize,
+        (index, attempt): (usize, u32),
         info: SubDeviceInfo,
         effects: &mut Effects,
     ) {
+        self.addresses.change();
+        if self.unassigned(station).is_none() || self.current(index, attempt).is_none() {
+            return self.attention.want();
+        }
         self.take_place(station, index, effects);
         let Segment { members, layout, .. } = self;
         let Some(member) = members.get_mut(index) else { return };

@@ -1,0 +1,279 @@
+//! Findings that were requested before a change of the model arrive after it: each is refused, per fact.
+
+use alloc::boxed::Box;
+use alloc::rc::Rc;
+use alloc::string::String;
+
+use ringcat_wire::sii::Identity;
+
+use crate::segment::unassigned::Knowledge;
+use crate::segment::view::View;
+
+use super::*;
+
+/// A temporary address.
+const TEMPORARY: StationAddress = StationAddress(0xC000);
+
+/// Changes of a member, after which the findings of its earlier attempt are stale.
+const CHANGES: [fn(&mut Ring); 3] = [lose, replace, reset];
+
+fn lose(ring: &mut Ring) {
+    ring.observe(of_member((0, 0), MemberFinding::Unreachable));
+}
+
+/// Another SubDevice answers at its address.
+fn replace(ring: &mut Ring) {
+    lose(ring);
+    let attempt = ring.segment.members[0].attempt;
+    ring.scan(&[PASS; 3]);
+    ring.observe(of_member((0, attempt + 1), MemberFinding::NotReturned));
+}
+
+/// Its registers no longer hold what was written.
+fn reset(ring: &mut Ring) {
+    ring.observe(of_member((0, 0), MemberFinding::Undone("FMMUs".into())));
+}
+
+fn info(serial: u32, station: StationAddress) -> SubDeviceInfo {
+    let identity = Identity { vendor_id: 2, product_code: 7, revision: 1, serial };
+    SubDeviceInfo { station, identity, ..SubDeviceInfo::default() }
+}
+
+/// The addresses of three members, with those of `others` behind them.
+fn view(others: &[StationAddress]) -> View {
+    let stations: Vec<StationAddress> = (0..3).map(station).chain(others.iter().copied()).collect();
+    View { counts: (Wkc(stations.len() as u16), Wkc(0)), ring: RingWord::default(), stations }
+}
+
+/// A fourth SubDevice, without a declaration, is found at the end and gets a temporary address.
+fn give(ring: &mut Ring) -> u32 {
+    let versions = ring.segment.versions();
+    ring.observe(Observation::Given { versions, view: &view(&[TEMPORARY]), given: &[TEMPORARY] });
+    ring.segment.versions().addresses
+}
+
+fn isolate(ring: &mut Ring, number: u32) {
+    ring.observe(Observation::Wanted(Wanted { disturbance: Disturbance::IsolateRings, number }));
+}
+
+#[test]
+fn process_data_steps_of_an_ended_attempt_do_not_reach_the_exchange() {
+    for (number, change) in CHANGES.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        let joined = |attempt| of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Joined));
+        ring.observe(joined(0));
+        assert!(ring.segment.board.takes_part(0));
+        change(&mut ring);
+        ring.segment.board.set_taking_part(0, false);
+        assert_eq!(ring.observe(joined(0)), [], "change {number}");
+        assert!(!ring.segment.board.takes_part(0), "change {number}: no working counter expects it");
+        let attempt = ring.segment.members[0].attempt;
+        ring.observe(joined(attempt));
+        assert!(ring.segment.board.takes_part(0), "change {number}");
+    }
+}
+
+#[test]
+fn an_ended_attempt_does_not_mark_a_member_as_configured() {
+    for (number, change) in CHANGES.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        change(&mut ring);
+        ring.observe(of_member((0, 0), MemberFinding::Configured(true)));
+        assert!(!ring.segment.members[0].configured, "change {number}");
+        let attempt = ring.segment.members[0].attempt;
+        ring.observe(of_member((0, attempt), MemberFinding::Configured(true)));
+        assert!(ring.segment.members[0].configured, "change {number}");
+    }
+}
+
+#[test]
+fn an_sii_that_was_read_before_a_change_is_not_taken_over() {
+    for (number, change) in CHANGES.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        change(&mut ring);
+        let serial = |ring: &Ring| ring.segment.members[0].info.as_ref().map(|info| info.identity.serial);
+        ring.observe(of_member((0, 0), MemberFinding::ReadAgain(&info(5, station(0)))));
+        assert_eq!(serial(&ring), Some(0), "change {number}");
+        let attempt = ring.segment.members[0].attempt;
+        ring.observe(of_member((0, attempt), MemberFinding::ReadAgain(&info(5, station(0)))));
+        assert_eq!(serial(&ring), Some(5), "change {number}");
+    }
+}
+
+#[test]
+fn a_member_that_came_back_by_itself_is_not_replaced_by_an_admitted_subdevice() {
+    let mut ring = Ring::closed(3);
+    lose(&mut ring);
+    let attempt = ring.segment.members[0].attempt;
+    give(&mut ring);
+    let admitted = || {
+        let info = Box::new(info(5, station(0)));
+        Observation::Admitted { station: TEMPORARY, index: 0, attempt, info }
+    };
+    // It answers at its address: it is being configured again.
+    ring.scan(&[PASS; 3]);
+    let back = ring.segment.members[0].attempt;
+    assert_ne!(back, attempt);
+    assert_eq!(reports(&ring.observe(admitted())), []);
+    assert_eq!((ring.segment.members[0].attempt, ring.segment.unassigned.len()), (back, 1));
+    assert_eq!(ring.segment.members[0].info.as_ref().map(|info| info.identity.serial), Some(0));
+}
+
+#[test]
+fn an_unassigned_subdevice_that_has_left_is_not_admitted() {
+    let mut ring = Ring::closed(3);
+    lose(&mut ring);
+    let attempt = ring.segment.members[0].attempt;
+    give(&mut ring);
+    ring.observe(Observation::Readdressing(&[TEMPORARY]));
+    let info = Box::new(info(5, station(0)));
+    let effects = ring.observe(Observation::Admitted { station: TEMPORARY, index: 0, attempt, info });
+    assert_eq!((effects, ring.segment.members[0].phase), (Vec::new(), Phase::Absent));
+}
+
+#[test]
+fn what_was_read_of_a_subdevice_is_not_stored_for_the_next_with_its_address() {
+    let mut ring = Ring::closed(3);
+    let since = give(&mut ring);
+    ring.observe(Observation::Readdressing(&[TEMPORARY]));
+    let now = give(&mut ring);
+    let is_known = |ring: &Ring| matches!(ring.segment.unassigned[0].knowledge, Knowledge::Known(_));
+    for (since, stored) in [(since, false), (now, true)] {
+        let read = Ok(Rc::new(info(5, TEMPORARY)));
+        ring.observe(Observation::Read { station: TEMPORARY, since, read });
+        assert_eq!(is_known(&ring), stored, "read since {since}");
+    }
+}
+
+#[test]
+fn positions_that_were_read_before_a_change_of_addresses_are_not_stored() {
+    let other = StationAddress(0xC001);
+    let changes: [fn(&mut Ring); 4] = [
+        |ring| drop(ring.observe(Observation::Readdressing(&[station(1)]))),
+        |ring| {
+            let versions = ring.segment.versions();
+            ring.observe(Observation::Given { versions, view: &view(&[TEMPORARY]), given: &[] });
+        },
+        |ring| isolate(ring, 0),
+        |ring| {
+            isolate(ring, 0);
+            ring.observe(Observation::Undisturbed(0));
+        },
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        give(&mut ring);
+        let versions = ring.segment.versions();
+        change(&mut ring);
+        // It was at the fifth position, and is at the fourth.
+        let before = view(&[other, TEMPORARY]);
+        ring.observe(Observation::Places { versions, view: &before });
+        assert_eq!(ring.segment.unassigned[0].position, Position(3), "change {number}");
+        ring.observe(Observation::Given { versions, view: &before, given: &[other] });
+        assert_eq!(ring.segment.unassigned.len(), 1, "change {number}: the next search finds it");
+    }
+    let mut ring = Ring::closed(3);
+    give(&mut ring);
+    let versions = ring.segment.versions();
+    ring.observe(Observation::Places { versions, view: &view(&[other, TEMPORARY]) });
+    assert_eq!(ring.segment.unassigned[0].position, Position(4));
+}
+
+#[test]
+fn positions_that_are_read_while_rings_are_examined_are_not_stored() {
+    let mut ring = Ring::closed(3);
+    give(&mut ring);
+    isolate(&mut ring, 0);
+    let versions = ring.segment.versions();
+    let two = View { stations: [station(0), TEMPORARY].to_vec(), ..view(&[]) };
+    ring.observe(Observation::Places { versions, view: &two });
+    assert_eq!(ring.segment.unassigned[0].position, Position(3));
+}
+
+/// The cabling is replaced: two SubDevices have changed places.
+fn recable(ring: &mut Ring) {
+    let versions = ring.segment.versions();
+    let topology = ring.segment.cabling.topology.clone();
+    let stations = [station(0), station(2), station(1)];
+    let seen = Seen { topology: &topology, stations: &stations, members: &[Some(0), Some(2), Some(1)] };
+    let words = ring.words;
+    ring.observe(Observation::Rescanned { versions, seen, words });
+    assert_eq!(ring.segment.cabling.stations, stations);
+}
+
+#[test]
+fn crossed_lines_found_in_the_previous_cabling_are_searched_again() {
+    let crossing = Crossing { subdevice: Some((station(1), Position(1))), entry_port: Some(1) };
+    let check = || Some(LineCheck { crossings: vec![crossing], ..LineCheck::default() });
+    let changes: [fn(&mut Ring); 3] = [
+        recable,
+        |ring| drop(ring.observe(Observation::Readdressing(&[]))),
+        |ring| {
+            isolate(ring, 0);
+            ring.observe(Observation::Undisturbed(0));
+        },
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        for in_control in [false, true] {
+            let mut ring = Ring::closed(3);
+            let versions = ring.segment.versions();
+            change(&mut ring);
+            let effects = ring.observe(Observation::LineChecked { versions, found: check(), in_control });
+            assert_eq!(reports(&effects), [], "change {number}");
+            let again = ring.scan(&[PASS; 3]);
+            let task = Effect::Start(Task::ExamineCabling { in_control: false });
+            assert!(again.contains(&task), "change {number}: {again:?}");
+            let versions = ring.segment.versions();
+            let effects = ring.observe(Observation::LineChecked { versions, found: check(), in_control });
+            assert_eq!(reports(&effects).len(), 1, "change {number}");
+        }
+    }
+}
+
+#[test]
+fn a_rescan_is_not_taken_over_after_the_cabling_or_an_address_has_changed() {
+    let changes: [fn(&mut Ring); 2] = [recable, |ring| drop(ring.observe(Observation::Readdressing(&[station(1)])))];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        let versions = ring.segment.versions();
+        change(&mut ring);
+        let (before, adoptions) = (ring.segment.cabling.stations.clone(), ring.segment.adoptions());
+        let (topology, words) = (ring.segment.cabling.topology.clone(), ring.words);
+        let stations = [station(1), station(0), station(2)];
+        let seen = Seen { topology: &topology, stations: &stations, members: &[Some(1), Some(0), Some(2)] };
+        ring.observe(Observation::Rescanned { versions, seen, words });
+        assert_eq!((&ring.segment.cabling.stations, ring.segment.adoptions()), (&before, adoptions), "change {number}");
+    }
+}
+
+#[test]
+fn temporary_addresses_are_used_in_turn_and_without_those_in_use() {
+    let mut ring = Ring::closed(3);
+    let next = |ring: &mut Ring| {
+        let address = ring.segment.free_address(&[StationAddress(0xC001)]);
+        ring.observe(Observation::Offered(address));
+        address.0
+    };
+    assert_eq!([next(&mut ring), next(&mut ring), next(&mut ring)], [0xC000, 0xC002, 0xC003]);
+    ring.observe(Observation::Offered(StationAddress(0xFFFE)));
+    assert_eq!(next(&mut ring), 0xC000, "0xFFFF is no station address");
+}
+
+#[test]
+fn searches_that_fail_repeatedly_test_the_frames_and_are_reported_once() {
+    let mut ring = Ring::closed(3);
+    let mut failed = |count: usize| -> Vec<Event> {
+        let failure = || Observation::Searched(Err(String::from("a reason")));
+        (0..count).flat_map(|_| reports(&ring.observe(failure()))).collect()
+    };
+    assert_eq!(failed(99), []);
+    assert_eq!(failed(2), [Event::ScanFailed { reason: "a reason".into() }]);
+    ring.observe(Observation::Searched(Ok(())));
+    let doubts: Vec<bool> = (0..4)
+        .map(|_| {
+            ring.observe(Observation::Searched(Err(String::new())));
+            ring.segment.are_frames_doubtful()
+        })
+        .collect();
+    assert_eq!(doubts, [false, false, true, false]);
+}
