@@ -172,3 +172,8 @@ pub fn plant(count: usize) -> Network {
     let kinds: Vec<&str> = parts.iter().flat_map(|(kind, count)| std::iter::repeat_n(*kind, *count)).collect();
     line(descriptions(&kinds), NetworkOptions::default())
 }
+
+/// A line of servo drives, as on a machine with many axes: their SIIs are long, and all but the names are equal.
+pub fn drives(count: usize) -> Network {
+    line(descriptions(&vec!["servo"; count]), NetworkOptions::default())
+}

@@ -1,7 +1,7 @@
 //! Reads the SII of a SubDevice through its controller (protocol 3.8, 4).
 //!
 //! Only the words of the fixed area and the categories that the engine uses are read. If another SubDevice with the
-//! same fixed area was read before, or is being read, only the category headers are read.
+//! same fixed area was read before, only the category headers are read. If others are being read, they share the rest.
 
 mod cache;
 mod contents;
@@ -9,6 +9,7 @@ mod eeprom;
 mod error;
 mod pace;
 pub mod program;
+mod shared_words;
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -25,6 +26,7 @@ pub use contents::{ChainEnd, SiiContents};
 use eeprom::Eeprom;
 pub use error::SiiReadError;
 use pace::Pace;
+use shared_words::{Blocks, SharedWords};
 
 use crate::supervisor::{Bus, BusError};
 
@@ -72,30 +74,81 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
     }
     cache.teach(eeprom.pace.learnt());
     if !cache.enabled {
-        return categories(&mut eeprom, &area, true).await.map(|(_, contents)| contents);
+        return categories(&mut eeprom, &area, Extent::Own).await.map(|(_, contents)| contents);
     }
     let mut own_chain = None;
     loop {
         match cache.find(&area, station) {
             Found::Nothing(claim) => {
-                let (chain, contents) = categories(&mut eeprom, &area, true).await?;
+                let words = claim.words();
+                let (chain, contents) = loop {
+                    let trust = words.trust();
+                    let read = categories(&mut eeprom, &area, Extent::Shared(&words)).await?;
+                    // Trust only decreases, so this ends.
+                    if words.trust() == trust {
+                        break read;
+                    }
+                };
                 claim.settle(chain, contents.clone());
                 return Ok(contents);
             }
-            Found::BeingRead | Found::Contents(..) if own_chain.is_none() => {
-                own_chain = Some(categories(&mut eeprom, &area, false).await?.0);
+            Found::BeingRead(words) => match &own_chain {
+                None => own_chain = Some(own_headers(&mut eeprom, &area).await?),
+                Some(_) if bus.now() >= eeprom.until() => return Err(SiiReadError::TooSlow { word: HEADER_WORDS }),
+                Some(own) => {
+                    help(&mut eeprom, own, &words).await;
+                    bus.sleep(CACHE_PAUSE).await;
+                }
+            },
+            Found::Contents(..) if own_chain.is_none() => {
+                own_chain = Some(own_headers(&mut eeprom, &area).await?);
             }
-            Found::BeingRead if bus.now() >= eeprom.until() => {
-                return Err(SiiReadError::TooSlow { word: HEADER_WORDS });
+            Found::Contents(chain, contents) if own_chain.as_ref().is_some_and(|own| own.0 == chain) => {
+                return Ok(contents);
             }
-            Found::BeingRead => bus.sleep(CACHE_PAUSE).await,
-            Found::Contents(chain, contents) if own_chain.as_ref() == Some(&chain) => return Ok(contents),
             // The SubDevice has another identity than its fixed area.
             Found::Contents(..) | Found::Disputed => {
-                return categories(&mut eeprom, &area, true).await.map(|(_, contents)| contents);
+                return categories(&mut eeprom, &area, Extent::Own).await.map(|(_, contents)| contents);
             }
         }
     }
+}
+
+/// The chain of categories, and its end.
+type Headers = (Vec<CategoryHeader>, ChainEnd);
+
+async fn own_headers(eeprom: &mut Eeprom, area: &FixedArea) -> Result<Headers, SiiReadError> {
+    let (chain, contents) = categories(eeprom, area, Extent::Headers).await?;
+    Ok((chain, contents.end))
+}
+
+/// Reads words of others with the same fixed area, as long as there are any that too few SubDevices read. An EEPROM that
+/// fails does not help; its own data is not needed yet.
+async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, words: &SharedWords) {
+    if !matches!(end, ChainEnd::Sound { .. }) {
+        return;
+    }
+    let blocks = Blocks::new(chain, eeprom.width());
+    let mut next = words.claim(eeprom.station(), &blocks);
+    while let Some(block) = next {
+        next = words.claim(eeprom.station(), &blocks);
+        let ahead = next.map(|next| next.first);
+        if eeprom.bytes(block.first, block.count, ahead).await.is_err() {
+            return;
+        }
+        words.report(eeprom.station(), block.kind, eeprom.own_words(block.first, block.count));
+    }
+}
+
+/// How much of the categories is read.
+#[derive(Clone, Copy)]
+enum Extent<'a> {
+    /// The headers alone.
+    Headers,
+    /// Headers and data of needed categories, all from this EEPROM.
+    Own,
+    /// The same, but data that two others have returned is not read again.
+    Shared(&'a SharedWords),
 }
 
 /// Reads vendor, product, revision and serial number.
@@ -106,11 +159,11 @@ pub(super) async fn identity(bus: &Bus, station: StationAddress, cache: &SiiCach
     Ok(Identity { vendor_id: field(0), product_code: field(4), revision: field(8), serial: field(12) })
 }
 
-/// Follows the chain of categories, and reads the data of needed ones if `with_data` is set.
+/// Follows the chain of categories, and reads the data of needed ones.
 async fn categories(
     eeprom: &mut Eeprom,
     area: &FixedArea,
-    with_data: bool,
+    extent: Extent<'_>,
 ) -> Result<(Vec<CategoryHeader>, SiiContents), SiiReadError> {
     let header = SiiHeader::decode(area);
     let mut contents =
@@ -140,10 +193,19 @@ async fn categories(
             contents.end = ChainEnd::Beyond { kind: category.kind, at, announced, left };
             return Ok((chain, contents));
         }
-        if with_data && is_needed(category.kind) {
+        if is_needed(category.kind) {
             let next = word + words;
             let then = (next + 2 <= end && chain.len() < MAX_CATEGORIES).then_some(next);
-            contents.categories.push((category.kind, at, eeprom.bytes(word, words, then).await?));
+            let data = match extent {
+                Extent::Headers => None,
+                Extent::Own => Some(eeprom.bytes(word, words, then).await?),
+                Extent::Shared(shared) => {
+                    let data = eeprom.bytes_with(word, words, then, |word| shared.confirmed(word)).await?;
+                    shared.report(eeprom.station(), category.kind, eeprom.own_words(word, words));
+                    Some(data)
+                }
+            };
+            contents.categories.extend(data.map(|data| (category.kind, at, data)));
         }
         word += words;
     }

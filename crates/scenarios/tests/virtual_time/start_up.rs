@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use ringcat::{Error, Event, Links, MainDevice, Options, ScanError};
+use ringcat::{Error, Event, Links, MainDevice, Options, ScanError, SubDeviceInfo};
 use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use scenarios::phases::{End, start_up};
-use scenarios::segments::{descriptions, line, plant};
+use scenarios::segments::{describe, descriptions, line, plant};
 use scenarios::tap::Tap;
 
 const KINDS: [&str; 5] = ["coupler", "digital-output-8", "servo", "digital-input-8", "digital-output-8"];
@@ -82,11 +83,64 @@ fn a_count_that_never_settles_ends_the_scan_after_its_limit() {
 
 // covers: scan
 #[test]
-fn fifty_subdevices_are_in_op_after_60_ms_and_one_after_34() {
-    for (count, limit) in [(1, 34), (10, 40), (50, 60)] {
+fn fifty_subdevices_are_in_op_after_52_ms_and_one_after_34() {
+    for (count, limit) in [(1, 34), (10, 28), (50, 52)] {
         let phases = start_up(plant(count), &Options::default(), Duration::from_millis(1)).expect("they start");
         let op = phases.iter().find(|phase| matches!(phase.end, End::State(ringcat_wire::al::AlState::Op)));
         let at = op.expect("the last phase").at;
         assert!(at <= Duration::from_millis(limit), "{count} SubDevices: {at:?}");
+    }
+}
+
+/// Eight drives of one type with these names, the categories of one of them changed at a byte of a PDO.
+fn alike(names: impl Fn(usize) -> String, changed: Option<usize>) -> Network {
+    let device = |number: usize| {
+        let mut drive = describe("servo", &names(number));
+        if changed == Some(number) {
+            let mut image = Device::new(drive.clone()).controller.sii_image().to_vec();
+            let index = image.windows(2).position(|word| word == [0x01, 0x1A]).expect("the drive has a PDO 0x1A01");
+            image[index] = 0x02;
+            drive.sii_image = Some(image);
+        }
+        drive
+    };
+    line((0..8).map(device).collect(), NetworkOptions::default())
+}
+
+/// What a scan finds, and the time that it takes.
+fn scanned(network: Network, cache: bool) -> (Vec<SubDeviceInfo>, Duration) {
+    let mut main_device = MainDevice::request(Tap::new(network), &Options::default().with_sii_cache(cache));
+    let found = main_device.scan().expect("all are there").subdevices;
+    (found, Duration::from_nanos(main_device.links_mut().now().0))
+}
+
+// covers: scan
+#[test]
+fn subdevices_of_one_type_share_the_reading_of_their_sii() {
+    for (names, limit_ms) in [((|_| "drive".to_owned()) as fn(usize) -> String, 22), (|at| format!("drive-{at}"), 26)] {
+        let (alone, alone_took) = scanned(alike(names, None), false);
+        let (shared, shared_took) = scanned(alike(names, None), true);
+        println!("{alone_took:?} without sharing, {shared_took:?} with it");
+        assert_eq!(shared.len(), 8);
+        for (one, other) in shared.iter().zip(&alone) {
+            assert_eq!((&one.pdos, &one.sync_managers, &one.warnings), (&other.pdos, &other.sync_managers, &vec![]));
+            assert!(alone.iter().any(|any| any.name == one.name), "{}", one.name);
+        }
+        assert!(alone_took > Duration::from_millis(36), "{alone_took:?}");
+        assert!(shared_took < Duration::from_millis(limit_ms), "{shared_took:?}");
+    }
+}
+
+// covers: scan
+#[test]
+fn one_bad_eeprom_never_changes_what_is_known_of_the_others() {
+    let (good, _) = scanned(alike(|_| "drive".to_owned(), None), false);
+    for changed in 0..8 {
+        let (found, took) = scanned(alike(|_| "drive".to_owned(), Some(changed)), true);
+        for (number, (found, good)) in found.iter().zip(&good).enumerate() {
+            assert!(number == changed || found.pdos == good.pdos, "drive {number}, changed {changed}");
+        }
+        println!("changed {changed}: {took:?}");
+        assert!(took < Duration::from_millis(85), "at most every SII is read twice: {took:?}");
     }
 }

@@ -13,6 +13,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
 
 use super::contents::SiiContents;
+use super::shared_words::SharedWords;
 
 /// Entries of the cache, more than a segment has types of SubDevices; beyond this the oldest entry is removed.
 const MAX_ENTRIES: usize = 1024;
@@ -47,14 +48,15 @@ enum Known {
 struct Entry {
     area: FixedArea,
     known: Known,
+    words: SharedWords,
 }
 
 /// The cache's entry for a fixed area.
 pub(super) enum Found {
     /// Too few have been read; the procedure with the claim reads its own.
     Nothing(Claim),
-    /// Other procedures are reading it.
-    BeingRead,
+    /// Other procedures are reading it, and these words have been returned.
+    BeingRead(SharedWords),
     /// Two equal contents were read, with these category headers.
     Contents(Vec<CategoryHeader>, SiiContents),
     /// SubDevices with it differ.
@@ -95,23 +97,24 @@ impl SiiCache {
     pub(super) fn find(&self, area: &FixedArea, station: StationAddress) -> Found {
         /// Concurrent readers: as many as have to agree.
         const READERS: usize = 2;
-        let claim = || Claim { entries: self.entries.clone(), area: *area, station };
+        let claim = |words| Claim { entries: self.entries.clone(), area: *area, station, words };
         let mut entries = self.entries.borrow_mut();
-        match entries.iter_mut().find(|entry| entry.area == *area).map(|entry| &mut entry.known) {
-            Some(Known::Twice((chain, contents))) => Found::Contents(chain.clone(), contents.clone()),
-            Some(Known::Disputed) => Found::Disputed,
-            Some(Known::Once { read, readers }) if *readers + usize::from(read.is_some()) < READERS => {
+        let Some(Entry { known, words, .. }) = entries.iter_mut().find(|entry| entry.area == *area) else {
+            if entries.len() >= MAX_ENTRIES {
+                entries.remove(0);
+            }
+            let words = SharedWords::default();
+            entries.push(Entry { area: *area, known: Known::Once { read: None, readers: 1 }, words: words.clone() });
+            return Found::Nothing(claim(words));
+        };
+        match known {
+            Known::Twice((chain, contents)) => Found::Contents(chain.clone(), contents.clone()),
+            Known::Disputed => Found::Disputed,
+            Known::Once { read, readers } if *readers + usize::from(read.is_some()) < READERS => {
                 *readers += 1;
-                Found::Nothing(claim())
+                Found::Nothing(claim(words.clone()))
             }
-            Some(Known::Once { .. }) => Found::BeingRead,
-            None => {
-                if entries.len() >= MAX_ENTRIES {
-                    entries.remove(0);
-                }
-                entries.push(Entry { area: *area, known: Known::Once { read: None, readers: 1 } });
-                Found::Nothing(claim())
-            }
+            Known::Once { .. } => Found::BeingRead(words.clone()),
         }
     }
 
@@ -134,9 +137,15 @@ pub(super) struct Claim {
     entries: Rc<RefCell<Vec<Entry>>>,
     area: FixedArea,
     station: StationAddress,
+    words: SharedWords,
 }
 
 impl Claim {
+    /// The words that SubDevices with this fixed area have returned.
+    pub(super) fn words(&self) -> SharedWords {
+        self.words.clone()
+    }
+
     pub(super) fn settle(self, chain: Vec<CategoryHeader>, contents: SiiContents) {
         let mut entries = self.entries.borrow_mut();
         let Some(entry) = entries.iter_mut().find(|entry| entry.area == self.area) else { return };
@@ -153,6 +162,9 @@ impl Claim {
             Known::Once { readers, .. } => Known::Once { read: Some((self.station, now)), readers: *readers },
             Known::Twice(_) | Known::Disputed => return,
         };
+        if !matches!(next, Known::Once { .. }) {
+            entry.words = SharedWords::default();
+        }
         entry.known = next;
     }
 }
@@ -187,7 +199,7 @@ mod tests {
     fn claim(cache: &SiiCache, area: &FixedArea, station: u16) -> Option<Claim> {
         match cache.find(area, StationAddress(station)) {
             Found::Nothing(claim) => Some(claim),
-            Found::BeingRead | Found::Contents(..) | Found::Disputed => None,
+            Found::BeingRead(_) | Found::Contents(..) | Found::Disputed => None,
         }
     }
 

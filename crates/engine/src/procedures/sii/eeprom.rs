@@ -91,16 +91,32 @@ impl Eeprom {
         self.until
     }
 
+    pub(super) fn station(&self) -> StationAddress {
+        self.station
+    }
+
     /// Reads words. `then` is the word that will be read next, if that is certain: it is read ahead.
     pub(super) async fn bytes(&mut self, first: u32, count: u32, then: Option<u32>) -> Result<Vec<u8>, SiiReadError> {
+        self.bytes_with(first, count, then, |_| None).await
+    }
+
+    /// As [`Eeprom::bytes`], but words that `known` returns are not read.
+    pub(super) async fn bytes_with(
+        &mut self,
+        first: u32,
+        count: u32,
+        then: Option<u32>,
+        known: impl Fn(u32) -> Option<u16>,
+    ) -> Result<Vec<u8>, SiiReadError> {
         let end = first + count;
         let mut bytes = Vec::with_capacity(2 * count as usize);
         for word in first..end {
-            let value = match self.word(word) {
+            let value = match self.word(word).or_else(|| known(word)) {
                 Some(value) => value,
                 None => {
                     let beyond = word + self.width();
-                    let mut rest = (beyond..end).chain(then.filter(|then| !(word..beyond).contains(then)));
+                    let rest = (beyond..end).filter(|word| known(*word).is_none());
+                    let mut rest = rest.chain(then.filter(|then| !(word..beyond).contains(then)));
                     let ahead = rest.find(|word| self.word(*word).is_none());
                     self.fetch(word, ahead).await?
                 }
@@ -110,8 +126,13 @@ impl Eeprom {
         Ok(bytes)
     }
 
+    /// The words of this range that have been read.
+    pub(super) fn own_words(&self, first: u32, count: u32) -> impl Iterator<Item = (u32, u16)> {
+        (first..first + count).filter_map(|word| Some((word, self.word(word)?)))
+    }
+
     /// Words that one command reads.
-    const fn width(&self) -> u32 {
+    pub(super) const fn width(&self) -> u32 {
         if self.eight_bytes { 4 } else { 2 }
     }
 
