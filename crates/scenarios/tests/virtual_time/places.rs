@@ -40,7 +40,7 @@ fn register(
 /// Numbers of SyncManagers, last ones first.
 const BACKWARDS: [u8; 4] = [3, 2, 1, 0];
 
-// covers: places
+// covers: layout
 #[test]
 fn registered_places_hold_in_line_and_ring_over_several_frames_through_a_cut() {
     for (seed, policy, is_ring) in [
@@ -94,7 +94,7 @@ fn registered_places_hold_in_line_and_ring_over_several_frames_through_a_cut() {
     }
 }
 
-// covers: places
+// covers: layout
 #[test]
 fn the_same_sync_manager_in_two_domains_delivers_to_both() {
     for is_ring in [false, true] {
@@ -129,7 +129,7 @@ fn the_same_sync_manager_in_two_domains_delivers_to_both() {
     }
 }
 
-// covers: places
+// covers: layout
 #[test]
 fn sixty_four_domains_of_one_subdevice_each_with_and_without_a_period() {
     let kinds = ["digital-output-8", "servo", "digital-input-8", "analog-input-4"];
@@ -163,7 +163,7 @@ fn sixty_four_domains_of_one_subdevice_each_with_and_without_a_period() {
     }
 }
 
-// covers: places, domains
+// covers: layout, domains
 #[test]
 fn periods_that_are_no_multiples_of_each_other_keep_their_rates() {
     let micros = |us: u64| Duration::from_micros(us);
@@ -191,7 +191,7 @@ fn periods_that_are_no_multiples_of_each_other_keep_their_rates() {
     }
 }
 
-// covers: places
+// covers: layout
 #[test]
 fn a_place_registered_for_another_size_is_refused_at_activation() {
     let pdo = |bits| vec![PdoMapping::of(0x1A00, [PdoEntry::new(0x6000, 1, bits)])];

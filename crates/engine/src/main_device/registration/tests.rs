@@ -47,7 +47,7 @@ fn place(entry: Entry) -> (usize, u8, u16) {
     (entry.byte_offset(), entry.bit_position(), entry.bit_length)
 }
 
-// covers: places
+// covers: layout
 #[test]
 fn a_whole_sync_manager_comes_behind_those_registered_before_padded_to_bytes() {
     let mut declaration = declaration(vec![config(&[1, 1, 1], &[16, 32]), config(&[16], &[8, 3])], 2);
@@ -66,7 +66,7 @@ fn a_whole_sync_manager_comes_behind_those_registered_before_padded_to_bytes() {
     assert_eq!(sizes, [(0, 11), (11, 2)]);
 }
 
-// covers: places
+// covers: layout
 #[test]
 fn the_working_counter_of_igh_counts_two_for_outputs_and_one_for_inputs_of_an_lrw() {
     let mut declaration = declaration(vec![config(&[8], &[8]), config(&[], &[8]), config(&[16], &[])], 4);
@@ -128,7 +128,7 @@ fn more_places_than_fmmus_are_refused() {
 }
 
 proptest! {
-    // covers: places
+    // covers: layout
     #[test]
     fn no_registration_moves_an_earlier_one(
         order in proptest::collection::vec((0usize..6, 0usize..4, any::<bool>()), 1..40),
