@@ -11,7 +11,9 @@
 
 mod chunk;
 mod error;
+mod fixed;
 mod plan;
+mod service;
 mod spec;
 
 use alloc::vec::Vec;
@@ -23,11 +25,12 @@ use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 use crate::domain::DomainId;
 use crate::link::LinkSet;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
+use fixed::Starts;
 use spec::Cut;
 
 pub use error::LayoutError;
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
-pub use spec::{AreaSpec, Delivers, DomainSpec, LrwPolicy, Rules, Witness};
+pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy, Rules, Witness};
 
 /// All that the exchange sends.
 #[derive(Clone, Debug, Default)]
@@ -74,7 +77,7 @@ impl Layout {
             let cut = Cut { lrw, each, most };
             let domain = lay_out(spec, cut, LogicalAddress(logical), &mut witnesses)?;
             // Domains start at multiples of four bytes, which makes captures easier to read.
-            let end = logical.checked_add(domain.image_len).filter(|end| *end < 1 << 31);
+            let end = logical.checked_add(domain.logical_len).filter(|end| *end < 1 << 31);
             logical = end.ok_or(LayoutError::TooLarge)?.next_multiple_of(4);
             layout.domains.push(domain);
         }
@@ -97,12 +100,13 @@ impl Layout {
 
     fn check_in_flight(&self) -> Result<(), LayoutError> {
         let of_domain = |domain: &PlannedDomain| domain.frames.len() * usize::from(domain.under_way.max(1));
-        let frames = self.domains.iter().map(of_domain).sum();
+        let frames = self.domains.iter().map(of_domain).sum::<usize>() + usize::from(self.service().is_some());
         if frames > crate::ring::MAX_IN_FLIGHT { Err(LayoutError::TooManyFrames { frames }) } else { Ok(()) }
     }
 
     fn add_supervision(&mut self) {
-        let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return };
+        let Some(home) = self.home() else { return };
+        let domain = &mut self.domains[home];
         let room = |frame: &PlannedFrame| {
             frame.used() + OVERHEAD + SUPERVISION_LEN <= MAX_DATA + OVERHEAD && frame.takes(1, self.most)
         };
@@ -112,9 +116,10 @@ impl Layout {
         }
     }
 
-    /// Adds the datagrams of distributed clocks to the domain with the shortest period.
+    /// Adds the datagrams of distributed clocks.
     pub fn add_clocks(&mut self) -> Result<(), LayoutError> {
-        let Some(domain) = self.domains.iter_mut().min_by_key(|domain| domain.period) else { return Ok(()) };
+        let Some(home) = self.home() else { return Ok(()) };
+        let domain = &mut self.domains[home];
         let others = |frame: &PlannedFrame| if frame.supervision { OVERHEAD + SUPERVISION_LEN } else { 0 };
         let room = |frame: &PlannedFrame| {
             frame.used() + others(frame) + CLOCKS_LEN <= MAX_DATA + OVERHEAD && frame.takes(CLOCKS, self.most)
@@ -126,13 +131,19 @@ impl Layout {
         self.check_in_flight()
     }
 
-    /// The place of a SubDevice's area, with its domain.
+    /// The first place of a SubDevice's area, with its domain.
     pub fn area(&self, subdevice: usize, sync_manager: u8) -> Option<(DomainId, PlacedArea)> {
-        self.domains.iter().enumerate().find_map(|(id, domain)| {
-            let found =
-                domain.areas.iter().find(|a| a.area.subdevice == subdevice && a.area.sync_manager == sync_manager);
-            found.map(|area| (DomainId(id), *area))
-        })
+        self.areas_of(subdevice).find(|(_, placed)| placed.area.sync_manager == sync_manager)
+    }
+
+    /// All places of a SubDevice's areas, with their domains: an area has one in each domain that exchanges it.
+    pub fn areas_of(&self, subdevice: usize) -> impl Iterator<Item = (DomainId, PlacedArea)> {
+        let in_domain = move |(id, domain): (usize, &PlannedDomain)| {
+            let places: Vec<PlacedArea> =
+                domain.areas.iter().filter(|placed| placed.area.subdevice == subdevice).copied().collect();
+            places.into_iter().map(move |placed| (DomainId(id), placed))
+        };
+        self.domains.iter().enumerate().flat_map(in_domain)
     }
 }
 
@@ -175,11 +186,13 @@ fn lay_out(
         period: spec.period,
         under_way: spec.under_way,
         image_len: 0,
+        logical_len: 0,
         areas: Vec::new(),
         frames: Vec::new(),
     };
-    for chunk in chunk::chunks(spec, cut, witnesses)? {
-        let frame = domain.place(&chunk, base, witnesses)?;
+    let starts = Starts::new(spec);
+    for chunk in chunk::chunks(&starts.wire_order(spec), cut, witnesses)? {
+        let frame = domain.place(&chunk, base, &starts, witnesses)?;
         match domain.frames.last_mut() {
             Some(last)
                 if cut.each
@@ -191,6 +204,7 @@ fn lay_out(
             _ => domain.frames.push(frame),
         }
     }
+    domain.image_len = starts.image_len(&domain);
     Ok(domain)
 }
 
@@ -200,11 +214,12 @@ impl PlannedDomain {
         &mut self,
         chunk: &chunk::Chunk,
         base: LogicalAddress,
+        starts: &Starts,
         witnesses: &mut chunk::Witnesses<'_>,
     ) -> Result<PlannedFrame, LayoutError> {
         let mut frame = PlannedFrame::default();
         for group in chunk.groups() {
-            self.place_group(&mut frame, group, base)?;
+            self.place_group(&mut frame, group, base, starts)?;
         }
         let is_shared = frame.datagrams.iter().any(|datagram| datagram.inputs > 0 && datagram.contributions.len() > 1);
         frame.presence = is_shared.then(|| witnesses.presence(chunk.witnessed())).flatten();
@@ -217,28 +232,29 @@ impl PlannedDomain {
         frame: &mut PlannedFrame,
         group: &chunk::Group,
         base: LogicalAddress,
+        starts: &Starts,
     ) -> Result<(), LayoutError> {
-        let start = self.image_len;
+        let start = self.logical_len;
         let mut placed = Vec::new();
         for area in group.outputs.iter().chain(&group.inputs) {
-            let logical = LogicalAddress(base.0.checked_add(self.image_len).ok_or(LayoutError::TooLarge)?);
-            placed.push(PlacedArea { area: *area, image_offset: self.image_len, logical });
-            self.image_len += u32::from(area.length);
+            let logical = LogicalAddress(base.0.checked_add(self.logical_len).ok_or(LayoutError::TooLarge)?);
+            let image_offset = starts.of(area).unwrap_or(self.logical_len);
+            placed.push(PlacedArea { area: *area, image_offset, logical });
+            self.logical_len += u32::from(area.length);
         }
         let (outputs, inputs) = placed.split_at(group.outputs.len());
         let bytes = |areas: &[PlacedArea]| areas.iter().map(|a| a.area.length).sum::<u16>();
         let (out_len, in_len) = (bytes(outputs), bytes(inputs));
-        let datagram = |command, image_offset: u32, out_len, in_len, reads: &[PlacedArea], writes: &[PlacedArea]| {
-            PlannedDatagram {
+        let datagram =
+            |command, offset: u32, out_len, in_len, reads: &[PlacedArea], writes: &[PlacedArea]| PlannedDatagram {
                 command,
-                logical: LogicalAddress(base.0 + image_offset),
-                image_offset,
+                logical: LogicalAddress(base.0 + offset),
                 outputs: out_len,
                 inputs: in_len,
                 contributions: contributions(command, reads, writes),
+                output_areas: writes.to_vec(),
                 input_areas: reads.to_vec(),
-            }
-        };
+            };
         if group.lrw && out_len > 0 && in_len > 0 {
             frame.datagrams.push(datagram(Command::Lrw, start, out_len, in_len, inputs, outputs));
         } else {

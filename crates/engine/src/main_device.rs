@@ -20,9 +20,14 @@ mod mail;
 mod options;
 mod pending;
 mod prepare;
+mod register_error;
+mod registered;
+mod registered_area;
+mod registration;
 mod services;
 mod states;
 mod steps;
+mod working_counters;
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -41,6 +46,8 @@ pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_
 pub use ethernet::EthernetSubDevice;
 pub use options::Options;
 pub use pending::Pending;
+pub use register_error::RegisterError;
+pub use registered_area::RegisteredArea;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};

@@ -23,7 +23,7 @@ use crate::window::{Half, SHORTEST, Window};
 const LATE_FRACTION: u64 = 10;
 /// Between two looks whether a pause has ended.
 const PAUSE_LOOK: Duration = Duration::from_micros(20);
-/// Period of an application without domains.
+/// Period of an application without domains that have one.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
 
 #[derive(Debug)]
@@ -60,11 +60,9 @@ pub(crate) struct Cyclic {
 impl Cyclic {
     pub fn new(active: Active, window: Arc<Window>, now: Instant) -> Cyclic {
         let periods = active.periods;
-        let period = periods.iter().copied().min().unwrap_or(IDLE_PERIOD).max(Duration::from_micros(1));
-        let rate = |domain: &Duration| Rate {
-            divider: (domain.as_nanos() / period.as_nanos()).max(1) as u64,
-            status: DomainStatus::default(),
-        };
+        let shortest = periods.iter().copied().filter(|period| !period.is_zero()).min();
+        let period = shortest.unwrap_or(IDLE_PERIOD).max(Duration::from_micros(1));
+        let rate = |domain: &Duration| Rate::new(*domain, period);
         let next_cycle = now + period;
         let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         window.expect_cycle(next_cycle);
@@ -101,8 +99,8 @@ impl Cyclic {
     /// Sets what is copied in every cycle; the ages that rules tolerate count from the period of the source's domain.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         let of_domain = |rule: &CopyRule| {
-            let divider = self.rates.get(rule.source.domain.0).map_or(1, |rate| rate.divider);
-            rule.with_max_age(rule.max_age.saturating_add(divider - 1))
+            let cycles = self.rates.get(rule.source.domain.0).map_or(1, Rate::cycles);
+            rule.with_max_age(rule.max_age.saturating_add(cycles - 1))
         };
         let rules: Vec<CopyRule> = rules.iter().map(of_domain).collect();
         self.exchange.set_copies(&rules)

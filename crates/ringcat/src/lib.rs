@@ -139,7 +139,8 @@ pub use ringcat_engine::mail::voe::Voe;
 pub use ringcat_engine::mail::{Limits, Mailbox, MailboxError};
 pub use ringcat_engine::main_device::{
     ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
-    GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, Required, SubDeviceId, SubDeviceState,
+    GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, RegisterError, RegisteredArea,
+    Required, SubDeviceId, SubDeviceState,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;

@@ -1,6 +1,7 @@
 //! What an application works on within a cycle.
 
 use std::ops::Range;
+use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainStatus, Freshness};
 use ringcat_engine::exchange::{Entry, Exchange};
@@ -14,16 +15,57 @@ use crate::value::Number;
 /// When a domain is due, and its state at the last evaluation.
 #[derive(Debug)]
 pub(crate) struct Rate {
-    /// The domain is due every so many cycles.
-    pub divider: u64,
+    due: Due,
     pub status: DomainStatus,
 }
 
+/// In which cycles a domain is due.
+#[derive(Clone, Copy, Debug)]
+enum Due {
+    /// In each.
+    Always,
+    /// In every one of so many.
+    Every(u64),
+    /// In the first that begins at or after each multiple of its period, both in nanoseconds.
+    Between { cycle_ns: u64, period_ns: u64 },
+}
+
 impl Rate {
-    /// Whether the domain is due in a cycle. Most have the shortest period: no division then.
+    /// A domain with this period in cycles of that length; one without a period is due in each cycle.
+    pub fn new(period: Duration, cycle: Duration) -> Rate {
+        let [period_ns, cycle_ns] =
+            [period, cycle].map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX).max(1));
+        let due = match period_ns / cycle_ns {
+            _ if period_ns <= cycle_ns => Due::Always,
+            cycles if period_ns.is_multiple_of(cycle_ns) => Due::Every(cycles),
+            _ => Due::Between { cycle_ns, period_ns },
+        };
+        Rate { due, status: DomainStatus::default() }
+    }
+
+    /// Whether the domain is due in a cycle. Most are due in each: no division then.
     #[inline(always)]
     pub fn is_due(&self, cycle: u64) -> bool {
-        self.divider == 1 || cycle.is_multiple_of(self.divider)
+        matches!(self.due, Due::Always) || self.is_due_now(cycle)
+    }
+
+    fn is_due_now(&self, cycle: u64) -> bool {
+        match self.due {
+            Due::Always => true,
+            Due::Every(cycles) => cycle.is_multiple_of(cycles),
+            Due::Between { cycle_ns, period_ns } => {
+                u128::from(cycle) * u128::from(cycle_ns) % u128::from(period_ns) < u128::from(cycle_ns)
+            }
+        }
+    }
+
+    /// Most cycles from one exchange of the domain to the next.
+    pub fn cycles(&self) -> u64 {
+        match self.due {
+            Due::Always => 1,
+            Due::Every(cycles) => cycles,
+            Due::Between { cycle_ns, period_ns } => period_ns.div_ceil(cycle_ns),
+        }
     }
 }
 

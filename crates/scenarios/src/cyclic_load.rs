@@ -13,7 +13,7 @@ use ringcat_engine::board::Board;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::Exchange;
-use ringcat_engine::layout::{AreaSpec, DomainSpec, Layout, LayoutError};
+use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LayoutError};
 use ringcat_engine::link::LinkSet;
 use ringcat_engine::queue::{Consumer, queue};
 use ringcat_engine::ring::Identity;
@@ -148,7 +148,7 @@ impl CyclicLoad {
 
 fn domains(spec: &LoadSpec) -> Vec<DomainSpec> {
     let (under_way, lrw) = (spec.under_way, spec.lrw);
-    let domain = DomainSpec { period: PERIOD, under_way, lrw, areas: Vec::new() };
+    let domain = DomainSpec { period: PERIOD, under_way, lrw, areas: Vec::new(), image: ImageOrder::Packed };
     let mut domains = vec![domain; spec.domains.max(1)];
     let count = domains.len();
     for subdevice in 0..spec.subdevices {

@@ -17,7 +17,7 @@ use ringcat::{DomainId, DomainState, Instant, Links};
 use ringcat_engine::board::Board;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::exchange::{Exchange, Received};
-use ringcat_engine::layout::{AreaSpec, DomainSpec, Layout};
+use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout};
 use ringcat_engine::link::LinkSet;
 use ringcat_engine::queue::{Consumer, queue};
 use ringcat_engine::ring::Identity;
@@ -249,7 +249,7 @@ impl Cyclic {
         let area = |sync_manager, direction, length| AreaSpec { subdevice: 0, sync_manager, direction, length };
         let outputs = (data / 2) as u16;
         let areas = vec![area(2, Direction::Outputs, outputs), area(3, Direction::Inputs, data as u16 - outputs)];
-        let spec = DomainSpec { period: LOST_AFTER, under_way: 1, lrw: true, areas };
+        let spec = DomainSpec { period: LOST_AFTER, under_way: 1, lrw: true, areas, image: ImageOrder::Packed };
         let layout = Layout::new(&[spec], LinkSet::Single, true).map_err(|error| Failure::new(error.to_string()))?;
         let board = Arc::new(Board::new(1));
         board.set_taking_part(0, true);

@@ -25,6 +25,9 @@ struct Member {
 /// the first ones with their process data.
 const SILENT_CYCLES: u8 = 16;
 
+/// Deadline of the frames of a domain without a period: that of IgH's interface.
+const WITHOUT_PERIOD: Duration = Duration::from_micros(500);
+
 /// A domain of the exchange.
 ///
 /// Its frames lie in sets, one per cycle that may be on the wire, each with all frames of a cycle. The sets are used in
@@ -82,8 +85,7 @@ impl Domain {
             newest: frames.len() - set,
             out: 0,
             unsent: false,
-            // Until shortly before the set is used again.
-            timeout_ns: whole_ns(planned.period.saturating_mul(planned.under_way.into()) - planned.period / 4),
+            timeout_ns: whole_ns(timeout(planned)),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
             told: Told::Nothing { silent: 0 },
@@ -279,6 +281,14 @@ impl Domain {
             left if left >= self.judged => Freshness::Fresh,
             left => Freshness::Stale { cycles: self.judged - left },
         }
+    }
+}
+
+/// Until shortly before a set of frames is used again.
+fn timeout(planned: &PlannedDomain) -> Duration {
+    match planned.period {
+        Duration::ZERO => WITHOUT_PERIOD,
+        period => period.saturating_mul(planned.under_way.into()) - period / 4,
     }
 }
 

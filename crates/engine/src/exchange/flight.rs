@@ -259,6 +259,9 @@ impl CyclicFrame {
         self.left = cycle + 1;
         for place in &mut self.places {
             place.outputs.load(image, &mut self.tx);
+            if !place.outputs_apart.is_empty() {
+                place.outputs_apart.iter().for_each(|span| span.load(image, &mut self.tx));
+            }
         }
         self.wkc = 0;
         self.is_overtaken = false;
@@ -491,6 +494,6 @@ impl CyclicFrame {
 
     /// Whether outputs contain all the given bytes of the image.
     pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
-        self.places.iter().any(|place| place.outputs.holds(&bytes))
+        self.places.iter().any(|place| place.has_outputs(&bytes))
     }
 }

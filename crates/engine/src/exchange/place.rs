@@ -24,7 +24,7 @@ const OUTSIDE: usize = 2 * MAX_FRAME;
 const INPUTS_OF_LRW: Wkc = Wkc(1);
 
 /// Bytes copied between frame and image.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Span {
     pub frame_at: usize,
     pub image_at: usize,
@@ -70,7 +70,9 @@ pub(crate) enum Brought {
     Nothing,
     /// Those of some SubDevices.
     Part,
-    /// All inputs.
+    /// All inputs, which lie apart from each other in the image.
+    AllApart,
+    /// All inputs, one piece of the image.
     All,
 }
 
@@ -99,7 +101,9 @@ pub(crate) struct Place {
     /// Working counter with all SubDevices.
     expected: Wkc,
     pub outputs: Span,
-    pub inputs: Span,
+    /// Outputs that lie apart from these in the image.
+    pub outputs_apart: Box<[Span]>,
+    inputs: Span,
     contributions: Box<[Contribution]>,
     segments: Box<[Segment]>,
     views: [View; 2],
@@ -108,13 +112,17 @@ pub(crate) struct Place {
 impl Place {
     pub fn new(datagram: &PlannedDatagram, data_at: usize, number: InputNumber) -> Place {
         let (outputs, inputs) = (usize::from(datagram.outputs), usize::from(datagram.inputs));
-        let start = datagram.image_offset as usize;
-        let span = |image_at: usize, length| Span { frame_at: data_at + image_at - start, image_at, length };
+        let span = |placed: &PlacedArea| Span {
+            frame_at: data_at + placed.logical.0.saturating_sub(datagram.logical.0) as usize,
+            image_at: placed.image_offset as usize,
+            length: usize::from(placed.area.length),
+        };
+        let mut out = joined(datagram.output_areas.iter().map(span)).into_iter();
         let contribution = |subdevice: usize| datagram.contributions.iter().position(|(other, _)| *other == subdevice);
         let segment = |placed: &PlacedArea| Segment {
             subdevice: placed.area.subdevice,
             contribution: contribution(placed.area.subdevice).unwrap_or_default(),
-            span: span(placed.image_offset as usize, usize::from(placed.area.length)),
+            span: span(placed),
         };
         let contributor = |(subdevice, wkc): &(usize, Wkc)| {
             let has_inputs = datagram.input_areas.iter().any(|placed| placed.area.subdevice == *subdevice);
@@ -127,8 +135,9 @@ impl Place {
             datagram: number.datagram,
             first_part: number.part,
             expected: datagram.contributions.iter().fold(Wkc(0), |sum, (_, wkc)| sum.plus(*wkc)),
-            outputs: span(start, outputs),
-            inputs: span(start + outputs, inputs),
+            outputs: out.next().unwrap_or_default(),
+            outputs_apart: out.collect(),
+            inputs: joined(datagram.input_areas.iter().map(span)).into_iter().next().unwrap_or_default(),
             contributions: datagram.contributions.iter().map(contributor).collect(),
             segments: datagram.input_areas.iter().map(segment).collect(),
             views: [view(), view()],
@@ -143,6 +152,7 @@ impl Place {
         Place {
             wkc_at: self.wkc_at + OUTSIDE,
             outputs: span(self.outputs),
+            outputs_apart: self.outputs_apart.iter().copied().map(span).collect(),
             inputs: span(self.inputs),
             contributions: self.contributions.clone(),
             segments: self.segments.iter().map(segment).collect(),
@@ -221,7 +231,8 @@ impl Place {
         }
         view.brought = match count {
             0 => Brought::Nothing,
-            _ if count == segments.len() => Brought::All,
+            _ if count == segments.len() && view.runs.len() == 1 => Brought::All,
+            _ if count == segments.len() => Brought::AllApart,
             _ => Brought::Part,
         };
     }
@@ -275,8 +286,7 @@ impl Place {
     /// Puts the inputs of a copy into the image, except where it has newer ones.
     #[inline(always)]
     pub fn deliver(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
-        let view = &self.views[link];
-        match view.brought {
+        match self.views[link].brought {
             Brought::Nothing => {}
             Brought::All => {
                 self.inputs.deliver(bytes, &mut image.bytes);
@@ -284,12 +294,24 @@ impl Place {
                     *whole = moment;
                 }
             }
-            Brought::Part => self.deliver_part(link, bytes, image, moment),
+            Brought::AllApart | Brought::Part => self.deliver_runs(link, bytes, image, moment),
+        }
+    }
+
+    /// Puts inputs into several places of the image.
+    #[inline(never)]
+    fn deliver_runs(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
+        let view = &self.views[link];
+        if view.brought == Brought::Part {
+            return self.deliver_part(link, bytes, image, moment);
+        }
+        view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
+        if let Some(whole) = image.datagrams.get_mut(self.datagram) {
+            *whole = moment;
         }
     }
 
     /// Puts the inputs of some SubDevices into the image.
-    #[inline(never)]
     fn deliver_part(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
         let view = &self.views[link];
         view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
@@ -341,10 +363,27 @@ impl Place {
         numbered.filter(move |(_, segment)| segment.subdevice == subdevice).map(|(number, _)| self.number_of(number))
     }
 
+    /// Whether outputs contain all the given bytes of the image.
+    pub fn has_outputs(&self, bytes: &Range<usize>) -> bool {
+        self.outputs.holds(bytes) || self.outputs_apart.iter().any(|span| span.holds(bytes))
+    }
+
     /// The SubDevice whose inputs contain all the given bytes of the image.
     pub fn whose_inputs(&self, bytes: &Range<usize>) -> Option<usize> {
         self.segments.iter().find(|segment| segment.span.holds(bytes)).map(|segment| segment.subdevice)
     }
+}
+
+/// Spans with neighbours joined.
+fn joined(spans: impl Iterator<Item = Span>) -> Vec<Span> {
+    let mut runs: Vec<Span> = Vec::new();
+    for span in spans {
+        match runs.last_mut() {
+            Some(run) if run.reaches(&span) => run.length += span.length,
+            _ => runs.push(span),
+        }
+    }
+    runs
 }
 
 impl Contribution {

@@ -13,7 +13,7 @@ use super::*;
 use crate::board::Supervision;
 use crate::direction::Direction;
 use crate::domain::Freshness;
-use crate::layout::{AreaSpec, DomainSpec};
+use crate::layout::{AreaSpec, DomainSpec, ImageOrder};
 use crate::queue::{Consumer, queue};
 use crate::ring::RingState;
 use ringcat_wire::address::Wkc;
@@ -51,7 +51,7 @@ impl Ring {
     fn with(optional: Vec<bool>, under_way: u8) -> Ring {
         let area = |subdevice, direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: 1 };
         let areas = (0..3).flat_map(|s| [area(s, Direction::Outputs), area(s, Direction::Inputs)]).collect();
-        let spec = DomainSpec { period: PERIOD, under_way, lrw: true, areas };
+        let spec = DomainSpec { period: PERIOD, under_way, lrw: true, areas, image: ImageOrder::Packed };
         let layout = Layout::new(&[spec], LinkSet::Ring, true).unwrap();
         let board = Arc::new(Board::new(3).with_optional(optional));
         (0..3).for_each(|subdevice| board.set_taking_part(subdevice, true));
@@ -354,7 +354,7 @@ fn a_domain_is_complete_without_its_optional_subdevice_but_no_other() {
 fn a_domain_queued_twice_leaves_once_with_its_last_outputs() {
     let spec = |subdevice| {
         let areas = vec![AreaSpec { subdevice, sync_manager: 0, direction: Direction::Outputs, length: 1 }];
-        DomainSpec { period: PERIOD, under_way: 1, lrw: false, areas }
+        DomainSpec { period: PERIOD, under_way: 1, lrw: false, areas, image: ImageOrder::Packed }
     };
     let layout = Layout::new(&[spec(0), spec(1)], LinkSet::Single, false).unwrap();
     let identity = Identity::new(MacCodec::FlagsFirst, MacAddress([0, 1, 2, 3, 4, 5]), None);
@@ -393,7 +393,13 @@ impl Starting {
     fn new() -> Starting {
         let spec = |subdevices: core::ops::Range<usize>, length| {
             let area = |subdevice| AreaSpec { subdevice, sync_manager: 3, direction: Direction::Inputs, length };
-            DomainSpec { period: PERIOD, under_way: 1, lrw: true, areas: subdevices.map(area).collect() }
+            DomainSpec {
+                period: PERIOD,
+                under_way: 1,
+                lrw: true,
+                areas: subdevices.map(area).collect(),
+                image: ImageOrder::Packed,
+            }
         };
         let layout = Layout::new(&[spec(0..1, 4), spec(1..3, 1000)], LinkSet::Single, true).unwrap();
         let board = Arc::new(Board::new(3));

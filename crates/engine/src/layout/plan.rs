@@ -26,15 +26,15 @@ pub struct PlannedDatagram {
     pub command: Command,
     /// Logical address.
     pub logical: LogicalAddress,
-    /// First byte in the image that the datagram covers.
-    pub image_offset: u32,
     /// Bytes of outputs, at the beginning of the data.
     pub outputs: u16,
     /// Bytes of inputs, behind the outputs.
     pub inputs: u16,
     /// Increment of the working counter by each SubDevice.
     pub contributions: Vec<(usize, Wkc)>,
-    /// Input areas, to deliver them one by one.
+    /// Areas at the beginning of the data, without gaps.
+    pub output_areas: Vec<PlacedArea>,
+    /// Areas behind them, to deliver them one by one.
     pub input_areas: Vec<PlacedArea>,
 }
 
@@ -63,12 +63,14 @@ pub struct PlannedFrame {
 /// A domain that was laid out.
 #[derive(Clone, Debug)]
 pub struct PlannedDomain {
-    /// From the specification.
+    /// From the specification; zero for a domain without one.
     pub period: Duration,
     /// From the specification: how often each frame may be on the wire at once.
     pub under_way: u8,
     /// Bytes of the image.
     pub image_len: u32,
+    /// Logical addresses, one per byte on the wire.
+    pub logical_len: u32,
     /// All areas with their places.
     pub areas: Vec<PlacedArea>,
     /// The frames.

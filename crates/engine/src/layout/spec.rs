@@ -57,7 +57,7 @@ pub enum Delivers {
 pub struct Rules<'a> {
     /// Links that frames leave on.
     pub links: LinkSet,
-    /// Adds the supervision datagram to the domain with the shortest period.
+    /// Adds the supervision datagram.
     pub supervision: bool,
     /// Where LRW is used.
     pub lrw: LrwPolicy,
@@ -73,14 +73,36 @@ pub struct Rules<'a> {
 /// Content of a domain.
 #[derive(Clone, Debug)]
 pub struct DomainSpec {
-    /// Period of its exchange by the application.
+    /// Period of its exchange by the application; zero for a domain without one.
     pub period: Duration,
     /// Largest number of its cycles on the wire at once.
     pub under_way: u8,
     /// Whether every SubDevice of the domain supports LRW (protocol 3.1, features bit 9).
     pub lrw: bool,
-    /// Areas in the order of the image; those of a SubDevice are adjacent.
+    /// The areas.
     pub areas: Vec<AreaSpec>,
+    /// Their order in the image.
+    pub image: ImageOrder,
+}
+
+/// Places of areas in the image of a domain.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ImageOrder {
+    /// As on the wire: in the order of the areas, in each frame outputs before inputs. The areas of a SubDevice are
+    /// adjacent.
+    #[default]
+    Packed,
+    /// Given, whatever the order on the wire.
+    Fixed(FixedImage),
+}
+
+/// Places that were given before the layout.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FixedImage {
+    /// First byte of each area of [`DomainSpec::areas`]. Areas do not overlap.
+    pub starts: Vec<u32>,
+    /// Bytes of the image.
+    pub bytes: u32,
 }
 
 /// Rules for cutting the areas of a domain into frames.

@@ -15,7 +15,7 @@ fn area(subdevice: usize, sync_manager: u8, direction: Direction, length: u16) -
 }
 
 fn spec(areas: Vec<AreaSpec>) -> DomainSpec {
-    DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: true, areas }
+    DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: true, areas, image: ImageOrder::Packed }
 }
 
 /// Two links, and separate datagrams for each SubDevice.

@@ -123,7 +123,7 @@ impl MainDevice {
         let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
         let specs = domain_specs(declaration, plans, lrw, links)?;
         check_lrw(lrw, &specs, links)?;
-        let witnesses = witnesses(plans, found);
+        let witnesses = witnesses(plans, found, &specs);
         let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
         let session = self.next_session(self.supervisor.bus().now());
         let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };

@@ -11,6 +11,7 @@ use super::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::config::ConfigError;
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
+use crate::info::Direction;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
 use crate::segment::setup::SetupError;
@@ -64,14 +65,23 @@ pub enum ActivateError {
         /// The domains.
         domains: [DomainId; 2],
     },
-    /// The period of a domain is zero, or no multiple of the shortest one.
-    Period {
+    /// A domain has members, which the MainDevice packs, and registered areas, which have their places already.
+    MixedPlaces {
         /// Number of the domain.
         domain: DomainId,
-        /// Its period.
-        period: Duration,
-        /// The shortest period.
-        shortest: Duration,
+    },
+    /// Process data has another size or direction than when its place was registered.
+    Registered {
+        /// Number of the domain.
+        domain: DomainId,
+        /// Index in the declaration.
+        subdevice: SubDeviceId,
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Direction and bytes as registered.
+        expected: (Direction, u16),
+        /// Direction and bytes now; `None` where the SyncManager has no process data.
+        got: Option<(Direction, u16)>,
     },
     /// There is no domain, and a SubDevice has process data: it would reach OP without exchanging any.
     NoDomain {
@@ -154,7 +164,10 @@ impl fmt::Display for ActivateError {
                 f,
                 "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
             ),
-            ActivateError::Period { domain, period, shortest } => fmt_period(f, *domain, *period, *shortest),
+            ActivateError::MixedPlaces { domain } => {
+                write!(f, "domain {domain} has members and registered areas: register all of its process data, or none")
+            }
+            ActivateError::Registered { .. } => self.fmt_registered(f),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
                 "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or \
@@ -193,6 +206,24 @@ impl fmt::Display for ActivateError {
     }
 }
 
+impl ActivateError {
+    fn fmt_registered(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ActivateError::Registered { domain, subdevice, sync_manager, expected: (direction, bytes), got } = self
+        else {
+            return Ok(());
+        };
+        write!(
+            f,
+            "declaration {subdevice}: SyncManager {sync_manager} was registered in domain {domain} with {bytes} bytes \
+             of {direction}, "
+        )?;
+        match got {
+            Some((direction, bytes)) => write!(f, "it has {bytes} bytes of {direction}"),
+            None => f.write_str("it has no process data"),
+        }
+    }
+}
+
 /// Indices as a list: `[2, 3]`.
 fn list(subdevices: &[SubDeviceId]) -> impl fmt::Debug + '_ {
     core::fmt::from_fn(move |f| f.debug_list().entries(subdevices.iter().map(|subdevice| subdevice.0)).finish())
@@ -205,14 +236,6 @@ fn in_us(time: Duration) -> impl fmt::Display {
         0 => write!(f, "{}", ns / 1_000),
         rest => write!(f, "{}.{rest:03}", ns / 1_000),
     })
-}
-
-fn fmt_period(f: &mut fmt::Formatter<'_>, domain: DomainId, period: Duration, shortest: Duration) -> fmt::Result {
-    if period.is_zero() || shortest.is_zero() {
-        return write!(f, "domain {domain}: expected a period above zero, got {} us", in_us(period));
-    }
-    let [shortest, period] = [shortest, period].map(in_us);
-    write!(f, "domain {domain}: expected a period that is a multiple of {shortest} us, got {period} us")
 }
 
 fn fmt_sync_cycle(

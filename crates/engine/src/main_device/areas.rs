@@ -5,6 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::working_counters::expected_as_igh;
 use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
@@ -88,7 +89,17 @@ impl Directory {
         self.contributions.get(subdevice.0).copied().unwrap_or(0)
     }
 
-    /// All areas of a SubDevice.
+    /// The working counter of a domain as IgH's interface expects it ([`super::Declaration::expected_wkc_as_igh`]);
+    /// [`crate::domain::DomainStatus::expected`] is that of the datagrams in use.
+    pub fn expected_wkc_as_igh(&self, domain: DomainId) -> u32 {
+        let areas = self.subdevices.iter().flatten().filter(|area| area.domain == domain);
+        let mut placed: Vec<PlacedArea> = areas.map(|area| area.placed).collect();
+        placed.sort_unstable_by_key(|placed| placed.image_offset);
+        let area = |placed: PlacedArea| (SubDeviceId(placed.area.subdevice), placed.area.direction, placed.area.length);
+        expected_as_igh(placed.into_iter().map(area))
+    }
+
+    /// All areas of a SubDevice; an area that is in several domains once for each.
     pub fn areas(&self, subdevice: SubDeviceId) -> &[AreaEntries] {
         self.subdevices.get(subdevice.0).map_or(&[], Vec::as_slice)
     }
@@ -156,8 +167,13 @@ impl Areas {
 
     pub(super) fn directory(&self, index: usize, layout: &Layout) -> Vec<AreaEntries> {
         let mut found = Vec::new();
-        for (sync_manager, direction, _) in self.list() {
-            let Some((domain, placed)) = layout.area(index, sync_manager) else { continue };
+        let mut places: Vec<(DomainId, PlacedArea)> = layout.areas_of(index).collect();
+        // In the order of the SyncManagers; the places of one in the order of the domains.
+        let listed = self.list();
+        let rank = |placed: &PlacedArea| listed.iter().position(|(number, ..)| *number == placed.area.sync_manager);
+        places.sort_by_key(|(_, placed)| rank(placed).unwrap_or(listed.len()));
+        for (domain, placed) in places {
+            let (sync_manager, direction) = (placed.area.sync_manager, placed.area.direction);
             let entries = self.mapped(sync_manager).into_iter().filter(|entry| entry.index != 0).map(|entry| {
                 let bit_offset = placed.image_offset * 8 + entry.bit_offset;
                 let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
@@ -169,12 +185,17 @@ impl Areas {
     }
 
     /// Entries of an area in order, gaps included.
-    fn mapped(&self, sync_manager: u8) -> Vec<MappedEntry> {
+    pub(super) fn mapped(&self, sync_manager: u8) -> Vec<MappedEntry> {
+        self.pdos(sync_manager).into_iter().flatten().collect()
+    }
+
+    /// Entries of an area by PDO, gaps included.
+    pub(super) fn pdos(&self, sync_manager: u8) -> Vec<Vec<MappedEntry>> {
         match self {
             Areas::Planned(plan) => {
                 let areas = plan.iter().flat_map(|plan| &plan.process_data);
                 let pdos = areas.filter(|area| area.sync_manager == sync_manager).flat_map(|area| &area.pdos);
-                pdos.flat_map(|pdo| &pdo.entries).copied().collect()
+                pdos.map(|pdo| pdo.entries.clone()).collect()
             }
             Areas::Declared(Declared { config, .. }) => {
                 let pdos: &[PdoMapping] = match &config.declared {
@@ -184,14 +205,14 @@ impl Areas {
                         all.find(|a| a.sync_manager == sync_manager).map_or(&[], |a| &a.pdos)
                     }
                 };
-                let entries = pdos.iter().flat_map(|pdo| pdo.entries.iter().flatten());
-                let place = |bit_offset: &mut u32, entry: &PdoEntry| {
+                let mut bit_offset = 0;
+                let mut place = |entry: &PdoEntry| {
                     let PdoEntry { index, sub_index, bit_length } = *entry;
-                    let mapped = MappedEntry { index, sub_index, bit_offset: *bit_offset, bit_length };
-                    *bit_offset += u32::from(bit_length);
-                    Some(mapped)
+                    let mapped = MappedEntry { index, sub_index, bit_offset, bit_length };
+                    bit_offset += u32::from(bit_length);
+                    mapped
                 };
-                entries.scan(0, place).collect()
+                pdos.iter().map(|pdo| pdo.entries.iter().flatten().map(&mut place).collect()).collect()
             }
         }
     }

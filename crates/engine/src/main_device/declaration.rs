@@ -6,6 +6,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::LogicalAddress;
 
+use super::registered_area::RegisteredArea;
 use crate::config::{ClockConfig, Group, SubDeviceConfig};
 use crate::declared::{GroupId, SubDeviceId};
 use crate::layout::LrwPolicy;
@@ -17,15 +18,19 @@ pub const MAX_UNDER_WAY: u8 = 4;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DomainConfig {
-    /// Interval at which the application will exchange it.
+    /// Interval at which the application will exchange it. Zero: it has none, and its frames count as lost after
+    /// 500 us ([`crate::exchange::Exchange::set_timeout`]).
     pub period: Duration,
     /// Number of its cycles that may be under way at once, 1 to [`MAX_UNDER_WAY`]: 1 if frames return within a period,
     /// more if their way through segment and host takes longer. The cost: inputs are up to as many periods old, the
     /// answer to an input is sent as many cycles later, a lost cycle is detected as much later (or when the next one
     /// returns), and each cycle under way has buffers of its own.
     pub under_way: u8,
-    /// Its members.
+    /// Its members; the MainDevice packs their process data.
     pub members: Vec<DomainMember>,
+    /// Process data with places of its own, in the order of registration, instead of members
+    /// ([`Declaration::register_entry`]).
+    pub registered: Vec<RegisteredArea>,
 }
 
 impl DomainConfig {
@@ -38,7 +43,7 @@ impl DomainConfig {
 
     /// A domain with one cycle under way.
     pub const fn new(period: Duration, members: Vec<DomainMember>) -> DomainConfig {
-        DomainConfig { period, under_way: 1, members }
+        DomainConfig { period, under_way: 1, members, registered: Vec::new() }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Compares the declaration with the scan, and builds domains and members from it.
 
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeSet;
 use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
@@ -15,12 +16,13 @@ use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 use super::activate_error::ActivateError;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
+use super::registered;
 use crate::config::{ConfigError, Resolution, can_be_head, groups, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::layout::{AreaSpec, DomainSpec, Layout, LrwPolicy, Witness};
+use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
 use crate::plan::{PlanFault, plan};
 use crate::procedures::request_state::exchanges;
@@ -115,10 +117,22 @@ pub(super) fn plan_all(
 
 /// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
 /// free FMMU.
-pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>]) -> Vec<Witness> {
+pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>], specs: &[DomainSpec]) -> Vec<Witness> {
+    // Further places of an area need FMMUs, too.
+    let mut further = vec![0; plans.len()];
+    let mut seen = BTreeSet::new();
+    for area in specs.iter().flat_map(|spec| &spec.areas).filter(|area| area.length > 0) {
+        if !seen.insert((area.subdevice, area.sync_manager))
+            && let Some(count) = further.get_mut(area.subdevice)
+        {
+            *count += 1;
+        }
+    }
     let pairs = plans.iter().zip(found).enumerate();
     let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<SubDeviceInfo>))| match (areas, info) {
-        (Areas::Planned(Some(plan)), Some(info)) => presence::witness(subdevice, plan, info),
+        (Areas::Planned(Some(plan)), Some(info)) => {
+            presence::witness(subdevice, plan, info, plan.mapped_areas().count() + further[subdevice])
+        }
         _ => Witness::Alone,
     };
     pairs.map(witness).collect()
@@ -137,11 +151,11 @@ pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     if let Some(subdevice) = headless {
         return Err(ActivateError::Headless { subdevice: SubDeviceId(subdevice) });
     }
-    let shortest = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
+    let periods = declaration.domains.iter().map(|domain| domain.period).filter(|period| !period.is_zero());
+    let shortest = periods.min().unwrap_or_default();
     for (domain, config) in declaration.domains.iter().enumerate() {
-        let period = config.period;
-        if period.is_zero() || period.as_nanos() % shortest.as_nanos() != 0 {
-            return Err(ActivateError::Period { domain: DomainId(domain), period, shortest });
+        if !config.members.is_empty() && !config.registered.is_empty() {
+            return Err(ActivateError::MixedPlaces { domain: DomainId(domain) });
         }
         if !(1..=MAX_UNDER_WAY).contains(&config.under_way) {
             return Err(ActivateError::UnderWay { domain: DomainId(domain), under_way: config.under_way });
@@ -185,7 +199,19 @@ pub(super) fn domain_specs(
     let is_asked_for = lrw == LrwPolicy::Explicit && links == LinkSet::Single;
     let mut specs: Vec<DomainSpec> = Vec::new();
     for (domain, config) in declaration.domains.iter().enumerate() {
-        let mut spec = DomainSpec { period: config.period, under_way: config.under_way, lrw: true, areas: Vec::new() };
+        let mut spec = DomainSpec {
+            period: config.period,
+            under_way: config.under_way,
+            lrw: true,
+            areas: Vec::new(),
+            image: ImageOrder::Packed,
+        };
+        if !config.registered.is_empty() {
+            let id = DomainId(domain);
+            registered::fill(&mut spec, id, &config.registered, plans, is_asked_for)?;
+            specs.push(spec);
+            continue;
+        }
         for member in &config.members {
             let subdevice = member.subdevice;
             let Some(areas) = plans.get(subdevice.0) else {
@@ -198,7 +224,8 @@ pub(super) fn domain_specs(
             for (sync_manager, direction, length) in areas.list() {
                 if member.sync_managers.as_ref().is_none_or(|wanted| wanted.contains(&sync_manager)) {
                     let same = |a: &AreaSpec| a.subdevice == subdevice.0 && a.sync_manager == sync_manager;
-                    let earlier = specs.iter().position(|spec| spec.areas.iter().any(same));
+                    let is_packed = |spec: &DomainSpec| spec.image == ImageOrder::Packed;
+                    let earlier = specs.iter().position(|spec| is_packed(spec) && spec.areas.iter().any(same));
                     let earlier = earlier.or_else(|| spec.areas.iter().any(same).then_some(domain));
                     if let Some(other) = earlier {
                         let domains = [other, domain];
@@ -255,7 +282,7 @@ fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option
         let (domain, _) = layout.area(subdevice, area.sync_manager)?;
         Some(layout.domains.get(domain.0)?.period)
     });
-    periods.max().filter(|period| *period >= watchdog).map(|period| (period, watchdog))
+    periods.max().filter(|period| !period.is_zero() && *period >= watchdog).map(|period| (period, watchdog))
 }
 
 pub(super) fn members(

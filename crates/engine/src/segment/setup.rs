@@ -1,6 +1,8 @@
 //! Data to write to a SubDevice, complete with logical addresses.
 
+mod error;
 pub mod mail_status;
+mod places;
 pub mod presence;
 
 use alloc::vec::Vec;
@@ -10,7 +12,9 @@ use ringcat_wire::register::Fmmu;
 use crate::config::{DeclaredSyncManager, SubDeviceConfig};
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::Layout;
-use crate::plan::{self, AreaPlan, PlanError, SubDevicePlan};
+use crate::plan::{self, AreaPlan, SubDevicePlan};
+
+pub use error::SetupError;
 
 /// Data to write to one SubDevice, complete with logical addresses.
 #[derive(Debug)]
@@ -31,49 +35,6 @@ pub struct Setup {
     pub emulated: bool,
 }
 
-/// An area whose size on the SubDevice differs from that in the layout.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum SetupError {
-    /// The declaration does not fit the SubDevice.
-    Plan(PlanError),
-    /// The process image has no place, or a place of another size, for an area of the SubDevice.
-    Area {
-        /// The SyncManager.
-        sync_manager: u8,
-        /// Bytes in the process image.
-        expected: u16,
-        /// Bytes of the SubDevice.
-        got: u16,
-    },
-    /// Its AL status has to be mapped through an FMMU, and it has none free; the number of its FMMUs.
-    NoSpareFmmu(u8),
-}
-
-impl core::fmt::Display for SetupError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            SetupError::Plan(error) => error.fmt(f),
-            SetupError::Area { sync_manager, expected, got } => write!(
-                f,
-                "SyncManager {sync_manager}: the process image has {expected} bytes for it, the SubDevice {got}"
-            ),
-            SetupError::NoSpareFmmu(count) => {
-                write!(f, "expected an FMMU to spare for the AL status, all {count} are in use")
-            }
-        }
-    }
-}
-
-impl core::error::Error for SetupError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            SetupError::Plan(error) => Some(error),
-            _ => None,
-        }
-    }
-}
-
 impl Setup {
     /// Plans a SubDevice and gives its areas the logical addresses of the layout. Areas without a domain are configured
     /// without an FMMU.
@@ -84,22 +45,14 @@ impl Setup {
         layout: &Layout,
     ) -> Result<Setup, SetupError> {
         let plan = plan::plan(config, info).map_err(SetupError::Plan)?;
-        let mut fmmus = Vec::new();
-        for (number, area) in plan.mapped_areas() {
-            let Some((_, placed)) = layout.area(index, area.sync_manager) else { continue };
-            if placed.area.length != area.length {
-                let (expected, got) = (placed.area.length, area.length);
-                return Err(SetupError::Area { sync_manager: area.sync_manager, expected, got });
-            }
-            fmmus.push((number, plan::fmmu(area, placed.logical)));
-        }
-        let mail = mail_status::fmmu(index, &plan, info);
+        let (mut fmmus, mapped) = places::fmmus(index, &plan, info, layout)?;
+        let mail = mail_status::fmmu(index, &plan, info, mapped);
         let mail_fmmu = mail.map(|(number, _)| number);
         fmmus.extend(mail);
         let mut presence_fmmu = None;
         if let Some(logical) = layout.presence(index) {
-            let number =
-                presence::number(index, &plan, info).ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
+            let number = presence::number(index, &plan, info, mapped)
+                .ok_or(SetupError::NoSpareFmmu(info.controller.fmmu_count))?;
             fmmus.push((number, presence::fmmu(logical)));
             presence_fmmu = Some(number);
         }
@@ -116,8 +69,8 @@ impl Setup {
 
     /// Number of areas with an FMMU.
     pub fn process_data_fmmus(&self) -> usize {
-        let others = [self.mail_fmmu, self.presence_fmmu];
-        self.fmmus.iter().filter(|(number, _)| !others.contains(&Some(*number))).count()
+        let areas = self.plan.mapped_areas().count();
+        self.fmmus.iter().filter(|(number, _)| usize::from(*number) < areas).count()
     }
 
     /// The FMMU registers from the first to the last used one, for one write.

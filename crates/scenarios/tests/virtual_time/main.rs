@@ -49,6 +49,7 @@ mod mailbox_decoders;
 mod odd_sii;
 mod own_datagrams;
 mod own_objects;
+mod places;
 mod power_cycles;
 mod real_images;
 mod register_commands;

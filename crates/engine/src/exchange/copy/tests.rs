@@ -12,7 +12,7 @@ use crate::board::Board;
 use crate::direction::Direction;
 use crate::domain::DomainId;
 use crate::exchange::Exchange;
-use crate::layout::{AreaSpec, DomainSpec, Layout};
+use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout};
 use crate::link::{Link, LinkSet};
 use crate::queue::queue;
 use crate::ring::Identity;
@@ -26,7 +26,13 @@ fn exchange() -> Exchange {
     let spec = |subdevice| {
         let area = |direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: BYTES };
         let areas = vec![area(Direction::Outputs), area(Direction::Inputs)];
-        DomainSpec { period: core::time::Duration::from_millis(1), under_way: 1, lrw: true, areas }
+        DomainSpec {
+            period: core::time::Duration::from_millis(1),
+            under_way: 1,
+            lrw: true,
+            areas,
+            image: ImageOrder::Packed,
+        }
     };
     let layout = Layout::new(&[spec(0), spec(1)], LinkSet::Single, false).unwrap();
     let board = alloc::sync::Arc::new(Board::new(2));

@@ -15,10 +15,9 @@ pub const BITS_AT: LogicalAddress = LogicalAddress(0xF000_0000);
 const FULL_BIT: u8 = 3;
 
 /// The FMMU that maps the mailbox-full bit, with its number: the one given in the SII, or the first one behind those of
-/// process data. `None` if the SII gives none, or bits cannot be mapped.
-pub fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<(u8, Fmmu)> {
+/// process data, of which there are `mapped`. `None` if the SII gives none, or bits cannot be mapped.
+pub fn fmmu(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo, mapped: usize) -> Option<(u8, Fmmu)> {
     let named = info.fmmu_usages.iter().position(|usage| *usage == FmmuUsage::MailboxStatus)?;
-    let mapped = plan.mapped_areas().count();
     let number = u8::try_from(named.max(mapped)).ok().filter(|number| *number < info.controller.fmmu_count)?;
     let byte = u32::try_from(index / 8).ok().filter(|byte| *byte < MAX_DATA as u32)?;
     let send = plan.mailbox.last().filter(|_| !info.controller.features.fmmu_byte_oriented)?;

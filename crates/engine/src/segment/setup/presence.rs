@@ -10,21 +10,21 @@ use crate::plan::{AreaPlan, SubDevicePlan};
 
 /// How a SubDevice shows whether its inputs were processed: through an FMMU that process data and mailbox leave free.
 /// If its inputs can be read only once per buffer, as from a mailbox, they would make every sum of a working counter
-/// uncertain; it gets a separate datagram.
-pub fn witness(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Witness {
+/// uncertain; it gets a separate datagram. `mapped`: number of FMMUs for process data.
+pub fn witness(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo, mapped: usize) -> Witness {
     let is_steady = |area: &AreaPlan| area.register.control.mode == SyncManagerMode::Buffered;
     let inputs = plan.mapped_areas().map(|(_, area)| area).filter(|area| area.direction == Direction::Inputs);
     let delivers = if plan.is_op_only() { Delivers::InOp } else { Delivers::FromSafeOp };
-    match number(index, plan, info) {
+    match number(index, plan, info, mapped) {
         Some(_) if inputs.into_iter().all(is_steady) => Witness::Mapped(delivers),
         _ => Witness::Alone,
     }
 }
 
-/// The first FMMU behind those of process data that is not the mailbox's.
-pub fn number(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo) -> Option<u8> {
-    let mail = mail_status::fmmu(index, plan, info).map(|(number, _)| number);
-    let first = u8::try_from(plan.mapped_areas().count()).ok()?;
+/// The first FMMU behind those of process data, of which there are `mapped`, that is not the mailbox's.
+pub fn number(index: usize, plan: &SubDevicePlan, info: &SubDeviceInfo, mapped: usize) -> Option<u8> {
+    let mail = mail_status::fmmu(index, plan, info, mapped).map(|(number, _)| number);
+    let first = u8::try_from(mapped).ok()?;
     (first..info.controller.fmmu_count).find(|number| Some(*number) != mail)
 }
 
