@@ -16,7 +16,7 @@ pub struct SubDeviceId(pub usize);
 pub struct GroupId(pub usize);
 
 /// Names a SubDevice by its index in the declaration or by its position on the bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Address {
     /// Index in the declaration; valid while a declaration is active.
     Declared(SubDeviceId),

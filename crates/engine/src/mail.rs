@@ -5,6 +5,7 @@
 //! delivered to its lane. All lanes work in parallel. Unsolicited mail (emergencies, Ethernet frames, notifications) is
 //! kept in bounded queues. The parts:
 //!
+//! * `emergencies`: a ring per SubDevice, for any thread;
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
 //! * `delivery`: assigns mail to its lane; `recent`: detects duplicate mail;
 //! * `conversation`: holds a lane, sends and waits for answers; `answer_time`: when to poll for an answer;
@@ -18,6 +19,7 @@ pub mod coe;
 mod conversation;
 mod counters;
 mod delivery;
+mod emergencies;
 pub mod eoe;
 mod error;
 pub mod foe;
@@ -40,6 +42,8 @@ mod tests;
 
 pub use conversation::{Conversation, Limits};
 pub use counters::MailCounters;
+pub use emergencies::EmergencyRing;
+pub(crate) use emergencies::EmergencyRings;
 pub use error::MailboxError;
 pub use lane::Lane;
 pub use mailbox::Mailbox;

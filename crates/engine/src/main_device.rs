@@ -56,9 +56,9 @@ pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 use crate::event::{CyclicEvent, Event, TimedEvent};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
-use crate::mail::Mailbox;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
+use crate::mail::{EmergencyRings, Mailbox};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
@@ -97,6 +97,8 @@ pub struct MainDevice {
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
+    /// Emergencies of all SubDevices.
+    emergencies: EmergencyRings,
     /// Error counters, once active.
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
@@ -128,6 +130,7 @@ impl MainDevice {
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
+            emergencies: EmergencyRings::default(),
             statistics: None,
             statistics_period: None,
             loaded: None,
@@ -149,6 +152,7 @@ impl MainDevice {
         }
         *self.scan.borrow_mut() = None;
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
+        self.emergencies.forget_positions();
         let (bus, slot, scanning) = (self.supervisor.bus(), self.scan.clone(), self.scanning.clone());
         let options = ScanOptions {
             settle: self.options.settle,
@@ -192,6 +196,7 @@ impl MainDevice {
         self.supervisor.order_link(self.disconnected.take());
         self.scanning.set(false);
         self.requests.end();
+        self.emergencies = EmergencyRings::default();
         self.visited.clear();
         self.ports.clear();
         self.gateway_queue = None;

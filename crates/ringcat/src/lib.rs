@@ -136,7 +136,7 @@ pub use ringcat_engine::mail::foe::{FoeError, FoeFailure, FoeOptions, FoeProgres
 pub use ringcat_engine::mail::soe::command::CommandState;
 pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
-pub use ringcat_engine::mail::{Limits, Mailbox, MailboxError};
+pub use ringcat_engine::mail::{EmergencyRing, Limits, Mailbox, MailboxError, Unclaimed, Unsolicited};
 pub use ringcat_engine::main_device::{
     ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
     GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, RegisterError, RegisteredArea,

@@ -21,6 +21,7 @@ mod objects;
 mod protocols;
 mod resolve;
 mod start;
+mod unsolicited;
 
 use std::future::Future;
 use std::time::Duration;

@@ -27,10 +27,6 @@ impl<T> BoundedQueue<T> {
         self.entries.pop_front()
     }
 
-    pub(super) fn clear(&mut self) {
-        self.entries.clear();
-    }
-
     pub(super) fn overruns(&self) -> u64 {
         self.overruns
     }

@@ -7,7 +7,7 @@ use ringcat_wire::mailbox::Header;
 
 use super::delivery;
 use super::error::MailboxError;
-use super::lane::{Arrival, Lane, LaneState, PendingRequest};
+use super::lane::{Arrival, Lane, LaneState, PendingRequest, Refusal};
 use super::reader;
 use super::shared::SharedMailbox;
 use crate::time::Instant;
@@ -206,7 +206,7 @@ impl Conversation {
             let Some(arrival) = received else { continue };
             let (is_part, is_over) = match &arrival {
                 Arrival::Payload(payload) => (true, delivery::is_last(self.lane, payload)),
-                Arrival::Refused(_, doubtful) => (false, !doubtful),
+                Arrival::Refused(_, refusal) => (false, *refusal == Refusal::Certain),
             };
             delivery::keep_unclaimed(&mut self.shared.state_mut(), self.lane, arrival);
             if is_over {
@@ -344,11 +344,13 @@ impl Conversation {
         loop {
             let left = until.since(self.shared.bus.now());
             match self.arrival(left).await {
-                Ok(Arrival::Refused(reply, doubtful)) => {
-                    if doubtful {
-                        self.give_up();
-                    } else {
-                        self.complete();
+                Ok(Arrival::Refused(reply, refusal)) => {
+                    match self.with(|lane| lane.answer_after(refusal, limit))? {
+                        Some(limit) => {
+                            self.limit = limit;
+                            self.give_up();
+                        }
+                        None => self.complete(),
                     }
                     return Err(MailboxError::Error(reply));
                 }

@@ -6,7 +6,7 @@ use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency, SdoInformatio
 use ringcat_wire::mailbox::soe::SoeMessage;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 
-use super::lane::{Arrival, Lane, LaneState};
+use super::lane::{Arrival, Lane, LaneState, Refusal};
 use super::protocol_error;
 use super::recent::ReadKind;
 use super::shared::{MailboxState, SharedMailbox};
@@ -19,6 +19,14 @@ const SOE_ANSWERS: [u8; 2] = [2, 4];
 /// Offset of the flags in an AoE header, and the bit of an answer (protocol 6.7).
 const AOE_FLAGS_AT: usize = 18;
 const AOE_RESPONSE: u8 = 0x01;
+/// Details of error replies about the mailbox header or the service, not about length, content or memory.
+const ABOUT_HEADERS: [u16; 5] = [
+    ErrorReply::SYNTAX,
+    ErrorReply::UNSUPPORTED_PROTOCOL,
+    ErrorReply::INVALID_CHANNEL,
+    ErrorReply::SERVICE_NOT_SUPPORTED,
+    ErrorReply::INVALID_HEADER,
+];
 /// EoE types that are answers: set IP, set filter, get IP, get filter (protocol 6.5).
 const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
@@ -92,7 +100,7 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
                 return false;
             };
             let emergency = Emergency::decode(bytes);
-            state.unsolicited.emergencies().push((shared.bus.now(), emergency));
+            state.emergencies.push(shared.bus.now(), &emergency);
             shared.bus.report(Event::Emergency { subdevice: shared.subdevice, emergency });
             false
         }
@@ -178,11 +186,21 @@ fn refused(state: &mut MailboxState, message: &Message<'_>, now: Instant) -> boo
         && state.lanes.iter().any(|lane| !lane.proven && may_be_to(lane));
     let in_question = |lane: &LaneState| !(unknown && lane.proven);
     let lanes = || state.lanes.iter().filter(|lane| in_question(lane));
-    let others = lanes().any(|lane| is_late(lane) || lane.is_unanswered(now));
-    let doubtful = in_parts || others || lanes().filter(|lane| is_waiting(lane)).count() > 1;
+    let frames = &state.lanes[Lane::Frames.index()];
+    // Fragments differ in length and content only: a SubDevice that sends frames itself accepts their header.
+    let to_frames =
+        in_question(frames) && frames.is_unanswered(now) && !(frames.proven && ABOUT_HEADERS.contains(&reply.detail));
+    let others = lanes().any(|lane| is_late(lane) || (lane.is_unanswered(now) && !core::ptr::eq(lane, frames)));
+    let refusal = if in_parts || others || lanes().filter(|lane| is_waiting(lane)).count() > 1 {
+        Refusal::Uncertain
+    } else if to_frames {
+        Refusal::BesideFrames
+    } else {
+        Refusal::Certain
+    };
     let candidates = state.lanes.iter_mut().filter(|lane| is_waiting(lane) && in_question(lane));
     match candidates.min_by_key(|lane| (lane.proven, lane.pending.map(|pending| pending.at))) {
-        Some(lane) => lane.arrive(Arrival::Refused(reply, doubtful), state.available_at, true),
+        Some(lane) => lane.arrive(Arrival::Refused(reply, refusal), state.available_at, true),
         None if in_parts => false,
         None => {
             state.counters.unclaimed += 1;

@@ -17,6 +17,12 @@ const INBOX: usize = 8;
 const OUTBOX: usize = 64;
 /// Time in which an error reply may still belong to a message without an answer.
 const UNANSWERED_LIMIT: Duration = Duration::from_secs(1);
+/// The same for a fragment of an Ethernet frame, and the longest wait for the answer to a request beside such frames: a
+/// SubDevice refuses a fragment when it takes it, and takes messages within 100 ms (protocol 5.4, mailbox request).
+/// Twice this time and a lost read are included.
+const BESIDE_FRAMES: Duration = Duration::from_millis(250);
+/// Usual answer times after which the answer to a request beside such frames no longer arrives.
+const USUAL_TIMES: u32 = 8;
 
 /// A lane holds one conversation at a time; the lanes work in parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -139,9 +145,20 @@ impl PendingRequest {
 pub(super) enum Arrival {
     /// Payload of a message of its protocol.
     Payload(Vec<u8>),
-    /// The SubDevice refused a message. If the flag is set, it may have been another message, and the answer may still
-    /// arrive.
-    Refused(ErrorReply, bool),
+    /// The SubDevice refused a message.
+    Refused(ErrorReply, Refusal),
+}
+
+/// Which message an error reply belongs to (decision 0007).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Refusal {
+    /// To the request: it has no answer.
+    Certain,
+    /// To the request or to an Ethernet frame: the answer may still arrive within [`BESIDE_FRAMES`], or within several
+    /// usual answer times.
+    BesideFrames,
+    /// To the request or to any other message: the answer may still arrive within its time limit.
+    Uncertain,
 }
 
 /// State of one lane.
@@ -285,7 +302,8 @@ impl LaneState {
             }
             self.writing = None;
         } else {
-            self.unanswered_until = Some(now + UNANSWERED_LIMIT);
+            let limit = if message.lane == Lane::Frames { BESIDE_FRAMES } else { UNANSWERED_LIMIT };
+            self.unanswered_until = Some(now + limit);
         }
         self.written = Some((message.id, result));
     }
@@ -299,6 +317,15 @@ impl LaneState {
     pub(super) fn polled_empty(&mut self, seen: Instant) {
         if let Some(pending) = self.pending.as_mut().filter(|pending| pending.polled) {
             pending.empty_poll = Some(seen.since(pending.at));
+        }
+    }
+
+    /// Time in which the answer to a refused request may still arrive; `limit`: time limit of answers.
+    pub(super) fn answer_after(&self, refusal: Refusal, limit: Duration) -> Option<Duration> {
+        match refusal {
+            Refusal::Certain => None,
+            Refusal::BesideFrames => Some((self.answer_time.first_poll() * USUAL_TIMES).max(BESIDE_FRAMES).min(limit)),
+            Refusal::Uncertain => Some(limit),
         }
     }
 

@@ -9,6 +9,7 @@ use ringcat_wire::sii::MailboxLayout;
 
 use super::conversation::Conversation;
 use super::counters::MailCounters;
+use super::emergencies::EmergencyRing;
 use super::error::MailboxError;
 use super::lane::{Lane, LaneState};
 use super::shared::{Session, SharedMailbox};
@@ -121,17 +122,17 @@ impl Mailbox {
 
     /// Takes the oldest kept emergency, with the time at which it was read. Each emergency is also an event.
     pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
-        self.shared.state_mut().unsolicited.emergencies().pop()
+        self.emergencies().pop()
     }
 
-    /// Drops all kept emergencies.
-    pub fn clear_emergencies(&self) {
-        self.shared.state_mut().unsolicited.emergencies().clear();
+    /// The ring that keeps its emergencies.
+    pub fn emergencies(&self) -> EmergencyRing {
+        self.shared.state().emergencies.clone()
     }
 
-    /// Number of emergencies that were not kept because the queue was full.
-    pub fn emergency_overruns(&self) -> u64 {
-        self.shared.state_mut().unsolicited.emergencies().overruns()
+    /// Keeps further emergencies in this ring.
+    pub(crate) fn keep_emergencies_in(&self, ring: EmergencyRing) {
+        self.shared.state_mut().emergencies = ring;
     }
 
     /// Takes the oldest unsolicited mail of a kind.

@@ -11,6 +11,7 @@ use ringcat_wire::sii::MailboxLayout;
 
 use super::answer_time::ShortestTrip;
 use super::counters::MailCounters;
+use super::emergencies::EmergencyRing;
 use super::eoe::Traffic;
 use super::lane::{Lane, LaneState};
 use super::recent::Recent;
@@ -67,6 +68,7 @@ pub(super) struct MailboxState {
     pub tasks: u32,
     /// A repeat may bring mail that was received before.
     pub repeated: bool,
+    pub emergencies: EmergencyRing,
     pub unsolicited: UnsolicitedQueues,
     pub ethernet: Traffic,
     pub counters: MailCounters,
@@ -108,6 +110,7 @@ impl SharedMailbox {
             reading: false,
             tasks: 0,
             repeated: false,
+            emergencies: EmergencyRing::new(EmergencyRing::DEFAULT_SIZE),
             unsolicited: UnsolicitedQueues::new(),
             ethernet: Traffic::new(),
             counters: MailCounters::default(),

@@ -3,13 +3,9 @@
 use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::Protocol;
-use ringcat_wire::mailbox::coe::Emergency;
 
 use super::bounded_queue::BoundedQueue;
-use crate::time::Instant;
 
-/// Number of emergencies kept.
-const EMERGENCIES: usize = 32;
 /// Number of Ethernet fragments kept: a frame of 1,518 bytes in the smallest fragments, and some more.
 const ETHERNET: usize = 64;
 /// Number of mails kept of each other kind.
@@ -39,10 +35,9 @@ pub struct Unclaimed {
     pub payload: Vec<u8>,
 }
 
-/// Queues of unsolicited mail: emergencies, and one queue per kind.
+/// Queues of unsolicited mail, one per kind. Emergencies have a ring of their own.
 #[derive(Debug)]
 pub(super) struct UnsolicitedQueues {
-    emergencies: BoundedQueue<(Instant, Emergency)>,
     rings: [BoundedQueue<Unclaimed>; 5],
 }
 
@@ -50,14 +45,7 @@ impl UnsolicitedQueues {
     pub(super) fn new() -> UnsolicitedQueues {
         let capacity = |kind| if kind == Unsolicited::Ethernet { ETHERNET } else { OTHERS };
         let kinds = [Unsolicited::Ethernet, Unsolicited::Soe, Unsolicited::Aoe, Unsolicited::Voe, Unsolicited::Other];
-        UnsolicitedQueues {
-            emergencies: BoundedQueue::new(EMERGENCIES),
-            rings: kinds.map(|kind| BoundedQueue::new(capacity(kind))),
-        }
-    }
-
-    pub(super) fn emergencies(&mut self) -> &mut BoundedQueue<(Instant, Emergency)> {
-        &mut self.emergencies
+        UnsolicitedQueues { rings: kinds.map(|kind| BoundedQueue::new(capacity(kind))) }
     }
 
     pub(super) fn of_kind(&mut self, kind: Unsolicited) -> &mut BoundedQueue<Unclaimed> {

@@ -20,7 +20,6 @@ use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
-use crate::mail::Mailbox;
 use crate::procedures::clocks;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::error_watch::watch_errors;
@@ -79,7 +78,7 @@ impl MainDevice {
         let closings = loaded.closings(&topology, &members, &stations);
         let cables = cables(&topology, self.options.links());
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
-        let mailboxes = (0..members.len()).map(|index| Mailbox::new(&bus, SubDeviceId(index))).collect();
+        let mailboxes = (0..members.len()).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
         let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
         let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
         let known = Known {

@@ -65,16 +65,18 @@ fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipi
     let Some((member, info)) = member.and_then(|member| Some((member, member.info.as_ref()?))) else {
         return Err(ErrorReply::INVALID_HEADER);
     };
-    let bit = match message.header.protocol {
+    let announced = match message.header.protocol {
         Protocol::Aoe => MailboxProtocols::AOE,
         Protocol::Eoe => MailboxProtocols::EOE,
         Protocol::Coe => MailboxProtocols::COE,
         Protocol::Foe => MailboxProtocols::FOE,
         Protocol::Soe => MailboxProtocols::SOE,
         Protocol::Voe => MailboxProtocols::VOE,
-        Protocol::Error | Protocol::Other(_) => 0,
+        Protocol::Error => 0,
+        // The SII has no bit for other types.
+        Protocol::Other(_) => u16::MAX,
     };
-    if info.protocols.0 & bit == 0 {
+    if info.protocols.0 & announced == 0 {
         return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
     }
     let index = access.member_of(member.station);

@@ -8,8 +8,9 @@ use ringcat_wire::al::AlState;
 
 use super::MainDevice;
 use super::pending::Pending;
+use crate::declared::Address;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
-use crate::mail::{Limits, Mailbox, MailboxError};
+use crate::mail::{EmergencyRing, Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::visit::visit;
@@ -35,8 +36,10 @@ impl MainDevice {
         let bus = self.supervisor.bus();
         if info.is_some() {
             // A scan counts SubDevices in 16 bits (protocol 2.2).
-            let new = (0..=position as u16).skip(self.visited.len()).map(|it| Mailbox::new(&bus, Position(it)));
-            self.visited.extend(new);
+            for new in self.visited.len()..=position {
+                let mailbox = self.new_mailbox(Position(new as u16));
+                self.visited.push(mailbox);
+            }
         }
         let mailbox = self.visited.get(position).cloned();
         self.start(async move {
@@ -97,6 +100,37 @@ impl MainDevice {
         let (handler, served) = VoeHandler::new(subdevice, size, self.requests.bell());
         self.requests.add(served);
         handler
+    }
+
+    /// The emergencies of a SubDevice, for any thread: by its index in the declaration, before or after activation, or
+    /// before activation by its position in the last scan. While a declaration is active, the MainDevice opens no
+    /// mailbox of a SubDevice without a declaration: such a SubDevice keeps its emergencies.
+    ///
+    /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
+    pub fn emergencies(&mut self, subdevice: Address) -> EmergencyRing {
+        self.emergencies.of(subdevice)
+    }
+
+    /// Keeps further emergencies of a SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]. With
+    /// a size of 0 they are only counted, and reported as events.
+    pub fn create_emergency_ring(&mut self, subdevice: Address, size: usize) -> EmergencyRing {
+        let ring = self.emergencies.create(subdevice, size);
+        let mailbox = match subdevice {
+            Address::Declared(subdevice) => self.segment.as_ref().and_then(|segment| segment.mailbox(subdevice.0)),
+            Address::Scanned(position) => self.visited.get(usize::from(position.0)).cloned(),
+        };
+        if let Some(mailbox) = mailbox {
+            mailbox.keep_emergencies_in(ring.clone());
+        }
+        ring
+    }
+
+    /// A mailbox that is not in use yet, with the ring of its SubDevice.
+    pub(super) fn new_mailbox(&mut self, subdevice: impl Into<Address>) -> Mailbox {
+        let subdevice = subdevice.into();
+        let mailbox = Mailbox::new(&self.supervisor.bus(), subdevice);
+        mailbox.keep_emergencies_in(self.emergencies.of(subdevice));
+        mailbox
     }
 
     /// Starts a procedure of the application: any async function over a [`Mailbox`] or the bus.

@@ -169,6 +169,19 @@ pub async fn request(
         if readings > 2 {
             pause = (pause * 3 / 2).min(LONGEST_PAUSE);
         }
+        if pause == LONGEST_PAUSE {
+            insist(bus, station, state).await?;
+        }
         bus.sleep(pause).await;
     }
+}
+
+/// Writes a request again if AL control holds another one: a write of a procedure that had ended, or of another
+/// MainDevice, came after it.
+async fn insist(bus: &Bus, station: StationAddress, state: AlState) -> Result<(), StateError> {
+    let control = AlControl::new(state).encode();
+    if bus.fprd_array(station, map::AL_CONTROL).await? != control {
+        bus.fpwr(station, map::AL_CONTROL, &control).await?;
+    }
+    Ok(())
 }

@@ -291,7 +291,7 @@ fn emergencies_are_events_and_kept_with_the_mailbox() {
     assert_eq!(told, (1..=10).collect::<Vec<_>>());
     let kept: Vec<_> = std::iter::from_fn(|| mailbox.pop_emergency()).map(|(_, kept)| kept).collect();
     assert_eq!(kept, (1..=10).map(emergency).collect::<Vec<_>>());
-    assert_eq!(mailbox.emergency_overruns(), 0);
+    assert_eq!(mailbox.emergencies().overruns(), 0);
 }
 
 // covers: 6.4, mailbox-faults

@@ -1,15 +1,15 @@
-//! Random interleaving of protocols, losses, mail faults, cut cables and power cycles, by seed: no response reaches
-//! another request, all requests end in bounded time, and nothing remains in mailboxes, procedures and datagrams.
-//! Besides the procedures, a request of the cyclic thread, a client of the gateway and a host with a download through
-//! the Ethernet port use each device. The list of a drive contains a checksum, since discarded fragments cannot be
-//! detected otherwise.
+//! Random interleaving of protocols, losses, mail faults, cut cables, power cycles and BOOT, by seed: no response
+//! reaches another request, all requests end in bounded time, and nothing remains in mailboxes, procedures and
+//! datagrams. Besides the procedures, a request of the cyclic thread, a client of the gateway and a host with a
+//! download through the Ethernet port use each device. The list of a drive contains a checksum, since discarded
+//! fragments cannot be detected otherwise.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{Event, Limits};
+use ringcat::{ConfigureError, Event, Limits, SubDeviceState};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
 use ringcat_engine::supervisor::UnderWay;
@@ -17,6 +17,7 @@ use ringcat_sim::application::mailbox::faults::MailFault;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::ErrorReply;
 use ringcat_wire::mailbox::foe::FoeErrorCode;
 use ringcat_wire::mailbox::sdo::AbortCode;
@@ -83,7 +84,7 @@ fn mail_fault(dice: &mut Dice) -> MailFault {
 fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergencies: &mut BTreeMap<u16, u32>) {
     let device = *dice.pick(&ALL);
     let station = world.station_of(device);
-    match dice.below(8) {
+    match dice.below(9) {
         0..=2 => {
             let fault = mail_fault(dice);
             if let MailFault::EmergencyBefore { count, code } = fault {
@@ -102,11 +103,33 @@ fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergen
             beside.run_cycles(world, 1 + dice.below(20));
             world.heal(cable);
         }
-        _ => {
+        7 => {
             world.power_off(DeviceIndex(device));
             beside.run_cycles(world, 2 + dice.below(40));
             world.power_on(DeviceIndex(device));
         }
+        // In BOOT it has another mailbox, which serves only files.
+        _ => {
+            change_state(world, beside, device, AlState::Boot);
+            beside.run_cycles(world, 2 + dice.below(40));
+            change_state(world, beside, device, AlState::Op);
+        }
+    }
+}
+
+/// Requests a state of a device, and waits for it while its users go on. A request that meets a device without power
+/// fails, and the device reaches the state after its return.
+fn change_state(world: &mut World, beside: &mut MailboxUsers, device: usize, state: AlState) {
+    let mut request = world.application_mut().engine_mut().start_state_request(device, state);
+    let until = world.application().now() + END;
+    let mut result = None;
+    while world.application().states()[device] != SubDeviceState::Settled(state) {
+        assert!(world.application().now() < until, "device {device} does not reach {state:?}: {result:?}");
+        beside.run_cycles(world, 1);
+        result = result.or_else(|| request.take());
+    }
+    if let Some(Err(error)) = result {
+        assert!(!matches!(error, ConfigureError::State(_)), "device {device} refused {state:?}: {error}");
     }
 }
 

@@ -45,6 +45,7 @@ mod mail_protocols;
 mod mail_services;
 mod mail_startup;
 mod mail_storm;
+mod mail_unrequested;
 mod mailbox_decoders;
 mod odd_sii;
 mod own_datagrams;

@@ -53,6 +53,8 @@ pub(super) enum AnswerFilter {
     Voe([u8; VENDOR_LEN]),
     /// EoE of this type.
     Eoe(u8),
+    /// Any message of the same mailbox type, which the lane checks.
+    SameType,
 }
 
 /// A transfer of a client.
@@ -91,7 +93,10 @@ pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
             Ok(Lane::Eoe)
         }
         Protocol::Eoe => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
-        Protocol::Error | Protocol::Other(_) => Err(ErrorReply::UNSUPPORTED_PROTOCOL),
+        // The SubDevice knows whether it supports a type that RingCAT does not know.
+        Protocol::Other(code) => Ok(Lane::Other(code)),
+        // Error replies are never answered: two ends could answer each other endlessly.
+        Protocol::Error => Err(ErrorReply::UNSUPPORTED_PROTOCOL),
     }
 }
 
@@ -123,7 +128,8 @@ impl Dialogue {
                 let vendor = payload.first_chunk().ok_or(ErrorReply::SIZE_TOO_SHORT)?;
                 Ok(ExpectedAnswer::Matching(AnswerFilter::Voe(*vendor)))
             }
-            Lane::Eoe | Lane::Frames | Lane::Other(_) => {
+            Lane::Other(_) => Ok(ExpectedAnswer::Matching(AnswerFilter::SameType)),
+            Lane::Eoe | Lane::Frames => {
                 let kind = payload.first().ok_or(ErrorReply::SIZE_TOO_SHORT)? & EOE_TYPE;
                 Ok(ExpectedAnswer::Matching(AnswerFilter::Eoe(kind + 1)))
             }
@@ -243,7 +249,9 @@ impl Dialogue {
                 more = SoeMessage::decode(payload).is_ok_and(|part| part.incomplete && !part.error);
                 Transfer::None
             }
-            AnswerFilter::Aoe(_) | AnswerFilter::Voe(_) | AnswerFilter::Eoe(_) => Transfer::None,
+            AnswerFilter::Aoe(_) | AnswerFilter::Voe(_) | AnswerFilter::Eoe(_) | AnswerFilter::SameType => {
+                Transfer::None
+            }
         };
         more
     }
@@ -332,6 +340,7 @@ impl AnswerFilter {
             }
             AnswerFilter::Voe(vendor) => payload.starts_with(vendor),
             AnswerFilter::Eoe(kind) => payload.first().is_some_and(|first| first & EOE_TYPE == *kind),
+            AnswerFilter::SameType => true,
         }
     }
 }

@@ -20,9 +20,9 @@ use crate::mail::{Mailbox, MailboxError};
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
-/// Messages of one client that may wait in one lane.
+/// Messages of one client that may wait in one lane, of one type.
 const PER_CLIENT: usize = 8;
-/// Messages of all clients that may wait in one lane.
+/// Messages of all clients that may wait in one lane, of one type.
 const QUEUE: usize = 64;
 /// Answers that are kept until the gateway takes them.
 const ANSWERS: usize = 1024;
@@ -94,7 +94,7 @@ struct Queue {
 
 #[derive(Default)]
 struct State {
-    queues: BTreeMap<(u16, usize), Queue>,
+    queues: BTreeMap<(u16, u8), Queue>,
     answers: VecDeque<Relayed>,
     counters: RelayCounters,
 }
@@ -145,7 +145,7 @@ impl GatewayQueue {
     }
 
     fn queue(&self, job: Job, mailbox: Option<Mailbox>, lane: Lane) {
-        let key = (job.header.address, lane.index());
+        let key = (job.header.address, lane.protocol().code());
         let state = &mut *self.shared.state.borrow_mut();
         let queue = state.queues.entry(key).or_default();
         let of_client = queue.jobs.iter().filter(|other| other.client == job.client).count();
@@ -221,7 +221,7 @@ impl Shared {
     }
 
     /// The next message, of the client with the oldest last turn. `None` if no message waits.
-    fn next(&self, key: (u16, usize)) -> Option<Job> {
+    fn next(&self, key: (u16, u8)) -> Option<Job> {
         let now = self.bus.now();
         let state = &mut *self.state.borrow_mut();
         let queue = state.queues.get_mut(&key)?;
@@ -244,7 +244,7 @@ impl Shared {
     }
 
     /// The next message of a client; the inner `None` means that the client has disconnected.
-    fn next_of(&self, key: (u16, usize), client: u64) -> Option<Option<Job>> {
+    fn next_of(&self, key: (u16, u8), client: u64) -> Option<Option<Job>> {
         let state = &mut *self.state.borrow_mut();
         let queue = state.queues.get_mut(&key)?;
         if !queue.turns.contains_key(&client) {
@@ -255,14 +255,14 @@ impl Shared {
     }
 
     /// Whether other clients wait.
-    fn others_wait(&self, key: (u16, usize), client: u64) -> bool {
+    fn others_wait(&self, key: (u16, u8), client: u64) -> bool {
         let state = self.state.borrow();
         state.queues.get(&key).is_some_and(|queue| queue.jobs.iter().any(|job| job.client != client))
     }
 }
 
 /// Processes the messages for one SubDevice and lane until the queue is empty.
-async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: Lane) {
+async fn serve(shared: Rc<Shared>, key: (u16, u8), mailbox: Mailbox, lane: Lane) {
     while let Some(job) = shared.next(key) {
         let conversation = async {
             let mut conversation = mailbox.conversation(lane).await?;
@@ -277,7 +277,7 @@ async fn serve(shared: Rc<Shared>, key: (u16, usize), mailbox: Mailbox, lane: La
 }
 
 /// Answers the messages for the MainDevice itself until the queue is empty.
-async fn serve_own(shared: Rc<Shared>, key: (u16, usize)) {
+async fn serve_own(shared: Rc<Shared>, key: (u16, u8)) {
     while let Some(mut job) = shared.next(key) {
         let Some(answer) = job.own.take() else { continue };
         match answer.await {
@@ -300,7 +300,7 @@ async fn settle(conversation: &mut Conversation, lane: Lane) -> Result<(), Mailb
 /// Processes one message with its answers, and the rest of the same transfer.
 async fn hold_conversation(
     shared: &Rc<Shared>,
-    key: (u16, usize),
+    key: (u16, u8),
     mut conversation: Conversation,
     lane: Lane,
     first: Job,

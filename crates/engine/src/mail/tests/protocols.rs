@@ -162,7 +162,7 @@ fn an_emergency_between_request_and_response_is_kept_and_is_an_event() {
     }
     bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(50));
-    assert_eq!(bench.mailbox.emergency_overruns(), 8);
+    assert_eq!(bench.mailbox.emergencies().overruns(), 8);
 }
 
 // covers: 6.4, foe

@@ -153,7 +153,8 @@ fn messages_that_are_not_relayed_are_refused_with_their_error_code() {
     let mut dialogue = Dialogue::default();
     assert_eq!(lane(Protocol::Eoe, &[0, 1, 0, 0]), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
     assert_eq!(lane(Protocol::Eoe, &[6, 1, 0, 0]), Ok(Lane::Eoe));
-    assert_eq!(lane(Protocol::Other(9), &[]), Err(ErrorReply::UNSUPPORTED_PROTOCOL));
+    assert_eq!(lane(Protocol::Error, &[1, 0, 2, 0]), Err(ErrorReply::UNSUPPORTED_PROTOCOL));
+    assert_eq!(lane(Protocol::Other(9), &[]), Ok(Lane::Other(9)));
     assert_eq!(dialogue.request(Lane::Coe, &[0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));
     assert_eq!(dialogue.request(Lane::Coe, &[0, 0x10, 0, 0], SIZE), Err(ErrorReply::SERVICE_NOT_SUPPORTED));
     assert_eq!(dialogue.request(Lane::Voe, &[0, 0x10, 0], SIZE), Err(ErrorReply::SIZE_TOO_SHORT));

@@ -1,0 +1,56 @@
+//! Mail that a SubDevice sends without a request: emergencies, vendor messages, notifications.
+
+use ringcat_engine::mail::voe::{self, Voe};
+use ringcat_engine::mail::{EmergencyRing, Unclaimed, Unsolicited};
+
+use super::resolve::find;
+use super::{SubDevice, SubDeviceError};
+use crate::services::Services;
+
+impl<S: Services> SubDevice<S> {
+    /// The SubDevice's emergencies (CoE). The ring is a handle for any thread: reading, clearing and counting wait for
+    /// no other thread. Each emergency is also an [`Event::Emergency`](crate::Event::Emergency).
+    ///
+    /// ```
+    /// use ringcat::{Error, SubDeviceId, SupervisorThread};
+    ///
+    /// /// Prints the emergencies of a drive, of which the last 200 are kept.
+    /// fn watch(supervisor: &SupervisorThread, drive: SubDeviceId) -> Result<(), Error> {
+    ///     let emergencies = supervisor.subdevice(drive).create_emergency_ring(200)?;
+    ///     while let Some((at, emergency)) = emergencies.pop() {
+    ///         println!("{} ns: {:#06x}", at.0, emergency.error_code);
+    ///     }
+    ///     println!("{} more were not kept", emergencies.overruns());
+    ///     Ok(())
+    /// }
+    /// ```
+    pub fn emergencies(self) -> S::Immediate<EmergencyRing> {
+        let address = self.address;
+        self.services.immediately(move |engine| engine.emergencies(address))
+    }
+
+    /// Keeps further emergencies of the SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]; the
+    /// ring before gets no more. With a size of 0 emergencies are only counted and reported as events.
+    pub fn create_emergency_ring(self, size: usize) -> S::Immediate<EmergencyRing> {
+        let address = self.address;
+        self.services.immediately(move |engine| engine.create_emergency_ring(address, size))
+    }
+
+    /// Waits for a vendor message that the SubDevice sends without a request, or takes the oldest kept one. The time
+    /// limit is that of an answer, see [`SubDevice::limits`].
+    pub fn voe_receive(self) -> S::Outcome<Voe, SubDeviceError> {
+        let limit = self.limits.answer;
+        self.ask_mailbox(move |mailbox| async move { voe::receive(&mailbox, limit).await })
+    }
+
+    /// Takes the oldest kept mail of a kind that no request waited for: notifications of drives and ADS, vendor
+    /// messages, late answers, mail of unknown types. `None` if there is none. The SubDevice's mailbox keeps 32 of each
+    /// kind.
+    pub fn take_unsolicited(self, kind: Unsolicited) -> S::Immediate<Option<Unclaimed>> {
+        let address = self.address;
+        self.services.immediately(move |engine| {
+            let number = find(engine, address).ok()?;
+            engine.mailbox(number)?.pop_unsolicited(kind)
+        })
+    }
+}

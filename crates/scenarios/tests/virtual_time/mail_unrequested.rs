@@ -1,0 +1,244 @@
+//! Mail that belongs to no request of RingCAT: error replies beside Ethernet frames, types that only a gateway's client
+//! knows, vendor messages and emergencies that a SubDevice sends by itself.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use ringcat::{Event, MainDevice, Options, Position, SubDeviceId, TransferLimits, Unsolicited, automatic};
+use ringcat_engine::mail::eoe::EthernetPort;
+use ringcat_engine::mail::voe::{self, Voe};
+use ringcat_engine::mail::{Limits, MailboxError};
+use ringcat_engine::main_device::Pending;
+use ringcat_sim::application::mailbox::faults::MailFault;
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
+use scenarios::ethernet_host::{Addresses, download};
+use scenarios::segments::{descriptions, line, ring};
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
+
+const LIMITS: Limits = Limits::new(Duration::from_millis(500), Duration::from_secs(2));
+const KINDS: [&str; 3] = ["coupler", "digital-input-8", "all-protocols"];
+/// The device with all protocols.
+const ALL: usize = 2;
+const VENDOR: u32 = 0x0C47;
+const OTHER_VENDOR: u32 = VENDOR + 1;
+const ADDRESSES: Addresses = Addresses { mac: [2, 0, 0, 0, 0, 9], host: [10, 0, 0, 1], device: [10, 0, 0, 2] };
+const CLIENT: u64 = 7;
+/// A mailbox type that no standard names.
+const UNKNOWN: Protocol = Protocol::Other(9);
+
+fn world(seed: u64) -> World {
+    let mut devices = descriptions(&KINDS);
+    devices[ALL].services.eoe.address = Some(ADDRESSES.device.into());
+    devices[ALL].services.eoe.mask = Some([255, 255, 255, 0].into());
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    World::in_op(seed, ring(devices, options))
+}
+
+fn message(vendor_id: u32, text: &[u8]) -> Voe {
+    Voe { vendor_id, vendor_type: 1, data: text.to_vec() }
+}
+
+fn emergency(error_code: u16) -> Emergency {
+    Emergency { error_code, error_register: 1, data: [1, 2, 3, 4, 5] }
+}
+
+fn send_emergency(world: &mut World, device: usize, code: u16) {
+    assert!(world.network_mut().device_mut(DeviceIndex(device)).application.emergency(&emergency(code)));
+    world.run_cycles(20);
+}
+
+/// Downloads through the Ethernet port, one after the other.
+fn start_downloads(world: &mut World, stop: &Rc<Cell<bool>>) -> Pending<u32> {
+    let (mailbox, stop) = (world.mailbox(ALL), stop.clone());
+    world.start(async move {
+        let port = EthernetPort::open(&mailbox).expect("the port is free");
+        let mut done = 0;
+        while !stop.get() {
+            let got = download(mailbox.bus().clone(), &port, ADDRESSES, 20_000, Duration::from_secs(2)).await;
+            done += u32::from(got.is_ok());
+        }
+        done
+    })
+}
+
+// covers: 6.1, mailbox
+#[test]
+fn an_error_reply_beside_ethernet_frames_delays_no_other_request() {
+    let mut world = world(1);
+    let stop = Rc::new(Cell::new(false));
+    let downloads = start_downloads(&mut world, &stop);
+    world.run_cycles(30);
+    let refused = ErrorReply::new(ErrorReply::SERVICE_NOT_SUPPORTED);
+    let no_memory = ErrorReply::new(ErrorReply::NO_MORE_MEMORY);
+    // The refusal of a service cannot belong to a frame; that of memory can, for a short time.
+    for (reply, longest) in [(refused, Duration::from_millis(20)), (no_memory, Duration::from_millis(300))] {
+        let mailbox = world.mailbox(ALL);
+        let (mut longest_wait, mut refusals) = (Duration::ZERO, 0);
+        for round in 0..20 {
+            let vendor_id = if reply == refused { OTHER_VENDOR } else { VENDOR };
+            if reply == no_memory {
+                let fault = MailFault::Refuse { count: 1, detail: reply.detail };
+                world.fault(Fault::Mail(DeviceIndex(ALL), fault));
+            }
+            let own = mailbox.clone();
+            let first = world.run(async move { voe::exchange(&own, &message(vendor_id, b"first"), LIMITS).await });
+            if first.is_ok() {
+                assert_eq!(reply, no_memory, "round {round}: a frame was refused");
+                continue;
+            }
+            assert_eq!(first, Err(MailboxError::Error(reply)), "round {round}");
+            refusals += 1;
+            let (own, begin) = (mailbox.clone(), world.now());
+            let second = message(VENDOR, format!("second {round}").as_bytes());
+            let wanted = second.clone();
+            let got = world.run(async move { voe::exchange(&own, &second, LIMITS).await });
+            assert_eq!(got, Ok(wanted), "round {round}");
+            longest_wait = longest_wait.max(world.now() - begin);
+        }
+        println!("{refusals} refusals {:#06x}, next response after at most {longest_wait:?}", reply.detail);
+        assert!(refusals > 0 && longest_wait < longest, "{refusals} refusals, {longest_wait:?}");
+    }
+    stop.set(true);
+    assert!(world.finish(Duration::from_secs(10), downloads) > 0, "frames were under way");
+}
+
+/// Passes a client's message of a type to the device.
+fn relay(world: &mut World, protocol: Protocol, payload: &[u8]) {
+    let address = world.station_of(ALL);
+    let header = Header { address, ..Header::new(protocol, 5, payload.len() as u16) };
+    let mut bytes = vec![0; gateway::HEADER_LEN + Header::LEN + payload.len()];
+    gateway::encode(&Message { header, payload }, &mut bytes).expect("it fits");
+    world.application_mut().engine_mut().relay(CLIENT, &bytes);
+}
+
+/// Protocol, counter and payload of the next message to the client, if one arrives.
+fn relayed(world: &mut World, cycles: u32) -> Option<(Protocol, u8, Vec<u8>)> {
+    for _ in 0..cycles {
+        world.cycle();
+        if let Some(relayed) = world.application_mut().engine_mut().pop_relayed() {
+            let Message { header, payload } = gateway::decode(&relayed.bytes).expect("a message");
+            return Some((header.protocol, header.counter, payload.to_vec()));
+        }
+    }
+    None
+}
+
+// covers: 10.1, gateway
+#[test]
+fn a_gateway_client_exchanges_mail_of_a_type_that_ringcat_does_not_know() {
+    let mut world = world(2);
+    let before = world.mailbox(ALL).counters().written;
+    // The device itself refuses a type that it does not support.
+    relay(&mut world, UNKNOWN, b"question");
+    let unsupported = ErrorReply::new(ErrorReply::UNSUPPORTED_PROTOCOL).encode().to_vec();
+    assert_eq!(relayed(&mut world, 100), Some((Protocol::Error, 5, unsupported)));
+    let counters = world.application_mut().engine_mut().relay_counters();
+    assert_eq!((counters.answers, counters.refused), (1, 0), "the reply is from the device");
+    assert_eq!(world.mailbox(ALL).counters().written, before + 1);
+    // Another type shares the lane, and each client's message has the response of its own type.
+    for (protocol, text) in [(UNKNOWN, b"first"), (Protocol::Other(12), b"other")] {
+        world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::LoseRequests { count: 1 }));
+        relay(&mut world, protocol, b"question");
+        world.run_cycles(5);
+        for (kind, payload) in [(Protocol::Other(11), &b"not this"[..]), (protocol, &text[..])] {
+            assert!(world.network_mut().device_mut(DeviceIndex(ALL)).application.post(kind, payload.to_vec()));
+        }
+        assert_eq!(relayed(&mut world, 100), Some((protocol, 5, text.to_vec())));
+    }
+    // Error replies are not requests.
+    relay(&mut world, Protocol::Error, &[1, 0, 2, 0]);
+    assert_eq!(relayed(&mut world, 2).map(|(protocol, ..)| protocol), Some(Protocol::Error));
+    assert_eq!(world.application_mut().engine_mut().relay_counters().refused, 1);
+}
+
+// covers: 6.8, pdo-mail
+#[test]
+fn vendor_messages_without_a_request_reach_the_application_by_its_handle() {
+    let mut world = world(3);
+    let post = |world: &mut World, protocol: Protocol, payload: &[u8]| {
+        let device = world.network_mut().device_mut(DeviceIndex(ALL));
+        assert!(device.application.post(protocol, payload.to_vec()));
+    };
+    let limits = TransferLimits::new(LIMITS.request, Duration::from_millis(100));
+    // Received before and after the call.
+    for early in [true, false] {
+        if early {
+            post(&mut world, Protocol::Voe, &[0x47, 0x0C, 0, 0, 1, 0, b'h', b'i']);
+            world.run_cycles(20);
+        }
+        let receiving = world.application_mut().subdevice(SubDeviceId(ALL)).limits(limits).voe_receive();
+        if !early {
+            world.run_cycles(20);
+            post(&mut world, Protocol::Voe, &[0x47, 0x0C, 0, 0, 1, 0, b'h', b'i']);
+        }
+        assert_eq!(world.finish(Duration::from_secs(1), receiving).expect("a message"), message(VENDOR, b"hi"));
+    }
+    let receiving = world.application_mut().subdevice(SubDeviceId(ALL)).limits(limits).voe_receive();
+    let error = world.finish(Duration::from_secs(1), receiving).expect_err("no message");
+    assert!(error.to_string().contains("100 ms"), "{error}");
+    // Mail of an unknown type is kept as it is.
+    post(&mut world, UNKNOWN, b"news");
+    world.run_cycles(20);
+    let mut take = |kind| world.application_mut().subdevice(SubDeviceId(ALL)).take_unsolicited(kind);
+    assert_eq!(take(Unsolicited::Other).map(|mail| (mail.protocol, mail.payload)), Some((UNKNOWN, b"news".to_vec())));
+    assert_eq!((take(Unsolicited::Other), take(Unsolicited::Voe)), (None, None));
+}
+
+// covers: 6.3, sdo-information
+#[test]
+fn the_application_chooses_how_many_emergencies_of_a_subdevice_are_kept() {
+    let mut world = world(4);
+    let mark = world.mark();
+    let codes = |ring: &ringcat::EmergencyRing| -> Vec<u16> {
+        std::iter::from_fn(|| ring.pop()).map(|(_, emergency)| emergency.error_code).collect()
+    };
+    let before = world.application_mut().subdevice(SubDeviceId(ALL)).emergencies();
+    send_emergency(&mut world, ALL, 1);
+    let ring = world.application_mut().subdevice(SubDeviceId(ALL)).create_emergency_ring(3);
+    (2..=7).for_each(|code| send_emergency(&mut world, ALL, code));
+    assert_eq!((ring.len(), ring.overruns()), (3, 3));
+    // Another thread reads while this thread does not run the engine.
+    let own = ring.clone();
+    assert_eq!(std::thread::spawn(move || codes(&own)).join().expect("it ends"), [2, 3, 4]);
+    assert_eq!(codes(&before), [1], "the ring before keeps its content and gets no more");
+    send_emergency(&mut world, ALL, 8);
+    ring.clear();
+    assert_eq!((codes(&ring), ring.overruns()), (vec![], 0));
+    let none = world.application_mut().subdevice(SubDeviceId(ALL)).create_emergency_ring(0);
+    send_emergency(&mut world, ALL, 9);
+    assert_eq!((codes(&none), none.overruns()), (vec![], 1));
+    let reported = world.events(mark).iter().filter(|timed| matches!(timed.event, Event::Emergency { .. })).count();
+    assert_eq!(reported, 9, "each is also an event");
+}
+
+// covers: 6.3, sdo-information
+#[test]
+fn emergencies_are_kept_by_position_and_wait_in_an_undeclared_subdevice() {
+    let network = line(descriptions(&KINDS), NetworkOptions::default());
+    let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
+    let scan = main_device.scan().expect("a scan");
+    let position = Position(ALL as u16);
+    let by_position = main_device.subdevice(position).create_emergency_ring(5);
+    // Its mailbox is open from the first request on.
+    main_device.subdevice(position).sdo_read::<u32>(0x1000, 0).expect("a device type");
+    let mut declaration = automatic(&scan.subdevices, CYCLE);
+    let post = |main_device: &mut MainDevice<Tap>, code| {
+        let network = main_device.links_mut().network_mut();
+        assert!(network.device_mut(DeviceIndex(ALL)).application.emergency(&emergency(code)));
+    };
+    post(&mut main_device, 1);
+    main_device.subdevice(position).sdo_read::<u32>(0x1000, 0).expect("a device type");
+    assert_eq!(by_position.pop().map(|(_, kept)| kept), Some(emergency(1)));
+    // Declared without it: its mailbox is closed, so it cannot send.
+    declaration.subdevices.truncate(ALL);
+    declaration.domains.iter_mut().for_each(|domain| domain.members.retain(|member| member.subdevice.0 < ALL));
+    let mut application = main_device.activate(declaration).expect("activation");
+    (0..2000).for_each(|_| application.cycle(|_| ()));
+    assert!(application.all_settled() && by_position.is_empty());
+}
