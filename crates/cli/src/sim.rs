@@ -6,6 +6,7 @@ mod mail_orders;
 mod names;
 mod orders;
 mod plant;
+mod residence;
 mod wires;
 
 use std::path::PathBuf;

@@ -10,6 +10,11 @@ pub fn now_ns() -> u64 {
     read(libc::CLOCK_MONOTONIC)
 }
 
+/// Processor time of this process so far: all threads, user and system.
+pub fn process_cpu_ns() -> u64 {
+    read(libc::CLOCK_PROCESS_CPUTIME_ID)
+}
+
 /// From the monotonic clock to the Unix clock. It changes only when the Unix clock is set: the rates of both
 /// clocks are corrected alike.
 pub(crate) fn unix_offset_ns() -> u64 {

@@ -2,7 +2,7 @@
 //!
 //! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings all SubDevices to OP and exchanges process data. In
 //! cycle i byte j of the outputs of SubDevice k is i + k + j. The same number of cycles follows without other work, to
-//! measure the cycle rate. Prints one line of figures, with the measured propagation delays, then keeps exchanging the
+//! measure the cycle rate and the processor time per cycle. Prints one line of figures, with the measured propagation delays, then keeps exchanging the
 //! last outputs until its standard input ends. Unexpected results end it with an error. TIMES is the number of
 //! distributions of the reference time before OP; default is that of ethercrab.
 
@@ -15,11 +15,12 @@ use std::time::{Duration, Instant};
 
 use ethercrab::std::{ethercat_now, tx_rx_task};
 use ethercrab::{MainDevice, MainDeviceConfig, PduStorage, Timeouts};
+use ringcat_link::monotonic::process_cpu_ns;
 
 /// Maximum number of SubDevices.
-const SUBDEVICES: usize = 64;
+const SUBDEVICES: usize = 128;
 /// Bytes of process data in both directions.
-const PROCESS_DATA: usize = 1024;
+const PROCESS_DATA: usize = 4096;
 /// Frames in flight.
 const FRAMES: usize = 32;
 /// Maximum length of a datagram's data, in bytes.
@@ -119,20 +120,29 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
         }
         wrong += usize::from(response.working_counter != wkc);
     }
-    let back_to_back = Instant::now();
+    let (back_to_back, cpu_before) = (Instant::now(), process_cpu_ns());
+    let (mut cycle_times, mut last) = (Vec::with_capacity(cycles), back_to_back);
     for _ in 0..cycles {
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
+        let now = Instant::now();
+        cycle_times.push(now - last);
+        last = now;
     }
     let per_second = cycles as f64 / back_to_back.elapsed().as_secs_f64().max(f64::EPSILON);
+    let cpu_us = (process_cpu_ns() - cpu_before) as f64 / 1e3 / cycles.max(1) as f64;
     let inputs: Vec<String> = group.iter(&main_device).map(|subdevice| hex(&subdevice.inputs_raw())).collect();
     let delays: Vec<String> =
         group.iter(&main_device).map(|subdevice| subdevice.propagation_delay().to_string()).collect();
-    round_trips.sort();
-    let median = round_trips.get(cycles / 2).copied().unwrap_or_default();
+    let [median, cycle] = [&mut round_trips, &mut cycle_times].map(|times| {
+        times.sort();
+        times.get(cycles / 2).copied().unwrap_or_default()
+    });
     println!(
-        "op_ms {} median_us {:.1} per_second {per_second:.0} wkc {wkc} wrong {wrong} delays {} inputs {}",
+        "op_ms {} median_us {:.1} per_second {per_second:.0} cycle_us {:.2} cpu_us {cpu_us:.2} wkc {wkc} \
+         wrong {wrong} delays {} inputs {}",
         to_op.as_millis(),
         median.as_secs_f64() * 1e6,
+        cycle.as_secs_f64() * 1e6,
         delays.join(","),
         inputs.join(",")
     );

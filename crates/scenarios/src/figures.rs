@@ -56,6 +56,23 @@ impl Figures {
         self.row(name, format!("{} {unit}", short(value)), format!(">= {} {unit}", short(bar)), verdict);
     }
 
+    /// A ratio of wall-clock times, one value per block of alternating programs. It misses its bar only where all blocks
+    /// agree on that.
+    pub fn at_most_in_blocks(&mut self, name: &str, blocks: &[f64], bar: f64, unit: &str) {
+        let verdict = in_blocks(blocks, bar);
+        self.missed |= verdict == "MISSED";
+        self.row(name, of_blocks(blocks, unit), format!("<= {} {unit}", short(bar)), verdict);
+    }
+
+    /// As [`Self::at_most_in_blocks`] with a goal that is known not to be reached yet, or not everywhere: no failure.
+    pub fn goal_at_most_in_blocks(&mut self, name: &str, blocks: &[f64], goal: f64, unit: &str) {
+        let verdict = match in_blocks(blocks, goal) {
+            "MISSED" => "not reached",
+            other => other,
+        };
+        self.row(name, of_blocks(blocks, unit), format!("<= {} {unit}", short(goal)), verdict);
+    }
+
     fn row(&mut self, name: &str, value: String, bar: String, verdict: &str) {
         self.rows.push([name.to_owned(), value, bar, verdict.to_owned()]);
     }
@@ -72,6 +89,29 @@ impl Figures {
     }
 }
 
+/// Verdict about ratios of blocks: their median counts, but a failure needs all of them.
+fn in_blocks(blocks: &[f64], bar: f64) -> &'static str {
+    match () {
+        () if blocks.is_empty() => "not measured",
+        () if blocks.iter().all(|ratio| *ratio > bar) => "MISSED",
+        () if median(blocks) <= bar => "ok",
+        () => "not evaluated: the blocks disagree",
+    }
+}
+
+/// The median of blocks, with all of them.
+pub fn of_blocks(blocks: &[f64], unit: &str) -> String {
+    let all: Vec<String> = blocks.iter().map(|value| short(*value)).collect();
+    format!("{} {unit} (of {})", short(median(blocks)), all.join(", "))
+}
+
+/// The median of values in any order; of an even number the upper one.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+}
+
 /// Success, or failure if a bar was missed.
 pub fn verdict(met: bool) -> ExitCode {
     if met { ExitCode::SUCCESS } else { ExitCode::FAILURE }
@@ -80,4 +120,19 @@ pub fn verdict(met: bool) -> ExitCode {
 /// Rounds to the significant digits.
 fn short(value: f64) -> String {
     if value.fract() == 0.0 || value.abs() >= 1000.0 { format!("{value:.0}") } else { format!("{value:.2}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: bench
+    #[test]
+    fn a_ratio_misses_its_bar_only_where_all_blocks_agree() {
+        assert_eq!(in_blocks(&[1.1, 1.2, 3.0], 1.0), "MISSED");
+        assert_eq!(in_blocks(&[1.1, 0.9, 3.0], 1.0), "not evaluated: the blocks disagree");
+        assert_eq!(in_blocks(&[0.8, 0.9, 3.0], 1.0), "ok");
+        assert_eq!(in_blocks(&[], 1.0), "not measured");
+        assert_eq!(of_blocks(&[3.0, 0.8, 0.9], "x"), "0.90 x (of 3, 0.80, 0.90)");
+    }
 }

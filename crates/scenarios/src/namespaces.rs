@@ -4,12 +4,16 @@
 
 use std::ffi::OsStr;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Interface indices: different at both ends, so that the kernel reports the loss of a carrier in time.
 const INDEX: [u32; 2] = [50, 60];
 /// Start-up time of a server.
 const START: Duration = Duration::from_millis(400);
+
+/// Limit of the start-up of a server that shows when it is ready, and the period of checks.
+const READY: Duration = Duration::from_secs(10);
+const POLL: Duration = Duration::from_millis(5);
 
 /// The namespaces.
 #[derive(Debug)]
@@ -54,10 +58,32 @@ impl Namespaces {
         let child = command.spawn().map_err(|error| error.to_string())?;
         let mut server = Server(child);
         std::thread::sleep(START);
-        match server.0.try_wait() {
-            Ok(None) => Ok(server),
-            other => Err(format!("{arguments:?} ended at once: {other:?}")),
+        server.runs(arguments)?;
+        Ok(server)
+    }
+
+    /// As [`Namespaces::serve`], and returns as soon as it is ready.
+    ///
+    /// # Errors
+    /// It ends, or is not ready after [`READY`].
+    pub fn serve_until(
+        &self,
+        program: impl AsRef<OsStr>,
+        arguments: &[&str],
+        is_ready: &dyn Fn() -> bool,
+    ) -> Result<Server, String> {
+        let mut command = inside(&self.far, program.as_ref());
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null());
+        let mut server = Server(command.spawn().map_err(|error| error.to_string())?);
+        let begin = Instant::now();
+        while !is_ready() {
+            server.runs(arguments)?;
+            if begin.elapsed() > READY {
+                return Err(format!("{arguments:?} is not ready after {} s", READY.as_secs()));
+            }
+            std::thread::sleep(POLL);
         }
+        Ok(server)
     }
 }
 
@@ -73,6 +99,16 @@ impl Drop for Namespaces {
 /// A running server.
 #[derive(Debug)]
 pub struct Server(Child);
+
+impl Server {
+    /// Whether it is still there.
+    fn runs(&mut self, arguments: &[&str]) -> Result<(), String> {
+        match self.0.try_wait() {
+            Ok(None) => Ok(()),
+            other => Err(format!("{arguments:?} ended at once: {other:?}")),
+        }
+    }
+}
 
 impl Drop for Server {
     fn drop(&mut self) {

@@ -145,7 +145,8 @@ fn exchange<H: AcyclicHalf>(
     begin: u64,
     end: &EndRequest,
 ) -> (Vec<String>, bench::Cycles) {
-    let mut data = bench::Cycles { start_up, cycle_times: None, rate_hz: None, incomplete_cycles: None };
+    let mut data =
+        bench::Cycles { start_up, cycle_times: None, rate_hz: None, cpu_ns_per_cycle: None, incomplete_cycles: None };
     match reach_op(application, begin, end) {
         Ok(after_ns) => data.start_up.op_after_ns = Some(after_ns),
         Err(reason) => return (vec![reason], data),
@@ -158,7 +159,7 @@ fn exchange<H: AcyclicHalf>(
         one_cycle(application);
     }
     let mut times_ns = Vec::with_capacity(count as usize);
-    let before = application.cyclic_counters();
+    let (before, cpu_before) = (application.cyclic_counters(), monotonic::process_cpu_ns());
     let first = one_cycle(application);
     let mut last = first;
     for _ in (0..count).take_while(|_| !end.is_asked()) {
@@ -166,7 +167,7 @@ fn exchange<H: AcyclicHalf>(
         times_ns.push(now - last);
         last = now;
     }
-    let after = application.cyclic_counters();
+    let (after, cpu) = (application.cyclic_counters(), monotonic::process_cpu_ns() - cpu_before);
     // A cycle that was skipped sent nothing.
     let incomplete = after.incomplete - before.incomplete + after.skipped - before.skipped;
     let cycles = times_ns.len();
@@ -174,10 +175,13 @@ fn exchange<H: AcyclicHalf>(
     let rate_hz = cycles as f64 * 1e9 / (last - first).max(1) as f64;
     data.cycle_times = Times::of_sorted(&times_ns);
     data.rate_hz = (cycles > 0).then_some(rate_hz);
+    data.cpu_ns_per_cycle = cpu.checked_div(cycles as u64);
     data.incomplete_cycles = (cycles > 0).then_some(incomplete);
     say!("cycles per second: {rate_hz:.0}");
     say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
     say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
+    let share = 100.0 * cpu as f64 / (last - first).max(1) as f64;
+    say!("CPU per cycle: {:.2} us, {share:.0} % of a processor", cpu as f64 / 1e3 / cycles.max(1) as f64);
     say!("incomplete: {incomplete} of {cycles}");
     let mut reasons = Vec::new();
     if incomplete > 0 {

@@ -60,6 +60,8 @@ pub struct Cycles {
     pub cycle_times: Option<Times>,
     /// Rate of the measured cycles, in hertz; null where none was measured
     pub rate_hz: Option<f64>,
+    /// Processor time per measured cycle, all threads of this process, in nanoseconds; null where none was measured
+    pub cpu_ns_per_cycle: Option<u64>,
     /// Incomplete cycles among the measured ones; null where none was measured
     pub incomplete_cycles: Option<u64>,
 }

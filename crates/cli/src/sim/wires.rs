@@ -21,12 +21,16 @@ use ringcat::sim::time::SimTime;
 use ringcat_link::{LinkCounters, LinkError, PacketOptions, PacketSocket, ReceiveMode, monotonic};
 
 use super::lateness::Lateness;
+use super::residence::Residence;
 use crate::json::sim::Interface;
 
 /// Longest time between two checks for orders while the simulator spins.
 const SPIN: Duration = Duration::from_micros(50);
 /// The same while it sleeps: a stall of this machine that is not longer goes unnoticed.
 const NAP: Duration = Duration::from_micros(500);
+
+/// A receive stamp is nearer to the present, unless the Unix clock was set meanwhile.
+const STAMPED_WITHIN_NS: u64 = 1_000_000_000;
 
 /// Time that frames under way may take at most in one leap.
 const LONGEST_LEAP: Duration = Duration::from_millis(100);
@@ -78,6 +82,10 @@ pub struct Wires {
     asked_ns: u64,
     /// How late turns came.
     pub lateness: Lateness,
+    /// How long frames were here, at the pace that answers each at once.
+    residence: Residence,
+    /// When the frames of this turn arrived.
+    arrivals_ns: Vec<u64>,
 }
 
 impl Wires {
@@ -98,6 +106,8 @@ impl Wires {
             clock: Clock { begin_ns: now, lead_ns: 0 },
             asked_ns: u64::MAX,
             lateness: Lateness::default(),
+            residence: Residence::default(),
+            arrivals_ns: Vec::new(),
         })
     }
 
@@ -106,16 +116,26 @@ impl Wires {
         let now = monotonic::now_ns();
         self.lateness.note(self.asked_ns, now);
         network.advance(self.clock.virtual_time(now));
+        self.arrivals_ns.clear();
         for (link, socket) in &mut self.sockets {
-            while socket.receive(&mut |frame| network.send(*link, frame)) {}
+            while socket.receive(&mut |frame| network.send(*link, frame)) {
+                if self.pace == Pace::AsFastAsPossible {
+                    let bounds = (now.saturating_sub(STAMPED_WITHIN_NS), now + STAMPED_WITHIN_NS);
+                    self.arrivals_ns.push(socket.received_at_ns(bounds.0, bounds.1));
+                }
+            }
         }
         if self.pace == Pace::AsFastAsPossible {
             let before = network.now();
             network.advance_until_quiet(before + LONGEST_LEAP);
             self.clock.leap(network.now() - before);
         }
+        let mut arrivals = self.arrivals_ns.iter();
         for (link, socket) in &mut self.sockets {
             while let Some(received) = network.receive(*link) {
+                if let Some(arrived) = arrivals.next() {
+                    self.residence.note(monotonic::now_ns().saturating_sub(*arrived));
+                }
                 // An interface that is down loses the frame, as a cable does.
                 socket.send(&received.bytes);
                 network.give_back(received.bytes);
@@ -165,7 +185,8 @@ impl Wires {
                  {sent} sent, {unsent} not sent\n"
             )
         };
-        self.sockets.iter().map(line).collect::<String>() + &self.lateness.summary()
+        let residence = self.residence.summary().map_or_else(String::new, |line| line + "\n");
+        self.sockets.iter().map(line).collect::<String>() + &residence + &self.lateness.summary()
     }
 }
 

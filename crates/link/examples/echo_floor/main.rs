@@ -20,7 +20,7 @@ use std::process::{Child, Command, Stdio, id};
 use std::time::Duration;
 
 use path::{Path, Recv, Ring};
-use ringcat_link::monotonic::now_ns;
+use ringcat_link::monotonic::{now_ns, process_cpu_ns};
 use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, realtime, wait};
 use xdp::{Attach, Wait, Xdp};
 
@@ -169,10 +169,10 @@ fn ping(path: &mut dyn Path, size: usize, count: usize) -> Outcome {
     let mut frame = frame(size);
     let mut times_ns = Vec::with_capacity(count);
     let (mut lost, mut wrong) = (0, 0);
-    let mut begin = (now_ns(), paths::cpu_ns()?);
+    let mut begin = (now_ns(), process_cpu_ns());
     for round in 0..WARM_UP + count {
         if round == WARM_UP {
-            begin = (now_ns(), paths::cpu_ns()?);
+            begin = (now_ns(), process_cpu_ns());
         }
         frame[17] = round as u8 & 0x7f;
         match round_trip(path, &frame) {
@@ -182,7 +182,7 @@ fn ping(path: &mut dyn Path, size: usize, count: usize) -> Outcome {
             Some(_) => {}
         }
     }
-    let (elapsed, cpu) = (now_ns() - begin.0, paths::cpu_ns()? - begin.1);
+    let (elapsed, cpu) = (now_ns() - begin.0, process_cpu_ns() - begin.1);
     times_ns.sort_unstable();
     let at = |percent: usize| times_ns.get(times_ns.len() * percent / 100).map_or(0.0, |ns| *ns as f64 / 1e3);
     println!(

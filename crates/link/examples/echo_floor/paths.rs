@@ -11,15 +11,6 @@ const COUNTS: [&str; 2] = ["30000", "5000"];
 /// Round trips of the shorter and the longer run whose instructions are counted.
 const COUNTED: [usize; 2] = [200, 1_200];
 
-/// CPU time of this process so far, in nanoseconds, user and system.
-pub fn cpu_ns() -> Result<u64, Failed> {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the pointer refers to a live timespec.
-    let result = unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut time) };
-    crate::path::checked(result)?;
-    Ok(time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64)
-}
-
 /// Measures all of them against a spinning echo.
 pub fn compare() -> Outcome {
     let bench = Bench::new("busy")?;

@@ -2,7 +2,7 @@
 
 pysoem_client.py INTERFACE[,REDUNDANT] SUBDEVICES CYCLES: brings everything to OP and exchanges process data. In cycle i
 byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but sending and receiving, to
-tell how many there are in a second. Prints one line of figures, then keeps exchanging the last outputs
+tell how many there are in a second, and how much processor time each takes. Prints one line of figures, then keeps exchanging the last outputs
 until its standard input ends.
 """
 
@@ -30,15 +30,19 @@ def main():
         sent = time.monotonic()
         wrong += exchange(main_device, PATIENCE_US) != main_device.expected_wkc
         times.append(time.monotonic() - sent)
-    begin = time.monotonic()
+    cpu = time.process_time()
+    begins = [time.monotonic()]
     for cycle in range(cycles):
         exchange(main_device, PATIENCE_US)
-    per_second = cycles / (time.monotonic() - begin)
+        begins.append(time.monotonic())
+    cpu_us = (time.process_time() - cpu) * 1e6 / cycles
+    per_second = cycles / (begins[-1] - begins[0])
+    cycle_us = sorted(after - before for before, after in zip(begins, begins[1:]))[cycles // 2] * 1e6
     times.sort()
     inputs = ",".join(bytes(subdevice.input).hex() for subdevice in main_device.slaves)
     median = times[cycles // 2] * 1e6
     print(
-        f"op_ms {op_ms:.0f} median_us {median:.1f} per_second {per_second:.0f} wkc {main_device.expected_wkc} "
+        f"op_ms {op_ms:.0f} median_us {median:.1f} per_second {per_second:.0f} cycle_us {cycle_us:.2f} cpu_us {cpu_us:.2f} wkc {main_device.expected_wkc} "
         f"wrong {wrong} inputs {inputs}",
         flush=True,
     )
