@@ -117,6 +117,19 @@ dependencies() {
     fi
 }
 
+# The programs of the benches, the demonstration's among them, and the client of ethercrab.
+release_programs() {
+    # The same selection as in ci/bench: another one has other features, and everything is built twice.
+    cargo build --release --package ringcat-cli --package scenarios --bins
+    ci/ethercrab-client/build
+}
+
+# What `release_programs` said.
+release_came() {
+    tail -n 5 "$logs/release"
+    return "$release_status"
+}
+
 figures() {
     cargo run --quiet --package tidy
     cargo run --quiet --package tidy -- figures

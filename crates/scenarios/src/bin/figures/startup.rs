@@ -47,6 +47,9 @@ const FINE: Duration = Duration::from_micros(500);
 /// Maximum bytes for 1,000 terminals, as a multiple of the floor.
 const BYTES_BAR: f64 = 1.5;
 
+/// A name, the segment with so many SubDevices, and how many are tried.
+type Kind<'a> = (&'static str, &'a dyn Fn(usize) -> Network, &'a [usize]);
+
 /// Cost of a start.
 struct Start {
     time: Duration,
@@ -111,7 +114,7 @@ fn datagrams_per_frame() -> Result<(), Error> {
     let servos = |count: usize| line(descriptions(&vec!["servo"; count]), NetworkOptions::default());
     let terminals = |count: usize| segment(count, true, Links::One, HOP);
     // A thousand servos (1.10 x) take a while to simulate.
-    let kinds: [(&str, &dyn Fn(usize) -> Network, &[usize]); 2] =
+    let kinds: [Kind<'_>; 2] =
         [("servos", &servos, &[1, 10, 50, 100]), ("terminals", &terminals, &[1, 10, 50, 100, 300, 1_000])];
     let mut most: f64 = 0.0;
     for (name, network, counts) in kinds {
