@@ -1,5 +1,5 @@
-//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and the effects
-//! of observations.
+//! The model of the segment: the SubDevices of the last scan, and once an application is active the state of
+//! SubDevices, cables, rings, links and clocks, and the effects of observations.
 //!
 //! A pure machine: [`Segment::observe`] takes one [`Observation`] and returns the [`Effects`]: events to report,
 //! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
