@@ -30,8 +30,9 @@ mod steps;
 mod working_counters;
 
 use alloc::rc::Rc;
+use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::cell::{Cell, RefCell};
+use core::cell::RefCell;
 use core::future::Future;
 use core::time::Duration;
 
@@ -53,7 +54,7 @@ pub use states::{GroupState, SubDeviceState};
 pub use crate::declared::{Address, GroupId, SubDeviceId};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
-use crate::event::{CyclicEvent, Event, TimedEvent};
+use crate::event::{CyclicEvent, TimedEvent};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::mail::eoe::EthernetPort;
@@ -69,14 +70,13 @@ use crate::procedures::stop::{StopError, all_known, stop};
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
-use crate::segment::counts;
 use crate::segment::member::Phase;
+use crate::segment::{Choices, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
-type ScanSlot = Rc<RefCell<Option<Result<Scan, ScanError>>>>;
 
 /// The MainDevice without its cyclic half.
 #[derive(Debug)]
@@ -89,10 +89,10 @@ pub struct MainDevice {
     activations: u32,
     identity: Identity,
     cache: SiiCache,
-    scan: ScanSlot,
-    scanning: Rc<Cell<bool>>,
+    /// Why the last scan failed.
+    scan_error: Rc<RefCell<Option<ScanError>>>,
     stopped: StopSlot,
-    segment: Option<SharedSegment>,
+    segment: SharedSegment,
     cyclic_events: Option<Consumer>,
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
@@ -117,16 +117,17 @@ impl MainDevice {
     /// A MainDevice that has not sent anything.
     pub fn new(options: Options, now: Instant) -> MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
+        let (supervisor, cache) = (supervisor(identity, &options, now), SiiCache::new(options.sii_cache));
+        let segment = SharedSegment::idle(&supervisor.bus(), Segment::new(choices(&options)), cache.clone());
         MainDevice {
-            supervisor: supervisor(identity, &options, now),
+            supervisor,
             activations: 0,
             counted: AcyclicCounters::default(),
             identity,
-            cache: SiiCache::new(options.sii_cache),
-            scan: ScanSlot::default(),
-            scanning: Rc::default(),
+            cache,
+            scan_error: Rc::default(),
             stopped: StopSlot::default(),
-            segment: None,
+            segment,
             cyclic_events: None,
             visited: Vec::new(),
             requests: Requests::default(),
@@ -144,16 +145,17 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        if self.segment.is_some() {
+        if self.active().is_some() {
             return Err(ActivateError::Active);
         }
-        if self.scanning.replace(true) {
+        if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
         }
-        *self.scan.borrow_mut() = None;
+        self.segment.observe(Observation::ScanBegun);
+        *self.scan_error.borrow_mut() = None;
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         self.emergencies.forget_positions();
-        let (bus, slot, scanning) = (self.supervisor.bus(), self.scan.clone(), self.scanning.clone());
+        let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = ScanOptions {
             settle: self.options.settle,
             patience: self.options.patience,
@@ -164,44 +166,46 @@ impl MainDevice {
         };
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
-            if let Err(error) = &result {
-                bus.report(Event::ScanFailed { reason: alloc::string::ToString::to_string(error) });
-            }
-            *slot.borrow_mut() = Some(result);
-            scanning.set(false);
+            let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
+            segment.observe(Observation::ScanEnded(ended));
         });
         Ok(())
     }
 
+    /// The shared model, while an application is active.
+    fn active(&self) -> Option<&SharedSegment> {
+        self.segment.view().is_active().then_some(&self.segment)
+    }
+
     /// The result of the last scan, once it has ended.
     pub fn scan_result(&self) -> Option<Result<Scan, ScanError>> {
-        self.scan.borrow().clone()
+        if let Some(error) = &*self.scan_error.borrow() {
+            return Some(Err(error.clone()));
+        }
+        self.segment.view().found().map(|found| Ok(found.scan()))
     }
 
     /// SubDevices of the last scan; empty before a successful scan.
     pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
-        match &*self.scan.borrow() {
-            Some(Ok(scan)) => scan.subdevices.clone(),
-            Some(Err(_)) | None => Vec::new(),
-        }
+        self.segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default()
     }
 
     /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower
     /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
-        let to_stop = self.segment.as_ref().map(|segment| all_known(&segment.view())).unwrap_or_default();
+        let to_stop = all_known(&self.segment.view());
         self.counted = self.counters();
         self.supervisor = supervisor(self.identity, &self.options, now);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
-        self.scanning.set(false);
+        self.segment = self.segment.without_application(&self.supervisor.bus());
+        self.segment.observe(Observation::Deactivated);
         self.requests.end();
         self.emergencies = EmergencyRings::default();
         self.visited.clear();
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
-        self.segment = None;
         self.statistics = None;
         self.cyclic_events = None;
         *self.stopped.borrow_mut() = None;
@@ -224,47 +228,44 @@ impl MainDevice {
 
     /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
-        let Some(segment) = &self.segment else { return Vec::new() };
-        segment.view().members().iter().map(|member| member.phase.into()).collect()
+        self.segment.view().members().iter().map(|member| member.phase.into()).collect()
     }
 
     /// Status of each clock of the segment, by position; empty without distributed clocks.
     pub fn clocks(&self) -> Vec<ClockStatus> {
-        self.segment.as_ref().map_or(Vec::new(), |segment| segment.view().clocks().status())
+        self.segment.view().clocks().status()
     }
 
     /// Whether all clocks are locked (protocol 7.2).
     pub fn clocks_locked(&self) -> bool {
-        self.segment.as_ref().is_some_and(|segment| segment.view().clocks().are_locked())
+        self.segment.view().clocks().are_locked()
     }
 
     /// Station addresses of the declared SubDevices.
     pub fn stations(&self) -> Vec<StationAddress> {
-        let Some(segment) = &self.segment else { return Vec::new() };
-        segment.view().members().iter().map(|member| member.station).collect()
+        self.segment.view().members().iter().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.
     pub fn all_settled(&self) -> bool {
-        let Some(segment) = &self.segment else { return false };
-        let access = segment.view();
-        access
-            .members()
-            .iter()
-            .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
+        let access = self.segment.view();
+        access.is_active()
+            && access
+                .members()
+                .iter()
+                .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
     }
 
     /// Whether every declared SubDevice that is not optional is in its target state.
     pub fn mandatory_settled(&self) -> bool {
-        let Some(segment) = &self.segment else { return false };
-        let access = segment.view();
-        access.members().iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
+        let access = self.segment.view();
+        access.is_active()
+            && access.members().iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
     /// The present state of each hot connect group, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
-        let Some(segment) = &self.segment else { return Vec::new() };
-        let counts = counts(segment.view().members());
+        let counts = counts(self.segment.view().members());
         counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
@@ -342,12 +343,11 @@ impl MainDevice {
 
     /// State of the ring and of both links. Values derived from frames need the supervision datagram.
     pub fn ring_status(&self) -> RingStatus {
-        let mut status = match &self.segment {
+        let mut status = match self.active() {
             Some(segment) => segment.view().ring_status(),
             None => RingStatus { state: self.ring(), ..self.first_ring_status() },
         };
-        let board = self.segment.as_ref().map(|segment| &segment.board);
-        let seen = board.and_then(|board| board.supervision()).map(|(_, seen)| seen).unwrap_or_default();
+        let seen = self.segment.board.supervision().map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
         let positions = status.place.map_or([None; 2], |cable| cable.positions());
         status.place_ends = self.supervisor.bus().occupants(positions);
@@ -360,7 +360,7 @@ impl MainDevice {
 
     /// Every cable of the scan with the error counts of the ports at its ends since activation, read once a second.
     pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
-        self.segment.as_ref().map(|segment| segment.view().cabling().cables.clone()).unwrap_or_default()
+        self.segment.view().cabling().cables.clone()
     }
 
     fn first_ring_status(&self) -> RingStatus {
@@ -374,6 +374,15 @@ impl MainDevice {
     /// State of the ring: the exchange's view once it runs, before that the acyclic half's.
     pub fn ring(&self) -> crate::ring::RingState {
         self.supervisor.bus().ring()
+    }
+}
+
+fn choices(options: &Options) -> Choices {
+    Choices {
+        enhanced_line_crossed: options.enhanced_line_crossed,
+        junctions: options.junctions,
+        // Without supervision unassigned SubDevices are not identified as members.
+        follow_groups: options.follow_groups && options.supervision,
     }
 }
 

@@ -1,5 +1,5 @@
-//! The model of the segment: the state of SubDevices, cables, rings, links and clocks after activation, and the effects
-//! of observations.
+//! The model of the segment: the SubDevices of the last scan, and once an application is active the state of
+//! SubDevices, cables, rings, links and clocks, and the effects of observations.
 //!
 //! A pure machine: [`Segment::observe`] takes one [`Observation`] and returns the [`Effects`]: events to report,
 //! procedures to start. Nothing else changes it. It does not send or wait; procedures do this, and return their results
@@ -31,9 +31,11 @@ pub mod retrace;
 mod ring;
 mod round_result;
 mod rules;
+mod scan;
 mod seen;
 pub mod setup;
 mod silence;
+mod stage;
 pub mod start;
 pub mod unassigned;
 mod versions;
@@ -44,13 +46,14 @@ pub use choices::Choices;
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use local_rings::is_down;
-pub use model::{Known, Segment};
+pub use model::{Declared, Segment};
 pub use observation::{MemberFinding, Observation, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
 pub use reading::Reading;
 pub use ring::Words;
 pub use round_result::RoundResult;
+pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use versions::Versions;
 

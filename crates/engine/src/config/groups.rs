@@ -60,7 +60,7 @@ pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec
 pub(super) fn find(
     configs: &[SubDeviceConfig],
     members: &[usize],
-    infos: &[SubDeviceInfo],
+    infos: &[&SubDeviceInfo],
     resolutions: &mut [Option<Resolution>],
 ) {
     let head = members.first().map_or(Ok(None), |head| find_marked(configs[*head].address, infos));

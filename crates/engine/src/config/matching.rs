@@ -7,7 +7,7 @@ use crate::info::SubDeviceInfo;
 /// Resolution of a declaration with the SubDevice at `place`, an index in `infos`.
 pub(super) fn at_place(
     configs: &[SubDeviceConfig],
-    infos: &[SubDeviceInfo],
+    infos: &[&SubDeviceInfo],
     config: usize,
     place: Option<usize>,
 ) -> Resolution {
@@ -25,7 +25,7 @@ pub(super) fn at_place(
 }
 
 /// The error that no SubDevice is at the place.
-pub(super) fn missing_error(declared: &SubDeviceConfig, infos: &[SubDeviceInfo]) -> ConfigError {
+pub(super) fn missing_error(declared: &SubDeviceConfig, infos: &[&SubDeviceInfo]) -> ConfigError {
     ConfigError::Missing { address: declared.address, present: infos.len() }
 }
 
@@ -34,7 +34,7 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
 }
 
 /// The only SubDevice with the alias or identification of an address.
-pub(super) fn find_marked(address: ConfigAddress, infos: &[SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+pub(super) fn find_marked(address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
     let mut marked = infos.iter().enumerate().filter(|(_, info)| address.is_mark_of(info));
     match (marked.next(), marked.next()) {
         (Some((_, first)), Some((_, second))) => {

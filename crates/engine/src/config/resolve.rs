@@ -2,6 +2,7 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::borrow::Borrow;
 use core::fmt;
 
 use ringcat_wire::address::Position;
@@ -52,7 +53,9 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 /// Groups are found first, at any place; positions count the SubDevices that belong to no group. If an optional
 /// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
 /// combinations of absent optional SubDevices, that with the fewest errors is taken.
-pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Resolution> {
+pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]) -> Vec<Resolution> {
+    let infos: Vec<&SubDeviceInfo> = infos.iter().map(Borrow::borrow).collect();
+    let infos = &infos[..];
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {
         groups::find(configs, &members, infos, &mut resolutions);
@@ -81,7 +84,7 @@ pub fn resolve(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo]) -> Vec<Reso
 
 /// The SubDevices that positions count.
 struct Segment<'a> {
-    infos: &'a [SubDeviceInfo],
+    infos: &'a [&'a SubDeviceInfo],
     places: Vec<usize>,
 }
 
@@ -149,7 +152,7 @@ impl AbsenceCosts {
 }
 
 /// Finds a SubDevice by alias or identification.
-fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) -> Resolution {
+fn by_mark(configs: &[SubDeviceConfig], infos: &[&SubDeviceInfo], config: usize) -> Resolution {
     let address = configs[config].address;
     match find_marked(address, infos) {
         Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
@@ -158,7 +161,7 @@ fn by_mark(configs: &[SubDeviceConfig], infos: &[SubDeviceInfo], config: usize) 
 }
 
 /// Gives each SubDevice to one declaration only, and appends the SubDevices without a declaration.
-fn claim(mut resolutions: Vec<Resolution>, infos: &[SubDeviceInfo]) -> Vec<Resolution> {
+fn claim(mut resolutions: Vec<Resolution>, infos: &[&SubDeviceInfo]) -> Vec<Resolution> {
     let mut owners: Vec<Option<usize>> = vec![None; infos.len()];
     for resolution in &mut resolutions {
         if let Resolution::Found { config, info } = *resolution {

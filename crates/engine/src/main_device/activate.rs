@@ -1,5 +1,7 @@
 //! The last step of a configuration: lays out process data, creates both halves, starts procedures.
 
+use alloc::boxed::Box;
+use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -25,7 +27,6 @@ use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::error_watch::watch_errors;
 use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::reconcile::reconcile;
-use crate::procedures::scan::Scan;
 use crate::procedures::serve_requests::serve_requests;
 use crate::procedures::services::statistics::collect;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
@@ -35,8 +36,7 @@ use crate::queue::queue;
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
 use crate::segment::member::Member;
-use crate::segment::start::Start;
-use crate::segment::{Cabling, Choices, Known, Observation, Segment, stations_by_position};
+use crate::segment::{Cabling, Declared, Found, Observation, stations_by_position};
 use crate::time::Instant;
 use crate::topology::Topology;
 
@@ -46,10 +46,7 @@ const CYCLIC_EVENTS: usize = 1024;
 impl MainDevice {
     /// Starts a loaded declaration.
     pub(super) fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
-        let scan = match &*self.scan.borrow() {
-            Some(Ok(scan)) => scan.clone(),
-            Some(Err(_)) | None => return Err(ActivateError::NoScan),
-        };
+        let scan = self.segment.view().found().cloned().ok_or(ActivateError::NoScan)?;
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
         let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;
@@ -81,7 +78,7 @@ impl MainDevice {
         let mailboxes = (0..members.len()).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
         let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
         let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
-        let known = Known {
+        let declared = Box::new(Declared {
             members,
             unassigned,
             layout,
@@ -89,10 +86,10 @@ impl MainDevice {
             clocks,
             ring: self.first_ring_status(),
             carriers: bus.carriers(),
-        };
-        let model = Segment::new(known, board.clone(), self.choices());
-        bus.set_occupants(model.occupants());
-        let segment = SharedSegment::new(bus.clone(), model, board.clone(), beside);
+            board: board.clone(),
+        });
+        let segment = self.segment.with_application(&bus, board.clone(), beside);
+        segment.observe(Observation::Activated(declared));
         self.supervisor.attach(board);
         self.supervisor.attach_bell(self.requests.bell().clone());
         self.start_procedures(segment, clock_config.is_some());
@@ -102,21 +99,12 @@ impl MainDevice {
         Ok(Active { exchange, directory, periods, under_way })
     }
 
-    fn choices(&self) -> Choices {
-        Choices {
-            enhanced_line_crossed: self.options.enhanced_line_crossed,
-            junctions: self.options.junctions,
-            // Without supervision unassigned SubDevices are not identified as members.
-            follow_groups: self.options.follow_groups && self.options.supervision,
-        }
-    }
-
     /// The domains, and the places of their process data.
     fn lay_out(
         &mut self,
         declaration: &Declaration,
         plans: &[Areas],
-        found: &[Option<SubDeviceInfo>],
+        found: &[Option<Rc<SubDeviceInfo>>],
     ) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
         let links = self.options.links();
         let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
@@ -137,7 +125,6 @@ impl MainDevice {
     fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
         self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
-        let start = if self.has_visited() { Start::Doubtful } else { Start::Cleared };
         self.visited.drain(..).for_each(|mailbox| mailbox.close());
         if with_clocks {
             // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
@@ -147,11 +134,11 @@ impl MainDevice {
             // Receive times are latched before other frames are sent (protocol 7.1).
             self.supervisor.spawn(async move {
                 clocks::begin(&bus, &segment).await;
-                segment.observe(Observation::Started(start));
+                segment.observe(Observation::Started);
                 clocks::keep(bus, segment).await;
             });
         } else {
-            segment.observe(Observation::Started(start));
+            segment.observe(Observation::Started);
         }
         if self.options.supervision {
             let (own_bus, own) = (bus.clone(), segment.clone());
@@ -166,7 +153,7 @@ impl MainDevice {
         self.supervisor.spawn(serve_requests(bus.clone(), segment.clone(), self.requests.clone()));
         self.supervisor.spawn(collect(bus, segment.clone()));
         self.statistics = Some(segment.statistics.clone());
-        self.segment = Some(segment);
+        self.segment = segment;
     }
 
     /// Number of a new session: differs from the previous one, and most probably from that of a program that ran here
@@ -180,7 +167,7 @@ impl MainDevice {
 }
 
 /// Clocks of all SubDevices of the scan.
-fn clocks_of(config: Option<ClockConfig>, scan: &Scan, topology: &Topology, members: &[Member]) -> Clocks {
+fn clocks_of(config: Option<ClockConfig>, scan: &Found, topology: &Topology, members: &[Member]) -> Clocks {
     let member = |info: &SubDeviceInfo| {
         let index = members.iter().position(|member| member.station == info.station)?;
         Some((index, &*members[index].config))

@@ -65,7 +65,7 @@ impl MainDevice {
     ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
         let bus = self.bus();
         let addressed = self.addressed(datagrams);
-        let segment = self.segment.clone();
+        let segment = self.active().cloned();
         self.start(async move {
             let addressed = addressed?;
             let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(segment.as_ref(), it)).collect();
@@ -95,16 +95,12 @@ impl MainDevice {
 
     /// The station addresses of the last scan, or of the rescan whose cabling was taken over, by position.
     fn stations_by_position(&self) -> Vec<StationAddress> {
-        match (&self.segment, &*self.scan.borrow()) {
-            (Some(segment), _) => segment.view().cabling().stations.clone(),
-            (None, Some(Ok(scan))) => scan.subdevices.iter().map(|info| info.station).collect(),
-            (None, Some(Err(_)) | None) => Vec::new(),
-        }
+        self.segment.view().stations_by_position()
     }
 
     fn check_lrw_of(&self, datagram: &RawDatagram) -> Result<(), ServiceError> {
         let (Command::Lrw, Target::Logical(logical)) = (datagram.command, datagram.target) else { return Ok(()) };
-        let Some(segment) = self.segment.as_ref().filter(|_| self.options.links() == LinkSet::Ring) else {
+        let Some(segment) = self.active().filter(|_| self.options.links() == LinkSet::Ring) else {
             return Ok(());
         };
         match covered(segment.view().layout(), logical, datagram.data.len()) {

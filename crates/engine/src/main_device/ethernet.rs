@@ -32,7 +32,7 @@ impl MainDevice {
     /// Declared SubDevices that were seen and whose SII offers EoE, whether they answer now or not; none before
     /// activation.
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
-        let Some(segment) = &self.segment else { return Vec::new() };
+        let Some(segment) = self.active() else { return Vec::new() };
         let access = segment.view();
         let members = access.members().iter().enumerate();
         members
@@ -48,7 +48,7 @@ impl MainDevice {
     /// The Ethernet of a declared SubDevice. Its port is opened at the first call and lasts until the MainDevice stops;
     /// `None` if no SubDevice is declared, or this mailbox has a port already.
     pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
-        let mailbox = self.segment.as_ref()?.mailbox(subdevice)?;
+        let mailbox = self.active()?.mailbox(subdevice)?;
         while self.ports.len() <= subdevice {
             self.ports.push(None);
         }

@@ -9,25 +9,19 @@ use crate::info::SubDeviceInfo;
 impl MainDevice {
     /// Number of SubDevices of the last scan; `None` before a successful scan.
     pub fn scanned_count(&self) -> Option<usize> {
-        match &*self.scan.borrow() {
-            Some(Ok(scan)) => Some(scan.subdevices.len()),
-            Some(Err(_)) | None => None,
-        }
+        self.segment.view().found().map(|found| found.subdevices.len())
     }
 
     /// Data of the SubDevice with this station address in the last scan.
     pub fn info_at(&self, station: StationAddress) -> Option<SubDeviceInfo> {
-        match &*self.scan.borrow() {
-            Some(Ok(scan)) => scan.subdevices.iter().find(|info| info.station == station).cloned(),
-            Some(Err(_)) | None => None,
-        }
+        let view = self.segment.view();
+        view.found()?.subdevices.iter().find(|info| info.station == station).map(|info| (**info).clone())
     }
 
     /// The declared SubDevices that are not in their target states, by their indices in the declaration, without absent
     /// optional ones.
     pub fn unsettled(&self) -> alloc::vec::Vec<(usize, SubDeviceState)> {
-        let Some(segment) = &self.segment else { return alloc::vec::Vec::new() };
-        let access = segment.view();
+        let access = self.segment.view();
         let members = access.members().iter().enumerate();
         let states = members.map(|(index, member)| (index, member.phase.into(), member.config.optional));
         let unsettled = states.filter(|(_, state, optional)| match state {

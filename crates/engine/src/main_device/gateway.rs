@@ -1,7 +1,6 @@
 //! Messages of a gateway's clients to declared SubDevices and to the MainDevice itself (protocol 10.1).
 
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 use ringcat_wire::sii::MailboxProtocols;
@@ -20,7 +19,7 @@ impl MainDevice {
     /// of the MainDevice itself (docs/mailbox-gateway.md).
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
-        let (segment, scan, acyclic) = (self.segment.clone(), self.scan.clone(), self.counters());
+        let (segment, scan, acyclic) = (self.active().cloned(), self.segment.clone(), self.counters());
         let own_objects = self.own_objects.clone();
         let gateway_queue = self.gateway_queue.get_or_insert_with(|| GatewayQueue::new(&bus));
         gateway_queue.take(client, message, |message| {
@@ -30,10 +29,7 @@ impl MainDevice {
             if message.header.protocol != Protocol::Coe {
                 return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
             }
-            let scanned = match &*scan.borrow() {
-                Some(Ok(scan)) => scan.subdevices.iter().map(|info| info.station).collect(),
-                Some(Err(_)) | None => Vec::new(),
-            };
+            let scanned = scan.view().found().map(|found| found.stations()).unwrap_or_default();
             let (seen, payload) = (Seen { bus, segment, scanned, acyclic }, message.payload.to_vec());
             Ok(Recipient::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
         });

@@ -1,5 +1,6 @@
 //! A loaded declaration that is not applied yet, and connections of local rings compared with a scan.
 
+use alloc::rc::Rc;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
@@ -12,6 +13,7 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
 use crate::procedures::scan::{Scan, node_status, report_cabling};
+use crate::segment::Found;
 use crate::segment::member::Member;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -29,8 +31,8 @@ impl Loaded {
         &self,
         bus: &Bus,
         mode: JunctionMode,
-        scan: &Scan,
-        found: &[Option<SubDeviceInfo>],
+        scan: &Found,
+        found: &[Option<Rc<SubDeviceInfo>>],
     ) -> Result<Topology, ActivateError> {
         if self.connections.is_empty() {
             return match mode {
@@ -48,11 +50,11 @@ impl Loaded {
                 }
             }
         }
-        let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(node_status).collect();
+        let nodes: Vec<NodeStatus> = scan.subdevices.iter().map(|info| node_status(info)).collect();
         let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
         if mode == JunctionMode::Strict {
             // The scan has not reported it.
-            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.clone() }, false);
+            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.scan() }, false);
         }
         Ok(topology)
     }
@@ -79,7 +81,7 @@ impl Loaded {
 /// The place of a declared connection in the segment; otherwise the optional SubDevice of it that does not answer.
 pub(super) fn closing(
     connection: &JunctionConnection,
-    found: &[Option<SubDeviceInfo>],
+    found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<Result<Closing, SubDeviceId>, JunctionError> {
     let JunctionConnection { head, head_port, tail, tail_port } = *connection;
     for (subdevice, port) in [(head, head_port), (head, START_PORT), (tail, tail_port)] {

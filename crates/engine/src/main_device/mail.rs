@@ -15,12 +15,13 @@ use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::visit::visit;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use crate::segment::Observation;
 
 impl MainDevice {
     /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, to
     /// be used after [`MainDevice::start_visit`] has brought it to PREOP. `None` if there is no such SubDevice.
     pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
-        match &self.segment {
+        match self.active() {
             Some(segment) => segment.mailbox(subdevice),
             None => self.visited.get(subdevice).cloned(),
         }
@@ -29,12 +30,11 @@ impl MainDevice {
     /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back
     /// to INIT.
     pub fn start_visit(&mut self, position: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
-        let info = match (&self.segment, &*self.scan.borrow()) {
-            (None, Some(Ok(scan))) => scan.subdevices.get(position).cloned(),
-            _ => None,
-        };
+        let found = self.segment.view().found().filter(|_| self.active().is_none()).cloned();
+        let info = found.and_then(|found| found.subdevices.get(position).cloned());
         let bus = self.supervisor.bus();
         if info.is_some() {
+            self.segment.observe(Observation::Visited);
             // A scan counts SubDevices in 16 bits (protocol 2.2).
             for new in self.visited.len()..=position {
                 let mailbox = self.new_mailbox(Position(new as u16));
@@ -58,18 +58,13 @@ impl MainDevice {
     /// Without process data its working counters are not expected, and its inputs are not fresh.
     pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
         let bus = self.supervisor.bus();
-        let work = self.segment.as_ref().map(|segment| request_state(&bus, segment, subdevice, state));
+        let work = self.active().map(|segment| request_state(&bus, segment, subdevice, state));
         self.start(async move {
             match work {
                 Some(work) => work.await,
                 None => Err(ConfigureError::NoSetup),
             }
         })
-    }
-
-    /// Whether a SubDevice was visited since the scan, so that it may not be in INIT.
-    pub(super) fn has_visited(&self) -> bool {
-        !self.visited.is_empty()
     }
 
     /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
@@ -116,7 +111,7 @@ impl MainDevice {
     pub fn create_emergency_ring(&mut self, subdevice: Address, size: usize) -> EmergencyRing {
         let ring = self.emergencies.create(subdevice, size);
         let mailbox = match subdevice {
-            Address::Declared(subdevice) => self.segment.as_ref().and_then(|segment| segment.mailbox(subdevice.0)),
+            Address::Declared(subdevice) => self.segment.mailbox(subdevice.0),
             Address::Scanned(position) => self.visited.get(usize::from(position.0)).cloned(),
         };
         if let Some(mailbox) = mailbox {

@@ -26,21 +26,21 @@ use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness
 use crate::link::LinkSet;
 use crate::plan::{PlanFault, plan};
 use crate::procedures::request_state::exchanges;
-use crate::procedures::scan::{Scan, station_at};
-use crate::segment::Owners;
+use crate::procedures::scan::station_at;
 use crate::segment::member::Member;
 use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
 use crate::segment::unassigned::UnassignedSubDevice;
+use crate::segment::{Found, Owners};
 use crate::supervisor::Bus;
 
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 
 /// By declaration the SubDevice found, and the undeclared SubDevices.
-type Matched = (Vec<Option<SubDeviceInfo>>, Vec<UnassignedSubDevice>);
+type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<UnassignedSubDevice>);
 
 /// Matches SubDevices with the declaration.
-pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Scan) -> Result<Matched, ActivateError> {
+pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
     let mut owners = vec![None; scan.subdevices.len()];
     let mut extra = Vec::new();
@@ -72,7 +72,10 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Sca
 }
 
 /// SYNC signals need a clock, and clocks that are synchronized.
-pub(super) fn check_clocks(declaration: &Declaration, found: &[Option<SubDeviceInfo>]) -> Result<(), ActivateError> {
+pub(super) fn check_clocks(
+    declaration: &Declaration,
+    found: &[Option<Rc<SubDeviceInfo>>],
+) -> Result<(), ActivateError> {
     for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
         let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
         if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
@@ -95,7 +98,7 @@ fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigErro
 
 pub(super) fn plan_all(
     declaration: &Declaration,
-    found: &[Option<SubDeviceInfo>],
+    found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<Vec<Areas>, ActivateError> {
     let pairs = declaration.subdevices.iter().zip(found).enumerate();
     pairs
@@ -117,7 +120,7 @@ pub(super) fn plan_all(
 
 /// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
 /// free FMMU.
-pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>], specs: &[DomainSpec]) -> Vec<Witness> {
+pub(super) fn witnesses(plans: &[Areas], found: &[Option<Rc<SubDeviceInfo>>], specs: &[DomainSpec]) -> Vec<Witness> {
     // Further places of an area need FMMUs, too.
     let mut further = vec![0; plans.len()];
     let mut seen = BTreeSet::new();
@@ -129,7 +132,7 @@ pub(super) fn witnesses(plans: &[Areas], found: &[Option<SubDeviceInfo>], specs:
         }
     }
     let pairs = plans.iter().zip(found).enumerate();
-    let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<SubDeviceInfo>))| match (areas, info) {
+    let witness = |(subdevice, (areas, info)): (usize, (&Areas, &Option<Rc<SubDeviceInfo>>))| match (areas, info) {
         (Areas::Planned(Some(plan)), Some(info)) => {
             presence::witness(subdevice, plan, info, plan.mapped_areas().count() + further[subdevice])
         }
@@ -287,7 +290,7 @@ fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option
 
 pub(super) fn members(
     declaration: Declaration,
-    found: Vec<Option<SubDeviceInfo>>,
+    found: Vec<Option<Rc<SubDeviceInfo>>>,
     plans: &[Areas],
     layout: &Layout,
 ) -> Result<Vec<Member>, ActivateError> {

@@ -23,11 +23,11 @@ use crate::supervisor::Bus;
 impl MainDevice {
     /// Station address of a SubDevice.
     pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
-        match (&self.segment, &*self.scan.borrow()) {
-            (Some(segment), _) => segment.view().members().get(subdevice).map(|member| member.station),
-            (None, Some(Ok(scan))) => scan.subdevices.get(subdevice).map(|info| info.station),
-            (None, _) => None,
+        let view = self.segment.view();
+        if view.is_active() {
+            return view.members().get(subdevice).map(|member| member.station);
         }
+        view.found()?.subdevices.get(subdevice).map(|info| info.station)
     }
 
     /// Starts a procedure on one SubDevice.
@@ -42,7 +42,7 @@ impl MainDevice {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let work = self.station(subdevice).map(|station| work(self.bus(), station));
-        let address = match self.segment {
+        let address = match self.active() {
             Some(_) => Address::Declared(SubDeviceId(subdevice)),
             None => Address::Scanned(Position(u16::try_from(subdevice).unwrap_or(u16::MAX))),
         };
@@ -75,7 +75,7 @@ impl MainDevice {
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
-        let segment = self.segment.clone();
+        let segment = self.active().cloned();
         self.start_on(subdevice, move |bus, station| async move {
             registers::write(&bus, segment.as_ref(), station, address, &data).await
         })
@@ -93,7 +93,7 @@ impl MainDevice {
         port: u8,
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
-        let segment = self.segment.clone();
+        let segment = self.active().cloned();
         self.start_on(subdevice, move |bus, station| async move {
             ports::set(&bus, segment.as_ref(), station, port, control).await
         })
@@ -102,7 +102,7 @@ impl MainDevice {
     /// Starts to cut off a declared SubDevice, by closing the ports of its neighbours. In a line the SubDevices behind
     /// it are cut off too.
     pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.segment.clone());
+        let (bus, segment) = (self.bus(), self.active().cloned());
         self.start(async move {
             let segment = segment.ok_or(ServiceError::NotActive)?;
             ports::block(&bus, &segment, subdevice).await
@@ -111,7 +111,7 @@ impl MainDevice {
 
     /// Starts to open all ports that were closed to cut SubDevices off.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.segment.clone());
+        let (bus, segment) = (self.bus(), self.active().cloned());
         self.start(async move {
             let segment = segment.ok_or(ServiceError::NotActive)?;
             ports::open_blocked(&bus, &segment).await
@@ -126,10 +126,10 @@ impl MainDevice {
     /// Makes supervision scan all SubDevices now, and search for new ones, as if the segment had changed. False before
     /// activation, when a normal scan does the same.
     pub fn force_topology_change(&mut self) -> bool {
-        if let Some(segment) = &self.segment {
+        if let Some(segment) = self.active() {
             segment.observe(Observation::ScanAgain);
         }
-        self.segment.is_some()
+        self.active().is_some()
     }
 
     /// Starts a scan of the whole segment while process data continues: the position of each SubDevice, and which are
@@ -140,7 +140,7 @@ impl MainDevice {
     /// junctions included. Exception: while the ring of two links is open, or a mandatory SubDevice does not answer,
     /// they follow the previous cabling.
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.segment.clone());
+        let (bus, segment) = (self.bus(), self.active().cloned());
         self.start(async move { rescan(&bus, &segment.ok_or(ServiceError::NotActive)?, limit).await })
     }
 

@@ -2,6 +2,7 @@
 //!
 //! [`MainDevice::activate`] does all at once, for applications without connections to add.
 
+use alloc::rc::Rc;
 use alloc::vec::Vec;
 
 use super::MainDevice;
@@ -24,7 +25,7 @@ impl MainDevice {
     /// # Errors
     /// [`ActivateError::Active`], and errors in the declaration alone.
     pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
-        if self.segment.is_some() {
+        if self.active().is_some() {
             return Err(ActivateError::Active);
         }
         check(&declaration)?;
@@ -70,9 +71,9 @@ impl MainDevice {
 
     /// The declared rings at their positions in the scan; `None` if these cannot be determined.
     fn declared_closings(&self) -> Option<DeclaredClosings> {
-        let loaded = self.loaded.as_ref().filter(|_| self.segment.is_none())?;
-        let scan = self.scan.borrow().as_ref()?.as_ref().ok()?.clone();
-        let mut found: Vec<Option<SubDeviceInfo>> = alloc::vec![None; loaded.declaration.subdevices.len()];
+        let loaded = self.loaded.as_ref().filter(|_| self.active().is_none())?;
+        let scan = self.segment.view().found()?.clone();
+        let mut found: Vec<Option<Rc<SubDeviceInfo>>> = alloc::vec![None; loaded.declaration.subdevices.len()];
         for resolution in resolve(&loaded.declaration.subdevices, &scan.subdevices) {
             if let Resolution::Found { config, info } = resolution {
                 found[config] = Some(scan.subdevices[info].clone());
@@ -81,7 +82,7 @@ impl MainDevice {
         let placed = |connection: &JunctionConnection| Some((*connection, closing(connection, &found).ok()?.ok()?));
         Some(DeclaredClosings {
             closings: loaded.connections.iter().filter_map(placed).collect(),
-            nodes: scan.subdevices.iter().map(node_status).collect(),
+            nodes: scan.subdevices.iter().map(|info| node_status(info)).collect(),
             main_count: scan.main_count,
         })
     }
@@ -92,7 +93,7 @@ impl MainDevice {
     /// # Errors
     /// [`ActivateError`]: nothing is loaded or scanned, or the declaration does not fit the scan.
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
-        if self.segment.is_some() {
+        if self.active().is_some() {
             return Err(ActivateError::Active);
         }
         let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;

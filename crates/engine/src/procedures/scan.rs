@@ -5,7 +5,6 @@
 mod cabling;
 mod count;
 mod error;
-mod found;
 mod identification;
 mod options;
 mod stations;
@@ -31,7 +30,6 @@ use self::cabling::locate_crossings;
 pub(crate) use self::cabling::report_cabling;
 use self::count::Count;
 pub use self::error::ScanError;
-pub use self::found::Scan;
 pub use self::options::ScanOptions;
 pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
@@ -44,6 +42,7 @@ use crate::event::Event;
 use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
+pub use crate::segment::Scan;
 use crate::supervisor::{Bus, BusError, Reply};
 use crate::topology::{Closing, NodeStatus, Topology, rings_shown};
 

@@ -1,4 +1,4 @@
-//! Shared data of all procedures of a MainDevice after activation: the model of the segment, which takes observations,
+//! Shared data of all procedures of a MainDevice: the model of the segment, which takes observations,
 //! and data beside the model that procedures need.
 
 use alloc::collections::VecDeque;
@@ -31,8 +31,6 @@ pub struct SharedSegment {
     /// A new observation that was not posted by the cyclic half.
     news: Rc<Cell<bool>>,
     changed: Signal,
-    /// Disturbances requested so far.
-    disturbances: Rc<Cell<u32>>,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
     /// SII contents read before.
@@ -52,18 +50,38 @@ pub struct Beside {
     pub statistics: ErrorStatistics,
 }
 
+impl Beside {
+    fn nothing(bus: &Bus, cache: SiiCache) -> Beside {
+        Beside { mailboxes: Vec::new(), cache, statistics: ErrorStatistics::new(bus, 0, None) }
+    }
+}
+
 impl SharedSegment {
-    /// Shares a model.
-    pub fn new(bus: Bus, segment: Segment, board: Arc<Board>, beside: Beside) -> SharedSegment {
+    /// Shares a model without an application.
+    pub fn idle(bus: &Bus, segment: Segment, cache: SiiCache) -> SharedSegment {
+        SharedSegment::of(bus, Rc::new(RefCell::new(segment)), Arc::new(Board::new(0)), Beside::nothing(bus, cache))
+    }
+
+    /// The same model, with an application that is activated next.
+    pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
+        SharedSegment::of(bus, self.segment.clone(), board, beside)
+    }
+
+    /// The same model, without an application.
+    pub fn without_application(&self, bus: &Bus) -> SharedSegment {
+        let beside = Beside::nothing(bus, self.cache.clone());
+        SharedSegment::of(bus, self.segment.clone(), Arc::new(Board::new(0)), beside)
+    }
+
+    fn of(bus: &Bus, segment: Rc<RefCell<Segment>>, board: Arc<Board>, beside: Beside) -> SharedSegment {
         let Beside { mailboxes, cache, statistics } = beside;
         SharedSegment {
-            segment: Rc::new(RefCell::new(segment)),
+            segment,
             mailboxes: mailboxes.into(),
             tasks: Rc::default(),
             news: Rc::default(),
             changed: bus.signal(),
-            disturbances: Rc::default(),
-            bus,
+            bus: bus.clone(),
             board,
             cache,
             statistics,
@@ -185,7 +203,7 @@ pub(super) struct Turn {
 
 impl Turn {
     fn new(segment: &SharedSegment, disturbance: Disturbance) -> Turn {
-        let number = segment.disturbances.replace(segment.disturbances.get().wrapping_add(1));
+        let number = segment.view().next_disturbance();
         segment.observe(Observation::Wanted(Wanted { disturbance, number }));
         Turn { segment: segment.clone(), number }
     }

@@ -12,7 +12,7 @@ use crate::topology::Topology;
 pub type End = (StationAddress, u8);
 
 /// Connections, and data of the cables.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Cabling {
     /// Connections according to the scan or a later rescan.
     pub topology: Topology,

@@ -38,6 +38,8 @@ pub(super) struct Slot {
     waiting: Vec<Wanted>,
     /// How often SubDevices were put out of reach.
     isolations: u32,
+    /// Number of the next request.
+    next_number: u32,
 }
 
 impl Slot {
@@ -61,8 +63,20 @@ impl Slot {
         self.isolations
     }
 
+    /// Number of the next request.
+    pub fn next_number(&self) -> u32 {
+        self.next_number
+    }
+
+    /// An empty slot, whose numbers differ from those before.
+    pub fn emptied(&self) -> Slot {
+        let isolations = self.isolations.wrapping_add(1);
+        Slot { running: None, waiting: Vec::new(), isolations, next_number: self.next_number }
+    }
+
     /// Requests a disturbance. It is under way at once if no other is.
     pub fn want(&mut self, wanted: Wanted) {
+        self.next_number = wanted.number.wrapping_add(1);
         self.waiting.push(wanted);
         self.grant();
     }

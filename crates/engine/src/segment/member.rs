@@ -30,7 +30,7 @@ pub struct Member {
     /// Its target state: that of the declaration, or one requested since.
     pub target: AlState,
     /// Its identity and features; `None` if it has never answered.
-    pub info: Option<SubDeviceInfo>,
+    pub info: Option<Rc<SubDeviceInfo>>,
     /// Its station address.
     pub station: StationAddress,
     /// Its phase.
@@ -129,7 +129,7 @@ impl Member {
     /// A member with the data of the scan only.
     pub fn new(
         config: SubDeviceConfig,
-        info: Option<SubDeviceInfo>,
+        info: Option<Rc<SubDeviceInfo>>,
         station: StationAddress,
         setup: Option<Rc<Setup>>,
     ) -> Member {

@@ -1,5 +1,6 @@
 //! The data of the model, and its queries.
 
+use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -18,7 +19,9 @@ use super::local_rings::LocalRings;
 use super::member::Member;
 use super::port_control::{BlockedPort, PortControl};
 use super::ring::{Ring, Words};
+use super::scan::Found;
 use super::silence::Silence;
+use super::stage::Stage;
 use super::unassigned::UnassignedSubDevice;
 use super::versions::Versions;
 use crate::board::Board;
@@ -28,9 +31,9 @@ use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
 use crate::time::Instant;
 
-/// Initial knowledge.
+/// What an application declares, compared with what the scan has found.
 #[derive(Debug)]
-pub struct Known {
+pub struct Declared {
     /// The declared SubDevices.
     pub members: Vec<Member>,
     /// SubDevices without a declaration.
@@ -45,11 +48,30 @@ pub struct Known {
     pub ring: RingStatus,
     /// Carriers of the links.
     pub carriers: [Option<bool>; 2],
+    /// Words for the cyclic half.
+    pub board: Arc<Board>,
+}
+
+impl Default for Declared {
+    /// Nothing.
+    fn default() -> Declared {
+        Declared {
+            members: Vec::new(),
+            unassigned: Vec::new(),
+            layout: Layout::default(),
+            cabling: Cabling::default(),
+            clocks: Clocks::undeclared(),
+            ring: RingStatus::default(),
+            carriers: [None; 2],
+            board: Arc::new(Board::new(0)),
+        }
+    }
 }
 
 /// The model.
 #[derive(Debug)]
 pub struct Segment {
+    pub(super) stage: Stage,
     /// The declared SubDevices.
     pub(super) members: Vec<Member>,
     /// SubDevices that answer and have no declaration, or are not yet identified.
@@ -81,10 +103,16 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// The segment at activation.
-    pub fn new(known: Known, board: Arc<Board>, choices: Choices) -> Segment {
-        let Known { members, unassigned, layout, cabling, clocks, ring, carriers } = known;
+    /// A segment before the first scan.
+    pub fn new(choices: Choices) -> Segment {
+        Segment::of(Declared::default(), choices)
+    }
+
+    /// A segment with a declaration, of which nothing was observed.
+    pub(super) fn of(declared: Declared, choices: Choices) -> Segment {
+        let Declared { members, unassigned, layout, cabling, clocks, ring, carriers, board } = declared;
         Segment {
+            stage: Stage::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
             local_rings: LocalRings::new(&cabling, &members),
@@ -106,6 +134,26 @@ impl Segment {
             board,
             choices,
         }
+    }
+
+    /// The SubDevices of the last scan; `None` before a successful scan.
+    pub fn found(&self) -> Option<&Rc<Found>> {
+        self.stage.scanned().map(|scanned| &scanned.found)
+    }
+
+    /// Whether a scan is under way.
+    pub fn is_scanning(&self) -> bool {
+        matches!(self.stage, Stage::Scanning)
+    }
+
+    /// Whether an application is active.
+    pub fn is_active(&self) -> bool {
+        matches!(self.stage, Stage::Active(_))
+    }
+
+    /// Number of the next request for a disturbance.
+    pub fn next_disturbance(&self) -> u32 {
+        self.slot.next_number()
     }
 
     /// The declared SubDevices, by their indices in the declaration.
@@ -131,6 +179,15 @@ impl Segment {
     /// Ports that were closed to cut SubDevices off.
     pub fn blocked(&self) -> &[BlockedPort] {
         &self.blocked
+    }
+
+    /// Station addresses by position: those of the last scan, or of the rescan that was taken over.
+    pub fn stations_by_position(&self) -> Vec<StationAddress> {
+        match &self.stage {
+            Stage::Unscanned | Stage::Scanning => Vec::new(),
+            Stage::Scanned(scanned) => scanned.found.stations(),
+            Stage::Active(_) => self.cabling.stations.clone(),
+        }
     }
 
     /// Time of the next evaluation if no words are posted before.

@@ -12,12 +12,13 @@ use ringcat_wire::register::DlControl;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
+use super::model::Declared;
 use super::port_control::BlockedPort;
 use super::reading::Reading;
 use super::ring::Words;
 use super::round_result::RoundResult;
+use super::scan::Scan;
 use super::seen::Seen;
-use super::start::Start;
 use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
@@ -90,8 +91,19 @@ pub enum Observation<'a> {
     /// It was tested how many datagrams a frame may hold. Until this time no other test is necessary.
     FramesTested(Instant),
 
+    /// A scan of the segment begins, with new station addresses.
+    ScanBegun,
+    /// It has ended; the reason if it failed.
+    ScanEnded(Result<Scan, String>),
+    /// A SubDevice is configured for its mailbox before an application is active.
+    Visited,
+    /// An application declares SubDevices.
+    Activated(Box<Declared>),
+    /// The application ends. The result of the scan stays.
+    Deactivated,
+
     /// The configuration of all present members may begin.
-    Started(Start),
+    Started,
     /// They will be configured later: an answer meanwhile is not a return.
     Delayed,
     /// A finding of an attempt to bring up a member. It is refused if that is no longer the current attempt: the member

@@ -12,4 +12,5 @@ mod observe;
 mod ports;
 mod recabling;
 mod silence;
+mod stages;
 mod unassigned;

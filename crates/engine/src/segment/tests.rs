@@ -1,8 +1,11 @@
 //! Tests from posted words and observations to events, without a bus.
 
 mod clocks;
+mod stages;
 mod stale;
 
+use alloc::boxed::Box;
+use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -15,8 +18,9 @@ use ringcat_wire::sii::Identity;
 
 use super::clocks::Clocks;
 use super::disturbance::{Disturbance, Wanted};
-use super::effect::{Check, Effect, Shown, Task};
+use super::effect::{Check, Effect, Effects, Shown, Task};
 use super::member::{Member, Phase};
+use super::setup::Setup;
 use super::start::Start;
 use super::*;
 use crate::board::{Board, RingWord, Supervision};
@@ -60,18 +64,23 @@ fn node(high: u8) -> NodeStatus {
 
 impl Ring {
     fn closed(count: usize) -> Ring {
-        Ring::with_clocks(count, Clocks::new(None, &[], &Topology::default(), |_| None))
+        Ring::with_clocks(count, Clocks::undeclared())
     }
 
     fn with_clocks(count: usize, clocks: Clocks) -> Ring {
-        let member = |index: usize| {
+        let info = |index: usize| {
             let identity = Identity { vendor_id: 2, product_code: 7, revision: 1, serial: 0 };
             let (position, station) = (Position(index as u16), station(index));
-            let info = SubDeviceInfo { position, station, identity, ..SubDeviceInfo::default() };
-            Member::new(SubDeviceConfig::at_position(index as u16), Some(info), station, None)
+            SubDeviceInfo { position, station, identity, ..SubDeviceInfo::default() }
+        };
+        let member = |index: usize| {
+            let info = Some(Rc::new(info(index)));
+            Member::new(SubDeviceConfig::at_position(index as u16), info, station(index), None)
         };
         let topology = Topology::build(&vec![node(PASS); count], count);
         let cables = cables(&topology, LinkSet::Ring).into_iter().map(|cable| (cable, CableErrors::default()));
+        let (subdevices, topology_found) = ((0..count).map(info).collect(), topology.clone());
+        let scan = Scan { subdevices, topology: topology_found, main_count: count, redundant_count: 0 };
         let cabling = Cabling {
             cables: cables.collect(),
             topology,
@@ -87,7 +96,7 @@ impl Ring {
             session: 0,
             max_datagrams: None,
         };
-        let known = Known {
+        let declared = Declared {
             members: (0..count).map(member).collect(),
             unassigned: Vec::new(),
             layout: Layout::with(&[], rules).unwrap(),
@@ -95,9 +104,13 @@ impl Ring {
             cabling,
             ring: RingStatus { redundancy: Redundancy::Unknown, ..RingStatus::default() },
             carriers: [Some(true); 2],
+            board: Arc::new(Board::new(count)),
         };
         let choices = Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false };
-        let segment = Segment::new(known, Arc::new(Board::new(count)), choices);
+        let mut segment = Segment::new(choices);
+        segment.observe(Observation::ScanBegun, Instant(0));
+        segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));
+        segment.observe(Observation::Activated(Box::new(declared)), Instant(0));
         let counts = Supervision { main: Wkc(count as u16), al_status: [8, 0], ..Supervision::default() };
         let words = Words {
             links: LinkSet::Ring,

@@ -61,9 +61,9 @@ pub(super) struct At<'a> {
 
 impl UnassignedSubDevice {
     /// A SubDevice found by a scan. `owners` has all positions; the first `main_count` are on the main link.
-    pub fn new(info: SubDeviceInfo, owners: &Owners, main_count: usize, reported: bool) -> UnassignedSubDevice {
+    pub fn new(info: Rc<SubDeviceInfo>, owners: &Owners, main_count: usize, reported: bool) -> UnassignedSubDevice {
         let (station, position) = (info.station, usize::from(info.position.0));
-        let knowledge = Knowledge::Known(Rc::new(info));
+        let knowledge = Knowledge::Known(info);
         UnassignedSubDevice::at((station, 0), &At { position, owners, main_count }, reported, knowledge)
     }
 

@@ -176,3 +176,28 @@ fn a_scan_clears_all_errors_even_if_one_does_not_reach_init() {
         assert_eq!(statuses(&mut stopped), expected);
     }
 }
+
+// covers: stop
+#[test]
+fn an_application_follows_another_one_without_a_scan_and_without_the_eeproms() {
+    for network in networks() {
+        let mut declaration = None;
+        let mut application = run(network, |scan| declaration.insert(automatic(&scan.subdevices, CYCLE)).clone());
+        let declaration = declaration.expect("it was declared");
+        let network = application.links_mut().network_mut();
+        (0..MIXED.len()).for_each(|at| network.device_mut(DeviceIndex(at)).controller.sii_image_mut().fill(0));
+        let busy = application.engine().under_way();
+        for round in 0..20 {
+            let state = [AlState::PreOp, AlState::Init, AlState::SafeOp][round % 3];
+            // Every second stop comes in the middle of the configuration.
+            let stopped = application.stop(LastOutputs::Zero, state, LIMIT).expect("all follow");
+            application = stopped.activate(declaration.clone()).map_err(Error::from).expect("it fits");
+            cycles(&mut application, if round % 2 == 0 { 3 } else { 1_000 });
+            if round % 2 == 1 {
+                assert!(application.all_settled(), "round {round}: {:?}", application.states());
+                assert_eq!(application.engine().under_way().datagrams, busy.datagrams, "round {round}");
+                assert_eq!(application.engine().under_way().procedures, busy.procedures, "round {round}");
+            }
+        }
+    }
+}

@@ -127,7 +127,7 @@ async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted:
     let has_history = requested.has_history(40).await;
     let access = segment.view();
     let Some(member) = access.members().get(index) else { return Vec::new() };
-    let (expected, info) = (&member.config.expected, member.info.as_ref());
+    let (expected, info) = (&member.config.expected, member.info.as_deref());
     let planned = member.setup.as_ref().and_then(|setup| setup.plan.mailbox_layout());
     let mailbox = planned.or_else(|| info.and_then(|info| info.mailbox));
     let string = |of: fn(&SubDeviceInfo) -> &str| info.map_or("", of).as_bytes();

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::PortKind;
 
-use super::found::Scan;
+use super::Scan;
 use crate::event::Event;
 use crate::link::LinkSet;
 use crate::procedures::cabling::{Known, cabling, stays_closed};

@@ -179,7 +179,7 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
     for (at, station) in seen.stations.iter().enumerate() {
         let unassigned = access.unassigned(*station);
         let known = match (owners.at(at), unassigned.map(|it| &it.knowledge)) {
-            (Some(index), _) => access.members()[index].info.as_ref(),
+            (Some(index), _) => access.members()[index].info.as_deref(),
             (None, Some(Knowledge::Known(info))) => Some(&**info),
             (None, _) => None,
         };

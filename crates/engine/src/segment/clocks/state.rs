@@ -1,6 +1,7 @@
 //! All clocks of a segment.
 
 use alloc::vec::Vec;
+use core::borrow::Borrow;
 
 use ringcat_wire::address::{Position, StationAddress};
 
@@ -52,12 +53,13 @@ impl Clocks {
     /// SubDevice.
     pub fn new<'a>(
         config: Option<ClockConfig>,
-        scanned: &[SubDeviceInfo],
+        scanned: &[impl Borrow<SubDeviceInfo>],
         topology: &Topology,
         members: impl Fn(&SubDeviceInfo) -> Option<(usize, &'a SubDeviceConfig)>,
     ) -> Clocks {
         let node = |info: &SubDeviceInfo| Node::new(info, members(info));
-        let nodes: Vec<Node> = if config.is_some() { scanned.iter().map(node).collect() } else { Vec::new() };
+        let scanned = scanned.iter().map(Borrow::borrow).filter(|_| config.is_some());
+        let nodes: Vec<Node> = scanned.map(node).collect();
         let has_clock: Vec<bool> = nodes.iter().map(|node| node.has_clock).collect();
         let life = match &config {
             None => Life::Undeclared,
@@ -68,6 +70,12 @@ impl Clocks {
         let epoch = config.epoch;
         let (reference, cables, measured, opened_without_result) = (None, Cables::default(), 0, None);
         Clocks { config, life, nodes, reference, cables, measured, opened_without_result, epoch }
+    }
+
+    /// No clocks.
+    pub fn undeclared() -> Clocks {
+        let scanned: [SubDeviceInfo; 0] = [];
+        Clocks::new(None, &scanned, &Topology::default(), |_| None)
     }
 
     /// Whether distributed clocks are declared.

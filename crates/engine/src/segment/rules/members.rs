@@ -211,7 +211,8 @@ impl Segment {
     }
 
     /// Starts the configuration of all members that were found.
-    pub(in crate::segment) fn start_all(&mut self, from: Start, effects: &mut Effects) {
+    pub(in crate::segment) fn start_all(&mut self, effects: &mut Effects) {
+        let from = self.stage.scanned().map_or(Start::Doubtful, |scanned| scanned.registers);
         for index in 0..self.members.len() {
             if self.members[index].is_there() {
                 self.start(index, from, None, Check::None, effects);
@@ -346,7 +347,7 @@ impl Segment {
         match Setup::new(index, &member.config, info, layout) {
             Ok(setup) => {
                 member.take_setup(index, setup, effects);
-                member.info = Some(info.clone());
+                member.info = Some(Rc::new(info.clone()));
             }
             // The same error as before.
             Err(_) if member.unfit.is_some() => {}

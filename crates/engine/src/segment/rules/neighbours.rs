@@ -49,7 +49,7 @@ impl Segment {
         let owners = self.owners(&view.stations);
         let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
             let known = match (owners.at(at), self.unassigned(*station).map(|it| &it.knowledge)) {
-                (Some(index), _) => self.members[index].info.as_ref(),
+                (Some(index), _) => self.members[index].info.as_deref(),
                 (None, Some(Knowledge::Known(info))) => Some(&**info),
                 (None, _) => None,
             };

@@ -30,7 +30,13 @@ impl Segment {
             Observation::ScanAgainIn(pause) => self.attention.again_in(pause, now),
             Observation::FramesTested(until) => self.frames_tested_until = until,
 
-            Observation::Started(from) => self.start_all(from, effects),
+            Observation::ScanBegun => self.begin_scan(),
+            Observation::ScanEnded(result) => self.end_scan(result, effects),
+            Observation::Activated(declared) => self.activate(*declared, effects),
+            Observation::Deactivated => self.deactivate(),
+
+            Observation::Visited => self.observe_visit(),
+            Observation::Started => self.start_all(effects),
             Observation::Delayed => self.delay_all(),
             Observation::OfMember { index, attempt, finding } => {
                 self.observe_finding((index, attempt), finding, now, effects);

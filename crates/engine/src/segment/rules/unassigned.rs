@@ -182,7 +182,7 @@ impl Segment {
         let Some(member) = members.get_mut(index) else { return };
         let Ok(setup) = Setup::new(index, &member.config, &info, layout) else { return };
         member.take_setup(index, setup, effects);
-        member.info = Some(info);
+        member.info = Some(Rc::new(info));
         member.configured = false;
         self.unassigned.retain(|other| other.station != station);
         effects.report(Event::Returned { subdevice: SubDeviceId(index) });

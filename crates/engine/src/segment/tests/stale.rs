@@ -1,7 +1,5 @@
 //! Findings that were requested before a change of the model arrive after it: each is refused, per fact.
 
-use alloc::boxed::Box;
-use alloc::rc::Rc;
 use alloc::string::String;
 
 use ringcat_wire::sii::Identity;

@@ -1,0 +1,58 @@
+//! Result of a scan, and the model's form of it.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+
+use crate::info::SubDeviceInfo;
+use crate::topology::Topology;
+
+/// Result of a scan.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Scan {
+    /// The SubDevices in the order of the processing units.
+    pub subdevices: Vec<SubDeviceInfo>,
+    /// Their connections.
+    pub topology: Topology,
+    /// Number of SubDevices that the main copy passed.
+    pub main_count: usize,
+    /// Number of SubDevices that the redundant copy passed.
+    pub redundant_count: usize,
+}
+
+/// The SubDevices that the last scan found. Members and SubDevices without a declaration share their data with it.
+#[derive(Debug)]
+pub struct Found {
+    /// By position.
+    pub subdevices: Vec<Rc<SubDeviceInfo>>,
+    /// Their connections.
+    pub topology: Topology,
+    /// Number of SubDevices that the main copy passed.
+    pub main_count: usize,
+}
+
+impl Found {
+    /// Station addresses by position.
+    pub fn stations(&self) -> Vec<StationAddress> {
+        self.subdevices.iter().map(|info| info.station).collect()
+    }
+
+    /// The result of the scan.
+    pub fn scan(&self) -> Scan {
+        Scan {
+            subdevices: self.subdevices.iter().map(|info| (**info).clone()).collect(),
+            topology: self.topology.clone(),
+            main_count: self.main_count,
+            redundant_count: self.subdevices.len() - self.main_count,
+        }
+    }
+}
+
+impl From<Scan> for Found {
+    fn from(scan: Scan) -> Found {
+        let Scan { subdevices, topology, main_count, .. } = scan;
+        Found { subdevices: subdevices.into_iter().map(Rc::new).collect(), topology, main_count }
+    }
+}

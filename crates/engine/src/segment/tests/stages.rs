@@ -1,0 +1,120 @@
+//! The stages of the segment: scans, activation and deactivation.
+
+use crate::layout::Layout;
+
+use super::*;
+
+fn choices() -> Choices {
+    Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false }
+}
+
+fn scan(count: usize) -> Scan {
+    let info = |index: usize| SubDeviceInfo { station: station(index), ..SubDeviceInfo::default() };
+    let topology = Topology::build(&vec![node(PASS); count], count);
+    Scan { subdevices: (0..count).map(info).collect(), topology, main_count: count, redundant_count: 0 }
+}
+
+fn scanned(count: usize) -> Segment {
+    let mut segment = Segment::new(choices());
+    segment.observe(Observation::ScanBegun, Instant(0));
+    segment.observe(Observation::ScanEnded(Ok(scan(count))), Instant(0));
+    segment
+}
+
+/// Declares the first of the SubDevices that were found.
+fn declare(segment: &Segment) -> Box<Declared> {
+    let info = segment.found().map(|found| found.subdevices[0].clone());
+    // It can be configured.
+    let plan = Setup::new(0, &SubDeviceConfig::at_position(0), info.as_ref().unwrap(), &Layout::default()).unwrap();
+    let member = Member::new(SubDeviceConfig::at_position(0), info, station(0), Some(Rc::new(plan)));
+    let cabling = Cabling { stations: segment.found().unwrap().stations(), ..Cabling::default() };
+    Box::new(Declared { members: vec![member], cabling, board: Arc::new(Board::new(1)), ..Declared::default() })
+}
+
+fn bring_up(effects: &Effects) -> Option<Start> {
+    effects.0.iter().find_map(|effect| match effect {
+        Effect::Start(Task::BringUp { from, .. }) => Some(*from),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_scan_is_known_to_the_model_without_an_application() {
+    let segment = scanned(3);
+    let found = segment.found().unwrap();
+    assert_eq!((found.subdevices.len(), segment.is_active(), segment.members().len()), (3, false, 0));
+    assert_eq!(segment.stations_by_position(), [station(0), station(1), station(2)]);
+    assert_eq!((found.scan().main_count, found.scan().redundant_count), (3, 0));
+}
+
+#[test]
+fn while_a_scan_is_under_way_nothing_is_known_and_a_failed_one_is_reported() {
+    let mut segment = scanned(3);
+    segment.observe(Observation::ScanBegun, Instant(0));
+    assert!(segment.is_scanning() && segment.found().is_none());
+    let failed = segment.observe(Observation::ScanEnded(Err("a reason".into())), Instant(0));
+    assert_eq!(reports(&failed.0), [Event::ScanFailed { reason: "a reason".into() }]);
+    assert!(!segment.is_scanning() && segment.found().is_none());
+}
+
+#[test]
+fn the_result_of_a_scan_that_was_given_up_is_refused() {
+    let mut segment = scanned(3);
+    segment.observe(Observation::ScanBegun, Instant(0));
+    segment.observe(Observation::Deactivated, Instant(0));
+    assert_eq!(segment.observe(Observation::ScanEnded(Ok(scan(2))), Instant(0)), Effects::default());
+    assert!(segment.found().is_none());
+}
+
+#[test]
+fn a_declaration_without_a_scan_or_beside_another_one_is_refused() {
+    let mut segment = Segment::new(choices());
+    let declared = declare(&scanned(3));
+    assert_eq!(segment.observe(Observation::Activated(declared), Instant(0)), Effects::default());
+    assert!(!segment.is_active());
+    let mut segment = scanned(3);
+    for _ in 0..2 {
+        let declared = declare(&segment);
+        segment.observe(Observation::Activated(declared), Instant(0));
+        segment.observe(Observation::Started, Instant(0));
+        assert_eq!(segment.members()[0].phase, Phase::Configuring);
+    }
+}
+
+#[test]
+fn members_share_the_data_of_the_scan() {
+    let mut segment = scanned(3);
+    let declared = declare(&segment);
+    segment.observe(Observation::Activated(declared), Instant(0));
+    let found = &segment.found().unwrap().subdevices[0];
+    assert!(segment.members()[0].info.as_ref().is_some_and(|info| Rc::ptr_eq(info, found)));
+}
+
+#[test]
+fn after_deactivation_the_scan_stays_and_nothing_of_the_declaration() {
+    let mut segment = scanned(3);
+    let mut registers = Vec::new();
+    for _ in 0..3 {
+        let declared = declare(&segment);
+        let effects = segment.observe(Observation::Activated(declared), Instant(0));
+        assert!(matches!(effects.0[..], [Effect::Occupants(ref all)] if all.len() == 3));
+        registers.push(bring_up(&segment.observe(Observation::Started, Instant(0))));
+        let versions = segment.versions();
+        segment.observe(Observation::Deactivated, Instant(0));
+        assert_eq!((segment.members().len(), segment.found().unwrap().subdevices.len()), (0, 3));
+        let now = segment.versions();
+        assert!(now.cabling != versions.cabling && now.isolations != versions.isolations);
+        assert!(!segment.are_places_valid(versions));
+    }
+    // A scan clears registers, and the application before leaves its own.
+    assert_eq!(registers, [Some(Start::Cleared), Some(Start::Doubtful), Some(Start::Doubtful)]);
+}
+
+#[test]
+fn a_subdevice_that_was_visited_is_not_taken_for_a_cleared_one() {
+    let mut segment = scanned(3);
+    segment.observe(Observation::Visited, Instant(0));
+    let declared = declare(&segment);
+    segment.observe(Observation::Activated(declared), Instant(0));
+    assert_eq!(bring_up(&segment.observe(Observation::Started, Instant(0))), Some(Start::Doubtful));
+}
