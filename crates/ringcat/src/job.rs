@@ -42,7 +42,7 @@ pub(crate) trait InOrder: Send + Sync {
     /// Waits until the thread has looked at everything that it was asked before.
     fn catch_up(&self) -> Result<(), Error>;
 
-    /// Has the thread look at its work soon.
+    /// Ends a sleep of the thread.
     fn wake(&self);
 }
 

@@ -36,8 +36,8 @@ pub trait Links {
     }
 
     /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before the wait ends the
-    /// next one. `None` where these links have none: the acyclic half in a thread of its own then looks for requests
-    /// every half millisecond.
+    /// next one. `None` where these links have none: the acyclic half in a thread of its own then reads
+    /// its requests every half millisecond.
     fn waker(&self) -> Option<Waker> {
         None
     }

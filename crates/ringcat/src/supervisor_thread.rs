@@ -49,10 +49,13 @@ const EVENTS: usize = 4096;
 /// A thread that waits for a scan looks at other things this often.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
-/// What another thread asks for: it begins work. Work of the engine stays in the thread that made it.
+/// Begins work. Work of the engine stays in the thread that made it.
+type Begin = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
+
+/// What another thread requests.
 struct Request {
     attention: Attention,
-    begin: Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>,
+    begin: Begin,
 }
 
 /// When work that has begun has a turn.
@@ -473,7 +476,7 @@ impl<L: Links> Worker<L> {
             || self.engine.next_deadline().is_some_and(|at| now >= at)
     }
 
-    /// Whether there is work that other threads do not wake this one for.
+    /// Whether there is work for which other threads do not end a sleep.
     fn is_often(&self) -> bool {
         !self.has_waker || self.tasks.iter().any(|(attention, _)| *attention != Attention::Engine)
     }
@@ -492,13 +495,12 @@ impl<L: Links> Worker<L> {
         self.blocked_until = blocked.then(|| self.window.look_again(now));
     }
 
-    /// The end of a sleep: a deadline, room on the wire, or the next time at which something is read that nothing wakes
-    /// for.
+    /// The end of a sleep: a deadline, room on the wire, or the next reading of words that do not end a sleep.
     fn next_turn(&self, now: Instant) -> Instant {
         let longest = match self.is_often() {
             true if now < self.attentive_until => now + SHORT_SLEEP,
             true => now + LONGEST_SLEEP,
-            false => self.publish_at.min(self.window.next_look(now)),
+            false => self.publish_at.min(self.window.next_reading(now)),
         };
         let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
         wake.min(self.blocked_until.unwrap_or(Instant::NEVER)).min(longest)

@@ -20,8 +20,8 @@ pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wi
 const SILENCE_NS: u64 = 20_000_000;
 /// A cycle that is due may begin any moment: the wire is looked at again after this.
 const LOOK_AGAIN: Duration = Duration::from_micros(50);
-/// Shortest time between two looks at what the cyclic half posts.
-const SHORTEST_LOOK: Duration = Duration::from_micros(500);
+/// Shortest time between two readings of what the cyclic half posts.
+const SHORTEST_READING: Duration = Duration::from_micros(500);
 
 /// The half that sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,14 +124,14 @@ impl Window {
         now.0.saturating_sub(last) <= SILENCE_NS
     }
 
-    /// When to look again at what the cyclic half posts: right after the next cycle has begun, so once per cycle. Never
-    /// where no cycles run, because nothing is posted then.
-    pub fn next_look(&self, now: Instant) -> Instant {
+    /// When to read again what the cyclic half posts: right after the next cycle has begun, so once per cycle. Never
+    /// without cycles, because nothing is posted then.
+    pub fn next_reading(&self, now: Instant) -> Instant {
         if !self.is_cyclic(now) {
             return Instant::NEVER;
         }
         let next = Instant(self.next_cycle.load(Ordering::Relaxed));
-        let earliest = now + SHORTEST_LOOK;
+        let earliest = now + SHORTEST_READING;
         if next == Instant::NEVER { earliest } else { (next + LOOK_AGAIN).max(earliest) }
     }
 
@@ -190,15 +190,15 @@ mod tests {
     #[test]
     fn posted_words_are_read_once_per_cycle_and_never_without_cycles() {
         let window = Window::default();
-        assert_eq!(window.next_look(Instant(50 * MS)), Instant::NEVER);
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant::NEVER);
         window.expect_cycle(Instant(54 * MS));
-        assert_eq!(window.next_look(Instant(50 * MS)), Instant(54 * MS) + LOOK_AGAIN);
-        assert_eq!(window.next_look(Instant(54 * MS)), Instant(54 * MS) + SHORTEST_LOOK, "the cycle is late");
-        assert_eq!(window.next_look(Instant(54 * MS + SILENCE_NS + 1)), Instant::NEVER, "the cycles have ended");
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant(54 * MS) + LOOK_AGAIN);
+        assert_eq!(window.next_reading(Instant(54 * MS)), Instant(54 * MS) + SHORTEST_READING, "the cycle is late");
+        assert_eq!(window.next_reading(Instant(54 * MS + SILENCE_NS + 1)), Instant::NEVER, "the cycles have ended");
         window.expect_cycle(Instant::NEVER);
-        assert_eq!(window.next_look(Instant(50 * MS)), Instant::NEVER);
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant::NEVER);
         window.occupy(Half::Cyclic, Instant(50 * MS), 60);
-        assert_eq!(window.next_look(Instant(50 * MS)), Instant(50 * MS) + SHORTEST_LOOK, "cycles back to back");
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant(50 * MS) + SHORTEST_READING, "cycles back to back");
     }
 
     // covers: threads
