@@ -225,6 +225,31 @@ pub fn request_socket() -> Result<OwnedFd, i32> {
     socket(libc::AF_INET, libc::SOCK_DGRAM, 0)
 }
 
+/// A counter that makes its descriptor readable (`eventfd`).
+pub fn event_counter() -> Result<OwnedFd, i32> {
+    // SAFETY: no pointers are passed.
+    let fd = unsafe { libc::eventfd(0, libc::EFD_CLOEXEC | libc::EFD_NONBLOCK) };
+    if fd < 0 {
+        return Err(errno());
+    }
+    // SAFETY: the descriptor was just made and has no other owner.
+    Ok(unsafe { OwnedFd::from_raw_fd(fd) })
+}
+
+/// Adds one to such a counter. A full counter is readable already.
+pub fn count(fd: RawFd) {
+    let one = 1_u64.to_ne_bytes();
+    // SAFETY: the pointer refers to eight live bytes that the kernel only reads.
+    unsafe { libc::write(fd, one.as_ptr().cast(), one.len()) };
+}
+
+/// Sets such a counter to zero.
+pub fn clear_counter(fd: RawFd) {
+    let mut count = [0_u8; 8];
+    // SAFETY: the pointer refers to eight live bytes for which all values are valid.
+    unsafe { libc::read(fd, count.as_mut_ptr().cast(), count.len()) };
+}
+
 /// Clears the pending error of a socket.
 pub fn clear_error(fd: &impl AsRawFd) {
     option::<libc::c_int>(fd.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ERROR, 0);

@@ -3,7 +3,8 @@
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
-//! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached;
+//! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
+//!   another thread;
 //! * [`interface`], [`carrier`]: the interfaces of the host, their other users, their carrier;
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
@@ -34,6 +35,7 @@ pub mod signals;
 pub mod sniffer;
 pub mod tap;
 pub mod waiting;
+pub mod wake_up;
 
 pub use carrier::{Carrier, CarrierWatch};
 pub use error::LinkError;
@@ -45,4 +47,5 @@ pub use recorder::{Recorder, RecorderError, Tap};
 pub use signals::{HeldSignals, Signal};
 pub use sniffer::Sniffer;
 pub use tap::{TapError, TapInterface};
-pub use waiting::{UsualReturn, wait, wait_from};
+pub use waiting::{UsualReturn, wait, wait_from, wait_or_wake};
+pub use wake_up::WakeUp;

@@ -11,6 +11,7 @@ use crate::kernel;
 use crate::monotonic::{now_ns, timespec};
 use crate::packet_socket::PacketSocket;
 use crate::receive_mode::ReceiveMode;
+use crate::wake_up::WakeUp;
 
 /// Maximum number of sockets per wait: two classes on two interfaces, and more for a simulator.
 pub const MAX_SOCKETS: usize = 16;
@@ -125,8 +126,38 @@ fn sleep(sockets: &[&PacketSocket], now: u64, until_ns: u64) -> bool {
     }
 }
 
+/// As [`wait_from`], asleep; another thread may end the wait by `wake_up` (false).
+///
+/// # Panics
+/// With more than [`MAX_SOCKETS`] sockets.
+pub fn wait_or_wake(sockets: &[&PacketSocket], wake_up: &WakeUp, now: u64, until_ns: u64) -> bool {
+    assert!(sockets.len() <= MAX_SOCKETS, "at most {MAX_SOCKETS} sockets are waited for at once");
+    let mut polled = [libc::pollfd { fd: -1, events: libc::POLLIN, revents: 0 }; MAX_SOCKETS + 1];
+    polled.iter_mut().zip(sockets).for_each(|(to, socket)| to.fd = socket.fd());
+    polled[sockets.len()].fd = wake_up.fd();
+    sleep_until(sockets, &mut polled[..=sockets.len()], now, until_ns, |polled| {
+        let is_woken = polled.last().is_some_and(|place| place.revents & libc::POLLIN != 0);
+        if is_woken {
+            wake_up.clear();
+        }
+        is_woken
+    })
+}
+
 #[inline(always)]
-fn sleep_on(sockets: &[&PacketSocket], polled: &mut [libc::pollfd], mut now: u64, until_ns: u64) -> bool {
+fn sleep_on(sockets: &[&PacketSocket], polled: &mut [libc::pollfd], now: u64, until_ns: u64) -> bool {
+    sleep_until(sockets, polled, now, until_ns, |_| false)
+}
+
+/// Sleeps until a frame has arrived (true), the time has come, or `ends` finds a reason in the polled places.
+#[inline(always)]
+fn sleep_until(
+    sockets: &[&PacketSocket],
+    polled: &mut [libc::pollfd],
+    mut now: u64,
+    until_ns: u64,
+    ends: impl Fn(&[libc::pollfd]) -> bool,
+) -> bool {
     loop {
         if any(sockets) {
             return true;
@@ -135,8 +166,12 @@ fn sleep_on(sockets: &[&PacketSocket], polled: &mut [libc::pollfd], mut now: u64
             return false;
         }
         if kernel::poll(polled, timespec(until_ns - now)) {
+            let ended = ends(polled);
             if any(sockets) {
                 return true;
+            }
+            if ended {
+                return false;
             }
             for (place, socket) in polled.iter().zip(sockets) {
                 if place.revents & libc::POLLERR != 0 {

@@ -41,6 +41,9 @@ pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
 pub(crate) trait InOrder: Send + Sync {
     /// Waits until the thread has looked at everything that it was asked before.
     fn catch_up(&self) -> Result<(), Error>;
+
+    /// Ends a sleep of the thread.
+    fn wake(&self);
 }
 
 /// The other end of a job, in the thread. Dropped without an answer, it says that there will be none.
@@ -217,7 +220,11 @@ impl<T> Future for Job<T> {
 
 impl<T> Drop for Job<T> {
     fn drop(&mut self) {
+        let is_running = matches!(*self.slot.state(), State::Running(_));
         self.slot.end(State::Aborted);
+        if is_running {
+            self.thread.wake();
+        }
     }
 }
 

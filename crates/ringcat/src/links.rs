@@ -1,5 +1,7 @@
 //! What a MainDevice sends and receives through, and where its time comes from.
 
+use std::task::Waker;
+
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::MacAddress;
@@ -30,6 +32,13 @@ pub trait Links {
 
     /// Whether an interface has a carrier; `None` where these links do not tell. Cheap: an atomic or two.
     fn carrier(&self, _link: Link) -> Option<bool> {
+        None
+    }
+
+    /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before the wait ends the
+    /// next one. `None` where these links have none: the acyclic half in a thread of its own then reads
+    /// its requests every half millisecond.
+    fn waker(&self) -> Option<Waker> {
         None
     }
 

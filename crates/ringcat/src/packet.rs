@@ -3,12 +3,13 @@
 //! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or
 //! one after the other. A link that goes down swallows frames and works again as soon as it is back.
 
+use std::task::Waker;
 use std::time::Duration;
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::interface;
-use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, UsualReturn, monotonic};
+use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, UsualReturn, WakeUp, monotonic};
 use ringcat_wire::frame::MacAddress;
 
 pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
@@ -34,6 +35,8 @@ pub struct PacketLinks {
     has_sent: bool,
     /// Polls the carriers; not for the cyclic half, which goes by what comes back.
     carriers: Option<CarrierWatch>,
+    /// Ends waits from other threads; not for the cyclic half, which waits for frames and times alone.
+    wake_up: Option<WakeUp>,
     /// Names of both interfaces.
     names: [Option<String>; 2],
     /// Interfaces that were switched off to be disconnected.
@@ -72,7 +75,8 @@ impl PacketLinks {
         Ok((
             PacketLinks::open_class(main, redundant, cyclic, ClassFilter::Cyclic)?,
             PacketLinks::open_class(main, redundant, ReceiveMode::Blocking, ClassFilter::Acyclic)?
-                .watch_carriers(main, redundant)?,
+                .watch_carriers(main, redundant)?
+                .with_wake_up()?,
         ))
     }
 
@@ -96,6 +100,7 @@ impl PacketLinks {
             usual: UsualReturn::default(),
             has_sent: false,
             carriers: None,
+            wake_up: None,
             names,
             disconnected: [false; 2],
         })
@@ -112,6 +117,11 @@ impl PacketLinks {
     fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
         let interfaces: Vec<&str> = core::iter::once(main).chain(redundant).collect();
         self.carriers = Some(CarrierWatch::start(&interfaces, CarrierWatch::PERIOD)?);
+        Ok(self)
+    }
+
+    fn with_wake_up(mut self) -> Result<PacketLinks, LinkError> {
+        self.wake_up = Some(WakeUp::new()?);
         Ok(self)
     }
 
@@ -175,6 +185,10 @@ impl Links for PacketLinks {
         self.carriers.as_ref().filter(|_| has_link).map(|watch| watch.carrier(link.index()).is_up())
     }
 
+    fn waker(&self) -> Option<Waker> {
+        self.wake_up.as_ref().map(WakeUp::waker)
+    }
+
     fn wait(&mut self, until: Instant) {
         self.wait_from(self.now(), until);
     }
@@ -186,6 +200,13 @@ impl Links for PacketLinks {
             && is_first
         {
             self.wait_as_usual(now, until, spin);
+            return;
+        }
+        if let Some(wake_up) = &self.wake_up {
+            match &self.redundant {
+                Some(redundant) => ringcat_link::wait_or_wake(&[&self.main, redundant], wake_up, now.0, until.0),
+                None => ringcat_link::wait_or_wake(&[&self.main], wake_up, now.0, until.0),
+            };
             return;
         }
         match &self.redundant {

@@ -1,6 +1,7 @@
 //! The acyclic half in a thread of its own, with links of its own.
 //!
-//! The thread sleeps until a frame, a deadline or a request comes. It sends in the windows that the cyclic half leaves
+//! The thread sleeps until a frame, a deadline or a request comes, and reads once per cycle whether the cyclic half has
+//! posted anything new; the cyclic half makes no system call for it. It sends in the windows that the cyclic half leaves
 //! ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a living
 //! bus behind it.
 
@@ -8,6 +9,7 @@ use std::future::Future;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -34,7 +36,7 @@ use crate::not_ready::{Failures, Reason};
 use crate::subdevice::{SubDeviceName, info};
 use crate::window::Window;
 
-/// A request, and what the cyclic half posts, waits for so long at most until the thread looks.
+/// Work that reads other threads' queues, and requests on links without a waker, wait for so long at most.
 const LONGEST_SLEEP: Duration = Duration::from_micros(500);
 /// And for so long after a recent request, so that a sequence of requests does not wait for each one.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
@@ -47,8 +49,24 @@ const EVENTS: usize = 4096;
 /// A thread that waits for a scan looks at other things this often.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
-/// What another thread asks for: it begins work. Work of the engine stays in the thread that made it.
-type Request = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
+/// Begins work. Work of the engine stays in the thread that made it.
+type Begin = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
+
+/// What another thread requests.
+struct Request {
+    attention: Attention,
+    begin: Begin,
+}
+
+/// When work that has begun has a turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Attention {
+    /// When the engine has done something.
+    Engine,
+    /// Every half millisecond: it reads queues that other threads fill.
+    #[cfg(any(feature = "eoe", feature = "gateway"))]
+    Often,
+}
 
 /// What the thread makes known.
 #[derive(Debug, Default)]
@@ -80,6 +98,8 @@ struct Handle {
     events: Mutex<Receiver<TimedEvent>>,
     published: Arc<Published>,
     window: Arc<Window>,
+    /// Ends a sleep of the thread.
+    waker: Option<Waker>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -98,6 +118,7 @@ impl SupervisorThread {
         let published = Arc::new(Published::default());
         let window = Arc::new(Window::new(options.acyclic_bytes));
         let options = options.clone();
+        let (waker, has_waker) = (links.waker(), links.waker().is_some());
         let (shared, windows) = (published.clone(), window.clone());
         let body = move || {
             prepare();
@@ -109,24 +130,36 @@ impl SupervisorThread {
                 window: windows,
                 asked: Vec::new(),
                 tasks: Vec::new(),
+                has_waker,
                 events: outgoing,
                 events_dropped: 0,
                 failures: Failures::default(),
                 published: shared,
                 publish_at: Instant(0),
+                blocked_until: None,
                 attentive_until: Instant(0),
             };
             worker.run(&incoming);
         };
         let thread = std::thread::Builder::new().name("supervisor".into()).spawn(body).map_err(Error::Thread)?;
         let (requests, events) = (Some(requests), Mutex::new(events));
-        Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, thread: Some(thread) })))
+        Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, waker, thread: Some(thread) })))
     }
 
     /// Has the thread begin a task.
     fn begin(&self, begin: impl FnOnce(&mut Engine, Instant) -> Task + Send + 'static) -> Result<(), Error> {
+        self.request(Attention::Engine, begin)
+    }
+
+    fn request(
+        &self,
+        attention: Attention,
+        begin: impl FnOnce(&mut Engine, Instant) -> Task + Send + 'static,
+    ) -> Result<(), Error> {
         let requests = self.0.requests.as_ref().ok_or(Error::Gone)?;
-        requests.send(Box::new(begin)).map_err(|_| Error::Gone)
+        requests.send(Request { attention, begin: Box::new(begin) }).map_err(|_| Error::Gone)?;
+        self.0.wake();
+        Ok(())
     }
 
     /// Starts work of the engine in the thread. The one way from a thread of the application to the engine's and back.
@@ -150,7 +183,7 @@ impl SupervisorThread {
     /// Has the thread do something with its engine in each of its turns, until it says true.
     #[cfg(any(feature = "eoe", feature = "gateway"))]
     pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
-        self.begin(move |_, _| Box::new(work))
+        self.request(Attention::Often, move |_, _| Box::new(work))
     }
 
     /// Has the thread do something with its engine, and waits for what comes out.
@@ -317,11 +350,22 @@ impl InOrder for SupervisorThread {
     fn catch_up(&self) -> Result<(), Error> {
         self.with(|_| ())
     }
+
+    fn wake(&self) {
+        self.0.wake();
+    }
+}
+
+impl Handle {
+    fn wake(&self) {
+        self.waker.iter().for_each(Waker::wake_by_ref);
+    }
 }
 
 impl Drop for Handle {
     fn drop(&mut self) {
         self.requests = None;
+        self.wake();
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been told by the panic handler.
             let _ = thread.join();
@@ -381,7 +425,9 @@ struct Worker<L> {
     engine: Engine,
     window: Arc<Window>,
     asked: Vec<Request>,
-    tasks: Vec<Task>,
+    tasks: Vec<(Attention, Task)>,
+    /// Other threads can end a sleep.
+    has_waker: bool,
     events: Sender<TimedEvent>,
     events_dropped: u64,
     failures: Failures,
@@ -389,49 +435,84 @@ struct Worker<L> {
     publish_at: Instant,
     /// Until when the next request is expected soon.
     attentive_until: Instant,
+    /// When there may be room for datagrams that wait.
+    blocked_until: Option<Instant>,
 }
 
 impl<L: Links> Worker<L> {
     fn run(mut self, incoming: &Receiver<Request>) {
         loop {
             let now = self.links.now();
-            let Worker { links, engine, window, .. } = &mut self;
+            let Worker { links, engine, .. } = &mut self;
+            let mut has_work = false;
             while links.receive(&mut |link, frame| {
                 engine.receive(link, frame, now);
-            }) {}
-            let blocked = work(engine, links, window);
-            let mut asked = false;
+            }) {
+                has_work = true;
+            }
             loop {
                 match incoming.try_recv() {
-                    Ok(request) => {
-                        self.asked.push(request);
-                        asked = true;
-                    }
+                    Ok(request) => self.asked.push(request),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            let news = self.pass_on_events();
-            self.publish(news);
-            asked |= self.answer();
-            let now = self.links.now();
-            if asked {
-                self.attentive_until = now + ATTENTIVE;
+            if has_work || self.is_due(now) {
+                self.turn();
             }
-            let longest = if now < self.attentive_until { SHORT_SLEEP } else { LONGEST_SLEEP };
-            let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
-            let wake = if blocked { wake.min(self.window.look_again(now)) } else { wake };
-            self.links.wait(wake.max(now).min(now + longest));
+            let now = self.links.now();
+            self.links.wait_from(now, self.next_turn(now).max(now));
         }
+    }
+
+    /// Whether there is work without a frame.
+    fn is_due(&mut self, now: Instant) -> bool {
+        let Worker { links, engine, .. } = self;
+        engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
+        !self.asked.is_empty()
+            || self.is_often()
+            || now >= self.publish_at
+            || self.blocked_until.is_some_and(|at| now >= at)
+            || self.engine.next_deadline().is_some_and(|at| now >= at)
+    }
+
+    /// Whether there is work for which other threads do not end a sleep.
+    fn is_often(&self) -> bool {
+        !self.has_waker || self.tasks.iter().any(|(attention, _)| *attention != Attention::Engine)
+    }
+
+    fn turn(&mut self) {
+        let Worker { links, engine, window, .. } = self;
+        let blocked = work(engine, links, window);
+        let mut asked = !self.asked.is_empty();
+        let news = self.pass_on_events();
+        self.publish(news);
+        asked |= self.answer();
+        let now = self.links.now();
+        if asked {
+            self.attentive_until = now + ATTENTIVE;
+        }
+        self.blocked_until = blocked.then(|| self.window.look_again(now));
+    }
+
+    /// The end of a sleep: a deadline, room on the wire, or the next reading of words that do not end a sleep.
+    fn next_turn(&self, now: Instant) -> Instant {
+        let longest = match self.is_often() {
+            true if now < self.attentive_until => now + SHORT_SLEEP,
+            true => now + LONGEST_SLEEP,
+            false => self.publish_at.min(self.window.next_reading(now)),
+        };
+        let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
+        wake.min(self.blocked_until.unwrap_or(Instant::NEVER)).min(longest)
     }
 
     /// Begins what was asked for, and gives all tasks a turn; true where any has ended.
     fn answer(&mut self) -> bool {
         let now = self.links.now();
         let Worker { asked, tasks, engine, .. } = self;
-        tasks.extend(asked.drain(..).map(|request| request(engine, now)));
+        tasks.extend(asked.drain(..).map(|request| (request.attention, (request.begin)(engine, now))));
         let before = tasks.len();
-        tasks.retain_mut(|task| !task(engine, now));
+        tasks.retain_mut(|(_, task)| !task(engine, now));
         tasks.len() < before
     }
 

@@ -4,6 +4,8 @@
 //! they are handed on, received ones when they are taken. Interface 0 of the capture is the main link, 1 the redundant
 //! one. One tap serves one thread; tees of several threads write into one file.
 
+use std::task::Waker;
+
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::Tap;
@@ -71,6 +73,10 @@ impl<L: Links> Links for Tee<L> {
 
     fn carrier(&self, link: Link) -> Option<bool> {
         self.links.carrier(link)
+    }
+
+    fn waker(&self) -> Option<Waker> {
+        self.links.waker()
     }
 
     fn wait(&mut self, until: Instant) {

@@ -20,6 +20,8 @@ pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wi
 const SILENCE_NS: u64 = 20_000_000;
 /// A cycle that is due may begin any moment: the wire is looked at again after this.
 const LOOK_AGAIN: Duration = Duration::from_micros(50);
+/// Shortest time between two readings of what the cyclic half posts.
+const SHORTEST_READING: Duration = Duration::from_micros(500);
 
 /// The half that sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,6 +116,25 @@ impl Window {
         if left < MIN_FRAME { 0 } else { left }
     }
 
+    /// Whether the cyclic half runs: it has announced a cycle, or has sent a moment ago.
+    fn is_cyclic(&self, now: Instant) -> bool {
+        let next = self.next_cycle.load(Ordering::Relaxed);
+        let last =
+            if next == Instant::NEVER.0 { self.free[Half::Cyclic as usize].load(Ordering::Relaxed) } else { next };
+        now.0.saturating_sub(last) <= SILENCE_NS
+    }
+
+    /// When to read again what the cyclic half posts: right after the next cycle has begun, so once per cycle. Never
+    /// without cycles, because nothing is posted then.
+    pub fn next_reading(&self, now: Instant) -> Instant {
+        if !self.is_cyclic(now) {
+            return Instant::NEVER;
+        }
+        let next = Instant(self.next_cycle.load(Ordering::Relaxed));
+        let earliest = now + SHORTEST_READING;
+        if next == Instant::NEVER { earliest } else { (next + LOOK_AGAIN).max(earliest) }
+    }
+
     /// When to look again for room that there is not now.
     pub fn look_again(&self, now: Instant) -> Instant {
         let next = Instant(self.next_cycle.load(Ordering::Relaxed));
@@ -163,6 +184,21 @@ mod tests {
         let least = Window::new(0);
         least.expect_cycle(Instant(10 * MS));
         assert_eq!(least.bytes(Instant(0)), MAX_FRAME);
+    }
+
+    // covers: threads
+    #[test]
+    fn posted_words_are_read_once_per_cycle_and_never_without_cycles() {
+        let window = Window::default();
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant::NEVER);
+        window.expect_cycle(Instant(54 * MS));
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant(54 * MS) + LOOK_AGAIN);
+        assert_eq!(window.next_reading(Instant(54 * MS)), Instant(54 * MS) + SHORTEST_READING, "the cycle is late");
+        assert_eq!(window.next_reading(Instant(54 * MS + SILENCE_NS + 1)), Instant::NEVER, "the cycles have ended");
+        window.expect_cycle(Instant::NEVER);
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant::NEVER);
+        window.occupy(Half::Cyclic, Instant(50 * MS), 60);
+        assert_eq!(window.next_reading(Instant(50 * MS)), Instant(50 * MS) + SHORTEST_READING, "cycles back to back");
     }
 
     // covers: threads
