@@ -23,6 +23,7 @@ mod image;
 mod missed;
 mod place;
 mod presence;
+mod service;
 mod template;
 mod usual;
 mod words;
@@ -31,7 +32,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-pub use clocks::{ClockSetup, ReferenceTime};
+pub use clocks::{ClockDatagrams, ClockSetup, ReferenceTime};
 pub use copy::{CopyError, CopyRule, WhenStale};
 pub use counters::CyclicCounters;
 pub use domain::Domain;
@@ -53,6 +54,7 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use missed::Missed;
+use service::{Carrier, Service};
 
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
@@ -92,6 +94,7 @@ pub struct Exchange {
     foreign: ForeignFrames,
     missed: Missed,
     copies: Copies,
+    service: Service,
     /// The frame of the last copy taken.
     taken: u16,
     cycle: u64,
@@ -116,11 +119,13 @@ impl Exchange {
             }
             domains.push(Domain::new(planned, first, &frames));
         }
+        let service = Service::new(&identity, links.mask(), layout, &mut frames);
         Exchange {
             identity,
             links,
             board,
             events,
+            service,
             sequence: Sequence::default(),
             by_id: [NO_FRAME; 256],
             frames,
@@ -190,9 +195,10 @@ impl Exchange {
             self.missed.late(copy.sequence, self.tally.disturbed());
             return Received::Late;
         };
-        let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
+        let domain = self.domains.get_mut(frame.domain());
+        let image = domain.map_or_else(|| self.service.image_mut(), Domain::inputs_mut);
         self.taken = index;
-        match frame.receive(copy, arrived_on, bytes, domain.inputs_mut(), self.cycle, &mut self.tally) {
+        match frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally) {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
                 self.evidence.hear_early(frame, &self.board);
@@ -331,10 +337,14 @@ impl Exchange {
         true
     }
 
-    /// Sends the queued frames, each on all links, and ends the cycle.
+    /// Sends the queued frames, each on all links, and ends the cycle. Supervision and distributed clocks leave in each
+    /// call, also where no domain is queued, unless a frame with them is still on the wire.
     #[inline(always)]
     pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
         self.board.traffic.post_departure(self.cycle);
+        if !self.service.leaves_at_home(&self.domains) {
+            self.send_service(now, transmit);
+        }
         for domain in &mut self.domains {
             let Some(set) = domain.leave() else { continue };
             let deadline = Instant(now.0.saturating_add(domain.timeout_ns()));
@@ -356,6 +366,40 @@ impl Exchange {
         }
         self.cycle += 1;
         self.board.post_cycle(self.cycle, self.tally.counters.sent);
+    }
+
+    /// Has the datagrams of supervision and clocks leave though the home domain does not: with another domain, or in a
+    /// frame of their own.
+    #[cold]
+    fn send_service(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        let Carrier::Alone(index) = self.service.place(&self.domains, &mut self.frames, &self.board, now) else {
+            return;
+        };
+        let timeout_ns = self.service_timeout_ns();
+        let Some(frame) = self.frames.get_mut(index) else { return };
+        if frame.is_waiting() {
+            give_up(frame, &mut self.missed, self.tally.disturbed());
+            self.board.post_lost(self.tally.counters.lost);
+        }
+        if frame.is_open() {
+            if frame.is_delivered() {
+                self.tally.disturbed().copies_lost += 1;
+            }
+            self.evidence.close(frame, &self.board, &mut self.events);
+        }
+        frame.load(&[], self.cycle);
+        self.sequence = self.sequence.next();
+        self.by_id[usize::from(self.sequence.frame_id())] = index as u16;
+        let deadline = Instant(now.0.saturating_add(timeout_ns));
+        let leaving = Leaving { identity: &self.identity, links: self.links, board: &self.board, now };
+        let bytes = leaving.send(frame, self.sequence, deadline, &mut self.evidence, transmit);
+        self.tally.counters.sent += 1;
+        self.tally.counters.bytes += bytes as u64;
+    }
+
+    /// Deadline of a frame of supervision and clocks alone: that of the home domain.
+    fn service_timeout_ns(&self) -> u64 {
+        self.domains.get(self.service.home()).map_or(0, Domain::timeout_ns)
     }
 
     /// Applies the supervisor's changes to the participation in process data, for frames of a domain that are not on
@@ -394,7 +438,7 @@ impl Leaving<'_> {
     ) -> usize {
         let clocks = frame.clocks().map(|places| {
             let payloads = evidence.clocks.depart(self.board, self.now);
-            frame.clocks_leave(self.now, evidence.clocks.changes());
+            frame.clocks_leave(self.now, evidence.clocks.changes(), payloads[0].monitors);
             (places, payloads)
         });
         let bytes = frame.depart(self.identity, sequence, deadline);
@@ -455,15 +499,23 @@ fn give_up_overdue(
     let now = if domain.is_overtaken(frames) { Instant::NEVER } else { now };
     let mut pending = false;
     for frame in frames[set].iter_mut().filter(|frame| frame.is_waiting()) {
-        if !frame.overdue(now) {
-            pending = true;
-        } else if frame.give_up() {
-            missed.give_up(frame.sequence(), counters);
+        if frame.overdue(now) {
+            give_up(frame, missed, counters);
         } else {
-            counters.half += 1;
+            pending = true;
         }
     }
     pending
+}
+
+/// Gives up a frame that is overdue.
+#[cold]
+fn give_up(frame: &mut CyclicFrame, missed: &mut Missed, counters: &mut CyclicCounters) {
+    if frame.give_up() {
+        missed.give_up(frame.sequence(), counters);
+    } else {
+        counters.half += 1;
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use core::time::Duration;
 
 use super::copy::Copies;
 use super::{
-    ClockSetup, CopyError, CopyRule, CyclicCounters, CyclicFrame, Domain, Entry, Exchange, ForeignFrame, ReferenceTime,
+    ClockDatagrams, ClockSetup, CopyError, CopyRule, CyclicCounters, CyclicFrame, Domain, Entry, Exchange,
+    ForeignFrame, ReferenceTime,
 };
 use crate::domain::{DomainId, DomainStatus, Freshness};
 use crate::ring::RingState;
@@ -94,7 +95,8 @@ impl Exchange {
     /// When the frame left of which the last copy was taken.
     pub fn taken_left_at(&self) -> Instant {
         let Some(frame) = self.frames.get(usize::from(self.taken)) else { return Instant::NEVER };
-        let timeout_ns = self.domains.get(frame.domain()).map_or(0, Domain::timeout_ns);
+        let domain = self.domains.get(frame.domain());
+        let timeout_ns = domain.map_or_else(|| self.service_timeout_ns(), Domain::timeout_ns);
         Instant(frame.deadline().0.saturating_sub(timeout_ns))
     }
 
@@ -139,6 +141,29 @@ impl Exchange {
     /// The next frame sets the reference clock towards this time, once. The other clocks follow.
     pub fn sync_reference_to(&mut self, time: u64) {
         self.evidence.clocks.want_reference_at(time);
+    }
+
+    /// Chooses when the datagrams of distributed clocks take effect; in each cycle unless chosen otherwise.
+    pub fn set_clock_datagrams(&mut self, policy: ClockDatagrams) {
+        self.evidence.clocks.set_datagrams(policy);
+    }
+
+    /// The next frame sets the reference clock towards the application's time, once.
+    pub fn sync_reference(&mut self, now: Instant) {
+        let time = self.evidence.clocks.application_time(now);
+        self.evidence.clocks.want_reference_at(time);
+    }
+
+    /// The next frame distributes the time of the reference clock, with [`ClockDatagrams::Called`]. No time is
+    /// distributed while delays are unknown after a change of cables.
+    pub fn sync_clocks(&mut self) {
+        self.evidence.clocks.want_distribution();
+    }
+
+    /// The next frame reads the differences of all clocks, with [`ClockDatagrams::Called`];
+    /// [`Exchange::clock_spread_ns`] is `None` until it is back.
+    pub fn monitor_clocks(&mut self) {
+        self.evidence.clocks.want_differences();
     }
 
     /// The last reading of the reference clock; `None` before the first and without distributed clocks.

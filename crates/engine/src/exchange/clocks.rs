@@ -11,6 +11,7 @@ use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::register::{EcatEvent, map};
 
+mod calls;
 mod lead;
 
 use crate::board::Board;
@@ -21,6 +22,8 @@ use crate::link::Link;
 use crate::queue::Producer;
 use crate::ring::{Arrivals, RingState};
 use crate::time::Instant;
+use calls::Calls;
+pub use calls::ClockDatagrams;
 use lead::Lead;
 
 /// Data of each datagram: the low half of a time.
@@ -70,6 +73,8 @@ pub(crate) struct Places {
 pub(crate) struct Payload {
     sync: Option<(StationAddress, u32)>,
     steer: Option<(StationAddress, u32)>,
+    /// The differences are read.
+    pub monitors: bool,
 }
 
 /// Result of the datagrams in the copies of a flight.
@@ -78,6 +83,8 @@ pub(crate) struct Seen {
     pub sent_at: Instant,
     /// References that it distributed, by number of posts.
     pub references: u32,
+    /// It reads the differences.
+    pub monitors: bool,
     /// Low half of the distributed time and working counter, by the link on which the copy was sent.
     sync: [(u32, Wkc); 2],
     spread: u32,
@@ -91,6 +98,11 @@ impl Places {
     pub(crate) fn write(&self, bytes: &mut [u8], payload: &Payload) {
         write(bytes, self.sync_at, payload.sync);
         write(bytes, self.steer_at, payload.steer);
+        // A read of another register by all has no meaning, and no effect.
+        let register = if payload.monitors { map::DC_SYSTEM_TIME_DIFFERENCE } else { RegisterAddress(0) };
+        if let Some(bytes) = bytes.get_mut(self.spread_at + 4..self.spread_at + 6) {
+            bytes.copy_from_slice(&register.0.to_le_bytes());
+        }
     }
 
     /// Takes the result of a copy.
@@ -150,6 +162,7 @@ pub(crate) struct Clocks {
     wanted: Option<u64>,
     spread_ns: Option<u32>,
     window: SyncWindow,
+    calls: Calls,
 }
 
 impl Clocks {
@@ -168,6 +181,22 @@ impl Clocks {
 
     pub(crate) fn want_reference_at(&mut self, time: u64) {
         self.wanted = Some(time);
+    }
+
+    /// When the datagrams take effect.
+    pub(crate) fn set_datagrams(&mut self, policy: ClockDatagrams) {
+        self.calls.policy = policy;
+    }
+
+    /// The next cycle distributes time.
+    pub(crate) fn want_distribution(&mut self) {
+        self.calls.distribute = true;
+    }
+
+    /// The next cycle reads the differences; the last result is forgotten.
+    pub(crate) fn want_differences(&mut self) {
+        self.calls.monitor = true;
+        self.spread_ns = None;
     }
 
     /// The last reading of the segment's reference.
@@ -192,14 +221,16 @@ impl Clocks {
         if changes != self.changes {
             self.follow(references, changes, now);
         }
-        let mut payloads = [Payload::default(); 2];
+        let (distributes, monitors) = self.calls.take();
+        let mut payloads = [Payload { monitors, ..Payload::default() }; 2];
         if board.clocks.is_held() {
             return payloads;
         }
-        let steer = self.steering(board, now);
+        let steer = self.steering(distributes, board, now);
         for link in Link::ALL {
             let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
-            payloads[link.index()] = Payload { sync, steer: steer[link.index()] };
+            payloads[link.index()].sync = sync.filter(|_| distributes);
+            payloads[link.index()].steer = steer[link.index()];
         }
         payloads
     }
@@ -225,12 +256,15 @@ impl Clocks {
 
     /// The references that receive another time than their own, and that time, by the link of the copy. In an open ring
     /// each copy passes a reference of its own; the leading one may follow the host while the other one follows it.
-    fn steering(&mut self, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
+    fn steering(&mut self, distributes: bool, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
+        let steered = steered.filter(|_| distributes);
         let to_host = self.leading(leader, board, now);
         match (leader, steered) {
             (Some(Link::Main), Some(_)) => [to_host, self.following(Link::Redundant, now)],
             (Some(Link::Redundant), Some(_)) => [self.following(Link::Main, now), to_host],
+            (Some(Link::Main), None) if self.references.redundant.is_some() => [to_host, None],
+            (Some(Link::Redundant), None) if self.references.main.is_some() => [None, to_host],
             _ => [to_host; 2],
         }
     }
@@ -242,7 +276,7 @@ impl Clocks {
         let station = self.references.on(leader)?;
         let time = match self.wanted.take() {
             Some(time) => time,
-            None if self.setup.bus_shift => self.application_time(now),
+            None if self.setup.bus_shift && self.calls.is_automatic() => self.application_time(now),
             None => return None,
         };
         board.clocks.lead_reference();
@@ -284,7 +318,7 @@ impl Clocks {
             is_held = true;
         }
         self.ports_changed = ports_changed;
-        if seen.spread_wkc > 0 {
+        if seen.spread_wkc > 0 && seen.monitors {
             // While no time is distributed, differences are those of a frame that took another way. A steered reference
             // and the clocks in front of a reference show the jitter of the host; the supervisor checks each of the
             // other clocks then.

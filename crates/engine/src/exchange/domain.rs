@@ -204,6 +204,17 @@ impl Domain {
         self.unsent = true;
     }
 
+    /// Whether frames are queued and have not left.
+    #[inline(always)]
+    pub(crate) fn is_queued(&self) -> bool {
+        self.unsent
+    }
+
+    /// Number of the set that was queued last, and its first frame.
+    pub(crate) fn queued_set(&self) -> (usize, usize) {
+        ((self.newest - self.frames.start).checked_div(self.set).unwrap_or_default(), self.newest)
+    }
+
     /// Indices of the frames that leave now; `None` where none is queued.
     #[inline(always)]
     pub(crate) fn leave(&mut self) -> Option<Range<usize>> {

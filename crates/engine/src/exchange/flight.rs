@@ -80,6 +80,8 @@ pub(crate) struct CyclicFrame {
     clocks_seen: Seen,
     headers: Box<[Header]>,
     places: Box<[Place]>,
+    /// Outputs of a datagram lie in several places of the image.
+    has_outputs_apart: bool,
     /// What copies mostly show, by the link on which they were sent.
     usual: [Usual; 2],
     presence: Option<Presence>,
@@ -136,6 +138,7 @@ impl CyclicFrame {
             clocks,
             clocks_seen: Seen::default(),
             headers: headers.into_iter().map(|at| Header { at, sent: header_at(&bytes, at) }).collect(),
+            has_outputs_apart: places.iter().any(|place| !place.outputs_apart.is_empty()),
             places: places.into_boxed_slice(),
             presence,
             first,
@@ -151,7 +154,24 @@ impl CyclicFrame {
         let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
         // The working counters of places outside are zero: they need no check.
         let places = self.places.iter().map(Place::outside).collect();
-        CyclicFrame { places, ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first) }
+        CyclicFrame {
+            places,
+            has_outputs_apart: false,
+            ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first)
+        }
+    }
+
+    /// Takes the place of a loaded frame with the same process data, which does not leave.
+    pub(crate) fn take_over(&mut self, loaded: &CyclicFrame) {
+        self.clear(loaded.left);
+        for place in &self.places {
+            place.outputs_in_frame().for_each(|span| span.take_over(&loaded.tx, &mut self.tx));
+        }
+    }
+
+    /// Whether datagrams of supervision or of distributed clocks are in it.
+    pub(crate) fn carries_service(&self) -> bool {
+        self.supervision_at.is_some() || self.clocks.is_some()
     }
 
     /// Whether it leaves without process data.
@@ -256,13 +276,27 @@ impl CyclicFrame {
     /// Copies the outputs in, to leave in this cycle, and clears the previous flight.
     #[inline(always)]
     pub(crate) fn load(&mut self, image: &[u8], cycle: u64) {
-        self.left = cycle + 1;
         for place in &mut self.places {
             place.outputs.load(image, &mut self.tx);
-            if !place.outputs_apart.is_empty() {
-                place.outputs_apart.iter().for_each(|span| span.load(image, &mut self.tx));
-            }
         }
+        if self.has_outputs_apart {
+            self.load_apart(image);
+        }
+        self.clear(cycle + 1);
+    }
+
+    /// Copies outputs in that lie in several places of the image.
+    #[inline(never)]
+    fn load_apart(&mut self, image: &[u8]) {
+        for span in self.places.iter().flat_map(|place| &place.outputs_apart) {
+            span.load(image, &mut self.tx);
+        }
+    }
+
+    /// Clears the previous flight; the next one leaves in the cycle `left` minus one.
+    #[inline(always)]
+    fn clear(&mut self, left: u64) {
+        self.left = left;
         self.wkc = 0;
         self.is_overtaken = false;
         self.complete = self.places.is_empty();
@@ -278,8 +312,9 @@ impl CyclicFrame {
         self.clocks
     }
 
-    /// The frame leaves now with these references.
-    pub(crate) fn clocks_leave(&mut self, now: Instant, references: u32) {
+    /// The frame leaves now with these references; it reads the differences of the clocks or not.
+    pub(crate) fn clocks_leave(&mut self, now: Instant, references: u32, monitors: bool) {
+        self.clocks_seen.monitors = monitors;
         self.clocks_seen.sent_at = now;
         self.clocks_seen.references = references;
     }

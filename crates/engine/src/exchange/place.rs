@@ -68,10 +68,8 @@ pub(crate) enum Brought {
     /// No inputs.
     #[default]
     Nothing,
-    /// Those of some SubDevices.
-    Part,
-    /// All inputs, which lie apart from each other in the image.
-    AllApart,
+    /// Those of some SubDevices, or all, which lie apart from each other in the image.
+    InRuns,
     /// All inputs, one piece of the image.
     All,
 }
@@ -81,6 +79,8 @@ pub(crate) enum Brought {
 struct View {
     wkc: Wkc,
     brought: Brought,
+    /// It brought all inputs.
+    is_all: bool,
     /// Working counter and presence are consistent.
     is_sure: bool,
     /// The received inputs, neighbours joined. Memory for all of them is reserved at activation.
@@ -229,11 +229,11 @@ impl Place {
                 _ => view.runs.push(segment.span),
             }
         }
+        view.is_all = count == segments.len();
         view.brought = match count {
             0 => Brought::Nothing,
-            _ if count == segments.len() && view.runs.len() == 1 => Brought::All,
-            _ if count == segments.len() => Brought::AllApart,
-            _ => Brought::Part,
+            _ if view.is_all && view.runs.len() == 1 => Brought::All,
+            _ => Brought::InRuns,
         };
     }
 
@@ -294,7 +294,7 @@ impl Place {
                     *whole = moment;
                 }
             }
-            Brought::AllApart | Brought::Part => self.deliver_runs(link, bytes, image, moment),
+            Brought::InRuns => self.deliver_runs(link, bytes, image, moment),
         }
     }
 
@@ -302,20 +302,12 @@ impl Place {
     #[inline(never)]
     fn deliver_runs(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
         let view = &self.views[link];
-        if view.brought == Brought::Part {
-            return self.deliver_part(link, bytes, image, moment);
-        }
         view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
-        if let Some(whole) = image.datagrams.get_mut(self.datagram) {
-            *whole = moment;
-        }
-    }
-
-    /// Puts the inputs of some SubDevices into the image.
-    fn deliver_part(&mut self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) {
-        let view = &self.views[link];
-        view.runs.iter().for_each(|run| run.deliver(bytes, &mut image.bytes));
-        if !image.note_share(self.datagram, link, view.share, moment) {
+        if view.is_all {
+            if let Some(whole) = image.datagrams.get_mut(self.datagram) {
+                *whole = moment;
+            }
+        } else if !image.note_share(self.datagram, link, view.share, moment) {
             let is_met = |part: usize| self.contributions[self.segments[part].contribution].met[link];
             self.views[link].share = image.take_share(self.datagram, link, is_met, moment);
         }
@@ -361,6 +353,11 @@ impl Place {
     pub fn inputs_of(&self, subdevice: usize) -> impl Iterator<Item = InputNumber> {
         let numbered = self.segments.iter().enumerate();
         numbered.filter(move |(_, segment)| segment.subdevice == subdevice).map(|(number, _)| self.number_of(number))
+    }
+
+    /// Where the outputs lie in the frame.
+    pub fn outputs_in_frame(&self) -> impl Iterator<Item = &Span> {
+        core::iter::once(&self.outputs).chain(&self.outputs_apart)
     }
 
     /// Whether outputs contain all the given bytes of the image.
@@ -456,6 +453,11 @@ impl Span {
     /// Copies from the image into the frame.
     pub fn load(&self, image: &[u8], frame: &mut [u8]) {
         copy(image, self.image_at, frame, self.frame_at, self.length);
+    }
+
+    /// Copies from a frame into another one with the same process data.
+    pub fn take_over(&self, from: &[u8], to: &mut [u8]) {
+        copy(from, self.frame_at, to, self.frame_at, self.length);
     }
 
     fn deliver(&self, frame: &[u8], image: &mut [u8]) {

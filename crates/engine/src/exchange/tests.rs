@@ -1,6 +1,7 @@
 //! Flights of a domain of three SubDevices with one byte out and one byte in each, on a ring.
 
 mod answers;
+mod parts;
 mod under_way;
 
 use core::time::Duration;

@@ -17,6 +17,7 @@ mod clocks;
 mod configuration;
 mod copies;
 mod crossed_rings;
+mod cycle_parts;
 mod declared_sync_managers;
 mod determinism;
 mod disturbed_frames;
