@@ -74,3 +74,4 @@ mod stops;
 mod topologies;
 mod unassigned;
 mod under_way;
+mod whole_state;
