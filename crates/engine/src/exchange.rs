@@ -20,9 +20,11 @@ mod evidence;
 mod flight;
 pub mod foreign;
 mod image;
+mod leaving;
 mod missed;
 mod place;
 mod presence;
+mod send_service;
 mod service;
 mod template;
 mod usual;
@@ -53,8 +55,9 @@ use evidence::Evidence;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
-use missed::Missed;
-use service::{Carrier, Service};
+use leaving::Leaving;
+use missed::{Missed, give_up};
+use service::Service;
 
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
@@ -368,40 +371,6 @@ impl Exchange {
         self.board.post_cycle(self.cycle, self.tally.counters.sent);
     }
 
-    /// Has the datagrams of supervision and clocks leave though the home domain does not: with another domain, or in a
-    /// frame of their own.
-    #[cold]
-    fn send_service(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
-        let Carrier::Alone(index) = self.service.place(&self.domains, &mut self.frames, &self.board, now) else {
-            return;
-        };
-        let timeout_ns = self.service_timeout_ns();
-        let Some(frame) = self.frames.get_mut(index) else { return };
-        if frame.is_waiting() {
-            give_up(frame, &mut self.missed, self.tally.disturbed());
-            self.board.post_lost(self.tally.counters.lost);
-        }
-        if frame.is_open() {
-            if frame.is_delivered() {
-                self.tally.disturbed().copies_lost += 1;
-            }
-            self.evidence.close(frame, &self.board, &mut self.events);
-        }
-        frame.load(&[], self.cycle);
-        self.sequence = self.sequence.next();
-        self.by_id[usize::from(self.sequence.frame_id())] = index as u16;
-        let deadline = Instant(now.0.saturating_add(timeout_ns));
-        let leaving = Leaving { identity: &self.identity, links: self.links, board: &self.board, now };
-        let bytes = leaving.send(frame, self.sequence, deadline, &mut self.evidence, transmit);
-        self.tally.counters.sent += 1;
-        self.tally.counters.bytes += bytes as u64;
-    }
-
-    /// Deadline of a frame of supervision and clocks alone: that of the home domain.
-    fn service_timeout_ns(&self) -> u64 {
-        self.domains.get(self.service.home()).map_or(0, Domain::timeout_ns)
-    }
-
     /// Applies the supervisor's changes to the participation in process data, for frames of a domain that are not on
     /// the wire. A frame gets its process data with the first SubDevice, and keeps it: a SubDevice that returns with
     /// its FMMUs set takes part at once.
@@ -414,47 +383,6 @@ impl Exchange {
             }
             frame.follow(changes, board);
         }
-    }
-}
-
-/// What frames need that leave on two links or carry datagrams of distributed clocks.
-struct Leaving<'a> {
-    identity: &'a Identity,
-    links: LinkSet,
-    board: &'a Board,
-    now: Instant,
-}
-
-impl Leaving<'_> {
-    /// Sends a frame; returns its length.
-    #[inline(never)]
-    fn send(
-        &self,
-        frame: &mut CyclicFrame,
-        sequence: Sequence,
-        deadline: Instant,
-        evidence: &mut Evidence,
-        transmit: &mut impl FnMut(Link, &[u8]),
-    ) -> usize {
-        let clocks = frame.clocks().map(|places| {
-            let payloads = evidence.clocks.depart(self.board, self.now);
-            frame.clocks_leave(self.now, evidence.clocks.changes(), payloads[0].monitors);
-            (places, payloads)
-        });
-        let bytes = frame.depart(self.identity, sequence, deadline);
-        if let Some((places, payloads)) = &clocks {
-            places.write(bytes, &payloads[0]);
-        }
-        transmit(Link::Main, bytes);
-        if self.links == LinkSet::Ring {
-            if let Some((places, payloads)) = &clocks {
-                places.write(bytes, &payloads[1]);
-            }
-            Identity::mark_redundant(bytes, true);
-            transmit(Link::Redundant, bytes);
-            Identity::mark_redundant(bytes, false);
-        }
-        bytes.len()
     }
 }
 
@@ -506,16 +434,6 @@ fn give_up_overdue(
         }
     }
     pending
-}
-
-/// Gives up a frame that is overdue.
-#[cold]
-fn give_up(frame: &mut CyclicFrame, missed: &mut Missed, counters: &mut CyclicCounters) {
-    if frame.give_up() {
-        missed.give_up(frame.sequence(), counters);
-    } else {
-        counters.half += 1;
-    }
 }
 
 #[cfg(test)]

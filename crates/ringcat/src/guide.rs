@@ -6,6 +6,7 @@
 //! 4. [`mailbox`]: objects, files, IDNs, firmware
 //! 5. [`several_threads`]: cycles in a thread of their own, services from any other
 //! 6. [`testing`]: an application against the simulator, in its own CI
+//! 7. [`known_places`]: offsets before activation, cycles in parts
 
 #[doc = include_str!("../guide/first-application.md")]
 pub mod first_application {}
@@ -24,3 +25,6 @@ pub mod several_threads {}
 
 #[doc = include_str!("../guide/testing.md")]
 pub mod testing {}
+
+#[doc = include_str!("../guide/known-places.md")]
+pub mod known_places {}

@@ -122,7 +122,7 @@ pub use ringcat_engine::config::{
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{Event, EventsSince, Occupant, TimedEvent};
-pub use ringcat_engine::exchange::ReferenceTime;
+pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
 pub use ringcat_engine::junction::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};

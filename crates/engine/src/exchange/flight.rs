@@ -6,8 +6,9 @@
 //! Each copy is judged by itself, and its inputs are delivered when it arrives ([`super::place`]).
 //! While no SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
+mod variants;
+
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 use core::ops::Range;
 
 use ringcat_wire::address::Wkc;
@@ -148,37 +149,6 @@ impl CyclicFrame {
         }
     }
 
-    /// A frame that replaces this one while none of its SubDevices has its FMMUs: without process data, which no
-    /// SubDevice would answer. Its working counters are zero, and it stands for the same inputs and outputs.
-    pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
-        let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
-        // The working counters of places outside are zero: they need no check.
-        let places = self.places.iter().map(Place::outside).collect();
-        CyclicFrame {
-            places,
-            has_outputs_apart: false,
-            ..CyclicFrame::new(identity, self.all_links, self.domain, &bare, self.first)
-        }
-    }
-
-    /// Takes the place of a loaded frame with the same process data, which does not leave.
-    pub(crate) fn take_over(&mut self, loaded: &CyclicFrame) {
-        self.clear(loaded.left);
-        for place in &self.places {
-            place.outputs_in_frame().for_each(|span| span.take_over(&loaded.tx, &mut self.tx));
-        }
-    }
-
-    /// Whether datagrams of supervision or of distributed clocks are in it.
-    pub(crate) fn carries_service(&self) -> bool {
-        self.supervision_at.is_some() || self.clocks.is_some()
-    }
-
-    /// Whether it leaves without process data.
-    pub(crate) fn is_vacant(&self) -> bool {
-        self.places.iter().any(Place::is_outside)
-    }
-
     /// Whether the frame needs process data, because a SubDevice with process data in it takes part.
     pub(crate) fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
         self.places.iter().any(|place| place.concerns(&takes_part))
@@ -283,14 +253,6 @@ impl CyclicFrame {
             self.load_apart(image);
         }
         self.clear(cycle + 1);
-    }
-
-    /// Copies outputs in that lie in several places of the image.
-    #[inline(never)]
-    fn load_apart(&mut self, image: &[u8]) {
-        for span in self.places.iter().flat_map(|place| &place.outputs_apart) {
-            span.load(image, &mut self.tx);
-        }
     }
 
     /// Clears the previous flight; the next one leaves in the cycle `left` minus one.

@@ -6,6 +6,7 @@
 use alloc::boxed::Box;
 
 use super::counters::CyclicCounters;
+use super::flight::CyclicFrame;
 use crate::ring::Sequence;
 
 /// Fate of a frame.
@@ -62,6 +63,16 @@ impl Missed {
             *place = (sequence, Fate::None);
             counters.lost_late += 1;
         }
+    }
+}
+
+/// Gives up a frame that is overdue.
+#[cold]
+pub(crate) fn give_up(frame: &mut CyclicFrame, missed: &mut Missed, counters: &mut CyclicCounters) {
+    if frame.give_up() {
+        missed.give_up(frame.sequence(), counters);
+    } else {
+        counters.half += 1;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Event, Links, Options, RingState, Scan, TimedEvent, automatic};
+use ringcat::{DomainId, DomainState, Event, Options, RingState, Scan, TimedEvent, automatic};
 use ringcat_sim::cable::CableId;
 use scenarios::check::ring_events;
 use scenarios::segments::ring_of_16;
@@ -17,8 +17,7 @@ fn send_only(world: &mut World, cycles: u32, period: Duration) -> Vec<TimedEvent
         let application = world.application_mut();
         application.receive();
         application.send();
-        let wake = application.now() + period;
-        application.links_mut().sleep(wake);
+        world.network_mut().advance_by(period);
         events.extend(std::iter::from_fn(|| world.application_mut().pop_event()));
     }
     events
@@ -31,7 +30,7 @@ fn a_cut_is_reported_though_no_domain_is_queued() {
         let mut world = World::new(seed, ring_of_16(FAST));
         let events = send_only(&mut world, 400, period);
         assert_eq!(world.application().ring(), RingState::Closed, "seed {seed}");
-        assert!(!events.iter().any(|timed| matches!(timed.event, Event::RingBroken { .. })), "seed {seed}");
+        assert!(!events.iter().any(|timed| matches!(timed.event, Event::RingOpened { .. })), "seed {seed}");
         world.cut(CableId(3));
         let cut = send_only(&mut world, 400, period);
         assert_eq!(world.application().ring(), RingState::Open, "seed {seed}");
@@ -50,6 +49,7 @@ fn a_domain_that_is_queued_now_and_then_is_complete_beside_supervision() {
     let slow = |scan: &Scan| automatic(&scan.subdevices, 4 * CYCLE);
     let mut world = World::with(4, ring_of_16(FAST), &Options::default(), slow).expect("activation");
     world.settle();
+    world.network_mut().advance_by(CYCLE);
     let lost = world.application().cyclic_counters().lost;
     for round in 0..200 {
         let application = world.application_mut();
@@ -60,8 +60,7 @@ fn a_domain_that_is_queued_now_and_then_is_complete_beside_supervision() {
             assert!(application.queue(DomainId(0)));
         }
         application.send();
-        let wake = application.now() + CYCLE;
-        application.links_mut().sleep(wake);
+        world.network_mut().advance_by(CYCLE);
     }
     assert_eq!(world.application().cyclic_counters().lost, lost);
 }

@@ -3,12 +3,13 @@
 
 /// When the datagrams of distributed clocks take effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ClockDatagrams {
     /// In each cycle: time is distributed, the reference follows the host where that is declared, differences are read.
     #[default]
     Automatic,
-    /// Only what the application called for since the last [`crate::exchange::Exchange::send`], as with IgH's interface:
-    /// [`sync_clocks`](crate::exchange::Exchange::sync_clocks),
+    /// Only what the application called for since the last [`send`](crate::exchange::Exchange::send), as with IgH's
+    /// interface: [`sync_clocks`](crate::exchange::Exchange::sync_clocks),
     /// [`sync_reference`](crate::exchange::Exchange::sync_reference),
     /// [`sync_reference_to`](crate::exchange::Exchange::sync_reference_to),
     /// [`monitor_clocks`](crate::exchange::Exchange::monitor_clocks).
