@@ -1,6 +1,6 @@
 //! Ends the wait of another thread.
 //!
-//! Output: a [`Waker`], for any thread; its use costs one system call. The thread that waits sees it in the same `ppoll`
+//! Output: a [`Waker`], for any thread; its use costs one system call. The waiting thread sees it in the same `ppoll`
 //! as its sockets ([`crate::waiting::wait_or_wake`]). A wake-up that comes before the wait ends it at once.
 
 use std::os::fd::{AsRawFd, OwnedFd, RawFd};

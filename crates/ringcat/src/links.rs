@@ -35,9 +35,9 @@ pub trait Links {
         None
     }
 
-    /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before the wait ends the
-    /// next one. `None` where these links have none: the acyclic half in a thread of its own then reads
-    /// its requests every half millisecond.
+    /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before a wait
+    /// ends it at once. `None` where these links have none: the acyclic half in a thread of its own then reads its
+    /// requests every half millisecond.
     fn waker(&self) -> Option<Waker> {
         None
     }

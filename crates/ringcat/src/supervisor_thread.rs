@@ -1,19 +1,21 @@
 //! The acyclic half in a thread of its own, with links of its own.
 //!
 //! The thread sleeps until a frame, a deadline or a request comes, and reads once per cycle whether the cyclic half has
-//! posted anything new; the cyclic half makes no system call for it. It sends in the windows that the cyclic half leaves
-//! ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a living
-//! bus behind it.
+//! posted anything new; the cyclic half makes no system call for this. It sends in the windows that the cyclic half
+//! leaves ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a
+//! living bus behind it.
+
+mod worker;
 
 use std::future::Future;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
@@ -26,65 +28,19 @@ use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 use ringcat_wire::al::AlState;
 
-use crate::acyclic::{AcyclicHalf, work};
+use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::error::Error;
 use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
-use crate::not_ready::{Failures, Reason};
+use crate::not_ready::Reason;
 use crate::subdevice::{SubDeviceName, info};
 use crate::window::Window;
+use worker::{Attention, Published, Request, Rest, Worker};
 
-/// Work that reads other threads' queues, and requests on links without a waker, wait for so long at most.
-const LONGEST_SLEEP: Duration = Duration::from_micros(500);
-/// And for so long after a recent request, so that a sequence of requests does not wait for each one.
-const SHORT_SLEEP: Duration = Duration::from_micros(50);
-/// How long that is.
-const ATTENTIVE: Duration = Duration::from_millis(2);
-/// What others may see is brought up to date this often where no event does it earlier.
-const PUBLISH: Duration = Duration::from_millis(10);
-/// Events that may wait to be fetched; further ones are dropped and counted.
-const EVENTS: usize = 4096;
 /// A thread that waits for a scan looks at other things this often.
 const MEANWHILE: Duration = Duration::from_millis(10);
-
-/// Begins work. Work of the engine stays in the thread that made it.
-type Begin = Box<dyn FnOnce(&mut Engine, Instant) -> Task + Send>;
-
-/// What another thread requests.
-struct Request {
-    attention: Attention,
-    begin: Begin,
-}
-
-/// When work that has begun has a turn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Attention {
-    /// When the engine has done something.
-    Engine,
-    /// Every half millisecond: it reads queues that other threads fill.
-    #[cfg(any(feature = "eoe", feature = "gateway"))]
-    Often,
-}
-
-/// What the thread makes known.
-#[derive(Debug, Default)]
-struct Published {
-    settled: AtomicBool,
-    /// Events that wait to be fetched.
-    waiting: AtomicUsize,
-    rest: Mutex<Rest>,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Rest {
-    states: Vec<SubDeviceState>,
-    ring: RingStatus,
-    counters: AcyclicCounters,
-    events_dropped: u64,
-    failures: Failures,
-}
 
 /// A MainDevice whose acyclic half runs in a thread of its own: a handle, of which any thread may have one.
 ///
@@ -118,28 +74,13 @@ impl SupervisorThread {
         let published = Arc::new(Published::default());
         let window = Arc::new(Window::new(options.acyclic_bytes));
         let options = options.clone();
-        let (waker, has_waker) = (links.waker(), links.waker().is_some());
+        let waker = links.waker();
         let (shared, windows) = (published.clone(), window.clone());
         let body = move || {
             prepare();
             // The engine is made here because its procedures stay in the thread that made them.
             let engine = options.engine(&links);
-            let worker = Worker {
-                links,
-                engine,
-                window: windows,
-                asked: Vec::new(),
-                tasks: Vec::new(),
-                has_waker,
-                events: outgoing,
-                events_dropped: 0,
-                failures: Failures::default(),
-                published: shared,
-                publish_at: Instant(0),
-                blocked_until: None,
-                attentive_until: Instant(0),
-            };
-            worker.run(&incoming);
+            Worker::new(links, engine, windows, outgoing, shared).run(&incoming);
         };
         let thread = std::thread::Builder::new().name("supervisor".into()).spawn(body).map_err(Error::Thread)?;
         let (requests, events) = (Some(requests), Mutex::new(events));
@@ -418,135 +359,3 @@ impl AcyclicHalf for SupervisorThread {
 
 /// A running application, or both parts for another try.
 pub type Activated<C> = Result<Application<C, SupervisorThread>, Box<Refused<(SupervisorThread, C)>>>;
-
-/// What runs in the thread.
-struct Worker<L> {
-    links: L,
-    engine: Engine,
-    window: Arc<Window>,
-    asked: Vec<Request>,
-    tasks: Vec<(Attention, Task)>,
-    /// Other threads can end a sleep.
-    has_waker: bool,
-    events: Sender<TimedEvent>,
-    events_dropped: u64,
-    failures: Failures,
-    published: Arc<Published>,
-    publish_at: Instant,
-    /// Until when the next request is expected soon.
-    attentive_until: Instant,
-    /// When there may be room for datagrams that wait.
-    blocked_until: Option<Instant>,
-}
-
-impl<L: Links> Worker<L> {
-    fn run(mut self, incoming: &Receiver<Request>) {
-        loop {
-            let now = self.links.now();
-            let Worker { links, engine, .. } = &mut self;
-            let mut has_work = false;
-            while links.receive(&mut |link, frame| {
-                engine.receive(link, frame, now);
-            }) {
-                has_work = true;
-            }
-            loop {
-                match incoming.try_recv() {
-                    Ok(request) => self.asked.push(request),
-                    Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            }
-            if has_work || self.is_due(now) {
-                self.turn();
-            }
-            let now = self.links.now();
-            self.links.wait_from(now, self.next_turn(now).max(now));
-        }
-    }
-
-    /// Whether there is work without a frame.
-    fn is_due(&mut self, now: Instant) -> bool {
-        let Worker { links, engine, .. } = self;
-        engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
-        !self.asked.is_empty()
-            || self.is_often()
-            || now >= self.publish_at
-            || self.blocked_until.is_some_and(|at| now >= at)
-            || self.engine.next_deadline().is_some_and(|at| now >= at)
-    }
-
-    /// Whether there is work for which other threads do not end a sleep.
-    fn is_often(&self) -> bool {
-        !self.has_waker || self.tasks.iter().any(|(attention, _)| *attention != Attention::Engine)
-    }
-
-    fn turn(&mut self) {
-        let Worker { links, engine, window, .. } = self;
-        let blocked = work(engine, links, window);
-        let mut asked = !self.asked.is_empty();
-        let news = self.pass_on_events();
-        self.publish(news);
-        asked |= self.answer();
-        let now = self.links.now();
-        if asked {
-            self.attentive_until = now + ATTENTIVE;
-        }
-        self.blocked_until = blocked.then(|| self.window.look_again(now));
-    }
-
-    /// The end of a sleep: a deadline, room on the wire, or the next reading of words that do not end a sleep.
-    fn next_turn(&self, now: Instant) -> Instant {
-        let longest = match self.is_often() {
-            true if now < self.attentive_until => now + SHORT_SLEEP,
-            true => now + LONGEST_SLEEP,
-            false => self.publish_at.min(self.window.next_reading(now)),
-        };
-        let wake = self.engine.next_deadline().unwrap_or(Instant::NEVER);
-        wake.min(self.blocked_until.unwrap_or(Instant::NEVER)).min(longest)
-    }
-
-    /// Begins what was asked for, and gives all tasks a turn; true where any has ended.
-    fn answer(&mut self) -> bool {
-        let now = self.links.now();
-        let Worker { asked, tasks, engine, .. } = self;
-        tasks.extend(asked.drain(..).map(|request| (request.attention, (request.begin)(engine, now))));
-        let before = tasks.len();
-        tasks.retain_mut(|(_, task)| !task(engine, now));
-        tasks.len() < before
-    }
-
-    /// True where there were any.
-    fn pass_on_events(&mut self) -> bool {
-        let now = self.links.now();
-        let mut any = false;
-        while let Some(event) = self.engine.pop_event(now) {
-            self.failures.observe(&event);
-            any |= !matches!(event.event, Event::Skipped { .. } | Event::Domain { .. });
-            // A bounded channel would keep memory for as many from the beginning.
-            let has_room = self.published.waiting.fetch_add(1, Ordering::AcqRel) < EVENTS;
-            if !has_room || self.events.send(event).is_err() {
-                self.published.waiting.fetch_sub(1, Ordering::AcqRel);
-                self.events_dropped += 1;
-            }
-        }
-        any
-    }
-
-    fn publish(&mut self, news: bool) {
-        let now = self.links.now();
-        if !news && now < self.publish_at {
-            return;
-        }
-        self.publish_at = now + PUBLISH;
-        let rest = Rest {
-            states: self.engine.states(),
-            ring: self.engine.ring_status(),
-            counters: self.engine.counters(),
-            events_dropped: self.events_dropped + self.engine.events_dropped(),
-            failures: self.failures.clone(),
-        };
-        *self.published.rest.lock().unwrap_or_else(PoisonError::into_inner) = rest;
-        self.published.settled.store(self.engine.all_settled(), Ordering::Release);
-    }
-}

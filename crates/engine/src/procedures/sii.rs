@@ -23,6 +23,7 @@ use ringcat_wire::sii::{CategoryHeader, CategoryKind, Identity, SiiHeader};
 pub use cache::SiiCache;
 use cache::{FixedArea, Found};
 pub use contents::{ChainEnd, SiiContents};
+use contents::{HEADER_WORDS, is_needed};
 use eeprom::Eeprom;
 pub use error::SiiReadError;
 use pace::Pace;
@@ -38,28 +39,12 @@ const MAX_WORDS: u32 = 0x8000;
 const IDENTITY_WORD: u32 = 0x08;
 /// Value of an EEPROM that was never written, or behind its end.
 const ERASED: u8 = 0xFF;
-/// Words before the categories.
-const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
 /// Words of the fixed area that are read: all but reserved words (protocol 4.1). Words 0x20 to 0x23 are reserved too,
 /// but in many real images with otherwise equal fixed areas and different categories only these words differ, so they
 /// are read.
 const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
 /// Interval of the check whether another procedure has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
-
-/// Whether the engine uses a category.
-const fn is_needed(kind: CategoryKind) -> bool {
-    matches!(
-        kind,
-        CategoryKind::Strings
-            | CategoryKind::General
-            | CategoryKind::Fmmu
-            | CategoryKind::SyncManager
-            | CategoryKind::TxPdo
-            | CategoryKind::RxPdo
-            | CategoryKind::Dc
-    )
-}
 
 /// Reads the SII of one SubDevice, which must be assigned to EtherCAT: the fixed area and the categories that the
 /// engine uses.
@@ -122,8 +107,8 @@ async fn own_headers(eeprom: &mut Eeprom, area: &FixedArea) -> Result<Headers, S
     Ok((chain, contents.end))
 }
 
-/// Reads words of others with the same fixed area, as long as there are any that too few SubDevices read. An EEPROM that
-/// fails does not help; its own data is not needed yet.
+/// Reads words of others with the same fixed area, as long as there are any that too few SubDevices read. An EEPROM
+/// that fails does not help; its own data is not needed yet.
 async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, words: &SharedWords) {
     if !matches!(end, ChainEnd::Sound { .. }) {
         return;

@@ -174,6 +174,9 @@ impl Drop for Claim {
         self.entries.borrow_mut().retain_mut(|entry| match &mut entry.known {
             Known::Once { read, readers } if entry.area == self.area => {
                 *readers = readers.saturating_sub(1);
+                if *readers == 0 {
+                    entry.words = SharedWords::default();
+                }
                 read.is_some() || *readers > 0
             }
             _ => true,

@@ -4,6 +4,23 @@ use alloc::vec::Vec;
 
 use ringcat_wire::sii::{Category, CategoryKind, SiiHeader};
 
+/// Words before the categories.
+pub(super) const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
+
+/// Whether the engine uses a category.
+pub(super) const fn is_needed(kind: CategoryKind) -> bool {
+    matches!(
+        kind,
+        CategoryKind::Strings
+            | CategoryKind::General
+            | CategoryKind::Fmmu
+            | CategoryKind::SyncManager
+            | CategoryKind::TxPdo
+            | CategoryKind::RxPdo
+            | CategoryKind::Dc
+    )
+}
+
 /// Contents of an SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SiiContents {

@@ -1,6 +1,6 @@
 //! Words of an SII that several SubDevices with the same fixed area read together.
 //!
-//! An EEPROM takes half a millisecond for each 8 bytes, so the reading of a single SII determines how long a scan takes.
+//! An EEPROM takes half a millisecond for each 8 bytes, so the reading of one SII determines how long a scan takes.
 //! Two SubDevices read the categories from the beginning, the others help from the end. A word is used for another
 //! SubDevice only if two SubDevices have returned the same value, as in the cache. Where two values differ, nothing is
 //! shared any more; differing names only end the sharing of names, because names have no effect.
@@ -14,7 +14,7 @@ use core::ops::Range;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::sii::{CategoryHeader, CategoryKind};
 
-use super::{HEADER_WORDS, is_needed};
+use super::contents::{HEADER_WORDS, is_needed};
 
 /// SubDevices that read a word.
 const READERS: usize = 2;
