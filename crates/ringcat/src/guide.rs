@@ -7,6 +7,9 @@
 //! 5. [`several_threads`]: cycles in a thread of their own, services from any other
 //! 6. [`testing`]: an application against the simulator, in its own CI
 
+// Of two definitions of a link the first one counts: in a page it leads to the file beside it, here to the module.
+/// [a drive with clocks]: drive_with_clocks
+///
 #[doc = include_str!("../guide/first-application.md")]
 pub mod first_application {}
 
