@@ -110,7 +110,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
         watch.until(&cycles, &mut course, now() + arguments.lasts, false)?;
     }
     end.no_limit();
-    let clocks = cycles.supervisor().with(|engine| engine.clocks())?;
+    let clocks = cycles.supervisor().clocks()?;
     let settled = cycles.supervisor().all_settled();
     let mut reasons = reasons(&clocks, locked, settled);
     reasons.extend(end.cut_short(Some(arguments.lasts)));

@@ -23,6 +23,7 @@ use crate::json::data::Data;
 use crate::json::demo;
 use crate::json::scan::SubDevice;
 use crate::json::values::State;
+use crate::numbers::number;
 use crate::table;
 use crate::verdict::{Report, Verdict};
 use incident::Incident;
@@ -52,7 +53,7 @@ pub struct DemoArguments {
         long,
         value_name = "US",
         help_heading = "Cycle",
-        value_parser = clap::value_parser!(u64).range(50..=1_000_000)
+        value_parser = number(50u64..=1_000_000, 1_000)
     )]
     cycle_us: Option<u64>,
     /// Run in virtual time, as fast as the machine can

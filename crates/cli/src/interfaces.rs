@@ -8,6 +8,7 @@ use ringcat::{Link, MIN_DATAGRAMS_PER_FRAME, MacCodec, Options};
 use ringcat_link::interface;
 
 use crate::failure::Failure;
+use crate::numbers::number;
 use crate::others::{check_frames, check_sockets};
 use crate::output::warn;
 use crate::thread::ThreadArguments;
@@ -80,7 +81,7 @@ pub struct InterfaceArguments {
     #[arg(
         long,
         value_name = "COUNT",
-        value_parser = clap::value_parser!(u16).range(i64::from(MIN_DATAGRAMS_PER_FRAME)..)
+        value_parser = number(MIN_DATAGRAMS_PER_FRAME..=u16::MAX, 15)
     )]
     pub max_datagrams: Option<u16>,
     /// Go on although another MainDevice uses the interface

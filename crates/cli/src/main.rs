@@ -11,6 +11,7 @@ mod eni_summary;
 mod failure;
 mod interfaces;
 mod json;
+mod numbers;
 mod others;
 mod output;
 mod recording;
@@ -26,11 +27,16 @@ mod times;
 mod under_way;
 mod verdict;
 
+use std::io::{IsTerminal, stdout};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use verdict::{conclude, conclude_error_told};
+use verdict::{conclude, conclude_error_told, conclude_text};
+
+/// Width of help that does not go to a terminal.
+const PIPE_WIDTH: usize = 80;
 
 /// What a new user needs first.
 const FIRST_STEPS: &str = "\
@@ -115,7 +121,11 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let mut program = Arguments::command();
+    if !stdout().is_terminal() {
+        program = program.term_width(PIPE_WIDTH);
+    }
+    let arguments = match program.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => arguments,
         Err(error) => return explain(&error),
     };
@@ -155,13 +165,18 @@ impl Command {
 
 /// Help, the version, or what is wrong with the command line.
 fn explain(error: &clap::Error) -> ExitCode {
+    if std::env::args_os().any(|argument| argument == "--json") {
+        output::switch_to_json(None);
+    }
+    if output::is_json() && !error.use_stderr() {
+        let text = error.to_string();
+        let first = if error.kind() == ErrorKind::DisplayVersion { text.trim() } else { "help" };
+        return conclude_text(first, text.lines().map(str::to_owned).collect());
+    }
     // The only error that is likely is a closed pipe.
     let _ = error.print();
     if !error.use_stderr() {
         return ExitCode::SUCCESS;
-    }
-    if std::env::args_os().any(|argument| argument == "--json") {
-        output::switch_to_json(None);
     }
     let (message, details) = message_of(&error.to_string());
     conclude_error_told(&message, details)
@@ -182,8 +197,6 @@ fn message_of(text: &str) -> (String, Vec<String>) {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     /// All commands, those of `bench` too.

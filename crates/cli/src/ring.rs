@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::text::Names;
-use ringcat::wire::address::StationAddress;
-use ringcat::{Cable, CableErrors, Link, MainDevice, Occupant, RingLook, RingState};
+use ringcat::wire::address::{Position, StationAddress};
+use ringcat::{Cable, CableErrors, Link, LinkCounts, MainDevice, Occupant, RingInspection, RingState};
 
 use crate::access::AccessArguments;
 use crate::ending::EndRequest;
@@ -53,11 +53,11 @@ pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
     let links = recording.tee(links);
     let _awake = thread.apply();
     let mut main_device = MainDevice::request(links, &interfaces.options());
-    let mut look = main_device.look_at_ring()?;
+    let mut inspection = main_device.inspect_ring()?;
     if let Some(lasts) = arguments.lasts {
         std::thread::sleep(lasts);
-        let before = std::mem::replace(&mut look, main_device.look_at_ring()?);
-        for ((cable, errors), (same, earlier)) in look.cables.iter_mut().zip(&before.cables) {
+        let before = std::mem::replace(&mut inspection, main_device.inspect_ring()?);
+        for ((cable, errors), (same, earlier)) in inspection.cables.iter_mut().zip(&before.cables) {
             if cable == same {
                 *errors = gained(*earlier, *errors);
             }
@@ -65,15 +65,19 @@ pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
     }
     let two_links = interfaces.links.redundant.is_some();
     drop(main_device);
-    let verdict = verdict(&look, two_links).and(recording.finish());
-    lines(&look, two_links).iter().for_each(|line| say!("{line}"));
-    Ok(Report { verdict, data: Data::Ring(json(&look, two_links)) })
+    let verdict = verdict(&inspection, two_links).and(recording.finish());
+    lines(&inspection, two_links).iter().for_each(|line| say!("{line}"));
+    Ok(Report { verdict, data: Data::Ring(json(&inspection, two_links)) })
 }
 
 /// Whether there is a ring where two links are to make one.
-fn verdict(look: &RingLook, two_links: bool) -> Verdict {
-    let count = counted(usize::from(look.counts.0) + usize::from(look.counts.1), "SubDevice", "SubDevices");
-    match look.state {
+fn verdict(inspection: &RingInspection, two_links: bool) -> Verdict {
+    let count = counted(
+        usize::from(inspection.counts.main) + usize::from(inspection.counts.redundant),
+        "SubDevice",
+        "SubDevices",
+    );
+    match inspection.state {
         _ if !two_links => Verdict::Held(format!("one link, {count}")),
         RingState::Closed => Verdict::Held(format!("the ring is closed, {count}")),
         RingState::Open => Verdict::Failed(format!("the ring is open, {count}")),
@@ -89,19 +93,19 @@ fn gained(before: CableErrors, now: CableErrors) -> CableErrors {
 }
 
 /// The station address of a position, where the MainDevice in charge has given one.
-fn station(look: &RingLook, node: usize) -> Option<StationAddress> {
-    look.stations.get(node).copied().filter(|station| station.0 != 0)
+fn station(inspection: &RingInspection, position: Position) -> Option<StationAddress> {
+    inspection.stations.get(usize::from(position.0)).copied().filter(|station| station.0 != 0)
 }
 
 /// The SubDevices at both ends of a cable. This command knows no declaration.
-fn ends(look: &RingLook, cable: Cable) -> [Option<Occupant>; 2] {
-    cable.positions().map(|node| Some(Occupant::new(station(look, node?)?, None)))
+fn ends(inspection: &RingInspection, cable: Cable) -> [Option<Occupant>; 2] {
+    cable.positions().map(|position| Some(Occupant::new(station(inspection, position?)?, None)))
 }
 
-fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
+fn lines(inspection: &RingInspection, two_links: bool) -> Vec<String> {
     let names = Names::default();
-    let (main, redundant) = look.counts;
-    let state = match look.state {
+    let LinkCounts { main, redundant, .. } = inspection.counts;
+    let state = match inspection.state {
         _ if !two_links => "one link",
         RingState::Closed => "closed",
         RingState::Open => "OPEN: the next break isolates SubDevices",
@@ -112,33 +116,33 @@ fn lines(look: &RingLook, two_links: bool) -> Vec<String> {
     {
         lines.push(format!("{:<11} {count} SubDevices", link.to_string()));
     }
-    if two_links && look.topology.is_assumed() {
+    if two_links && inspection.topology.is_assumed() {
         let swapped = "interfaces swapped: MAIN is plugged in at the end of the ring";
         let crossed = "line crossed, or a branch on port 2: which SubDevices are neighbours is assumed below";
-        lines.push(format!("cabling     {}", if look.topology.main_count == 0 { swapped } else { crossed }));
+        lines.push(format!("cabling     {}", if inspection.topology.main_count == 0 { swapped } else { crossed }));
     }
-    if let Some(place) = look.place {
-        lines.push(format!("line break  {}", names.cable(place, ends(look, place))));
+    if let Some(place) = inspection.place {
+        lines.push(format!("line break  {}", names.cable(place, ends(inspection, place))));
     }
     lines.push(String::from("damaged frames, lost links of each cable:"));
-    for (cable, errors) in &look.cables {
-        let mark = if look.place == Some(*cable) { "  <- line break" } else { "" };
+    for (cable, errors) in &inspection.cables {
+        let mark = if inspection.place == Some(*cable) { "  <- line break" } else { "" };
         lines.push(format!(
             "{:>6} {:>6}  {}{mark}",
             errors.invalid_frames,
             errors.lost_links,
-            names.cable(*cable, ends(look, *cable))
+            names.cable(*cable, ends(inspection, *cable))
         ));
     }
     lines
 }
 
-fn json(look: &RingLook, two_links: bool) -> ring::Ring {
+fn json(inspection: &RingInspection, two_links: bool) -> ring::Ring {
     let end = |port: Option<ringcat::PortOf>| {
         port.map(|at| ring::CableEnd {
-            position: at.node,
-            station: station(look, at.node).map(|it| it.0),
-            port: at.port,
+            position: usize::from(at.position().0),
+            station: station(inspection, at.position()).map(|it| it.0),
+            port: at.port(),
         })
     };
     let cable = |cable: Cable| ring::Cable { near: end(cable.near), far: end(cable.far) };
@@ -149,11 +153,11 @@ fn json(look: &RingLook, two_links: bool) -> ring::Ring {
         lost_links: errors.lost_links,
     };
     ring::Ring {
-        ring: two_links.then(|| look.state.into()),
-        main_subdevices: look.counts.0,
-        redundant_subdevices: look.counts.1,
-        line_break: look.place.map(cable),
-        cables: look.cables.iter().map(errors).collect(),
+        ring: two_links.then(|| inspection.state.into()),
+        main_subdevices: inspection.counts.main,
+        redundant_subdevices: inspection.counts.redundant,
+        line_break: inspection.place.map(cable),
+        cables: inspection.cables.iter().map(errors).collect(),
     }
 }
 
@@ -167,7 +171,11 @@ mod tests {
     const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\n\
                         type = \"digital-output-8\"\n[[device]]\ntype = \"digital-input-8\"\n";
 
-    fn look(cut: Option<usize>, corrupt: Option<usize>) -> RingLook {
+    fn counts(inspection: &RingInspection) -> (u16, u16) {
+        (inspection.counts.main, inspection.counts.redundant)
+    }
+
+    fn look(cut: Option<usize>, corrupt: Option<usize>) -> RingInspection {
         let mut segment = SimulatedSegment::from_toml(RING).unwrap();
         let network = segment.network_mut();
         network.advance_by(Duration::from_millis(20));
@@ -179,15 +187,15 @@ mod tests {
             network.apply(ringcat::sim::fault::Fault::Corrupt { cable, direction: None, count: 2 });
         }
         network.advance_by(Duration::from_millis(20));
-        MainDevice::request(segment, &Options::default()).look_at_ring().unwrap()
+        MainDevice::request(segment, &Options::default()).inspect_ring().unwrap()
     }
 
     // covers: ring-status
     #[test]
     fn a_closed_ring_is_shown_with_every_cable() {
-        let look = look(None, None);
-        assert_eq!((look.state, look.counts, look.place), (RingState::Closed, (3, 0), None));
-        let lines = lines(&look, true);
+        let inspection = look(None, None);
+        assert_eq!((inspection.state, counts(&inspection), inspection.place), (RingState::Closed, (3, 0), None));
+        let lines = lines(&inspection, true);
         assert_eq!(lines[0], "ring        closed");
         assert_eq!(lines[2], "REDUNDANT   0 SubDevices");
         assert_eq!(lines[4], "     0      0  between the MAIN interface and SubDevice 0 port 0");
@@ -210,14 +218,14 @@ mod tests {
         let mut segment = SimulatedSegment::new(network.unwrap());
         segment.network_mut().advance_by(Duration::from_millis(20));
         let mut main_device = MainDevice::request(segment, &Options::default());
-        let look = main_device.look_at_ring().unwrap();
-        assert_eq!((look.state, look.counts), (RingState::Closed, (0, 2)));
-        let lines = lines(&look, true);
+        let inspection = main_device.inspect_ring().unwrap();
+        assert_eq!((inspection.state, counts(&inspection)), (RingState::Closed, (0, 2)));
+        let lines = lines(&inspection, true);
         assert!(lines[3].contains("interfaces swapped"), "{lines:?}");
         assert!(lines[5].ends_with("between SubDevice 0 port 0 and the REDUNDANT interface"), "{lines:?}");
         assert!(lines[7].ends_with("between the MAIN interface and SubDevice 1 port 1"), "{lines:?}");
         [0, 2].map(CableId).into_iter().for_each(|cable| main_device.links_mut().network_mut().cut(cable));
-        let error = main_device.look_at_ring().unwrap_err().to_string();
+        let error = main_device.inspect_ring().unwrap_err().to_string();
         assert!(error.contains("no frame returns"), "{error}");
     }
 
@@ -229,7 +237,7 @@ mod tests {
         let joined = builder.cable(Endpoint::Host(HostLink::Main), Endpoint::Host(HostLink::Redundant)).build();
         let mut segment = SimulatedSegment::new(joined.unwrap());
         segment.network_mut().advance_by(Duration::from_millis(20));
-        let error = MainDevice::request(segment, &Options::default()).look_at_ring().unwrap_err();
+        let error = MainDevice::request(segment, &Options::default()).inspect_ring().unwrap_err();
         let text = Failure::from(error).to_string();
         assert!(text.contains("frames return, but no SubDevice processes them"), "{text}");
         assert!(text.ends_with("something sends the frames back unchanged: is this the cable to the SubDevices?"));
@@ -239,15 +247,15 @@ mod tests {
     #[test]
     fn the_place_of_a_break_and_damaged_frames_are_shown_wherever_they_are() {
         for cable in 0..=3 {
-            let look = look(Some(cable), None);
-            assert_eq!((look.state, look.counts), (RingState::Open, (cable as u16, 3 - cable as u16)));
-            assert_eq!(look.place, Some(look.cables[cable].0), "cable {cable}");
-            assert!(lines(&look, true).iter().any(|line| line.ends_with("<- line break")));
-            assert_eq!(json(&look, true).ring, Some(crate::json::values::Ring::Open));
+            let inspection = look(Some(cable), None);
+            assert_eq!((inspection.state, counts(&inspection)), (RingState::Open, (cable as u16, 3 - cable as u16)));
+            assert_eq!(inspection.place, Some(inspection.cables[cable].0), "cable {cable}");
+            assert!(lines(&inspection, true).iter().any(|line| line.ends_with("<- line break")));
+            assert_eq!(json(&inspection, true).ring, Some(crate::json::values::Ring::Open));
         }
         for cable in 0..=3 {
-            let look = look(None, Some(cable));
-            let counted: Vec<u64> = look.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
+            let inspection = look(None, Some(cable));
+            let counted: Vec<u64> = inspection.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
             let at_the_host = cable == 0 || cable == 3;
             // No port counts what is damaged on the way to the host.
             let expected = if at_the_host { 1..=2 } else { 2..=4 };

@@ -92,7 +92,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         run.exchange(until, &end);
     }
     end.no_limit();
-    let status = if clocks { run.cycles.supervisor().with(|engine| engine.clocks())? } else { Vec::new() };
+    let status = if clocks { run.cycles.supervisor().clocks()? } else { Vec::new() };
     let exchanged = Exchanged::of(&run, &before, ring, &status);
     let mut at_end = End { cycle: period, reached_op: reached.is_ok(), signals, exchanged };
     let mut reasons = match reached {

@@ -22,7 +22,7 @@ pub fn lines(scan: &Scan) -> Vec<String> {
     let line = |info: &SubDeviceInfo| {
         let position = usize::from(info.position.0);
         let parent = match scan.topology.connection_to(position) {
-            Some(connection) => format!("{} port {}", connection.near.node, connection.near.port),
+            Some(connection) => format!("{} port {}", connection.near.position(), connection.near.port()),
             None if position == 0 && scan.topology.main_count > 0 => "MAIN".to_owned(),
             None => "REDUNDANT".to_owned(),
         };
@@ -67,7 +67,7 @@ pub fn json_subdevices(scan: &Scan) -> Vec<scan::SubDevice> {
             serial: info.identity.serial,
             output_bytes: bytes.map(|both| both[0]),
             input_bytes: bytes.map(|both| both[1]),
-            connected_to: connection.map(|c| Port { position: c.near.node, port: c.near.port }),
+            connected_to: connection.map(|c| Port { position: usize::from(c.near.position().0), port: c.near.port() }),
         }
     };
     scan.subdevices.iter().map(subdevice).collect()

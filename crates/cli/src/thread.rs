@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use ringcat_link::ReceiveMode;
 use ringcat_link::realtime::{self, CpuLatency};
 
+use crate::numbers::number;
 use crate::output::warn;
 
 /// A hybrid wait spins for this time: most segments answer within.
@@ -24,6 +25,9 @@ pub enum Receive {
     Hybrid,
 }
 
+/// Largest number of a processor that the kernel can be built for, less one.
+const MOST_PROCESSORS: usize = 8_191;
+
 /// The options of the thread that sends and receives.
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Thread")]
@@ -35,10 +39,10 @@ pub struct ThreadArguments {
     ///
     /// Memory is then locked, and processors are kept awake. A spinning thread with a priority takes its processor
     /// from all others. 99 is left to the kernel and to the thread that handles signals.
-    #[arg(long, value_name = "1-98", value_parser = clap::value_parser!(i32).range(1..=98))]
+    #[arg(long, value_name = "1-98", value_parser = number(1..=98, 80))]
     pub priority: Option<i32>,
     /// Processor that this thread is bound to
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = number(0..=MOST_PROCESSORS, 3))]
     cpu: Option<usize>,
 }
 

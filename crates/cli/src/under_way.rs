@@ -3,6 +3,8 @@
 use clap::Args;
 use ringcat::MAX_UNDER_WAY;
 
+use crate::numbers::number;
+
 /// The option.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct UnderWayArgument {
@@ -15,7 +17,7 @@ pub struct UnderWayArgument {
         value_name = "CYCLES",
         default_value = "1",
         help_heading = "Cycle",
-        value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_UNDER_WAY))
+        value_parser = number(1..=MAX_UNDER_WAY, 2)
     )]
     pub under_way: u8,
 }

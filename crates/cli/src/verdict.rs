@@ -103,10 +103,16 @@ pub fn conclude_error(text: &str) -> ExitCode {
     conclude_error_told(first, more.lines().map(str::to_owned).collect())
 }
 
+/// The only line of a command that explains the program, with `--json`: help, the version.
+pub fn conclude_text(message: &str, details: Vec<String>) -> ExitCode {
+    output::write_json(&line_without_data(Outcome::Ok, 0, message, details));
+    ExitCode::SUCCESS
+}
+
 /// As [`conclude_error`], where the details have been printed.
 pub fn conclude_error_told(message: &str, details: Vec<String>) -> ExitCode {
     if output::is_json() {
-        output::write_json(&error_line(Outcome::Error, ERROR, message, details));
+        output::write_json(&line_without_data(Outcome::Error, ERROR, message, details));
     }
     eprintln!("result: FAILED: {message}");
     ExitCode::from(ERROR)
@@ -117,7 +123,7 @@ pub fn end_at_once(message: &str) -> ! {
     if output::is_json()
         && let Ok(out) = stdout().as_fd().try_clone_to_owned()
     {
-        let line = error_line(Outcome::Failed, FAILED, message, Vec::new());
+        let line = line_without_data(Outcome::Failed, FAILED, message, Vec::new());
         let text = serde_json::to_string(&line).unwrap_or_default();
         // The program ends with a failure in any case.
         let _ = File::from(out).write_all(format!("{text}\n").as_bytes());
@@ -126,7 +132,7 @@ pub fn end_at_once(message: &str) -> ! {
     std::process::exit(i32::from(FAILED));
 }
 
-fn error_line(outcome: Outcome, exit_code: u8, message: &str, details: Vec<String>) -> ResultLine<'static> {
+fn line_without_data(outcome: Outcome, exit_code: u8, message: &str, details: Vec<String>) -> ResultLine<'static> {
     let result = Ending { outcome, exit_code, message: message.to_owned(), details };
     ResultLine { head: head(Kind::Result), result, data: None }
 }

@@ -14,6 +14,7 @@ pub mod branches;
 pub mod cable_ends;
 pub mod cables;
 pub mod delay;
+mod delay_range;
 pub mod delays;
 pub mod follow;
 pub mod measurement;
@@ -25,6 +26,7 @@ pub mod wiring;
 
 pub use cables::Cables;
 pub use delay::{Passage, PortTimes, Segment};
+pub use delay_range::DelayRange;
 pub use delays::{Delays, Unknown};
 pub use follow::{Follower, phase_error};
 pub use measurement::{Disagreement, Latched, Measurements};

@@ -17,6 +17,7 @@ pub use log::{EventLog, EventsSince};
 
 pub use crate::ring_status::Occupant;
 
+use crate::clocks::DelayRange;
 use crate::declared::{Address, GroupId, SubDeviceId};
 use crate::domain::{DomainId, DomainStatus};
 use crate::info::IdentityField;
@@ -383,8 +384,8 @@ pub enum Event {
         position: Position,
         /// Position of the fork; `None` if the path from the reference clock to this SubDevice is unknown.
         fork: Option<Position>,
-        /// Lower and upper limit of the delay in nanoseconds; `None` if they are unknown.
-        range_ns: Option<(i64, i64)>,
+        /// Limits of the delay; `None` if they are unknown.
+        range: Option<DelayRange>,
         /// The middle of the range was written. Otherwise no delay was written.
         is_estimated: bool,
     },
@@ -413,7 +414,7 @@ pub enum Event {
 impl Event {
     /// Cabling positions that the event names. Positions of the scan are not included: they may differ from those of a
     /// later rescan.
-    fn positions(&self) -> [Option<usize>; 2] {
+    fn positions(&self) -> [Option<Position>; 2] {
         match self {
             Event::BreakLocated { cable }
             | Event::CableErrors { cable, .. }

@@ -16,7 +16,7 @@ use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
 pub use identity_field::IdentityField;
-pub use subdevice::{ControllerInfo, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
+pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};
 
 impl SubDeviceInfo {

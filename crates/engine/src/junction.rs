@@ -168,26 +168,38 @@ impl JunctionConnection {
     }
 
     /// Checks a connection against earlier ones and against the number of declared SubDevices (JR-06).
-    pub fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
+    pub(crate) fn check(&self, before: &[JunctionConnection], declared: usize) -> Result<(), JunctionError> {
         if self.head >= SubDeviceId(declared) {
             return Err(JunctionError::UnknownHead(*self));
         }
         if self.tail >= SubDeviceId(declared) {
             return Err(JunctionError::UnknownTail(*self));
         }
+        self.check_ports()?;
+        let [head, tail] = self.ends();
+        if before.iter().flat_map(JunctionConnection::ends).any(|end| end == head || end == tail) {
+            return Err(JunctionError::Taken(*self));
+        }
+        Ok(())
+    }
+
+    /// Checks its ports, which needs no declaration.
+    ///
+    /// # Errors
+    /// Another port than 1 at the head, port 0 or above 3 at the tail, or one port for both ends (JR-06).
+    pub fn check_ports(&self) -> Result<(), JunctionError> {
         if self.head_port != HEAD_PORT {
             return Err(JunctionError::HeadPort(*self));
         }
         if self.tail_port == 0 || self.tail_port >= PORTS {
             return Err(JunctionError::TailPort(*self));
         }
-        let ends = |it: &JunctionConnection| [(it.head, it.head_port), (it.tail, it.tail_port)];
-        let [head, tail] = ends(self);
-        let taken = before.iter().flat_map(ends).any(|end| end == head || end == tail);
-        if taken || head == tail {
-            return Err(JunctionError::Taken(*self));
-        }
-        Ok(())
+        let [head, tail] = self.ends();
+        if head == tail { Err(JunctionError::Taken(*self)) } else { Ok(()) }
+    }
+
+    fn ends(&self) -> [(SubDeviceId, u8); 2] {
+        [(self.head, self.head_port), (self.tail, self.tail_port)]
     }
 }
 

@@ -19,7 +19,7 @@ use ringcat_wire::register::{Fmmu, map};
 use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
 
 use crate::config::SubDeviceConfig;
-use crate::info::{Direction, SubDeviceInfo};
+use crate::info::{Direction, MailboxSyncManagers, SubDeviceInfo};
 
 pub use error::{PlanError, PlanFault, PlanProblem, PlanWarning};
 pub use subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan, SubDevicePlan};
@@ -109,21 +109,21 @@ pub fn fmmu(area: &AreaPlan, logical: LogicalAddress) -> Fmmu {
 /// Whether the mailbox has SyncManagers: without a description in the SII these are SM 0 and 1, unless the SII uses one
 /// of them for process data.
 fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
-    let (out, inward) = info.mailbox_sync_managers();
-    let managers = [out, inward].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));
+    let MailboxSyncManagers { written, read } = info.mailbox_sync_managers();
+    let managers = [written, read].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));
     !managers.into_iter().any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
 }
 
-fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, (out, inward): (u8, u8)) -> Vec<SmPlan> {
+fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, of: MailboxSyncManagers) -> Vec<SmPlan> {
     let control = |index: u8, kind, default| {
         let described = info.sync_managers.get(usize::from(index));
         described.filter(|sm| sm.kind == kind && sm.kind_of_control() == kind).map_or(default, |sm| sm.control)
     };
-    let out_control = control(out, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
-    let in_control = control(inward, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);
+    let out_control = control(of.written, SyncManagerKind::MailboxOut, MAILBOX_OUT_CONTROL);
+    let in_control = control(of.read, SyncManagerKind::MailboxIn, MAILBOX_IN_CONTROL);
     Vec::from([
-        SmPlan { index: out, register: sync_manager(layout.receive_offset, layout.receive_size, out_control) },
-        SmPlan { index: inward, register: sync_manager(layout.send_offset, layout.send_size, in_control) },
+        SmPlan { index: of.written, register: sync_manager(layout.receive_offset, layout.receive_size, out_control) },
+        SmPlan { index: of.read, register: sync_manager(layout.send_offset, layout.send_size, in_control) },
     ])
 }
 

@@ -8,7 +8,7 @@ mod cables;
 
 use core::fmt;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlState;
 
 pub use cables::{CableErrors, cables, port_errors};
@@ -62,6 +62,16 @@ impl Occupant {
     pub const fn new(station: StationAddress, declared: Option<SubDeviceId>) -> Occupant {
         Occupant { station, declared }
     }
+}
+
+/// Number of SubDevices that process the copies of frames sent on each link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct LinkCounts {
+    /// On MAIN.
+    pub main: u16,
+    /// On REDUNDANT; 0 with one link.
+    pub redundant: u16,
 }
 
 /// Whether the ring tolerates a further break.
@@ -131,8 +141,8 @@ impl LinkStatus {
 
 impl Cable {
     /// Positions at the near and at the far end.
-    pub fn positions(&self) -> [Option<usize>; 2] {
-        [self.near, self.far].map(|end| end.map(|at| at.node))
+    pub fn positions(&self) -> [Option<Position>; 2] {
+        [self.near, self.far].map(|end| end.map(PortOf::position))
     }
 }
 

@@ -64,11 +64,7 @@ fn describe(path: &Path, error: &io::Error) -> String {
     format!("the capture {} cannot be written: {error}; {advice}", path.display())
 }
 
-impl Error for RecorderError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        Some(&self.error)
-    }
-}
+impl Error for RecorderError {}
 
 #[derive(Debug)]
 struct Shared {

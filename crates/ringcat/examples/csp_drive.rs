@@ -90,7 +90,15 @@ fn run<L: Links + 'static>(links: L) -> Result<(), Box<dyn Error>> {
     application.wait_until_op_with(LIMIT, |data| data.set(drive.target, data.get(drive.actual)))?;
     println!("in OP, phase error {} ns", application.follower().map_or(0, |follower| follower.error_ns()));
 
+    // In OP the clocks of the SubDevices agree. Cycles come to their phase soon after.
     let end = application.now() + LIMIT;
+    while !application.follower().is_some_and(|follower| follower.is_locked()) {
+        application.cycle(|data| data.set(drive.target, data.get(drive.actual)));
+        if application.now() >= end {
+            return Err("cycles do not keep their phase: does this computer wake up late?".into());
+        }
+    }
+    println!("cycles keep their phase");
     while !application.cycle(|data| drive.switch_on(data)) {
         if application.now() >= end {
             return Err("the drive is not enabled: look at its error code (0x603F)".into());

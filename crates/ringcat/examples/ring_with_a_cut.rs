@@ -63,11 +63,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn run(application: &mut Application<SimulatedSegment>, lamp: Output<bool>, cycles: u32) -> u32 {
     let mut incomplete = 0;
     for _ in 0..cycles {
-        let state = application.cycle(|data| {
+        let is_complete = application.cycle(|data| {
             data.set(lamp, data.cycle() / 100 % 2 == 0);
-            data.status(DOMAIN).state
+            data.status(DOMAIN).is_ok_and(|status| status.state == DomainState::Complete)
         });
-        incomplete += u32::from(state != DomainState::Complete);
+        incomplete += u32::from(!is_complete);
         while let Some(event) = application.pop_event() {
             println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event, &Names::default()));
         }

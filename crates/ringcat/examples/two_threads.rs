@@ -59,7 +59,7 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
         }
         sleep(Duration::from_millis(10));
     }
-    let status = cycles.news().status(DomainId(0));
+    let status = cycles.news().status(DomainId(0))?;
     println!("working counter {} of {}; {:?}", status.wkc, status.expected, cycles.news().pace());
     println!("round trips: {}", cycles.news().round_trips());
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1))?;

@@ -63,7 +63,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         Application { links, cyclic, acyclic, window }
     }
 
-    /// Waits for the next cycle, judges what is due, runs `work`, sends.
+    /// Waits for the next cycle, evaluates the domains that are due, runs `work`, sends.
     pub fn cycle<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
         let (now, looked_at) = self.wait_for_cycle();
         self.cyclic.begin(now, looked_at);
@@ -202,7 +202,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.news.round_trips()
     }
 
-    /// What others may look at while the cycles run.
+    /// Figures that other threads can read while the cycles run.
     pub fn news(&self) -> &Arc<News> {
         &self.cyclic.news
     }

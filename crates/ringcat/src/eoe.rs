@@ -20,7 +20,7 @@ use ringcat_link::tap::{TapError, TapInterface};
 use crate::error::Error;
 use crate::supervisor_thread::SupervisorThread;
 
-/// SubDevices that have appeared are looked for this often, and statistics are brought up to date.
+/// Interval of the search for new SubDevices and of the update of statistics.
 const LOOK: Duration = Duration::from_millis(20);
 /// Frames that one interface may hand to the host in one go, so that the others and the bus have their turn.
 const BURST: usize = 64;
@@ -186,7 +186,7 @@ impl Ethernet {
         self.0.told().interfaces.clone()
     }
 
-    /// What has happened since this was asked last.
+    /// News since the last call.
     pub fn take_news(&self) -> Vec<EthernetNews> {
         std::mem::take(&mut self.0.told().news)
     }
@@ -230,7 +230,7 @@ impl SupervisorThread {
     }
 }
 
-/// One interface and what it leads to.
+/// One interface and the SubDevice behind it.
 struct End {
     name: String,
     subdevice: EthernetSubDevice,

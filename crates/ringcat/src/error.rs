@@ -14,6 +14,7 @@ use ringcat_engine::supervisor::BusError;
 use ringcat_sim::segment::SegmentError;
 
 use crate::mapped::{DoesNotFit, MapError, WriteError};
+use crate::no_domain::NoDomain;
 use crate::not_ready::NotReady;
 use crate::subdevice::SubDeviceError;
 
@@ -31,7 +32,7 @@ pub enum Error {
     Sdo(SdoError),
     /// A service besides the mailbox protocols failed.
     Service(ServiceError),
-    /// Something that was asked of one SubDevice was not done.
+    /// A service of one SubDevice failed.
     SubDevice(Box<SubDeviceError>),
     /// SubDevices were not in their states in time.
     NotReady(NotReady),
@@ -41,6 +42,8 @@ pub enum Error {
     DoesNotFit(DoesNotFit),
     /// Process data was not written.
     Write(WriteError),
+    /// The declaration has no such domain.
+    NoDomain(NoDomain),
     /// Work did not end in time.
     TimedOut {
         /// The limit.
@@ -80,6 +83,7 @@ impl fmt::Display for Error {
             Error::Map(error) => error.fmt(f),
             Error::DoesNotFit(error) => error.fmt(f),
             Error::Write(error) => error.fmt(f),
+            Error::NoDomain(error) => error.fmt(f),
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(StopError::Bus(BusError::Lost { .. })) => f.write_str(
                 "stop: no frame comes back on any interface, so no SubDevice was brought to INIT: they keep their \
@@ -97,29 +101,7 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Error::Scan(error) => Some(error),
-            Error::Activate(error) => Some(error),
-            Error::Configure(error) => Some(error),
-            Error::Sdo(error) => Some(error),
-            Error::Service(error) => Some(error),
-            Error::SubDevice(error) => Some(&**error),
-            Error::NotReady(error) => Some(error),
-            Error::Map(error) => Some(error),
-            Error::DoesNotFit(error) => Some(error),
-            Error::Write(error) => Some(error),
-            Error::Stop(error) => Some(error),
-            #[cfg(feature = "sim")]
-            Error::Segment(error) => Some(error),
-            Error::Thread(error) => Some(error),
-            #[cfg(feature = "gateway")]
-            Error::Gateway { cause, .. } => Some(cause),
-            Error::TimedOut { .. } | Error::Panicked(_) | Error::Gone => None,
-        }
-    }
-}
+impl std::error::Error for Error {}
 
 macro_rules! errors {
     ($($variant:ident($error:ty),)*) => {$(
@@ -141,6 +123,7 @@ errors! {
     Map(MapError),
     DoesNotFit(DoesNotFit),
     Write(WriteError),
+    NoDomain(NoDomain),
     Stop(StopError),
 }
 

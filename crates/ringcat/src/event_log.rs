@@ -41,7 +41,7 @@ const QUIET: Duration = Duration::from_secs(10);
 pub struct EventLog {
     begin: Instant,
     names: Names,
-    /// Changes of how process data is judged, and the last of them in words.
+    /// Number of changes of domain states, and the last of them in words.
     judgements: Crowd,
     judged: String,
     /// Cycles whose frames were still out when the next one was due.
@@ -111,7 +111,7 @@ impl EventLog {
         is_shown.then(|| self.line(now, &format!("this machine: {more} cycles left out")))
     }
 
-    /// Lines for what was counted, as far as they are due; to be asked for every now and then.
+    /// Lines for counted events, as far as they are due. To be called regularly.
     pub fn counts(&mut self, now: Instant) -> Vec<String> {
         let judged = &self.judged;
         let words = [

@@ -8,6 +8,9 @@
 //! 6. [`testing`]: an application against the simulator, in its own CI
 //! 7. [`known_places`]: offsets before activation, cycles in parts
 
+// Of two definitions of a link the first one counts: in a page it leads to the file beside it, here to the module.
+/// [a drive with clocks]: drive_with_clocks
+///
 #[doc = include_str!("../guide/first-application.md")]
 pub mod first_application {}
 

@@ -22,7 +22,7 @@ use crate::error::Error;
 /// # use std::time::Duration;
 /// # use ringcat::{Error, Job};
 /// fn show(mut job: Job<u32>) -> Result<(), Error> {
-///     // A look, a wait with a limit, and a wait for the end; a job is a future as well.
+///     // A poll, a wait with a limit, and a wait for the end; a job is a future as well.
 ///     if job.take().is_none() && job.wait_for(Duration::from_millis(10)).is_none() {
 ///         println!("it goes on");
 ///     }
@@ -34,19 +34,19 @@ pub struct Job<T> {
     thread: Box<dyn InOrder>,
 }
 
-/// Work under way in the thread: it has a turn in each of the thread's turns, until it says that it has ended.
+/// Work under way in the thread: it has a turn in each of the thread's turns, until it has ended.
 pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
 
-/// The thread, as jobs see it: what is asked of it is done in order. It goes on while there is one of these.
+/// The thread, as jobs see it: requests are processed in order. It runs as long as one of these exists.
 pub(crate) trait InOrder: Send + Sync {
-    /// Waits until the thread has looked at everything that it was asked before.
+    /// Waits until the thread has processed all earlier requests.
     fn catch_up(&self) -> Result<(), Error>;
 
     /// Ends a sleep of the thread.
     fn wake(&self);
 }
 
-/// The other end of a job, in the thread. Dropped without an answer, it says that there will be none.
+/// The other end of a job, in the thread. Dropped without a result, it reports that there will be none.
 pub(crate) struct Reply<T> {
     slot: Arc<Slot<T>>,
 }

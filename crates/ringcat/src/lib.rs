@@ -72,6 +72,7 @@ pub mod main_device;
 mod mapped;
 pub mod memory;
 pub mod news;
+mod no_domain;
 mod not_ready;
 mod pace;
 #[cfg(feature = "packet")]
@@ -104,7 +105,8 @@ pub use job::Job;
 pub use limits::TransferLimits;
 pub use links::Links;
 pub use main_device::{MainDevice, Options, Refused, automatic};
-pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, Output, OutputBits, Wanted, WriteError};
+pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, ObjectOf, Output, OutputBits, Wanted, WriteError};
+pub use no_domain::NoDomain;
 pub use not_ready::{NotReady, Reason};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
@@ -113,7 +115,7 @@ pub use subdevice::{SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
 pub use value::{Number, ObjectValue};
 
-pub use ringcat_engine::clocks::{Follower, phase_error};
+pub use ringcat_engine::clocks::{DelayRange, Follower, phase_error};
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, DeclaredSyncManager, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError,
     Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock, RegisterAccess, RegisterCommand,
@@ -149,7 +151,7 @@ pub use ringcat_engine::main_device::{
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
-pub use ringcat_engine::procedures::look_at_ring::RingLook;
+pub use ringcat_engine::procedures::inspect_ring::RingInspection;
 pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
 pub use ringcat_engine::procedures::services::ports::BlockedPort;
@@ -162,7 +164,9 @@ pub use ringcat_engine::request::{
 };
 pub use ringcat_engine::ring::identity::{Classified, Identity};
 pub use ringcat_engine::ring::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
-pub use ringcat_engine::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
+pub use ringcat_engine::ring_status::{
+    Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
+};
 pub use ringcat_engine::supervisor::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::time::Instant;
 pub use ringcat_engine::topology::PortOf;
@@ -176,7 +180,7 @@ pub use ringcat_wire::source_address::MacCodec;
 pub use ringcat_engine::config::SyncManagerOverride;
 pub use ringcat_engine::event::history::Incident;
 pub use ringcat_engine::exchange::Exchange;
-pub use ringcat_engine::info::{ControllerInfo, InfoWarning, PdoInfo};
+pub use ringcat_engine::info::{ControllerInfo, InfoWarning, MailboxSyncManagers, PdoInfo};
 pub use ringcat_engine::layout::LayoutError;
 pub use ringcat_engine::mail::eoe::EthernetStatus;
 pub use ringcat_engine::mail::stream::Overflow;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ringcat_engine::config::Timeouts;
 use ringcat_engine::mail::Limits;
 
-/// Bytes that a read takes unless it is told otherwise.
+/// Largest number of bytes of a read by default.
 const DEFAULT_BYTES: usize = 1 << 20;
 
 /// How long one message of a transfer may take, and how much a read takes.

@@ -11,7 +11,7 @@ use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending};
 use ringcat_engine::procedures::dictionary::ReadPdos;
-use ringcat_engine::procedures::look_at_ring::{RingLook, look_at_ring};
+use ringcat_engine::procedures::inspect_ring::{RingInspection, inspect_ring};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_wire::address::Position;
@@ -37,7 +37,7 @@ use crate::window::{DEFAULT_BUDGET, Window};
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
-    /// Whose dictionaries are asked for PDOs after a scan.
+    /// SubDevices with dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
     pub supervision: bool,
@@ -49,15 +49,15 @@ pub struct Options {
     pub patience: Duration,
     /// What becomes of rings behind junctions. A connection that is added makes it strict.
     pub junctions: JunctionMode,
-    /// Whether the cabling is looked at anew, as by [`Services::rescan`](crate::Services::rescan), when a hot connect
+    /// Whether the cabling is scanned again, as by [`Services::rescan`](crate::Services::rescan), when a hot connect
     /// group has joined or left, as soon as nothing is broken: positions, places of breaks and errors of cables are
-    /// then those of the segment as it is. Without, a group has none until a rescan is asked for.
+    /// then those of the segment as it is. Without it, a group has none until a rescan is requested.
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
     /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
     pub enhanced_line_crossed: bool,
     /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators take
-    /// fewer (often 15): a scan that fails for that says so ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3
+    /// fewer (often 15): the scan fails then ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3
     /// counts as 3.
     pub max_datagrams_per_frame: Option<u16>,
     /// Bytes that everything but process data may send in a cycle, on each link; never more than what is left of the
@@ -91,7 +91,7 @@ impl Options {
         self
     }
 
-    /// The same, with these dictionaries asked for PDOs, see [`Options::pdos`].
+    /// The same, with these dictionaries read for PDOs, see [`Options::pdos`].
     #[must_use]
     pub fn with_pdos(mut self, pdos: ReadPdos) -> Options {
         self.pdos = pdos;
@@ -133,7 +133,7 @@ impl Options {
         self
     }
 
-    /// The same, with or without a look at the cabling for hot connect groups, see [`Options::follow_groups`].
+    /// The same, with or without scans of the cabling for hot connect groups, see [`Options::follow_groups`].
     #[must_use]
     pub fn with_follow_groups(mut self, follow_groups: bool) -> Options {
         self.follow_groups = follow_groups;
@@ -220,13 +220,13 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Looks at the ring without changing anything on it: counts, cabling, the place of a break, error counters.
+    /// Inspects the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
-    /// Frames that are lost repeatedly, no SubDevice that answers, or SubDevices that come or go meanwhile.
-    pub fn look_at_ring(&mut self) -> Result<RingLook, Error> {
+    /// Frames that are lost repeatedly, no SubDevice that answers, or SubDevices that are added or lost meanwhile.
+    pub fn inspect_ring(&mut self) -> Result<RingInspection, Error> {
         let bus = self.engine.bus();
-        Ok(self.run(look_at_ring(bus))?)
+        Ok(self.run(inspect_ring(bus))?)
     }
 
     /// Receives, lets procedures go on, sends.
@@ -367,11 +367,7 @@ impl<M> fmt::Display for Refused<M> {
     }
 }
 
-impl<M> std::error::Error for Refused<M> {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        self.error.source()
-    }
-}
+impl<M> std::error::Error for Refused<M> {}
 
 impl<M> From<Box<Refused<M>>> for Error {
     fn from(refused: Box<Refused<M>>) -> Error {
@@ -379,7 +375,7 @@ impl<M> From<Box<Refused<M>>> for Error {
     }
 }
 
-/// Everything that was scanned, as its SII says, in one domain.
+/// A declaration of all scanned SubDevices, with the process data of their SII in one domain.
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
     let mut declaration = Declaration::with_period(period);
     for subdevice in subdevices {

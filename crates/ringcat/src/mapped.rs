@@ -14,7 +14,7 @@ mod write;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::SubDeviceId;
 
-pub use bits::{DoesNotFit, OutputBits};
+pub use bits::{DoesNotFit, ObjectOf, OutputBits};
 pub(crate) use bits::{signed, unsigned};
 pub use error::{MapError, MappedObject, Wanted};
 pub use place::{Input, Mapped, Output};
@@ -45,7 +45,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// let target = application.output_named::<i32>(drive, "Target position")?;
     /// // Errors say what is mapped.
     /// let wrong = application.output::<i16>(drive, 0x6064, 0).unwrap_err();
-    /// assert!(wrong.to_string().contains("0x6064:00 is an input"), "{wrong}");
+    /// assert!(wrong.to_string().contains("0x6064:00 \"Feedback.Position\" is an input"), "{wrong}");
     /// # let _ = (actual, target);
     /// # Ok(())
     /// # }
@@ -91,8 +91,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// # Errors
     /// As [`Application::output`].
     pub fn output_bits(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Result<OutputBits, MapError> {
-        let entry = self.search(subdevice)?.find(&Wanted::Index { index, sub_index }, Direction::Outputs)?;
-        Ok(OutputBits::new(entry))
+        self.search(subdevice)?.bits(&Wanted::Index { index, sub_index }, Direction::Outputs)
     }
 
     /// All that is mapped of a declared SubDevice, in the order of its SyncManagers.

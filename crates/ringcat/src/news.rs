@@ -12,8 +12,19 @@ use ringcat_engine::ring::RingState;
 use ringcat_wire::frame::MacAddress;
 
 use crate::histogram::Histogram;
+use crate::no_domain::NoDomain;
 use crate::pace::{Pace, PaceNs};
 use crate::process_data::Rate;
+
+/// How far cycles are from their phase in the system time of the segment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Phase {
+    /// Last error in nanoseconds; positive: the host is late.
+    pub error_ns: i64,
+    /// The errors have been small for a while.
+    pub is_locked: bool,
+}
 
 /// News of the cyclic half.
 #[derive(Debug)]
@@ -86,9 +97,13 @@ impl News {
         CyclicCounters::from_words(load(&self.counters))
     }
 
-    /// Last judgement of a domain.
-    pub fn status(&self, domain: DomainId) -> DomainStatus {
-        let Some(words) = self.domains.get(domain.0) else { return DomainStatus::default() };
+    /// State of a domain when its frames were last evaluated.
+    ///
+    /// # Errors
+    /// The declaration has no such domain.
+    pub fn status(&self, domain: DomainId) -> Result<DomainStatus, NoDomain> {
+        let declared = self.domains.len();
+        let words = self.domains.get(domain.0).ok_or(NoDomain { domain, declared })?;
         let [counted, state] = load(words);
         let states = [DomainState::Zero, DomainState::Incomplete, DomainState::Complete];
         let mut status = DomainStatus::default();
@@ -97,7 +112,7 @@ impl News {
         status.state = states[(state as usize & 0x7F).min(2)];
         status.returned = state >> 7 & 1 != 0;
         status.skipped = state >> 8;
-        status
+        Ok(status)
     }
 
     /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface.
@@ -117,11 +132,10 @@ impl News {
         &self.phase_errors
     }
 
-    /// The last of these errors in nanoseconds (positive: the host is late), and whether they have been small for a
-    /// while.
-    pub fn phase(&self) -> (i64, bool) {
+    /// The last of these errors.
+    pub fn phase(&self) -> Phase {
         let word = self.phase.load(Ordering::Relaxed);
-        (word as i64 >> 1, word & 1 != 0)
+        Phase { error_ns: word as i64 >> 1, is_locked: word & 1 != 0 }
     }
 
     /// OR of all |0x092C| in nanoseconds, as the last cyclic frame saw it: at most twice the largest.

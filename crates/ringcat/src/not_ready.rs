@@ -100,7 +100,7 @@ impl Failures {
     }
 }
 
-/// Events that were looked at before the application took them.
+/// Events that were read for their reasons before the application takes them.
 #[derive(Debug, Default)]
 pub(crate) struct KeptEvents {
     events: VecDeque<TimedEvent>,

@@ -9,7 +9,8 @@ use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::{Directory, SubDeviceId};
 use ringcat_engine::time::Instant;
 
-use crate::mapped::{DoesNotFit, Mapped, Output, OutputBits, WriteError, signed, unsigned};
+use crate::mapped::{DoesNotFit, Mapped, ObjectOf, Output, OutputBits, WriteError, signed, unsigned};
+use crate::no_domain::NoDomain;
 use crate::value::Number;
 
 /// When a domain is due, and its state at the last evaluation.
@@ -91,8 +92,12 @@ impl ProcessData<'_> {
     }
 
     /// State of a domain when its frames were last evaluated.
-    pub fn status(&self, domain: DomainId) -> DomainStatus {
-        self.rates.get(domain.0).map_or_else(DomainStatus::default, |rate| rate.status)
+    ///
+    /// # Errors
+    /// The declaration has no such domain.
+    pub fn status(&self, domain: DomainId) -> Result<DomainStatus, NoDomain> {
+        let rate = self.rates.get(domain.0).map(|rate| rate.status);
+        rate.ok_or(NoDomain { domain, declared: self.rates.len() })
     }
 
     /// Whether a domain is due in this cycle.
@@ -126,7 +131,7 @@ impl ProcessData<'_> {
     /// ```
     pub fn write(&mut self, entry: &Entry, value: u64) -> Result<(), WriteError> {
         self.check(entry)?;
-        let bits = unsigned(value, entry.bit_length)?;
+        let bits = unsigned(value, entry.bit_length).map_err(|error| error.of(self.object_at(entry)))?;
         self.exchange.write(entry, bits);
         Ok(())
     }
@@ -137,7 +142,7 @@ impl ProcessData<'_> {
     /// As [`ProcessData::write`].
     pub fn write_signed(&mut self, entry: &Entry, value: i64) -> Result<(), WriteError> {
         self.check(entry)?;
-        let bits = signed(value, entry.bit_length)?;
+        let bits = signed(value, entry.bit_length).map_err(|error| error.of(self.object_at(entry)))?;
         self.exchange.write(entry, bits);
         Ok(())
     }
@@ -150,9 +155,17 @@ impl ProcessData<'_> {
         match entry.bit_length {
             _ if bits.end > image_bits => Err(WriteError::Outside { domain: entry.domain, end: bits.end, image_bits }),
             1..=64 if self.directory.are_outputs(entry.domain, bits.clone()) => Ok(()),
-            1..=64 => Err(WriteError::NotAnOutput { domain: entry.domain, start }),
+            1..=64 => Err(self.not_an_output(entry.domain, start)),
             length => Err(WriteError::Length { bits: length }),
         }
+    }
+
+    fn not_an_output(&self, domain: DomainId, start: u64) -> WriteError {
+        WriteError::NotAnOutput { domain, start, object: self.directory.object_at(domain, start).map(ObjectOf::new) }
+    }
+
+    fn object_at(&self, entry: &Entry) -> Option<ObjectOf> {
+        self.directory.object_at(entry.domain, entry.bit_offset.into()).map(ObjectOf::new)
     }
 
     /// Value of an input, or the value of an output that the next frame sends.
@@ -241,9 +254,11 @@ impl ProcessData<'_> {
         if end > image_bits {
             return Err(WriteError::Outside { domain, end, image_bits });
         }
-        let are_outputs = self.directory.are_outputs(domain, start..end);
-        let image = self.exchange.image_mut(domain).get_mut(bytes).filter(|_| are_outputs);
-        image.ok_or(WriteError::NotAnOutput { domain, start })
+        if !self.directory.are_outputs(domain, start..end) {
+            return Err(self.not_an_output(domain, start));
+        }
+        let image = self.exchange.image_mut(domain).get_mut(bytes);
+        image.ok_or(WriteError::Outside { domain, end, image_bits })
     }
 
     /// Sets all outputs of all domains to zero.

@@ -11,7 +11,7 @@ use crate::not_ready::NotReady;
 use crate::process_data::ProcessData;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Another thread looks this often.
+/// Interval at which another thread checks the states.
 const LOOK: Duration = Duration::from_millis(1);
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
@@ -19,7 +19,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// that do not answer left aside. Outputs stay as they are. Events stay to be taken.
     ///
     /// # Errors
-    /// [`Error::NotReady`]: the time is over; it says of each SubDevice what is missing. The application may go on.
+    /// [`Error::NotReady`]: the limit is over; it names each SubDevice that is not ready, with the reason. The
+    /// application may go on.
     pub fn wait_until_op(&mut self, limit: Duration) -> Result<(), Error> {
         self.wait_until_op_with(limit, |_| ())
     }

@@ -19,7 +19,7 @@ use crate::links::Links;
 use crate::simulated::{MAIN, REDUNDANT, host_link};
 use crate::window::Half;
 
-/// The other thread's frames may be due at any time: the segment is looked at again after this.
+/// The other thread's frames may be due at any time: the segment is polled again after this.
 const NAP: Duration = Duration::from_micros(100);
 
 #[derive(Debug)]
@@ -78,7 +78,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Looks into the segment, or brings about faults.
+    /// Gives access to the segment, to read from it or to inject faults.
     pub fn with_network<R>(&self, look: impl FnOnce(&mut Network) -> R) -> R {
         let mut inner = lock(&self.inner);
         inner.follow(since(self.begin));

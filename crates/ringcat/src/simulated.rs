@@ -40,7 +40,7 @@ impl SimulatedSegment {
         SimulatedSegment { network, ring, arrived: None, pace: None, stalled: Duration::ZERO }
     }
 
-    /// A segment from the text of a segment file; SII images are looked for in the working directory.
+    /// A segment from the text of a segment file; SII images are read from the working directory.
     pub fn from_toml(text: &str) -> Result<SimulatedSegment, SegmentError> {
         let segment = Segment::from_toml(text, std::path::Path::new("."))?;
         Ok(SimulatedSegment::new(Network::from_description(segment)?))

@@ -1,6 +1,6 @@
-//! How far SubDevices are: the mandatory ones, groups that join and leave.
+//! How far SubDevices and clocks are: the mandatory ones, groups that join and leave, differences to the reference.
 
-use ringcat_engine::main_device::GroupState;
+use ringcat_engine::main_device::{ClockStatus, GroupState};
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -17,6 +17,12 @@ impl<L: Links> Application<L, Inline> {
     /// How far each hot connect group is, by its number. Not for the cyclic path.
     pub fn groups(&self) -> Vec<GroupState> {
         self.engine().groups()
+    }
+
+    /// Each distributed clock: delay, drift, difference to the reference clock. Empty if the declaration has no clocks.
+    /// Not for the cyclic path.
+    pub fn clocks(&self) -> Vec<ClockStatus> {
+        self.engine().clocks()
     }
 }
 
@@ -35,5 +41,13 @@ impl SupervisorThread {
     /// The thread is gone.
     pub fn groups(&self) -> Result<Vec<GroupState>, Error> {
         self.with(|engine| engine.groups())
+    }
+
+    /// Each distributed clock: delay, drift, difference to the reference clock. Empty if the declaration has no clocks.
+    ///
+    /// # Errors
+    /// The thread is gone.
+    pub fn clocks(&self) -> Result<Vec<ClockStatus>, Error> {
+        self.with(|engine| engine.clocks())
     }
 }

@@ -76,8 +76,8 @@ impl<S: Services> SubDevice<S> {
         self
     }
 
-    /// The same, with a limit for the whole of what is asked. What is not done by then is given up: the SubDevice is
-    /// told, where its protocol can. Without, only single messages have limits.
+    /// The same, with a limit for a whole service. What is not done by then is given up; the SubDevice is
+    /// informed where the protocol permits it. Without it, only single messages have limits.
     #[must_use]
     pub fn within(mut self, limit: Duration) -> SubDevice<S> {
         self.within = Some(limit);
@@ -121,7 +121,7 @@ impl<L: Links> MainDevice<L> {
 }
 
 impl<L: Links> Application<L, Inline> {
-    /// A declared SubDevice; what is asked of it goes on while cycles go on.
+    /// A declared SubDevice; its services go on while cycles go on.
     pub fn subdevice(&mut self, subdevice: SubDeviceId) -> SubDevice<&mut Application<L, Inline>> {
         SubDevice::new(self, subdevice)
     }

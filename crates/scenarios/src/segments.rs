@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Cable, PortOf};
+use ringcat::{Cable, PortOf, Position};
 use ringcat_sim::cable::{DeviceIndex, Endpoint, HostLink};
 use ringcat_sim::catalogue;
 use ringcat_sim::description::DeviceDescription;
@@ -147,8 +147,8 @@ pub fn line(descriptions: Vec<DeviceDescription>, options: NetworkOptions) -> Ne
 /// A cable of a straight [`ring`] of `count` SubDevices, as the engine names it.
 pub fn cable_of_ring(cable: usize, count: usize) -> Cable {
     Cable {
-        near: cable.checked_sub(1).map(|node| PortOf { node, port: 1 }),
-        far: (cable < count).then_some(PortOf { node: cable, port: 0 }),
+        near: cable.checked_sub(1).map(|node| PortOf::new(Position(node as u16), 1)),
+        far: (cable < count).then_some(PortOf::new(Position(cable as u16), 0)),
     }
 }
 

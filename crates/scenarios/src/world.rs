@@ -179,7 +179,7 @@ impl World {
         let result = self.application.cycle(|data| {
             for (domain, outputs) in (0..).map(DomainId).zip(&self.outputs) {
                 if data.is_due(domain) {
-                    due.push((domain, data.status(domain)));
+                    due.push((domain, data.status(domain).expect("it is declared")));
                     write_pattern(data, domain, outputs, number);
                 }
             }

@@ -39,7 +39,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("plan", &["info", "topology", "config"]),
     ("layout", &["declared", "link", "ring", "direction", "domain"]),
     // what happened
-    ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status"]),
+    ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status", "clocks"]),
     // what is known of the segment, and what follows from what is seen
     ("segment", &["declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
         "plan", "layout", "event", "junction"]),

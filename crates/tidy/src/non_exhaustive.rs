@@ -33,7 +33,6 @@ const EXEMPT: &[(&str, &str)] = &[
     ("Half", "acyclic or cyclic"),
     ("Link", "a ring has two links"),
     ("PacketOptions", "of the kernel's sockets; applications name interfaces"),
-    ("PortOf", "a SubDevice and one of its ports"),
     ("RegisterAccess", "a register is written or checked"),
     ("RequestState", "a request of the cyclic thread is polled: an application has to handle each"),
     ("RingState", "closed, open, or not yet proved"),

@@ -22,6 +22,7 @@ use crate::interfaces::InterfaceArguments;
 use crate::json::bench;
 use crate::json::data::Data;
 use crate::json::values::Times;
+use crate::numbers::number;
 use crate::output::say;
 use crate::thread::ThreadArguments;
 use crate::under_way::UnderWayArgument;
@@ -51,7 +52,7 @@ pub struct CyclesArguments {
         help_heading = "Cycle",
         value_name = "CYCLES",
         default_value = "20000",
-        value_parser = clap::value_parser!(u32).range(0..=10_000_000)
+        value_parser = number(0u32..=10_000_000, 20_000)
     )]
     count: u32,
     #[command(flatten)]

@@ -29,6 +29,7 @@ use crate::failure::Failure;
 use crate::json::bench;
 use crate::json::data::Data;
 use crate::json::values::Times;
+use crate::numbers::number;
 use crate::others::{check_frames, check_sockets};
 use crate::output::say;
 use crate::thread::ThreadArguments;
@@ -64,7 +65,7 @@ pub struct RoundTripArguments {
         value_name = "BYTES",
         default_value = "60",
         help_heading = "Cycle",
-        value_parser = clap::value_parser!(u16).range(60..=1514)
+        value_parser = number(60u16..=1514, 60)
     )]
     size: u16,
     /// Cycles of each client
@@ -73,7 +74,7 @@ pub struct RoundTripArguments {
         help_heading = "Cycle",
         value_name = "CYCLES",
         default_value = "100000",
-        value_parser = clap::value_parser!(u32).range(1..=10_000_000)
+        value_parser = number(1u32..=10_000_000, 100_000)
     )]
     count: u32,
     /// Pairs of blocks that the cycles are divided into
@@ -84,7 +85,7 @@ pub struct RoundTripArguments {
         value_name = "PAIRS",
         default_value = "20",
         help_heading = "Cycle",
-        value_parser = clap::value_parser!(u32).range(0..=1000)
+        value_parser = number(0u32..=1000, 20)
     )]
     blocks: u32,
     #[command(flatten)]

@@ -68,7 +68,7 @@ pub fn json(
     phase_errors: &Histogram,
 ) -> Clocks {
     let clock = |clock: &ClockStatus| Clock {
-        position: clock.position,
+        position: clock.position.0,
         station: clock.station.0,
         name: name(clock, names).to_owned(),
         reference: clock.is_reference,
@@ -76,8 +76,8 @@ pub fn json(
         delay_ns: is_written(clock).then_some(clock.delay_ns),
         delay_hidden: clock.hidden.map(|hidden| HiddenDelay {
             fork: hidden.fork.map(|fork| fork.0),
-            least_ns: hidden.range_ns.map(|(least, _)| least),
-            most_ns: hidden.range_ns.map(|(_, most)| most),
+            least_ns: hidden.range.map(|range| range.least_ns),
+            most_ns: hidden.range.map(|range| range.most_ns),
             estimated: hidden.is_estimated,
         }),
         offset_ns: clock.offset_ns,
@@ -94,12 +94,12 @@ mod tests {
     use ringcat::SubDeviceId;
 
     use super::*;
-    use ringcat::HiddenDelay;
     use ringcat::wire::address::{Position, StationAddress};
+    use ringcat::{DelayRange, HiddenDelay};
 
     fn clock() -> ClockStatus {
         let mut clock = ClockStatus::default();
-        clock.position = 3;
+        clock.position = Position(3);
         clock.station = StationAddress(0x1004);
         clock.subdevice = Some(SubDeviceId(0));
         clock.delay_ns = 1_050;
@@ -127,7 +127,7 @@ mod tests {
         let one = |is_estimated| {
             let mut hidden = HiddenDelay::default();
             hidden.fork = Some(Position(2));
-            hidden.range_ns = Some((0, 2_100));
+            hidden.range = Some(DelayRange::new(0, 2_100));
             hidden.is_estimated = is_estimated;
             let mut clock = clock();
             clock.hidden = Some(hidden);

@@ -81,12 +81,12 @@ impl Plan {
 
 /// Positions from the main link to the redundant link, or to the end of the line.
 fn trunk(scan: &Scan, has_ring: bool) -> Vec<usize> {
-    let last = if has_ring { scan.topology.open_ports.last().map(|at| at.node) } else { None };
+    let last = if has_ring { scan.topology.open_ports.last().map(|at| usize::from(at.position().0)) } else { None };
     let mut path = Vec::new();
     let mut node = last.or(scan.subdevices.len().checked_sub(1));
     while let Some(at) = node {
         path.push(at);
-        node = scan.topology.connection_to(at).map(|connection| connection.near.node);
+        node = scan.topology.connection_to(at).map(|connection| usize::from(connection.near.position().0));
     }
     path.reverse();
     path

@@ -15,6 +15,26 @@ use crate::run_log::name_of;
 use crate::table;
 use crate::verdict::Verdict;
 
+/// Columns of the output.
+const WIDTH: usize = 80;
+/// Columns of time and mark before the text of an event.
+const INDENT: usize = 16;
+
+/// The lines of a text that is broken at blanks; a longer word has a line of its own.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut().filter(|line| line.chars().count() + 1 + word.chars().count() <= width) {
+            Some(line) => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 /// Writes lines with the time before them.
 #[derive(Debug)]
 pub struct Reporter {
@@ -57,7 +77,9 @@ impl Reporter {
     fn timed(&mut self, at: Instant, mark: &str, name: Option<String>, text: &str) {
         write_event(at.since(Instant(0)), name, text);
         self.end_line();
-        say!("{:>10.3} ms {mark} {text}", at.0 as f64 / 1e6);
+        let mut lines = wrapped(text, WIDTH - INDENT).into_iter();
+        say!("{:>10.3} ms {mark} {}", at.0 as f64 / 1e6, lines.next().unwrap_or_default());
+        lines.for_each(|line| say!("{:INDENT$}{line}", ""));
     }
 
     /// An event of the scan; progress stays on one line of a terminal.
@@ -194,11 +216,24 @@ impl Reporter {
         }
         for drive in &watch.drives {
             let text = format!(
-                "drive {}: enabled for {} cycles, at {}, at most {} increments behind",
+                "drive {}: enabled for {} cycles, at {}, following error up to {}",
                 drive.subdevice, drive.enabled_cycles, drive.position, drive.lag
             );
             verdict(self, drive.follows(), text);
         }
         Verdict::of(failed, "everything held")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: demo
+    #[test]
+    fn a_long_text_is_broken_at_blanks() {
+        assert_eq!(wrapped("ring closed, 19 SubDevices", 12), ["ring closed,", "19", "SubDevices"]);
+        assert_eq!(wrapped("a", 12), ["a"]);
+        assert_eq!(wrapped("aaaaaaaaaaaaaaaa b", 12), ["aaaaaaaaaaaaaaaa", "b"]);
     }
 }

@@ -112,7 +112,7 @@ impl Watch {
         let mut wrong_inputs = Vec::new();
         let without_power = self.without_power;
         application.cycle(|data| {
-            finding.status = data.status(DOMAIN);
+            finding.status = data.status(DOMAIN).unwrap_or_default();
             finding.missing =
                 without_power.map_or(0, |subdevice| data.directory().contribution(SubDeviceId(subdevice)));
             for (subdevice, place) in places.iter_mut().enumerate() {

@@ -12,6 +12,7 @@ use ringcat_link::interface;
 use crate::failure::Failure;
 use crate::interfaces::InterfaceArguments;
 use crate::json::run;
+use crate::numbers::number;
 use crate::output::{say, warn};
 
 /// Their options.
@@ -25,7 +26,7 @@ pub struct BesideArguments {
     #[arg(long)]
     eoe: bool,
     /// Number of this MainDevice in the names of these interfaces
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = number(0..=u16::MAX, 1))]
     index: u16,
     /// Open the mailbox gateway (ETG.8200, UDP and TCP)
     ///

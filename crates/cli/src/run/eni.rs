@@ -200,7 +200,7 @@ impl EniNetwork {
             image.write(&variable, bits);
         }
         for subdevice in image.unplaced() {
-            let name = self.names().0.get(*subdevice).cloned().unwrap_or_default();
+            let name = self.names().0.get(subdevice.0).cloned().unwrap_or_default();
             warn(format_args!("SubDevice {subdevice} \"{name}\" has places in the file's image and no process data"));
         }
         let watched = self.watch.iter().map(|name| {

@@ -104,7 +104,8 @@ impl Run {
 
     /// Domains whose last cycle was not complete, in words.
     pub fn incomplete(&self) -> Vec<String> {
-        let statuses = (0..self.domains).map(|domain| (domain, self.cycles.news().status(DomainId(domain))));
+        let status = |domain| Some((domain, self.cycles.news().status(DomainId(domain)).ok()?));
+        let statuses = (0..self.domains).filter_map(status);
         let incomplete = statuses.filter(|(_, status)| status.state != DomainState::Complete);
         incomplete
             .map(|(domain, status)| {
@@ -142,7 +143,7 @@ impl Run {
             let name = self.log.events().names().0.get(subdevice).map_or("", String::as_str);
             say!("  SubDevice {subdevice} \"{name}\": {state}");
         }
-        let clocks = self.cycles.supervisor().with(|engine| engine.clocks()).unwrap_or_default();
+        let clocks = self.cycles.supervisor().clocks().unwrap_or_default();
         for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
             let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
             let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice.0));

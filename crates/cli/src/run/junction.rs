@@ -69,10 +69,10 @@ fn connection(text: &str) -> Result<Connection, String> {
         return Err(format!("expected HEAD:PORT-TAIL:PORT, as in 1:1-4:1, got \"{text}\""));
     };
     let connection = Connection { head, tail };
-    // The number of SubDevices and their station addresses are not known yet.
+    // Station addresses are not known yet.
     let known = JunctionConnection::new(SubDeviceId(0), head.1, SubDeviceId(1), tail.1);
     let known = connection.resolve(|_| None).unwrap_or(known);
-    known.check(&[], usize::MAX).map_err(|error| error.to_string())?;
+    known.check_ports().map_err(|error| error.to_string())?;
     Ok(connection)
 }
 

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use ringcat::news::News;
+use ringcat::news::{News, Phase};
 use ringcat::text::Names;
 use ringcat::{
     AlState, ClockStatus, DomainId, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
@@ -50,7 +50,7 @@ impl Live {
         self.next = now + PERIOD;
         self.clear();
         let ring = self.ring.then(|| supervisor.ring_status());
-        let clocks = if self.clocks { supervisor.with(|engine| engine.clocks()).ok() } else { None };
+        let clocks = if self.clocks { supervisor.clocks().ok() } else { None };
         let clocks = clocks.map(|clocks| clock_line(&clocks, news.clock_spread_ns(), news.phase()));
         let lines = table(news, ring.as_ref(), clocks, &supervisor.states(), names);
         self.drawn = lines.len();
@@ -74,7 +74,7 @@ fn table(
     states: &[SubDeviceState],
     names: &Names,
 ) -> Vec<String> {
-    let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)));
+    let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)).unwrap_or_default());
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
     let judgement = status.in_words();
     let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
@@ -105,12 +105,13 @@ fn table(
 }
 
 /// The clocks: how many are locked, how far they are apart, how far cycles are from their phase.
-fn clock_line(clocks: &[ClockStatus], spread_ns: Option<u32>, (phase_ns, follows): (i64, bool)) -> String {
+fn clock_line(clocks: &[ClockStatus], spread_ns: Option<u32>, phase: Phase) -> String {
     let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
     let reference = clocks.iter().find(|clock| clock.is_reference);
     let reference = reference.map_or_else(String::new, |clock| format!(", reference {}", clock.position));
     let spread = spread_ns.map_or_else(String::new, |ns| format!(", spread {ns} ns"));
-    let phase = if follows { format!(", cycles {} us from their phase", us(phase_ns)) } else { String::new() };
+    let phase = phase.is_locked.then(|| format!(", cycles {} us from their phase", us(phase.error_ns)));
+    let phase = phase.unwrap_or_default();
     format!("{:<13} {locked} of {} locked{spread}{reference}{phase}", "clocks", clocks.len())
 }
 
@@ -180,7 +181,7 @@ fn list(states: &[SubDeviceState], names: &Names) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use ringcat::{Cable, PortOf};
+    use ringcat::{Cable, PortOf, Position};
 
     use super::*;
 
@@ -195,7 +196,7 @@ mod tests {
         assert_eq!(ring_lines(&status, &names)[..2], expected);
         assert_eq!(ring_lines(&status, &names)[2], "REDUNDANT     0 SubDevices, no carrier");
         status.state = RingState::Open;
-        status.place = Some(Cable { near: Some(PortOf { node: 2, port: 1 }), far: None });
+        status.place = Some(Cable { near: Some(PortOf::new(Position(2), 1)), far: None });
         let expected = "ring          OPEN, break between SubDevice 2 port 1 and the REDUNDANT interface";
         assert_eq!(ring_lines(&status, &names)[0], expected);
     }
@@ -204,11 +205,13 @@ mod tests {
     #[test]
     fn clocks_have_a_line() {
         let mut clocks = [ClockStatus::default(); 2];
-        clocks.iter_mut().for_each(|clock| clock.position = 3);
+        clocks.iter_mut().for_each(|clock| clock.position = Position(3));
         clocks[0].is_reference = true;
+        let mut phase = Phase::default();
+        (phase.error_ns, phase.is_locked) = (-1_500, true);
         let expected = "clocks        1 of 2 locked, spread 31 ns, reference 3, cycles -1.5 us from their phase";
-        assert_eq!(clock_line(&clocks, Some(31), (-1_500, true)), expected);
-        assert_eq!(clock_line(&[], None, (7, false)), "clocks        0 of 0 locked");
+        assert_eq!(clock_line(&clocks, Some(31), phase), expected);
+        assert_eq!(clock_line(&[], None, Phase::default()), "clocks        0 of 0 locked");
     }
 
     // covers: run

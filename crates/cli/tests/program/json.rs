@@ -76,3 +76,21 @@ fn what_cannot_be_done_is_an_object_too() {
     }
     std::fs::remove_file(&file).expect("it was just written");
 }
+
+// covers: json
+#[test]
+fn help_and_version_are_an_object_too() {
+    let version = format!("ringcat {}", env!("CARGO_PKG_VERSION"));
+    for (line, message) in [("help", "help"), ("run --help", "help"), ("--version", version.as_str())] {
+        let output = ringcat(&format!("--json {line}"));
+        let said = text(&output.stdout);
+        let result: serde_json::Value = serde_json::from_str(said.trim()).expect("one object and nothing else");
+        assert_eq!((result["result"]["outcome"].as_str(), output.status.code()), (Some("ok"), Some(0)), "{line}");
+        assert_eq!(result["result"]["message"], message, "{line}");
+        let details = result["result"]["details"].as_array().expect("lines");
+        // The path of the program, in a line of its own, may be longer.
+        let wide = |text: &&str| text.chars().count() > 80 && !text.contains(env!("CARGO_BIN_EXE_ringcat"));
+        let wide: Vec<&str> = details.iter().filter_map(|text| text.as_str()).filter(wide).collect();
+        assert_eq!(wide, [""; 0], "{line}");
+    }
+}

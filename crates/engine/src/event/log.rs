@@ -6,6 +6,8 @@ use alloc::vec::Vec;
 
 use super::history::History;
 use super::{Event, Occupant, TimedEvent};
+use ringcat_wire::address::Position;
+
 use crate::time::Instant;
 
 /// Largest number of unfetched frames of other MainDevices: enough to detect a second MainDevice.
@@ -60,8 +62,8 @@ impl EventLog {
     }
 
     /// The SubDevices at cabling positions.
-    pub fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
-        positions.map(|position| self.occupants.get(position?).copied())
+    pub fn occupants(&self, positions: [Option<Position>; 2]) -> [Option<Occupant>; 2] {
+        positions.map(|position| self.occupants.get(usize::from(position?.0)).copied())
     }
 
     /// Appends an event, with the SubDevices at the cabling positions that it names.

@@ -168,6 +168,16 @@ pub struct SubDeviceInfo {
     pub warnings: Vec<InfoWarning>,
 }
 
+/// Numbers of the SyncManagers of both mailboxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MailboxSyncManagers {
+    /// Of the mailbox that the MainDevice writes.
+    pub written: u8,
+    /// Of the mailbox that the MainDevice reads.
+    pub read: u8,
+}
+
 impl SubDeviceInfo {
     /// Whether the EEPROM was never written or cannot be read: nothing is known about the SubDevice.
     pub fn is_blank(&self) -> bool {
@@ -197,25 +207,26 @@ impl SubDeviceInfo {
         self.pdos.iter().filter(move |pdo| pdo.sync_manager == Some(sync_manager))
     }
 
-    /// SyncManagers of the mailboxes: of the mailbox that the MainDevice writes, and of the mailbox that it reads. From
-    /// the SII if it contains both, otherwise 0 and 1 (protocol 3.11).
-    pub fn mailbox_sync_managers(&self) -> (u8, u8) {
+    /// SyncManagers of the mailboxes: from the SII if it contains both, otherwise 0 and 1 (protocol 3.11).
+    pub fn mailbox_sync_managers(&self) -> MailboxSyncManagers {
         self.sync_managers_of(self.mailbox.as_ref())
     }
 
-    /// SyncManagers of the mailboxes in BOOT: to the SubDevice, and from it. If SyncManagers in the SII start at the
-    /// addresses of these mailboxes, they are used, otherwise those of PREOP.
-    pub fn boot_sync_managers(&self) -> (u8, u8) {
+    /// SyncManagers of the mailboxes in BOOT. If SyncManagers in the SII start at the addresses of these mailboxes,
+    /// they are used, otherwise those of PREOP.
+    pub fn boot_sync_managers(&self) -> MailboxSyncManagers {
         self.sync_managers_of(self.bootstrap.as_ref())
     }
 
-    fn sync_managers_of(&self, layout: Option<&MailboxLayout>) -> (u8, u8) {
+    fn sync_managers_of(&self, layout: Option<&MailboxLayout>) -> MailboxSyncManagers {
         let of = |kind, start: Option<u16>| {
             let all = || (0u8..).zip(&self.sync_managers).filter(move |(_, sm)| sm.kind == kind);
             all().find(|(_, sm)| Some(sm.start) == start).or_else(|| all().next()).map(|(index, _)| index)
         };
         let out = of(SyncManagerKind::MailboxOut, layout.map(|layout| layout.receive_offset));
-        out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset))).unwrap_or((0, 1))
+        let both = out.zip(of(SyncManagerKind::MailboxIn, layout.map(|layout| layout.send_offset)));
+        let (written, read) = both.unwrap_or((0, 1));
+        MailboxSyncManagers { written, read }
     }
 
     /// Whether it supports LRW, by the features of the controller and by the SII.

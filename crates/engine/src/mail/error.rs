@@ -56,14 +56,7 @@ impl fmt::Display for MailboxError {
     }
 }
 
-impl core::error::Error for MailboxError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            MailboxError::Bus(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for MailboxError {}
 
 impl From<BusError> for MailboxError {
     fn from(error: BusError) -> MailboxError {

@@ -86,14 +86,7 @@ impl fmt::Display for SoeError {
     }
 }
 
-impl core::error::Error for SoeError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match &self.cause {
-            SoeFailure::Mailbox(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for SoeError {}
 
 impl From<MailboxError> for SoeFailure {
     fn from(error: MailboxError) -> SoeFailure {

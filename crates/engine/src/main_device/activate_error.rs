@@ -249,14 +249,4 @@ fn fmt_sync_cycle(
     f.write_str("one must be a multiple of the other")
 }
 
-impl core::error::Error for ActivateError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            ActivateError::Config { error, .. } => Some(error),
-            ActivateError::Setup { error, .. } => Some(error),
-            ActivateError::Junction(error) => Some(error),
-            ActivateError::Layout(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for ActivateError {}

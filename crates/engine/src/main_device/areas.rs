@@ -79,6 +79,19 @@ impl Directory {
         bits.is_empty() || before.is_some_and(|(other, range)| *other == domain && bits.end <= range.end)
     }
 
+    /// The object at a bit of a domain's image: SubDevice, index and subindex. For messages: it searches all entries.
+    pub fn object_at(&self, domain: DomainId, bit: u64) -> Option<(SubDeviceId, u16, u8)> {
+        let covers = |entry: &Entry| {
+            let start = u64::from(entry.bit_offset);
+            entry.domain == domain && (start..start + u64::from(entry.bit_length)).contains(&bit)
+        };
+        self.subdevices.iter().enumerate().find_map(|(subdevice, areas)| {
+            let mut entries = areas.iter().flat_map(|area| &area.entries);
+            let (index, sub_index, _) = entries.find(|(_, _, entry)| covers(entry))?;
+            Some((SubDeviceId(subdevice), *index, *sub_index))
+        })
+    }
+
     /// Number of declared SubDevices.
     pub fn subdevice_count(&self) -> usize {
         self.subdevices.len()

@@ -106,11 +106,4 @@ impl fmt::Display for RegisterError {
     }
 }
 
-impl core::error::Error for RegisterError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            RegisterError::Plan { error, .. } => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for RegisterError {}

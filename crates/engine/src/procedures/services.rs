@@ -92,15 +92,7 @@ impl fmt::Display for ServiceError {
     }
 }
 
-impl core::error::Error for ServiceError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            ServiceError::Bus(error) => Some(error),
-            ServiceError::Sii(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for ServiceError {}
 
 impl From<SiiProgramError> for ServiceError {
     fn from(error: SiiProgramError) -> ServiceError {

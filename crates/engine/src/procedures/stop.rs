@@ -78,14 +78,7 @@ impl fmt::Display for StopError {
     }
 }
 
-impl core::error::Error for StopError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            StopError::Bus(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for StopError {}
 
 impl From<BusError> for StopError {
     fn from(error: BusError) -> StopError {

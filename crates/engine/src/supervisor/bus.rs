@@ -14,7 +14,7 @@ use core::cell::RefCell;
 use core::fmt;
 use core::future::Future;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 
@@ -88,7 +88,7 @@ impl Bus {
     }
 
     /// The SubDevices at cabling positions.
-    pub(crate) fn occupants(&self, positions: [Option<usize>; 2]) -> [Option<Occupant>; 2] {
+    pub(crate) fn occupants(&self, positions: [Option<Position>; 2]) -> [Option<Occupant>; 2] {
         self.shared.borrow().events.occupants(positions)
     }
 

@@ -2,13 +2,33 @@
 
 use core::fmt;
 
+use ringcat_wire::address::Position;
+
 /// A port of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PortOf {
-    /// Position of the SubDevice.
-    pub node: usize,
+    /// Position of the SubDevice, as index.
+    pub(crate) node: usize,
     /// Port 0..3.
-    pub port: u8,
+    pub(crate) port: u8,
+}
+
+impl PortOf {
+    /// Port 0..3 of the SubDevice at a position.
+    pub const fn new(position: Position, port: u8) -> PortOf {
+        PortOf { node: position.0 as usize, port }
+    }
+
+    /// Position of the SubDevice.
+    pub const fn position(self) -> Position {
+        // A scan counts SubDevices in 16 bits (protocol 2.2).
+        Position(self.node as u16)
+    }
+
+    /// Number of the port, 0..3.
+    pub const fn port(self) -> u8 {
+        self.port
+    }
 }
 
 impl fmt::Display for PortOf {

@@ -9,6 +9,7 @@ use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::SubDeviceId;
 use ringcat_engine::topology::{PortOf, Topology};
+use ringcat_wire::address::Position;
 
 use super::file::{Difference, EniFile};
 
@@ -37,13 +38,15 @@ impl EniFile {
             Some(config) => format!("\"{}\"", names[config]),
             None => format!("position {node}"),
         };
-        let into = |at: PortOf| format!("port {} of {}", LETTERS[usize::from(at.port & 3)], name(at.node));
+        let into = |at: PortOf| {
+            format!("port {} of {}", LETTERS[usize::from(at.port() & 3)], name(usize::from(at.position().0)))
+        };
         let mut differences = Vec::new();
         for (config, facts) in facts.iter().enumerate() {
             let Some(node) = place[config].filter(|node| !topology.is_in_local_ring(*node)) else { continue };
             let said = match facts.plugged_into {
                 Some((previous, port)) => match place[previous] {
-                    Some(node) => Some(PortOf { node, port: number(port) }),
+                    Some(node) => Some(PortOf::new(Position(node as u16), number(port))),
                     // Missing, so that the next one is plugged in elsewhere.
                     None => continue,
                 },

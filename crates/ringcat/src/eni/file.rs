@@ -24,7 +24,7 @@ use crate::text::Names;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct EniFile {
-    /// What it says.
+    /// Content of the file.
     pub eni: Eni,
     /// What follows.
     pub configuration: Configuration,
@@ -169,7 +169,7 @@ impl EniFile {
         differences
     }
 
-    /// A simulated segment that is as the file says; with `ring` its end leads to the redundant interface.
+    /// A simulated segment as in the file; with `ring` its end is connected to the redundant interface.
     ///
     /// # Errors
     /// [`SegmentError`]: cables that do not fit.

@@ -30,7 +30,7 @@ pub struct EniImage {
     /// Numbers of the variables by name.
     by_name: Box<[usize]>,
     copies: Vec<CopyRule>,
-    unplaced: Vec<usize>,
+    unplaced: Vec<SubDeviceId>,
 }
 
 /// A variable of the image.
@@ -245,8 +245,8 @@ impl EniImage {
         &self.copies
     }
 
-    /// Indices of SubDevices that have places in the file and no process data, in a domain or at all.
-    pub fn unplaced(&self) -> &[usize] {
+    /// SubDevices that have places in the file and no process data, in a domain or at all.
+    pub fn unplaced(&self) -> &[SubDeviceId] {
         &self.unplaced
     }
 
@@ -272,7 +272,7 @@ struct Builder<'a> {
     directory: &'a Directory,
     inputs: Vec<Piece>,
     outputs: Vec<Piece>,
-    unplaced: Vec<usize>,
+    unplaced: Vec<SubDeviceId>,
 }
 
 impl Builder<'_> {
@@ -289,6 +289,7 @@ impl Builder<'_> {
         let pieces = self.pieces(area, 0, bits);
         let placed: u64 = pieces.iter().map(|piece| u64::from(piece.bits)).sum();
         if placed == 0 && bits > 0 && self.process_data(area).next().is_none() {
+            let subdevice = SubDeviceId(subdevice);
             if !self.unplaced.contains(&subdevice) {
                 self.unplaced.push(subdevice);
             }

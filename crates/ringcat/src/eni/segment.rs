@@ -13,7 +13,7 @@ use ringcat_config::eni::Eni;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::segment::Segment;
 
-/// The segment of a file. With `ring` the last free port leads to the redundant interface.
+/// The segment of a file. With `ring` the last free port is connected to the redundant interface.
 pub fn segment(eni: &Eni, configuration: &Configuration, ring: bool) -> Segment {
     let mut devices: Vec<_> = eni
         .subdevices

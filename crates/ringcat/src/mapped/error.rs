@@ -9,7 +9,7 @@ use ringcat_engine::main_device::SubDeviceId;
 /// Most objects that a message lists.
 const LISTED: usize = 24;
 
-/// What is looked for.
+/// The wanted object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Wanted {
@@ -51,15 +51,23 @@ pub struct MappedObject {
     pub pdo: String,
 }
 
+impl MappedObject {
+    /// Index, subindex and name.
+    fn label(&self) -> impl fmt::Display {
+        fmt::from_fn(|f| {
+            write!(f, "{:#06x}:{:02x}", self.index, self.sub_index)?;
+            match (self.pdo.as_str(), self.name.as_str()) {
+                (_, "") => Ok(()),
+                ("", name) => write!(f, " \"{name}\""),
+                (pdo, name) => write!(f, " \"{pdo}.{name}\""),
+            }
+        })
+    }
+}
+
 impl fmt::Display for MappedObject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:#06x}:{:02x}", self.index, self.sub_index)?;
-        match (self.pdo.as_str(), self.name.as_str()) {
-            (_, "") => {}
-            ("", name) => write!(f, " \"{name}\"")?,
-            (pdo, name) => write!(f, " \"{pdo}.{name}\"")?,
-        }
-        write!(f, " ({}, {} bits)", noun(self.direction), self.entry.bit_length)
+        write!(f, "{} ({}, {} bits)", self.label(), noun(self.direction), self.entry.bit_length)
     }
 }
 
@@ -87,7 +95,7 @@ pub enum MapError {
         subdevice: SubDeviceId,
         /// Its name; may be empty.
         name: String,
-        /// What was looked for.
+        /// The wanted object.
         wanted: Wanted,
         /// What is mapped.
         mapped: Vec<MappedObject>,
@@ -96,17 +104,19 @@ pub enum MapError {
     Direction {
         /// The SubDevice.
         subdevice: SubDeviceId,
-        /// What was looked for.
-        wanted: Wanted,
-        /// The direction that it has.
-        is: Direction,
+        /// Its name; may be empty.
+        name: String,
+        /// The object, with the direction that it has.
+        object: Box<MappedObject>,
     },
     /// It has another number of bits than the type.
     Width {
         /// The SubDevice.
         subdevice: SubDeviceId,
-        /// What was looked for.
-        wanted: Wanted,
+        /// Its name; may be empty.
+        name: String,
+        /// The object.
+        object: Box<MappedObject>,
         /// The type.
         number: &'static str,
         /// Bits of the type.
@@ -118,7 +128,9 @@ pub enum MapError {
     Ambiguous {
         /// The SubDevice.
         subdevice: SubDeviceId,
-        /// What was looked for.
+        /// Its name; may be empty.
+        name: String,
+        /// The wanted object.
         wanted: Wanted,
         /// Those that have it.
         found: Vec<MappedObject>,
@@ -132,30 +144,35 @@ impl fmt::Display for MapError {
                 write!(f, "SubDevice {subdevice}: not declared: the declaration has {declared} SubDevices, from 0")
             }
             MapError::NotMapped { subdevice, name, wanted, mapped } => {
-                write!(f, "SubDevice {subdevice}")?;
-                if !name.is_empty() {
-                    write!(f, " \"{name}\"")?;
-                }
-                write!(f, ": {wanted} is not mapped; mapped: ")?;
+                write!(f, "{}: {wanted} is not mapped; mapped: ", called(*subdevice, name))?;
                 list(f, mapped)
             }
-            MapError::Direction { subdevice, wanted, is } => {
-                let other = match is {
+            MapError::Direction { subdevice, name, object } => {
+                let other = match object.direction {
                     Direction::Inputs => "the SubDevice sends it, so it cannot be set",
                     Direction::Outputs => "the SubDevice receives it: look for an output",
                 };
-                let article = if *is == Direction::Inputs { "an input" } else { "an output" };
-                write!(f, "SubDevice {subdevice}: {wanted} is {article}: {other}")
+                let (at, label) = (called(*subdevice, name), object.label());
+                write!(f, "{at}: {label} is an {}: {other}", noun(object.direction))
             }
-            MapError::Width { subdevice, wanted, number, expected, is } => {
-                write!(f, "SubDevice {subdevice}: {wanted}: {number} has {expected} bits, {is} bits are mapped")
+            MapError::Width { subdevice, name, object, number, expected, is } => {
+                let (at, label) = (called(*subdevice, name), object.label());
+                write!(f, "{at}: {label}: {number} has {expected} bits, {is} bits are mapped")
             }
-            MapError::Ambiguous { subdevice, wanted, found } => {
-                write!(f, "SubDevice {subdevice}: {wanted} is the name of several: ")?;
+            MapError::Ambiguous { subdevice, name, wanted, found } => {
+                write!(f, "{}: {wanted} is the name of several: ", called(*subdevice, name))?;
                 list(f, found)
             }
         }
     }
+}
+
+/// A SubDevice with its name, if it has one.
+fn called(subdevice: SubDeviceId, name: &str) -> impl fmt::Display {
+    fmt::from_fn(move |f| match name {
+        "" => write!(f, "SubDevice {subdevice}"),
+        name => write!(f, "SubDevice {subdevice} \"{name}\""),
+    })
 }
 
 fn list(f: &mut fmt::Formatter<'_>, objects: &[MappedObject]) -> fmt::Result {

@@ -4,6 +4,7 @@ use ringcat_engine::exchange::Entry;
 use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
 use ringcat_engine::main_device::{Directory, SubDeviceId};
 
+use super::bits::{ObjectOf, OutputBits};
 use super::error::{MapError, MappedObject, Wanted};
 use crate::value::Number;
 
@@ -43,18 +44,25 @@ impl Search {
 
     /// The place of a number.
     pub fn typed<T: Number>(self, wanted: &Wanted, direction: Direction) -> Result<Entry, MapError> {
-        let subdevice = self.subdevice;
-        let entry = self.find(wanted, direction)?;
-        if entry.bit_length != T::BITS {
-            let (number, expected, is) = (T::NAME, T::BITS, entry.bit_length);
-            return Err(MapError::Width { subdevice, wanted: wanted.clone(), number, expected, is });
+        let (subdevice, name) = (self.subdevice, self.name.clone());
+        let object = self.find(wanted, direction)?;
+        if object.entry.bit_length != T::BITS {
+            let (number, expected, is) = (T::NAME, T::BITS, object.entry.bit_length);
+            return Err(MapError::Width { subdevice, name, object: Box::new(object), number, expected, is });
         }
-        Ok(entry)
+        Ok(object.entry)
     }
 
-    /// The place of an object. One that is mapped in both directions is found in the one that is looked for; of one
+    /// The place of any number of bits.
+    pub fn bits(self, wanted: &Wanted, direction: Direction) -> Result<OutputBits, MapError> {
+        let subdevice = self.subdevice;
+        let object = self.find(wanted, direction)?;
+        Ok(OutputBits::new(object.entry, ObjectOf::new((subdevice, object.index, object.sub_index))))
+    }
+
+    /// A mapped object. One that is mapped in both directions is found in the wanted one; of one
     /// that is mapped more than once in it by index, the first place.
-    pub fn find(self, wanted: &Wanted, direction: Direction) -> Result<Entry, MapError> {
+    fn find(self, wanted: &Wanted, direction: Direction) -> Result<MappedObject, MapError> {
         let Search { subdevice, name, mapped } = self;
         let fits = |object: &&MappedObject| match wanted {
             Wanted::Index { index, sub_index } => (object.index, object.sub_index) == (*index, *sub_index),
@@ -64,14 +72,14 @@ impl Search {
         let with_direction = || found.iter().filter(|object| object.direction == direction);
         let wanted_again = wanted.clone();
         match (with_direction().count(), wanted) {
-            (1, _) | (2.., Wanted::Index { .. }) => Ok(with_direction().next().map_or(found[0].entry, |it| it.entry)),
+            (1, _) | (2.., Wanted::Index { .. }) => Ok(with_direction().next().map_or(found[0], |it| *it).clone()),
             (0, _) => match found.first() {
-                Some(other) => Err(MapError::Direction { subdevice, wanted: wanted_again, is: other.direction }),
+                Some(other) => Err(MapError::Direction { subdevice, name, object: Box::new((*other).clone()) }),
                 None => Err(MapError::NotMapped { subdevice, name, wanted: wanted_again, mapped }),
             },
             (_, Wanted::Name(_)) => {
                 let found = with_direction().map(|object| (*object).clone()).collect();
-                Err(MapError::Ambiguous { subdevice, wanted: wanted_again, found })
+                Err(MapError::Ambiguous { subdevice, name, wanted: wanted_again, found })
             }
         }
     }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use ringcat_engine::domain::DomainId;
 
-use super::bits::DoesNotFit;
+use super::bits::{DoesNotFit, ObjectOf};
 
 /// Process data was not written; nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +16,8 @@ pub enum WriteError {
         domain: DomainId,
         /// First bit of the place in the domain's image.
         start: u64,
+        /// The object at that bit; `None` if no PDO entry is there.
+        object: Option<ObjectOf>,
     },
     /// The place ends behind the domain's image, or there is no such domain.
     Outside {
@@ -39,7 +41,10 @@ pub enum WriteError {
 impl fmt::Display for WriteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            WriteError::NotAnOutput { domain, start } => {
+            WriteError::NotAnOutput { domain, start, object } => {
+                if let Some(object) = object {
+                    write!(f, "{object}: ")?;
+                }
                 write!(f, "domain {domain}, bit {start}: not an output, so it cannot be written")
             }
             WriteError::Outside { domain, end, image_bits } => {
@@ -51,14 +56,7 @@ impl fmt::Display for WriteError {
     }
 }
 
-impl std::error::Error for WriteError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            WriteError::DoesNotFit(error) => Some(error),
-            WriteError::NotAnOutput { .. } | WriteError::Outside { .. } | WriteError::Length { .. } => None,
-        }
-    }
-}
+impl std::error::Error for WriteError {}
 
 impl From<DoesNotFit> for WriteError {
     fn from(error: DoesNotFit) -> WriteError {

@@ -94,7 +94,7 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, number| engine.start_reset(number).ended())
     }
 
-    /// Reads its EEPROM, as large as it says that it is.
+    /// Reads its EEPROM, with the size that its header gives.
     pub fn sii_read(self) -> S::Outcome<Vec<u8>, SubDeviceError> {
         self.ask(move |engine, number| engine.start_sii_read(number).ended())
     }

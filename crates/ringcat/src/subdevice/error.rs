@@ -15,7 +15,7 @@ use ringcat_engine::procedures::services::ServiceError;
 
 use super::name::SubDeviceName;
 
-/// Something that was asked of a SubDevice was not done.
+/// A service of a SubDevice failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SubDeviceError {
@@ -118,28 +118,7 @@ impl fmt::Display for SubDeviceFailure {
     }
 }
 
-impl StdError for SubDeviceError {
-    fn source(&self) -> Option<&(dyn StdError + 'static)> {
-        match &self.failure {
-            SubDeviceFailure::Sdo(error) => Some(error),
-            SubDeviceFailure::Information(error) => Some(error),
-            SubDeviceFailure::Foe(error) => Some(error),
-            SubDeviceFailure::Soe(error) => Some(error),
-            SubDeviceFailure::Aoe(error) => Some(error),
-            SubDeviceFailure::Mailbox(error) => Some(error),
-            SubDeviceFailure::State(error) => Some(error),
-            SubDeviceFailure::Service(error) => Some(error),
-            SubDeviceFailure::NotScanned
-            | SubDeviceFailure::NotActive
-            | SubDeviceFailure::Active
-            | SubDeviceFailure::NotDeclared { .. }
-            | SubDeviceFailure::NoPosition { .. }
-            | SubDeviceFailure::NoMailbox
-            | SubDeviceFailure::Size { .. }
-            | SubDeviceFailure::TimedOut { .. } => None,
-        }
-    }
-}
+impl StdError for SubDeviceError {}
 
 macro_rules! failures {
     ($($variant:ident($error:ty),)*) => {$(

@@ -14,8 +14,8 @@ impl<S: Services> SubDevice<S> {
         self.foe_read_with(file, options, |_| ())
     }
 
-    /// Reads a file with a password or other limits; `progress` is told after each packet, in the thread of the acyclic
-    /// half.
+    /// Reads a file with a password or other limits; `progress` is called after each packet, in the thread of the
+    /// acyclic half.
     pub fn foe_read_with(
         self,
         file: impl Into<String>,
@@ -36,7 +36,7 @@ impl<S: Services> SubDevice<S> {
         self.foe_write_with(file, data, options, |_| ())
     }
 
-    /// Writes a file with a password or other limits; `progress` is told after each packet, in the thread of the
+    /// Writes a file with a password or other limits; `progress` is called after each packet, in the thread of the
     /// acyclic half.
     pub fn foe_write_with(
         self,

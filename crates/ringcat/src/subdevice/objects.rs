@@ -61,13 +61,13 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { information::list(&mailbox, list, limits).await })
     }
 
-    /// What the SubDevice says about an object: its name, its kind, its largest subindex.
+    /// Reads the description of an object (SDO information): name, kind, largest subindex.
     pub fn sdo_object(self, index: u16) -> S::Outcome<Object, SubDeviceError> {
         let limits = self.limits.of_message();
         self.ask_mailbox(move |mailbox| async move { information::object(&mailbox, index, limits).await })
     }
 
-    /// What the SubDevice says about an entry: its name, type, access rights, unit, default and range.
+    /// Reads the description of an entry (SDO information): name, type, access rights, unit, default and range.
     pub fn sdo_entry(self, index: u16, sub_index: u8) -> S::Outcome<ObjectEntry, SubDeviceError> {
         let limits = self.limits.of_message();
         let all = ValueInfo::UNIT | ValueInfo::DEFAULT | ValueInfo::MINIMUM | ValueInfo::MAXIMUM;

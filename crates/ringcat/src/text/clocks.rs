@@ -17,12 +17,12 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::DelaysChanged { clocks, largest_ns } => {
             format!("propagation delays of {clocks} clocks have changed, by {largest_ns} ns at most")
         }
-        Event::DelayUnknown { position, fork, range_ns, is_estimated } => {
+        Event::DelayUnknown { position, fork, range, is_estimated } => {
             let why = fork.map_or_else(
                 || "the path from the reference clock is unknown".to_owned(),
                 |fork| format!("the fork at position {fork} has no clock"),
             );
-            let range = range_ns.map_or_else(String::new, |(least, most)| format!(", {least} to {most} ns"));
+            let range = range.map_or_else(String::new, |range| format!(", {range}"));
             let written = if *is_estimated { "the middle of the range is used" } else { "no delay is set" };
             let at = names.at(*position, ends[0]);
             format!("the propagation delay of {at} cannot be measured: {why}{range}; {written}")

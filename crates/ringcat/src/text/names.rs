@@ -41,7 +41,7 @@ impl Names {
 
     /// A port of the SubDevice at a position, with its name in the declaration.
     pub(super) fn port(&self, at: PortOf, declared: Option<SubDeviceId>) -> String {
-        format!("SubDevice {}{} port {}", at.node, self.called(declared), at.port)
+        format!("SubDevice {}{} port {}", at.position(), self.called(declared), at.port())
     }
 
     /// A cable by its two ends. Its last SubDevice is also given by station address.

@@ -9,7 +9,7 @@ use ringcat::{
     Options, Refused, SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_engine::topology::{Closing, PortOf};
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{Position, StationAddress};
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
 /// The junction is number 1, the members of its ring are 2 to 4.
@@ -116,7 +116,7 @@ fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_
 #[test]
 fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
     let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);
-    let port = |node, port| PortOf { node, port };
+    let port = |node, port| PortOf::new(Position(node as u16), port);
     let words = |event| describe(&TimedEvent::new(Instant(0), event), &names);
     // The places of the scan are not those of the declaration.
     let changed = |broken, breaks| Event::JunctionChanged {

@@ -1,6 +1,7 @@
 //! The public API as an application uses it, on the embedded simulator.
 
 mod declarations;
+mod errors;
 mod ethernet;
 mod gateway;
 mod jobs;

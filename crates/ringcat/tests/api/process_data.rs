@@ -65,10 +65,14 @@ fn inputs_cannot_be_written_and_errors_say_what_is_mapped() -> Result<(), Box<dy
     let direction = application.output::<i32>(drive, 0x6064, 0).expect_err("the drive sends it");
     assert_eq!(
         direction.to_string(),
-        "SubDevice 0: 0x6064:00 is an input: the SubDevice sends it, so it cannot be set"
+        "SubDevice 0 \"servo-1\": 0x6064:00 \"Feedback.Position\" is an input: the SubDevice sends it, so it cannot be \
+         set"
     );
     let width = application.output::<i16>(drive, 0x607A, 0).expect_err("it has 32 bits");
-    assert_eq!(width.to_string(), "SubDevice 0: 0x607a:00: i16 has 16 bits, 32 bits are mapped");
+    assert_eq!(
+        width.to_string(),
+        "SubDevice 0 \"servo-1\": 0x607a:00 \"Command.Target position\": i16 has 16 bits, 32 bits are mapped"
+    );
     let missing = application.input::<bool>(buttons, 0x7000, 1).expect_err("it has inputs from 0x6000 on");
     let text = missing.to_string();
     assert!(text.starts_with("SubDevice 2 \""), "{text}");
@@ -93,7 +97,7 @@ fn a_value_that_does_not_fit_is_an_error_and_changes_nothing() -> Result<(), Box
     application.cycle(|data| {
         assert_eq!(data.set_bits(lamp, 1), Ok(()));
         let error = data.set_bits(lamp, 2).expect_err("one bit");
-        assert_eq!(error.to_string(), "2 does not fit into 1 bits");
+        assert_eq!(error.to_string(), "SubDevice 1: 0x7010:01: 2 does not fit into 1 bits");
         assert_eq!(data.read(&lamp.entry()), 1);
         assert_eq!(data.set_signed_bits(mode, -128), Ok(()));
         assert!(data.set_signed_bits(mode, -129).is_err() && data.set_signed_bits(mode, 128).is_err());
@@ -140,8 +144,12 @@ fn writing_inputs_values_that_do_not_fit_and_places_beyond_the_image_is_an_error
         let before = data.image(domain).to_vec();
         let input = data.write(&button, 1);
         assert!(matches!(input, Err(WriteError::NotAnOutput { start, .. }) if start == button.bit_offset.into()));
+        assert!(input.unwrap_err().to_string().starts_with("SubDevice 2: 0x6000:01: domain 0, bit "));
+        assert_eq!(data.status(domain).map(|status| status.state), Ok(DomainState::Complete));
+        let undeclared = data.status(DomainId(1)).expect_err("one is declared");
+        assert_eq!(undeclared.to_string(), "domain 1: not declared: the declaration has 1 domains, from 0");
         let too_large = data.write(&lamp, 2);
-        assert_eq!(too_large.unwrap_err().to_string(), "2 does not fit into 1 bits");
+        assert_eq!(too_large.unwrap_err().to_string(), "SubDevice 1: 0x7000:01: 2 does not fit into 1 bits");
         assert!(matches!(data.write_signed(&target, i64::MAX), Err(WriteError::DoesNotFit(_))));
         let beyond = Entry { bit_offset: before.len() as u32 * 8, ..lamp };
         assert!(matches!(data.write(&beyond, 1), Err(WriteError::Outside { .. })));

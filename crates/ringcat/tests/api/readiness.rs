@@ -11,8 +11,8 @@ use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
-    AlState, Declaration, Error, Event, LastOutputs, MainDevice, Options, Reason, SubDeviceConfig, SubDeviceId,
-    SupervisorThread,
+    ActivateError, AlState, Declaration, Error, Event, LastOutputs, MainDevice, Options, Reason, Refused,
+    SubDeviceConfig, SubDeviceId, SupervisorThread,
 };
 
 const SEGMENT: &str = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"servo\"\n\
@@ -89,6 +89,7 @@ fn a_refused_activation_is_an_error_like_any_other_and_names_the_subdevice() -> 
     }
     let error = activate().expect_err("another product");
     assert!(error.to_string().starts_with("activation: declaration 1: "), "{error}");
-    assert!(error.source().is_some(), "{error}");
+    let refused = error.downcast_ref::<Box<Refused<MainDevice<SimulatedSegment>>>>().expect("its own type");
+    assert!(matches!(refused.error, Error::Activate(ActivateError::Config { .. })), "{refused:?}");
     Ok(())
 }

@@ -81,7 +81,9 @@ fn objects_files_idns_and_registers_before_activation_by_position() -> Result<()
     assert!(!main_device.subdevice(SPEAKER).sdo_object(0x1018)?.name.is_empty());
     assert_eq!(main_device.subdevice(SPEAKER).sdo_entry(0x2001, 7)?.bit_length, 16);
     let refused = main_device.subdevice(SPEAKER).sdo_read::<u8>(0x7777, 0).expect_err("there is none");
-    assert!(refused.to_string().contains("0x06020000") && refused.source().is_some(), "{refused}");
+    assert!(refused.to_string().contains("0x06020000"), "{refused}");
+    let Error::SubDevice(refused) = refused else { panic!("{refused:?}") };
+    assert!(matches!(refused.failure, SubDeviceFailure::Sdo(_)), "{refused:?}");
     let short = TransferLimits::default().bytes(10);
     let long = main_device.subdevice(SPEAKER).limits(short).sdo_read::<Vec<u8>>(0x2002, 0);
     assert!(matches!(failure(long), SubDeviceFailure::Sdo(_)));

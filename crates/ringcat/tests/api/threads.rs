@@ -54,7 +54,7 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     )?;
     until("all are in OP", || cycles.supervisor().all_settled());
     until("outputs arrive", || plant.with_network(|network| outputs(network)[0] == [1]));
-    let status = cycles.news().status(DomainId(0));
+    let status = cycles.news().status(DomainId(0))?;
     assert!(status.expected > 0 && status.wkc > 0, "{status:?}");
     let events: Vec<_> = std::iter::from_fn(|| cycles.supervisor().pop_event()).collect();
     assert!(events.len() >= 3, "{events:?}");

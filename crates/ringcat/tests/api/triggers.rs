@@ -51,7 +51,10 @@ fn cycles_follow_each_other_as_soon_as_their_frames_have_returned() {
     }
     let after = application.cyclic_counters();
     assert_eq!((after.lost, after.skipped, after.incomplete), (before.lost, before.skipped, before.incomplete));
-    assert_eq!(application.cycle(|data| data.status(DomainId(0))).state, DomainState::Complete);
+    assert_eq!(
+        application.cycle(|data| data.status(DomainId(0))).expect("it is declared").state,
+        DomainState::Complete
+    );
     assert_eq!(application.pace().skipped, 0);
 }
 
@@ -80,7 +83,7 @@ fn frames_that_do_not_return_are_waited_for_a_period_and_no_longer() {
     for gap in gaps(&mut application, 20) {
         assert_eq!(gap, PERIOD);
     }
-    assert_eq!(application.cycle(|data| data.status(DomainId(0))).state, DomainState::Zero);
+    assert_eq!(application.cycle(|data| data.status(DomainId(0))).expect("it is declared").state, DomainState::Zero);
     application.links_mut().network_mut().apply(Fault::Heal(cable));
     gaps(&mut application, 3);
     let healed = gaps(&mut application, 20);

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Cable, Event, PortOf};
+use ringcat::{Cable, Event, PortOf, Position};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use scenarios::check::ring_events;
@@ -15,7 +15,7 @@ use crate::topologies::ring_with_branch;
 /// A cable of its ring, by positions: the branch is processed after the second SubDevice.
 fn cable(number: usize) -> Cable {
     const POSITIONS: [usize; 5] = [0, 1, 4, 5, 6];
-    let port = |device: usize, port: u8| PortOf { node: POSITIONS[device], port };
+    let port = |device: usize, port: u8| PortOf::new(Position(POSITIONS[device] as u16), port);
     Cable { near: number.checked_sub(1).map(|device| port(device, 1)), far: (number < 5).then(|| port(number, 0)) }
 }
 
@@ -84,7 +84,7 @@ fn a_broken_ring_of_couplers_with_terminals_is_located_at_the_scan() {
         let end = |end: Endpoint| match end {
             Endpoint::Device(device, port) => {
                 let node = (0..kinds.len()).find(|it| world.device_of(*it) == Some(device)).expect("scanned");
-                Some(PortOf { node, port: port.index() as u8 })
+                Some(PortOf::new(Position(node as u16), port.index() as u8))
             }
             Endpoint::Host(_) => None,
         };

@@ -71,7 +71,7 @@ fn the_free_running_rate_of_a_clock_is_known_after_lock_and_changes() {
     let is_right = |world: &World| {
         let clocks = world.application().engine().clocks();
         let off = |clock: &ringcat::ClockStatus| {
-            let expected = free[usize::from(clock.position)] - free[0];
+            let expected = free[usize::from(clock.position.0)] - free[0];
             (clock.drift_ppb - expected).abs()
         };
         let largest = clocks.iter().map(off).max();

@@ -121,8 +121,8 @@ fn a_delay_with_known_limits_is_estimated_on_request() {
         let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
         let mut told = Vec::new();
         for event in &events {
-            let Event::DelayUnknown { position, range_ns: Some(range), is_estimated, .. } = event else { continue };
-            told.push((usize::from(position.0), *range, *is_estimated));
+            let Event::DelayUnknown { position, range: Some(range), is_estimated, .. } = event else { continue };
+            told.push((usize::from(position.0), (range.least_ns, range.most_ns), *is_estimated));
         }
         assert!(!told.is_empty(), "{events:?}");
         for (device, (least, most), is_estimated) in told {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use ringcat::{Cable, Event, PortOf, RingState};
+use ringcat::{Cable, Event, PortOf, Position, RingState};
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port;
 use scenarios::check::ring_events;
@@ -39,7 +39,7 @@ fn plugged(world: &World, cable: (Endpoint, Endpoint)) -> Ends {
     let end = |end: Endpoint| match end {
         Endpoint::Device(device, port) => {
             let node = (0..COUNT).find(|position| world.device_of(*position) == Some(device)).expect("it was scanned");
-            Ok(PortOf { node, port: port.index() as u8 })
+            Ok(PortOf::new(Position(node as u16), port.index() as u8))
         }
         other => Err(if other == MAIN { "MAIN" } else { "REDUNDANT" }),
     };
@@ -176,12 +176,12 @@ fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unkn
         let position = |device: usize| (0..total).find(|it| world.device_of(*it).map(|it| it.0) == Some(device));
         let end = |end: Endpoint| match end {
             Endpoint::Device(device, port) => {
-                Ok(PortOf { node: position(device.0).expect("scanned"), port: port.index() as u8 })
+                Ok(PortOf::new(Position(position(device.0).expect("scanned") as u16), port.index() as u8))
             }
             other => Err(if other == MAIN { "MAIN" } else { "REDUNDANT" }),
         };
         let truth: Vec<Ends> = cables.iter().map(|(a, b)| sorted(vec![end(*a), end(*b)])).collect();
-        let nodes = |ends: &Ends| ends.iter().map(|end| end.map(|at| at.node)).collect::<Vec<_>>();
+        let nodes = |ends: &Ends| ends.iter().map(|end| end.map(|at| usize::from(at.position().0))).collect::<Vec<_>>();
         let mut note = |world: &World, mark, number: usize, what: &str| {
             let told = ring_events(world.events(mark));
             match &places(&told)[..] {

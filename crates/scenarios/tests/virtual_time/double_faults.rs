@@ -219,8 +219,9 @@ impl Run {
     fn cycle(&mut self) {
         let domains: Vec<DomainId> = (0..self.images.len()).map(DomainId).collect();
         let of = domains.clone();
-        let statuses: Vec<Option<DomainStatus>> =
-            self.world.cycle_with(|data| of.into_iter().map(|it| data.is_due(it).then(|| data.status(it))).collect());
+        let statuses: Vec<Option<DomainStatus>> = self.world.cycle_with(|data| {
+            of.into_iter().map(|it| data.is_due(it).then(|| data.status(it).expect("it is declared"))).collect()
+        });
         for (domain, status) in domains.into_iter().zip(statuses) {
             if let Some(status) = status.filter(|status| !status.pending) {
                 self.judge(domain, status.state);

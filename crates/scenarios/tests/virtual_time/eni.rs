@@ -69,7 +69,7 @@ fn activate(file: EniFile, ring: bool, split_lrw: bool) -> Result<Plant, Error> 
 
 fn activate_on(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
     let plant = start(network, file, split_lrw)?;
-    assert_eq!(plant.image.unplaced(), [0_usize; 0]);
+    assert_eq!(plant.image.unplaced(), []);
     assert_eq!(plant.file.compare(&plant.found), [], "it is the network of the file");
     Ok(plant)
 }

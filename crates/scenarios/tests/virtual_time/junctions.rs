@@ -11,6 +11,7 @@ mod sizes;
 
 use std::time::Duration;
 
+use ringcat::Position;
 use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, SubDeviceId, automatic};
 use ringcat_engine::mail::coe;
 use ringcat_engine::topology::PortOf;
@@ -36,7 +37,7 @@ fn one_ring() -> Network {
 
 /// Both ends of a cable of [`one_ring`]'s ring, as events name them.
 fn ends(cable: usize) -> (PortOf, PortOf) {
-    let port = |node, port| PortOf { node, port };
+    let port = |node, port| PortOf::new(Position(node as u16), port);
     match cable {
         2 => (port(1, 3), port(2, 0)),
         5 => (port(4, 1), port(1, 1)),

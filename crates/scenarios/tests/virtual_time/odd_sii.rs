@@ -172,7 +172,8 @@ fn mailboxes_on_other_sync_managers_work_as_in_the_sii() {
         world.settle();
         let mark = world.mark();
         let mailbox = world.mailbox(ODD);
-        assert_eq!(world.scan.subdevices[ODD].mailbox_sync_managers(), (3, 2));
+        let mailboxes = world.scan.subdevices[ODD].mailbox_sync_managers();
+        assert_eq!((mailboxes.written, mailboxes.read), (3, 2));
         // A lost response is repeated, unsolicited mail is found.
         world.lose(Loss::of_read(world.station_of(ODD), send).on_the_way_back());
         let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));

@@ -116,7 +116,7 @@ fn a_rescan_of_a_changing_ring_ends_in_time_with_right_places() {
     world.cut(CableId(2));
     world.run_cycles(50);
     let broken = rescan(&mut world);
-    assert_eq!((whole.counts.0.0, broken.counts.0.0, broken.counts.1.0), (5, 2, 3));
+    assert_eq!((whole.counts.main, broken.counts.main, broken.counts.redundant), (5, 2, 3));
     for rescan in [&whole, &broken] {
         assert_eq!(declared(rescan), (0..5).map(Some).collect::<Vec<_>>());
         assert_eq!((rescan.moved().count(), rescan.missing.len()), (0, 0));
@@ -145,12 +145,12 @@ fn a_rescan_of_a_changing_ring_ends_in_time_with_right_places() {
 fn damaged(world: &World) -> Vec<(Option<usize>, Option<usize>, u64)> {
     let counted = world.application().engine().cable_errors();
     let damaged = counted.iter().filter(|(_, errors)| errors.invalid_frames > 0);
-    let node = |end: Option<PortOf>| end.map(|end| end.node);
+    let node = |end: Option<PortOf>| end.map(|end| usize::from(end.position().0));
     damaged.map(|(cable, errors)| (node(cable.near), node(cable.far), errors.invalid_frames)).collect()
 }
 
 fn place(world: &World) -> Option<(Option<usize>, Option<usize>)> {
-    let node = |end: Option<PortOf>| end.map(|end| end.node);
+    let node = |end: Option<PortOf>| end.map(|end| usize::from(end.position().0));
     world.application().ring_status().place.map(|cable| (node(cable.near), node(cable.far)))
 }
 
@@ -273,7 +273,7 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
         world.run_cycles(60);
         let mark = world.mark();
         let all = rescan(&mut world);
-        assert_eq!((all.counts.0.0, all.counts.1.0), (4, 1), "{open_at_scan:?}");
+        assert_eq!((all.counts.main, all.counts.redundant), (4, 1), "{open_at_scan:?}");
         assert!(all.moved().count() == 0 && !world.saw(mark, |event| matches!(event, Event::Moved { .. })));
         // Order of the closed ring: 0, 1, the leaving SubDevice, 2, and the branch that processes the redundant copy.
         let located = |world: &mut World, between: CableId, at| {

@@ -90,7 +90,7 @@ fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
             let at = network.now() + Duration::from_micros(dice.below(1_000));
             network.schedule(at, fault);
         }
-        let status = application.cycle(|data| data.status(DomainId(0)));
+        let status = application.cycle(|data| data.status(DomainId(0))).expect("it is declared");
         while application.pop_event().is_some() {}
         let image = application.exchange().image(DomainId(0));
         let text = inputs.iter().map(|range| hex(&image[range.clone()])).collect();

@@ -157,7 +157,8 @@ fn firmware_update_uses_the_boot_sync_managers_of_the_sii() {
         let mut world = World::in_op(6, line(devices, NetworkOptions::default()));
         let mark = world.mark();
         let before = registers(&world, DRIVE);
-        assert_eq!(world.scan.subdevices[DRIVE].boot_sync_managers(), (receive, send));
+        let mailboxes = world.scan.subdevices[DRIVE].boot_sync_managers();
+        assert_eq!((mailboxes.written, mailboxes.read), (receive, send));
         assert_eq!(request(&mut world, DRIVE, AlState::Boot), Ok(()));
         assert_eq!(manager(&world, receive), (boot.receive_offset, boot.receive_size, true), "own: {own}");
         assert_eq!(manager(&world, send), (boot.send_offset, boot.send_size, true), "own: {own}");

@@ -72,11 +72,4 @@ impl fmt::Display for SdoError {
     }
 }
 
-impl core::error::Error for SdoError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match &self.cause {
-            SdoFailure::Mailbox(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for SdoError {}

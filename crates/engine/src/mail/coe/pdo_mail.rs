@@ -38,14 +38,7 @@ impl fmt::Display for PdoMailError {
     }
 }
 
-impl core::error::Error for PdoMailError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            PdoMailError::Mailbox(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for PdoMailError {}
 
 impl From<MailboxError> for PdoMailError {
     fn from(error: MailboxError) -> PdoMailError {

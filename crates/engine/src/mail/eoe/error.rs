@@ -47,14 +47,7 @@ impl fmt::Display for EoeFailure {
     }
 }
 
-impl core::error::Error for EoeError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match &self.cause {
-            EoeFailure::Mailbox(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for EoeError {}
 
 impl From<MailboxError> for EoeFailure {
     fn from(error: MailboxError) -> EoeFailure {

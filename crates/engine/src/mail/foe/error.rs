@@ -74,14 +74,7 @@ impl fmt::Display for FoeFailure {
     }
 }
 
-impl core::error::Error for FoeError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match &self.cause {
-            FoeFailure::Mailbox(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for FoeError {}
 
 impl From<MailboxError> for FoeFailure {
     fn from(error: MailboxError) -> FoeFailure {

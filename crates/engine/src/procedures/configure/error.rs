@@ -108,29 +108,9 @@ impl fmt::Display for StartupError {
     }
 }
 
-impl core::error::Error for ConfigureError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            ConfigureError::Bus(error) => Some(error),
-            ConfigureError::State(error) => Some(error),
-            ConfigureError::Sdo(error) => Some(error),
-            ConfigureError::Startup { error, .. } => Some(error),
-            ConfigureError::Unfit(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for ConfigureError {}
 
-impl core::error::Error for StartupError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            StartupError::Sdo(error) => Some(error),
-            StartupError::Soe(error) => Some(error),
-            StartupError::Eoe(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for StartupError {}
 
 impl From<BusError> for ConfigureError {
     fn from(error: BusError) -> ConfigureError {

@@ -18,6 +18,7 @@ use crate::event::Event;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
+use crate::ring_status::LinkCounts;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::unassigned::Knowledge;
 use crate::segment::view::View;
@@ -67,8 +68,8 @@ pub struct Found {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Rescan {
-    /// SubDevices passed by the main copy and by the redundant copy.
-    pub counts: (Wkc, Wkc),
+    /// SubDevices on each link.
+    pub counts: LinkCounts,
     /// All that answer, by position.
     pub subdevices: Vec<Found>,
     /// Declared SubDevices that do not answer, by their index in the declaration.
@@ -207,7 +208,8 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
     let is_found = |it: &SubDeviceId| subdevices.iter().any(|found| found.identified == Identified::Declared(*it));
     let missing = (0..access.members().len()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
     let topology = retrace::cabling(access.cabling(), &seen.stations, &nodes, usize::from(seen.counts.0.0));
-    Ok(Some(Rescan { counts: seen.counts, subdevices, missing, topology }))
+    let counts = LinkCounts { main: seen.counts.0.0, redundant: seen.counts.1.0 };
+    Ok(Some(Rescan { counts, subdevices, missing, topology }))
 }
 
 /// The ports of all SubDevices; `None` if the segment has changed since: port states of two cablings would be mixed.

@@ -9,6 +9,7 @@ use super::life::{Compensation, Delays, Due, Life, Lock, Running};
 use super::node::Node;
 use super::status::{ClockStatus, HiddenDelay};
 use crate::board::clocks::References;
+use crate::clocks::DelayRange;
 use crate::clocks::{Cables, FRACTION, Passage, Wiring, branches, round};
 use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig};
 use crate::declared::SubDeviceId;
@@ -149,7 +150,7 @@ impl Clocks {
     pub fn status(&self) -> Vec<ClockStatus> {
         let with_clock = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
         let status = |(index, node): (usize, &Node)| ClockStatus {
-            position: node.position,
+            position: Position(node.position),
             station: node.station,
             subdevice: node.member.map(SubDeviceId),
             is_reference: self.reference == Some(index),
@@ -172,7 +173,10 @@ impl Clocks {
         let range = hidden.range.zip(reference);
         Some(HiddenDelay {
             fork: hidden.fork.map(|fork| Position(fork as u16)),
-            range_ns: range.map(|((least, most), reference)| (round(least - reference), round(most - reference))),
+            range: range.map(|((least, most), reference)| DelayRange {
+                least_ns: round(least - reference),
+                most_ns: round(most - reference),
+            }),
             is_estimated: node.unit.is_some(),
         })
     }

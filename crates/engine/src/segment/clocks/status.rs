@@ -2,6 +2,7 @@
 
 use ringcat_wire::address::{Position, StationAddress};
 
+use crate::clocks::DelayRange;
 use crate::declared::SubDeviceId;
 
 /// Status of the clock of one SubDevice.
@@ -9,7 +10,7 @@ use crate::declared::SubDeviceId;
 #[non_exhaustive]
 pub struct ClockStatus {
     /// Position in the scan, or at which it was found later.
-    pub position: u16,
+    pub position: Position,
     /// Its station address.
     pub station: StationAddress,
     /// Index in the declaration.
@@ -41,8 +42,8 @@ pub struct ClockStatus {
 pub struct HiddenDelay {
     /// Position of the fork; `None` if the SubDevices between this one and the reference are unknown.
     pub fork: Option<Position>,
-    /// Lower and upper bound of the delay from the reference, in nanoseconds; `None` without bounds.
-    pub range_ns: Option<(i64, i64)>,
+    /// Limits of the delay from the reference; `None` if they are unknown.
+    pub range: Option<DelayRange>,
     /// The middle of that range was written
     /// ([`ClockConfig::estimated_delays`](crate::config::ClockConfig::estimated_delays)); otherwise no delay was
     /// written.

@@ -228,9 +228,9 @@ impl Segment {
             let fork = |hidden: HiddenDelay| hidden.fork.map(|fork| usize::from(fork.0));
             let now = hidden.map(|hidden| (fork(hidden), hidden.is_estimated));
             let before = core::mem::replace(&mut node.reported_hidden, now);
-            let Some(HiddenDelay { fork, range_ns, is_estimated }) = hidden.filter(|_| now != before) else { continue };
+            let Some(HiddenDelay { fork, range, is_estimated }) = hidden.filter(|_| now != before) else { continue };
             let (position, station) = (Position(node.position), node.station);
-            let event = Event::DelayUnknown { position, fork, range_ns, is_estimated };
+            let event = Event::DelayUnknown { position, fork, range, is_estimated };
             effects.report_of(event, self.occupant(station));
         }
     }

@@ -7,7 +7,7 @@ use ringcat_sim::frame::Port;
 use ringcat_sim::network::builder::DEFAULT_CABLE_DELAY;
 use ringcat_wire::register::PortKind;
 
-/// Ports that lead further, in the order in which a free one is looked for.
+/// Ports to the next SubDevices, in the order in which free ports are used.
 const FURTHER: [Port; 3] = [Port::B, Port::D, Port::C];
 
 /// What is plugged in where.
@@ -17,7 +17,7 @@ struct Plan<'a> {
     cables: Vec<CableSpec>,
 }
 
-/// All cables: cable n leads to SubDevice n, the last one closes the ring. Ports that the file does not have but uses
+/// All cables: cable n ends at SubDevice n, the last one closes the ring. Ports that the file does not have but uses
 /// are given to the devices.
 pub(super) fn plug(
     devices: &mut [DeviceDescription],

@@ -47,7 +47,7 @@ impl Run {
     fn ends(&self, event: &Event) -> [Option<(DeviceIndex, u8)>; 2] {
         let Event::JunctionChanged { near, far, declared, .. } = event else { return [None; 2] };
         let end = |port: Option<u8>, declared: Option<SubDeviceId>| Some((self.world.device_of(declared?.0)?, port?));
-        [end(near.map(|near| near.port), declared[0]), end(Some(far.port), declared[1])]
+        [end(near.map(|near| near.port()), declared[0]), end(Some(far.port()), declared[1])]
     }
 
     fn is_of(&self, event: &Event, cable: usize, is_broken: bool) -> bool {

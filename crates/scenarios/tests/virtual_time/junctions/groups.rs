@@ -4,6 +4,7 @@ mod at_the_end;
 
 use std::time::Duration;
 
+use ringcat::Position;
 use ringcat::{
     Declaration, DomainMember, Event, Identified, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig,
     SubDeviceId, TimedEvent, automatic,
@@ -165,7 +166,7 @@ fn rescan(world: &mut World) -> Vec<Option<usize>> {
 }
 
 fn own(near: (usize, u8), far: (usize, u8), broken: bool) -> Event {
-    let port = |(node, port)| PortOf { node, port };
+    let port = |(node, port)| PortOf::new(Position(node as u16), port);
     change(Some(port(near)), port(far), broken, usize::from(broken))
 }
 
@@ -185,13 +186,14 @@ fn names_fit(world: &World, mark: Mark) -> bool {
     let stations = world.application().engine().stations();
     world.events(mark).iter().all(|timed| match timed.event {
         Event::JunctionChanged { near: Some(near), far, station, declared, .. } => {
-            let with_group = |node: usize| WITH_GROUP[node].map(SubDeviceId);
-            declared == [near.node, far.node].map(with_group) && station == declared[1].map(|it| stations[it.0])
+            let with_group = |at: Position| WITH_GROUP[usize::from(at.0)].map(SubDeviceId);
+            declared == [near.position(), far.position()].map(with_group)
+                && station == declared[1].map(|it| stations[it.0])
         }
         Event::BreakLocated { cable } | Event::RingClosed { place: Some(cable), .. } => {
             let expected = |node: usize| WITH_GROUP[node].map(|it| (Some(SubDeviceId(it)), stations[it]));
             let occupants = timed.occupants.map(|both| both.map(|occupant| (occupant.declared, occupant.station)));
-            occupants == cable.positions().map(|node| expected(node?))
+            occupants == cable.positions().map(|at| expected(usize::from(at?.0)))
         }
         _ => true,
     })

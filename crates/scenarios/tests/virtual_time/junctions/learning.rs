@@ -1,6 +1,7 @@
 //! Rings behind junctions that a scan learns: in mode automatic several rings, nested, one of them broken, although
 //! open ports allow many solutions (JR-03); of a broken ring all but one end of the broken cable.
 
+use ringcat::Position;
 use ringcat::{Cable, Event, JunctionMode};
 use ringcat_engine::topology::{Closing, PortOf};
 use ringcat_sim::cable::CableId;
@@ -40,8 +41,8 @@ fn four_nested_rings_are_learned_closed_and_with_any_one_broken() {
         (at(5, C), at(7, A)),
     ];
     let closing = |(head, head_port), (tail, tail_port)| Closing {
-        head: PortOf { node: head, port: head_port },
-        tail: PortOf { node: tail, port: tail_port },
+        head: PortOf::new(Position(head as u16), head_port),
+        tail: PortOf::new(Position(tail as u16), tail_port),
     };
     let all = [closing((0, 1), (3, 2)), closing((1, 1), (2, 1)), closing((3, 1), (4, 1)), closing((5, 1), (6, 1))];
     for two_links in [false, true] {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::Position;
 use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceId, automatic};
 use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex};
@@ -46,7 +47,7 @@ fn either_of_two_rings_may_break_and_a_second_break_is_reported() {
         world.cut(CableId(6));
         world.run_cycles(300);
         let second = |broken, breaks| {
-            let (near, far) = (Some(PortOf { node: 4, port: 1 }), PortOf { node: 5, port: 0 });
+            let (near, far) = (Some(PortOf::new(Position(4), 1)), PortOf::new(Position(5), 0));
             change(near, far, broken, breaks)
         };
         assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }, second(true, 2)]);
@@ -72,7 +73,7 @@ pub fn ends_of_two(cable: usize) -> (PortOf, PortOf) {
         _ => (4, 1),
     };
     let far = if cable > 4 { cable - 1 } else { cable };
-    (PortOf { node: near, port }, PortOf { node: far, port: 0 })
+    (PortOf::new(Position(near as u16), port), PortOf::new(Position(far as u16), 0))
 }
 
 /// Two rings break within one cycle, so that no frame shows the places. No frame comes back, which is reported; then
@@ -178,7 +179,7 @@ fn nested_rings_that_break_at_once_are_reported_with_both_places() {
             3 => (2, 1, 3),
             _ => (1, 2, 4),
         };
-        change(Some(PortOf { node, port }), PortOf { node: far, port: 0 }, broken, breaks)
+        change(Some(PortOf::new(Position(node as u16), port)), PortOf::new(Position(far as u16), 0), broken, breaks)
     };
     let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
     let settings = [(JunctionMode::Strict, &strict[..]), (JunctionMode::Automatic, &[])];

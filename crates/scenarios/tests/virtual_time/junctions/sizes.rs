@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::Position;
 use ringcat::{Event, JunctionMode};
 use ringcat_engine::topology::{Closing, PortOf};
 use ringcat_sim::cable::{CableId, Endpoint};
@@ -31,7 +32,7 @@ fn rings(members: &[usize], two_links: bool) -> (Network, Vec<Closing>, Vec<Cabl
         }
         within.push(CableId(cables.len()));
         cables.push((last, at(junction, B)));
-        let port = |node, port| PortOf { node, port };
+        let port = |node, port| PortOf::new(Position(node as u16), port);
         closings.push(Closing { head: port(junction, 1), tail: port(junction + count, 1) });
         // Two SubDevices in a row: open ports allow the ring to end at either.
         for _ in 0..2 {

@@ -1,4 +1,4 @@
-//! Examines a ring without changing it: which SubDevices answer on which link, their cabling, their error counters. It
+//! Inspects a ring without changing it: which SubDevices answer on which link, their cabling, their error counters. It
 //! only reads, so a segment operated by another MainDevice is not disturbed.
 
 use alloc::vec::Vec;
@@ -10,18 +10,18 @@ use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
 use super::scan::{ScanError, explain};
 use crate::link::LinkSet;
 use crate::ring::RingState;
-use crate::ring_status::{Cable, CableErrors, cables, port_errors};
+use crate::ring_status::{Cable, CableErrors, LinkCounts, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{NodeStatus, PortOf, Topology, ends_of_earlier_break};
 
-/// Result of an examination.
+/// Result of an inspection.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct RingLook {
+pub struct RingInspection {
     /// Closed or open.
     pub state: RingState,
     /// SubDevices on the main and on the redundant link.
-    pub counts: (u16, u16),
+    pub counts: LinkCounts,
     /// Station addresses by position, as assigned by the MainDevice that operates the segment; 0 if none is assigned.
     pub stations: Vec<StationAddress>,
     /// AL states by position.
@@ -37,17 +37,17 @@ pub struct RingLook {
     pub place: Option<Cable>,
 }
 
-/// Examines the ring once. SubDevices are addressed by position, which needs no station addresses.
+/// Inspects the ring once. SubDevices are addressed by position, which needs no station addresses.
 ///
 /// # Errors
 /// Frames that are lost repeatedly, no answer of any SubDevice, or SubDevices that are added or lost meanwhile.
-pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
+pub async fn inspect_ring(bus: Bus) -> Result<RingInspection, ScanError> {
     let counted = match bus.brd(map::TYPE, 1).await {
         Ok(counted) if counted.wkc().0 == 0 => return Err(ScanError::NoSubDevices),
         Err(BusError::Lost { .. }) => return Err(ScanError::NoAnswer),
         counted => counted.map_err(ScanError::Bus)?,
     };
-    let counts = (counted.main.0, counted.redundant.0);
+    let counts = LinkCounts { main: counted.main.0, redundant: counted.redundant.0 };
     let positions = (0..counted.wkc().0).map(Position);
     let readings = bus.gather_in_turns(positions.collect(), look_at).await;
     let mut statuses = Vec::with_capacity(readings.len());
@@ -66,7 +66,7 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
         counters.push(counted);
     }
     let state = bus.ring();
-    let topology = Topology::build(&statuses, usize::from(counts.0));
+    let topology = Topology::build(&statuses, usize::from(counts.main));
     let dl_status: Vec<_> = statuses.iter().map(|status| Some(status.dl_status)).collect();
     let place = broken(&topology, bus.links(), state, &dl_status);
     let errors = |end: Option<PortOf>| {
@@ -75,7 +75,7 @@ pub async fn look_at_ring(bus: Bus) -> Result<RingLook, ScanError> {
     };
     let cables = cables(&topology, bus.links());
     let cables = cables.into_iter().map(|cable| (cable, errors(cable.near).plus(errors(cable.far)))).collect();
-    Ok(RingLook { state, counts, stations, states, topology, counters, cables, place })
+    Ok(RingInspection { state, counts, stations, states, topology, counters, cables, place })
 }
 
 type Seen = (StationAddress, NodeStatus, AlStatus, ErrorCounters);
