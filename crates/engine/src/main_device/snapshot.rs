@@ -303,7 +303,7 @@ impl MainDevice {
 
     fn clock_snapshots(&self) -> Vec<ClockSnapshot> {
         let clocks = self.clocks().into_iter().map(|clock| ClockSnapshot {
-            position: clock.position,
+            position: clock.position.0,
             declared: clock.subdevice.map(|subdevice| subdevice.0),
             is_reference: clock.is_reference,
             is_locked: clock.is_locked,
