@@ -2,9 +2,9 @@
 //!
 //! `ethercrab_client INTERFACE SUBDEVICES CYCLES [TIMES]`: brings all SubDevices to OP and exchanges process data. In
 //! cycle i byte j of the outputs of SubDevice k is i + k + j. The same number of cycles follows without other work, to
-//! measure the cycle rate and the processor time per cycle. Prints one line of figures, with the measured propagation delays, then keeps exchanging the
-//! last outputs until its standard input ends. Unexpected results end it with an error. TIMES is the number of
-//! distributions of the reference time before OP; default is that of ethercrab.
+//! measure the cycle rate and the processor time per cycle. Prints one line of figures, with the measured propagation
+//! delays, then keeps exchanging the last outputs until its standard input ends. Unexpected results end it with an
+//! error. TIMES is the number of distributions of the reference time before OP; default is that of ethercrab.
 
 use std::io;
 use std::process::ExitCode;
@@ -85,6 +85,16 @@ fn end_of_input() -> Arc<AtomicBool> {
     ended
 }
 
+/// Outputs of a SubDevice: bytes that count up.
+fn fill(outputs: &mut [u8], first: usize) {
+    outputs.iter_mut().enumerate().for_each(|(at, byte)| *byte = (first + at) as u8);
+}
+
+fn median_us(times: &mut [Duration]) -> f64 {
+    times.sort();
+    times.get(times.len() / 2).copied().unwrap_or_default().as_secs_f64() * 1e6
+}
+
 async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceConfig) -> Result<(), String> {
     let main_device = connect(interface, config)?;
     let begin = Instant::now();
@@ -108,9 +118,7 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
     let (mut wkc, mut wrong) = (0, 0);
     for cycle in 0..cycles {
         for (position, subdevice) in group.iter(&main_device).enumerate() {
-            for (at, byte) in subdevice.outputs_raw_mut().iter_mut().enumerate() {
-                *byte = (cycle + position + at) as u8;
-            }
+            fill(&mut subdevice.outputs_raw_mut(), cycle + position);
         }
         let sent = Instant::now();
         let response = group.tx_rx(&main_device).await.map_err(failed("process data"))?;
@@ -124,25 +132,19 @@ async fn run(interface: &str, count: usize, cycles: usize, config: MainDeviceCon
     let (mut cycle_times, mut last) = (Vec::with_capacity(cycles), back_to_back);
     for _ in 0..cycles {
         group.tx_rx(&main_device).await.map_err(failed("process data"))?;
-        let now = Instant::now();
-        cycle_times.push(now - last);
-        last = now;
+        cycle_times.push(last.elapsed());
+        last = Instant::now();
     }
     let per_second = cycles as f64 / back_to_back.elapsed().as_secs_f64().max(f64::EPSILON);
     let cpu_us = (process_cpu_ns() - cpu_before) as f64 / 1e3 / cycles.max(1) as f64;
     let inputs: Vec<String> = group.iter(&main_device).map(|subdevice| hex(&subdevice.inputs_raw())).collect();
     let delays: Vec<String> =
         group.iter(&main_device).map(|subdevice| subdevice.propagation_delay().to_string()).collect();
-    let [median, cycle] = [&mut round_trips, &mut cycle_times].map(|times| {
-        times.sort();
-        times.get(cycles / 2).copied().unwrap_or_default()
-    });
+    let [median, cycle] = [&mut round_trips, &mut cycle_times].map(|times| median_us(times));
     println!(
-        "op_ms {} median_us {:.1} per_second {per_second:.0} cycle_us {:.2} cpu_us {cpu_us:.2} wkc {wkc} \
+        "op_ms {} median_us {median:.1} per_second {per_second:.0} cycle_us {cycle:.2} cpu_us {cpu_us:.2} wkc {wkc} \
          wrong {wrong} delays {} inputs {}",
         to_op.as_millis(),
-        median.as_secs_f64() * 1e6,
-        cycle.as_secs_f64() * 1e6,
         delays.join(","),
         inputs.join(",")
     );

@@ -56,8 +56,8 @@ impl Figures {
         self.row(name, format!("{} {unit}", short(value)), format!(">= {} {unit}", short(bar)), verdict);
     }
 
-    /// A ratio of wall-clock times, one value per block of alternating programs. It misses its bar only where all blocks
-    /// agree on that.
+    /// A ratio of wall-clock times, one value per block of alternating programs. It misses its bar only where all
+    /// blocks agree on that.
     pub fn at_most_in_blocks(&mut self, name: &str, blocks: &[f64], bar: f64, unit: &str) {
         let verdict = in_blocks(blocks, bar);
         self.missed |= verdict == "MISSED";

@@ -1,14 +1,14 @@
 //! Round trip of a bare frame over a pair of interfaces: the lower limit for every MainDevice on this machine.
 //!
-//! `echo_floor echo IF` answers every EtherCAT frame as a segment would: it counts the first datagram's WKC up and sets
-//! bit 0x02 of the source address. `echo_floor ping IF [--size 60] [--count 100000] [--receive busy|block|hybrid]`
-//! measures. `echo_floor` alone, as root, creates two namespaces with a cable and measures there in all modes with two
-//! sizes. `--cpu N` pins either end to a processor.
+//! `echo_floor echo IF` answers every EtherCAT frame as a segment would: it counts the first datagram's WKC up and
+//! sets bit 0x02 of the source address. `echo_floor ping IF [--size 60] [--count 100000] [--receive
+//! busy|block|hybrid]` measures. `echo_floor` alone, as root, creates two namespaces with a cable and measures there
+//! in all modes with two sizes. `--cpu N` pins either end to a processor.
 //!
 //! `echo_floor paths` compares ways into the kernel there: the packet socket of this crate with its receive ring, one
-//! with `recv`, and `AF_XDP` in copy mode (`--path`, see [`NAMES`]). Blocks of all alternate; the echo is the same. With
-//! valgrind installed it counts user-side instructions per round trip of those that sleep: what spins executes as many
-//! as there is time.
+//! with `recv`, and `AF_XDP` in copy mode (`--path`, see [`NAMES`]). Blocks of all alternate; the echo is the same.
+//! With valgrind installed it counts user-side instructions per round trip of those that sleep: what spins executes
+//! as many as there is time.
 
 mod path;
 mod paths;

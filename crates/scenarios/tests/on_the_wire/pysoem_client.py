@@ -1,9 +1,9 @@
 """The MainDevice of another project (SOEM, through pysoem) on a network interface, as a check of our simulator.
 
-pysoem_client.py INTERFACE[,REDUNDANT] SUBDEVICES CYCLES: brings everything to OP and exchanges process data. In cycle i
-byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but sending and receiving, to
-tell how many there are in a second, and how much processor time each takes. Prints one line of figures, then keeps exchanging the last outputs
-until its standard input ends.
+pysoem_client.py INTERFACE[,REDUNDANT] SUBDEVICES CYCLES: brings everything to OP and exchanges process data. In cycle
+i byte j of the outputs of SubDevice k is i + k + j. As many cycles follow without any work but sending and receiving,
+to tell how many there are in a second, and how much processor time each takes. Prints one line of figures, then keeps
+exchanging the last outputs until its standard input ends.
 """
 
 import select
@@ -42,7 +42,8 @@ def main():
     inputs = ",".join(bytes(subdevice.input).hex() for subdevice in main_device.slaves)
     median = times[cycles // 2] * 1e6
     print(
-        f"op_ms {op_ms:.0f} median_us {median:.1f} per_second {per_second:.0f} cycle_us {cycle_us:.2f} cpu_us {cpu_us:.2f} wkc {main_device.expected_wkc} "
+        f"op_ms {op_ms:.0f} median_us {median:.1f} per_second {per_second:.0f} cycle_us {cycle_us:.2f} "
+        f"cpu_us {cpu_us:.2f} wkc {main_device.expected_wkc} "
         f"wrong {wrong} inputs {inputs}",
         flush=True,
     )

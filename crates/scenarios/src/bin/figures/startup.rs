@@ -8,16 +8,16 @@
 //!
 //! The minimum number of bytes, per SubDevice: for every 4 or 8 bytes of its SII one FPWR of command and word address
 //! (6 bytes) and one FPRD that polls and returns the data (6 + 4 or 6 + 8 bytes); its station address (2); its
-//! SyncManager (8) and FMMU (16); AL control for PREOP, SAFEOP and OP (2 each). These are sequential steps, each with a
-//! datagram (12 bytes besides its data) for every SubDevice, packed into the smallest number of frames (16 bytes of
+//! SyncManager (8) and FMMU (16); AL control for PREOP, SAFEOP and OP (2 each). These are sequential steps, each with
+//! a datagram (12 bytes besides its data) for every SubDevice, packed into the smallest number of frames (16 bytes of
 //! header, at least 60, at most 1,514). Other reads such as AL status, second checks of working counters and process
 //! data are not included. The floor is compared with all bytes sent until OP, cyclic frames included, without frame
 //! check sequences.
 //!
 //! # The limit of datagrams per frame
 //!
-//! Other software processes at most 15 datagrams of a frame. Start-up with that limit is compared with start-up without:
-//! a default of 15 is worth having where it costs at most [`LIMIT_BAR`] (issue 16).
+//! Other software processes at most 15 datagrams of a frame. Start-up with that limit is compared with start-up
+//! without: a default of 15 is worth having where it costs at most [`LIMIT_BAR`] (issue 16).
 
 use std::process::ExitCode;
 use std::time::Duration;

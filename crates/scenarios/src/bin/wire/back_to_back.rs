@@ -1,16 +1,17 @@
-//! Cycles back to back with 1, 10 and 50 servos: ours in all modes beside others, each with its receive mode, processor
-//! time, and the host's share of a cycle.
+//! Cycles back to back with 1, 10 and 50 servos: ours in all modes beside others, each with its receive mode,
+//! processor time, and the host's share of a cycle.
 //!
-//! The host's share is the median time of a cycle less the median time of a frame in the simulator, which the simulator
-//! records. It is from one cycle's begin to the next, with nothing but the exchange of others and, of ours, an output that
-//! follows an input. With one servo each stack sends one frame per cycle,
+//! The host's share is the median time of a cycle less the median time of a frame in the simulator, which the
+//! simulator records. It is from one cycle's begin to the next, with nothing but the exchange of others and, of ours,
+//! an output that follows an input. With one servo each stack sends one frame per cycle,
 //! and so do RingCAT and SOEM with 50; ethercrab sends several with 10 and 50, so its share there has more than one
 //! frame in it. Ratios compare programs that wait alike.
 
 use scenarios::figures::{Figures, median, of_blocks};
 
-use crate::programs::{Cycles, Pace, Program};
-use crate::{Tried, Wire};
+use crate::bench::{Tried, Wire};
+use crate::others::Program;
+use crate::programs::{Cycles, Pace};
 
 const SIZES: [usize; 3] = [1, 10, 50];
 const OURS: [Program; 6] = [

@@ -4,8 +4,8 @@ use std::process::{Command, Stdio};
 
 use scenarios::figures::{Figures, of_blocks};
 
+use crate::bench::{TEN, Tried, Wire, after};
 use crate::programs::Pace;
-use crate::{TEN, Tried, Wire, after};
 
 /// A cycle on the wire against a bare client, by the bytes of the frame.
 const ROUND_TRIP_BARS: [(&str, f64); 2] = [("60", 1.3), ("1500", 1.2)];

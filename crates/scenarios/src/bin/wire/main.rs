@@ -11,30 +11,22 @@
 //! ethercrab (`ci/bench-wire` sees to all three); without them their rows are missing, and the table says so.
 
 mod back_to_back;
+mod bench;
 mod cost;
+mod others;
 mod programs;
 mod start_up;
 
-use std::path::PathBuf;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use scenarios::figures::{Figures, verdict};
-use scenarios::namespaces::{Namespaces, Server};
+use scenarios::namespaces::Namespaces;
 
-type Tried<T> = Result<T, String>;
+use crate::bench::{Tried, Wire};
+
 /// Adds figures to a table.
 type Measure<'a> = &'a dyn Fn(&mut Figures) -> Tried<()>;
-
-/// Blocks of compared programs, and with `--full`.
-const BLOCKS: [usize; 2] = [3, 7];
-
-/// Coupler, terminals, and drives that have mailboxes.
-const MACHINE: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\ncount = 1\n\
-                       [[device]]\ntype = \"digital-output-8\"\ncount = 20\n\
-                       [[device]]\ntype = \"digital-input-8\"\ncount = 20\n[[device]]\ntype = \"servo\"\ncount = 9\n";
-const TEN: &str = "[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\ncount = 5\n\
-                   [[device]]\ntype = \"digital-input-8\"\ncount = 5\n";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -75,64 +67,4 @@ fn show(heading: &str, measure: Measure<'_>) -> bool {
     }
     println!("  (took {:.0} s)", begin.elapsed().as_secs_f64());
     met && result.is_ok()
-}
-
-/// The test set-up.
-struct Wire {
-    namespaces: Namespaces,
-    /// Directory of the programs.
-    programs: PathBuf,
-    others: programs::Others,
-    full: bool,
-}
-
-impl Wire {
-    fn new(namespaces: Namespaces, full: bool) -> Wire {
-        let here = std::env::current_exe().unwrap_or_default();
-        let programs = here.parent().map(PathBuf::from).unwrap_or_default();
-        Wire { namespaces, programs, others: programs::Others::from_environment(), full }
-    }
-
-    fn blocks(&self) -> usize {
-        BLOCKS[usize::from(self.full)]
-    }
-
-    fn ringcat(&self) -> PathBuf {
-        self.programs.join("ringcat")
-    }
-
-    fn serve(&self, arguments: &[&str]) -> Tried<Server> {
-        let fixed = ["--main", "far0", "--receive", "busy", "--cpu", "1"];
-        self.namespaces.serve(self.ringcat(), &[arguments, &fixed].concat())
-    }
-
-    /// `ringcat bench` at the near end; returns its output.
-    fn bench(&self, arguments: &[&str]) -> Tried<String> {
-        self.bench_waiting("busy", arguments)
-    }
-
-    /// As [`Self::bench`], in this receive mode.
-    fn bench_waiting(&self, receive: &str, arguments: &[&str]) -> Tried<String> {
-        let mut command = self.namespaces.near(self.ringcat());
-        command.arg("bench").args(arguments).args(["--main", "near0", "--receive", receive, "--cpu", "0"]);
-        output(command)
-    }
-}
-
-/// Runs a program to its end; returns its output.
-fn output(mut command: Command) -> Tried<String> {
-    let output = command.stdin(Stdio::null()).output().map_err(|error| error.to_string())?;
-    // 1: measured, but with losses, which a stall of the machine can cause.
-    if matches!(output.status.code(), Some(0 | 1)) && !output.stdout.is_empty() {
-        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
-    }
-    Err(format!("{command:?} failed: {}", String::from_utf8_lossy(&output.stderr).trim()))
-}
-
-/// The figure after a name.
-fn after(text: &str, name: &str) -> Tried<f64> {
-    let rest = text.split_once(name).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
-    let end = |rest: &str| rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
-    let figure = rest.and_then(|rest| rest[..end(rest)].parse().ok());
-    figure.ok_or_else(|| format!("no \"{name}\" in {text:?}"))
 }

@@ -5,8 +5,9 @@
 
 use scenarios::figures::{Figures, of_blocks};
 
-use crate::programs::{Pace, Program};
-use crate::{MACHINE, Tried, Wire};
+use crate::bench::{MACHINE, Tried, Wire};
+use crate::others::Program;
+use crate::programs::Pace;
 
 const OURS: Program = Program::ours("busy", false);
 const OTHERS: [Program; 2] = [Program::Pysoem { spins: false }, Program::Ethercrab];
