@@ -38,7 +38,7 @@ pub use register::{RegisterAccess, RegisterCommand};
 pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
-pub use clocks::{ClockConfig, Passage, ReferenceClock, SyncSignals};
+pub use clocks::{ClockConfig, Passage, PulseGrid, ReferenceClock, SyncSignals, WhenUnlocked};
 pub use resolution::{ConfigError, Resolution};
 pub use resolve::{DuplicateAlias, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;

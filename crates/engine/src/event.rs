@@ -13,7 +13,7 @@ use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
 pub use cyclic::CyclicEvent;
-pub use log::EventLog;
+pub use log::{EventLog, EventsSince};
 
 pub use crate::ring_status::Occupant;
 
@@ -30,6 +30,9 @@ use crate::topology::{Closing, PortOf};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TimedEvent {
+    /// Its number: events are numbered from 0 in the order in which the engine reports them. A jump means that events
+    /// in between were not kept.
+    pub number: u64,
     /// The `now` of the call in which the engine detected it.
     pub at: Instant,
     /// What happened.
@@ -40,9 +43,9 @@ pub struct TimedEvent {
 }
 
 impl TimedEvent {
-    /// An event without SubDevices at cabling positions.
+    /// An event without SubDevices at cabling positions, with number 0.
     pub const fn new(at: Instant, event: Event) -> TimedEvent {
-        TimedEvent { at, event, occupants: [None; 2] }
+        TimedEvent { number: 0, at, event, occupants: [None; 2] }
     }
 
     /// The same event with the SubDevices at its cabling positions.
@@ -388,6 +391,14 @@ pub enum Event {
     /// The set-up or measurement of distributed clocks failed; it is retried.
     ClocksFailed {
         /// Step and reason.
+        reason: String,
+    },
+    /// Clocks were not locked in time, and a SubDevice with SYNC signals went on without
+    /// (`WhenUnlocked::GoOn`).
+    WentOnUnlocked {
+        /// Index in the declaration.
+        subdevice: SubDeviceId,
+        /// The clock that is not locked, and its difference.
         reason: String,
     },
     /// The differences of the clocks entered or left the sync window.

@@ -25,6 +25,7 @@ mod registered;
 mod registered_area;
 mod registration;
 mod services;
+pub mod snapshot;
 mod states;
 mod steps;
 mod working_counters;
@@ -54,7 +55,7 @@ pub use states::{GroupState, SubDeviceState};
 pub use crate::declared::{Address, GroupId, SubDeviceId};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
-use crate::event::{CyclicEvent, TimedEvent};
+use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::mail::eoe::EthernetPort;
@@ -76,6 +77,9 @@ use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
 
+/// Unfetched events at which those of the cyclic half wait in their queue: a quarter of the log.
+const UNFETCHED: usize = 1024;
+
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 
 /// The MainDevice without its cyclic half.
@@ -94,6 +98,8 @@ pub struct MainDevice {
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
+    /// Cyclic events that were lost before they were numbered.
+    cyclic_events_lost: u64,
     /// Mailboxes by position, before activation.
     visited: Vec<Mailbox>,
     requests: Requests,
@@ -117,7 +123,9 @@ impl MainDevice {
     /// A MainDevice that has not sent anything.
     pub fn new(options: Options, now: Instant) -> MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
-        let (supervisor, cache) = (supervisor(identity, &options, now), SiiCache::new(options.sii_cache));
+        let mut supervisor = supervisor(identity, &options, now);
+        supervisor.set_events(EventLog::new(now.0));
+        let cache = SiiCache::new(options.sii_cache);
         let segment = SharedSegment::idle(&supervisor.bus(), Segment::new(choices(&options)), cache.clone());
         MainDevice {
             supervisor,
@@ -129,6 +137,7 @@ impl MainDevice {
             stopped: StopSlot::default(),
             segment,
             cyclic_events: None,
+            cyclic_events_lost: 0,
             visited: Vec::new(),
             requests: Requests::default(),
             emergencies: EmergencyRings::default(),
@@ -195,7 +204,10 @@ impl MainDevice {
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         let to_stop = all_known(&self.segment.view());
         self.counted = self.counters();
+        self.number_cyclic_events(now);
+        let events = self.supervisor.take_events().end_session();
         self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
@@ -208,6 +220,7 @@ impl MainDevice {
         self.own_objects = OwnObjects::default();
         self.statistics = None;
         self.cyclic_events = None;
+        self.cyclic_events_lost = 0;
         *self.stopped.borrow_mut() = None;
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
         self.supervisor.spawn(async move {
@@ -224,6 +237,26 @@ impl MainDevice {
     /// Events of both halves that were dropped because they were not fetched in time.
     pub fn events_dropped(&self) -> u64 {
         self.supervisor.events_dropped() + self.cyclic_events.as_ref().map_or(0, Consumer::dropped)
+    }
+
+    /// The events of both halves from a number on, also those that were fetched: for a client that was away. The last
+    /// 4,096 events are kept.
+    pub fn events_since(&mut self, number: u64) -> EventsSince {
+        self.number_cyclic_events(self.supervisor.bus().now());
+        self.supervisor.events_since(number)
+    }
+
+    /// Takes the events of the cyclic half into the log, as long as they leave room for those of the acyclic half.
+    fn number_cyclic_events(&mut self, now: Instant) {
+        let Some(cyclic) = self.cyclic_events.as_mut() else { return };
+        while self.supervisor.events_unfetched() < UNFETCHED {
+            let Some(words) = cyclic.pop() else { return };
+            let lost = cyclic.dropped();
+            if let Some(event) = CyclicEvent::unpack(words) {
+                self.supervisor.append_event(now, event.event(), lost - self.cyclic_events_lost);
+                self.cyclic_events_lost = lost;
+            }
+        }
     }
 
     /// The present state of each declared SubDevice.
@@ -271,11 +304,8 @@ impl MainDevice {
 
     /// Takes the oldest event of either half.
     pub fn pop_event(&mut self, now: Instant) -> Option<TimedEvent> {
-        if let Some(event) = self.supervisor.pop_event() {
-            return Some(event);
-        }
-        let words = self.cyclic_events.as_mut()?.pop()?;
-        CyclicEvent::unpack(words).map(|event| TimedEvent::new(now, event.event()))
+        self.number_cyclic_events(now);
+        self.supervisor.pop_event()
     }
 
     /// Receives a frame of the acyclic half.

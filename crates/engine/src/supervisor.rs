@@ -44,7 +44,7 @@ pub use stray::Stray;
 
 use crate::bell::Bell;
 use crate::board::Board;
-use crate::event::{Event, TimedEvent};
+use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingState};
 use crate::time::Instant;
@@ -168,6 +168,33 @@ impl Supervisor {
     /// Takes the oldest event.
     pub fn pop_event(&mut self) -> Option<TimedEvent> {
         self.shared.borrow_mut().events.pop()
+    }
+
+    /// The events, to be continued by another supervisor; this one begins anew.
+    pub(crate) fn take_events(&mut self) -> EventLog {
+        core::mem::take(&mut self.shared.borrow_mut().events)
+    }
+
+    /// Continues events.
+    pub(crate) fn set_events(&mut self, events: EventLog) {
+        self.shared.borrow_mut().events = events;
+    }
+
+    /// Appends an event of the other half. `lost`: events of that half that were lost before it.
+    pub(crate) fn append_event(&mut self, at: Instant, event: Event, lost: u64) {
+        let events = &mut self.shared.borrow_mut().events;
+        events.skip(lost);
+        events.push(at, event);
+    }
+
+    /// Number of events that the application has not fetched.
+    pub(crate) fn events_unfetched(&self) -> usize {
+        self.shared.borrow().events.unfetched()
+    }
+
+    /// The kept events from a number on.
+    pub fn events_since(&self, number: u64) -> EventsSince {
+        self.shared.borrow().events.since(number)
     }
 
     /// Number of events that were dropped because the application did not fetch them.

@@ -116,12 +116,12 @@ pub use value::{Number, ObjectValue};
 pub use ringcat_engine::clocks::{Follower, phase_error};
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, DeclaredSyncManager, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError,
-    Passage, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, RegisterAccess, RegisterCommand, SdoDownload,
-    SdoUpload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts,
-    Transition, Watchdog,
+    Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock, RegisterAccess, RegisterCommand,
+    SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals,
+    Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
-pub use ringcat_engine::event::{Event, Occupant, TimedEvent};
+pub use ringcat_engine::event::{Event, EventsSince, Occupant, TimedEvent};
 pub use ringcat_engine::exchange::ReferenceTime;
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SubDeviceInfo};
@@ -137,6 +137,10 @@ pub use ringcat_engine::mail::soe::command::CommandState;
 pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
 pub use ringcat_engine::mail::{EmergencyRing, Limits, Mailbox, MailboxError, Unclaimed, Unsolicited};
+pub use ringcat_engine::main_device::snapshot::{
+    Activity, AcyclicSnapshot, CableSnapshot, ClockSnapshot, GroupSnapshot, LinkSnapshot, Progress, RingSnapshot,
+    Snapshot, SubDeviceSnapshot,
+};
 pub use ringcat_engine::main_device::{
     ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
     GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, RegisterError, RegisteredArea,

@@ -12,6 +12,8 @@
 
 use std::time::Duration;
 
+use ringcat_engine::event::EventsSince;
+use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{MainDevice as Engine, Pending, RawDatagram, SubDeviceId};
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::services::statistics::Statistics;
@@ -100,6 +102,19 @@ pub trait Services: Sized {
     /// declaration has no such SubDevice.
     fn statistics(self, subdevice: SubDeviceId) -> Self::Immediate<Option<Statistics>> {
         self.immediately(move |engine| engine.statistics(subdevice.0))
+    }
+
+    /// The events from a number on ([`TimedEvent::number`](crate::TimedEvent)), also those that were fetched: for a
+    /// client that was away. The last 4,096 events are kept; the number of missing ones is in the result, and the
+    /// number to continue with. Another epoch means that the MainDevice began anew.
+    fn events_since(self, number: u64) -> Self::Immediate<EventsSince> {
+        self.immediately(move |engine| engine.events_since(number))
+    }
+
+    /// The whole state of the MainDevice at one moment: SubDevices, ring, clocks, groups, counters, and the number of
+    /// the next event. What happens later has that number or a higher one.
+    fn snapshot(self) -> Self::Immediate<Snapshot> {
+        self.immediately(|engine| engine.snapshot())
     }
 
     /// Creates a request for objects of a declared SubDevice of up to `size` bytes, for use in the cyclic thread. It

@@ -43,6 +43,7 @@ const fn level(event: &Event) -> Level {
         | Event::Missing { .. }
         | Event::Mismatch { .. }
         | Event::ClocksFailed { .. }
+        | Event::WentOnUnlocked { .. }
         | Event::Emergency { .. }
         | Event::ForeignFrame { .. } => Level::WARN,
         _ => Level::INFO,

@@ -32,7 +32,7 @@ enum External {
 /// The map of `docs/ARCHITECTURE.md`; a new crate gets a line here and there.
 const ROOMS: &[Room] = &[
     Room { directory: "wire", internal: Internal::Only(&[]), external: External::Only(&[]) },
-    Room { directory: "engine", internal: Internal::Only(&["ringcat-wire"]), external: External::Only(&[]) },
+    Room { directory: "engine", internal: Internal::Only(&["ringcat-wire"]), external: External::Only(&["serde"]) },
     Room {
         directory: "config",
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),

@@ -48,6 +48,8 @@ pub struct ClockWords {
     /// Stations in the lower half, the leader in bit 32, number of posts in the upper 31 bits.
     references: AtomicU64,
     spread: AtomicU32,
+    /// The first time that the application has set; 0 before.
+    first_application_time: AtomicU64,
     is_window_watched: AtomicBool,
     is_reference_led: AtomicBool,
     are_some_in_front: AtomicBool,
@@ -139,6 +141,18 @@ impl ClockWords {
     /// Whether some difference shows the jitter of the host, so that the OR of all differences carries no information.
     pub(crate) fn is_host_told(&self) -> bool {
         self.is_reference_led() || self.are_some_in_front.load(Ordering::Relaxed)
+    }
+
+    /// Posts a time of the application; only the first counts, and 0 is none.
+    pub(crate) fn post_application_time(&self, time: u64) {
+        if self.first_application_time.load(Ordering::Relaxed) == 0 {
+            self.first_application_time.store(time, Ordering::Relaxed);
+        }
+    }
+
+    /// The first time that the application has set.
+    pub(crate) fn first_application_time(&self) -> Option<u64> {
+        Some(self.first_application_time.load(Ordering::Relaxed)).filter(|time| *time != 0)
     }
 
     pub(crate) fn post_spread(&self, spread_ns: u32) {

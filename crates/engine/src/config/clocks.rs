@@ -38,6 +38,29 @@ impl Passage {
     }
 }
 
+/// What the pulses of SYNC0 are aligned to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum PulseGrid {
+    /// Multiples of the cycle in system time.
+    #[default]
+    SystemTime,
+    /// Multiples of the cycle after the first time that the application has set (`Exchange::set_application_time`), as
+    /// IgH does. Signals that start before the application has set a time are aligned to system time.
+    FirstApplicationTime,
+}
+
+/// What happens to a SubDevice with SYNC signals when the clocks are not locked in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum WhenUnlocked {
+    /// It stays in SAFEOP; its configuration fails and is tried again.
+    #[default]
+    StayInSafeOp,
+    /// It goes on, and an event reports it, as IgH does.
+    GoOn,
+}
+
 /// Distributed clocks of the segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -61,6 +84,10 @@ pub struct ClockConfig {
     pub lock_samples: u32,
     /// Longest time that a SubDevice with SYNC signals is held in SAFEOP until all clocks are locked.
     pub lock_limit: Duration,
+    /// What happens after that time.
+    pub when_unlocked: WhenUnlocked,
+    /// What the pulses of SYNC0 are aligned to.
+    pub pulse_grid: PulseGrid,
     /// Limit of the broadcast read of 0x092C; beyond it the clocks are out of the sync window. The read is the OR of
     /// all magnitudes: at most twice the largest.
     pub sync_window_ns: u32,
@@ -138,6 +165,31 @@ impl ClockConfig {
         self
     }
 
+    /// Sets [`ClockConfig::when_unlocked`].
+    #[must_use]
+    pub const fn with_when_unlocked(mut self, when_unlocked: WhenUnlocked) -> ClockConfig {
+        self.when_unlocked = when_unlocked;
+        self
+    }
+
+    /// Sets [`ClockConfig::pulse_grid`].
+    #[must_use]
+    pub const fn with_pulse_grid(mut self, pulse_grid: PulseGrid) -> ClockConfig {
+        self.pulse_grid = pulse_grid;
+        self
+    }
+
+    /// The choices of IgH: clocks count as locked within 10 us, after 5 s a SubDevice goes on without, and pulses are
+    /// aligned to the first application time.
+    #[must_use]
+    pub const fn as_igh(self) -> ClockConfig {
+        self.with_lock_window_ns(10_000)
+            .with_lock_samples(1)
+            .with_lock_limit(Duration::from_secs(5))
+            .with_when_unlocked(WhenUnlocked::GoOn)
+            .with_pulse_grid(PulseGrid::FirstApplicationTime)
+    }
+
     /// Sets [`ClockConfig::sync_window_ns`].
     #[must_use]
     pub const fn with_sync_window_ns(mut self, sync_window_ns: u32) -> ClockConfig {
@@ -172,6 +224,8 @@ impl Default for ClockConfig {
             lock_window_ns: 100,
             lock_samples: 100,
             lock_limit: Duration::from_secs(10),
+            when_unlocked: WhenUnlocked::default(),
+            pulse_grid: PulseGrid::default(),
             sync_window_ns: 1_000,
             pauses: true,
             estimated_delays: false,

@@ -128,8 +128,10 @@ impl Exchange {
     }
 
     /// Sets the application's time now, in nanoseconds of system time: bus shift leads the reference clock to it.
-    /// Without it, host time plus the epoch of the configuration is used.
+    /// Without it, host time plus the epoch of the configuration is used. The first time may also be the grid of SYNC
+    /// pulses (`PulseGrid`); 0 counts as not set.
     pub fn set_application_time(&mut self, time: u64, now: Instant) {
+        self.board.clocks.post_application_time(time);
         self.evidence.clocks.set_application_time(time, now);
     }
 

@@ -27,6 +27,9 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
             let at = names.at(*position, ends[0]);
             format!("the propagation delay of {at} cannot be measured: {why}{range}; {written}")
         }
+        Event::WentOnUnlocked { subdevice, reason } => {
+            format!("{}: goes on although clocks are not locked: {reason}", names.of(*subdevice))
+        }
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
         Event::SyncWindow { inside: true, spread_ns } => format!("clocks within the sync window: {spread_ns} ns"),
         Event::SyncWindow { inside: false, spread_ns } => format!("clocks outside the sync window: {spread_ns} ns"),

@@ -3,12 +3,12 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Follower, Trigger, phase_error};
+use ringcat::{Event, Follower, Options, PulseGrid, SubDeviceId, SyncSignals, Trigger, phase_error};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::register::map;
-use scenarios::clocks::{EPOCH, clocked, config, lock, spread, world};
+use scenarios::clocks::{EPOCH, clocked, config, lock, spread, with_clocks, world};
 use scenarios::segments::{line, ring};
 use scenarios::world::World;
 
@@ -190,4 +190,64 @@ fn clocks_that_leave_their_window_and_return_are_reported() {
         }
         drop(written);
     }
+}
+
+/// The application sets its time from the first cycle on, and pulses come at multiples of the cycle after that time.
+// covers: 7.3, dc-sync
+#[test]
+fn pulses_are_aligned_to_the_first_application_time_or_to_system_time() {
+    const BEGIN: u64 = 123_456;
+    for (grid, wanted) in [(PulseGrid::SystemTime, 200_000), (PulseGrid::FirstApplicationTime, 323_456)] {
+        let network = line(clocked(3, 50), NetworkOptions::default());
+        let mut world = World::with(13, network, &Options::default(), |scan| {
+            let mut declaration = with_clocks(scan, config().with_pulse_grid(grid));
+            for subdevice in &mut declaration.subdevices {
+                subdevice.sync = Some(SyncSignals::sync0(1_000_000, 200_000));
+            }
+            declaration
+        })
+        .expect("it can be activated");
+        let first = world.application().now().0.wrapping_add(EPOCH) / 1_000_000 * 1_000_000 + BEGIN;
+        for cycle in 0..4_000 {
+            let now = world.application().now();
+            world.application_mut().exchange_mut().set_application_time(first + cycle * 1_000_000, now);
+            world.cycle();
+        }
+        assert!(world.all_in_op());
+        let network = world.network();
+        for device in 0..3 {
+            let next = network.device(DeviceIndex(device)).controller.next_sync0(network.now()).expect("it runs");
+            let phase = network.device(DeviceIndex(0)).controller.system_time(next) % 1_000_000;
+            assert!(phase.abs_diff(wanted) <= 100, "{grid:?}, device {device}: {phase} ns");
+        }
+    }
+}
+
+/// One clock is beyond the range of its control loop (protocol 7.2.1).
+// covers: 7.3, dc-lock
+#[test]
+fn with_the_choices_of_igh_a_subdevice_goes_on_after_5_s_without_lock() {
+    let mut descriptions = clocked(3, 0);
+    descriptions[2].clock_drift_ppb = 900_000;
+    let mut world = World::with(14, line(descriptions, NetworkOptions::default()), &Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config().as_igh());
+        declaration.subdevices[0].sync = Some(SyncSignals::sync0(1_000_000, 0));
+        declaration
+    })
+    .expect("it can be activated");
+    let (mark, begin) = (world.beginning(), world.now());
+    world.until(Duration::from_secs(9), "all in OP", World::all_in_op);
+    assert!(world.now() - begin >= Duration::from_secs(5), "it waits for 5 s");
+    let went_on: Vec<_> = world
+        .events(mark)
+        .iter()
+        .filter_map(|timed| match &timed.event {
+            Event::WentOnUnlocked { subdevice, reason } => Some((*subdevice, reason.clone())),
+            _ => None,
+        })
+        .collect();
+    let [(SubDeviceId(0), reason)] = &went_on[..] else { panic!("{went_on:?}") };
+    let expected = "the clock of position 2 did not lock within 5000 ms: expected a difference of at most 10000 ns";
+    assert!(reason.starts_with(expected), "{reason}");
+    assert!(!world.application().engine().clocks_locked());
 }

@@ -75,3 +75,4 @@ mod stops;
 mod topologies;
 mod unassigned;
 mod under_way;
+mod whole_state;

@@ -1,5 +1,6 @@
 //! SYNC signals of one SubDevice, and the wait until its clock is accurate enough for them (protocol 7.3).
 
+use alloc::string::ToString;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
@@ -8,7 +9,9 @@ use ringcat_wire::register::map;
 use super::not_locked::{NotLocked, SignalsError};
 use super::set_up::set_up_one;
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
-use crate::config::SyncSignals;
+use crate::config::{PulseGrid, SyncSignals, WhenUnlocked};
+use crate::declared::SubDeviceId;
+use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::clocks::{ClockObservation, Clocks};
@@ -74,7 +77,8 @@ pub(in crate::procedures) async fn start_signals(
 ) -> Result<(), SignalsError> {
     let [control, activation] = signals.assign_activate.to_le_bytes();
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
-    wait_until_about_right(bus, segment, member, limit).await.map_err(SignalsError::NotLocked)?;
+    let result = wait_until_about_right(bus, segment, member, limit).await;
+    or_go_on(bus, segment, member, result).map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = if activation & 0x04 != 0 { signals.sync1_register_ns() } else { 0 };
     let mut cycles = [0; 8];
@@ -85,9 +89,32 @@ pub(in crate::procedures) async fn start_signals(
     let near = bus.now().0.wrapping_add(segment.view().clocks().epoch);
     let earliest = extend(low, near).wrapping_add(AHEAD_NS);
     let cycle = whole_cycle(signals.sync0_cycle_ns, sync1);
-    let start = first_pulse(earliest, cycle, signals.sync0_shift_ns.into());
+    let start = first_pulse(earliest, cycle, i64::from(signals.sync0_shift_ns) + grid_ns(segment, cycle));
     bus.fpwr(station, map::DC_START_TIME, &start.to_le_bytes()).await?;
     Ok(bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?)
+}
+
+/// Nanoseconds between the multiples of a cycle in system time and the grid of the pulses.
+fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
+    let begin = match segment.view().clocks().config.pulse_grid {
+        PulseGrid::SystemTime => None,
+        PulseGrid::FirstApplicationTime => segment.board.clocks.first_application_time(),
+    };
+    begin.and_then(|begin| begin.checked_rem(cycle)).map_or(0, |ns| ns as i64)
+}
+
+/// What follows from clocks that are not locked in time. A SubDevice whose delay is unknown never goes on: its time may
+/// be wrong by any amount.
+fn or_go_on(bus: &Bus, segment: &SharedSegment, member: usize, result: Result<(), NotLocked>) -> Result<(), NotLocked> {
+    let choice = segment.view().clocks().config.when_unlocked;
+    match (result, choice) {
+        (Err(not_locked), WhenUnlocked::GoOn) if not_locked.hidden.is_none() => {
+            let (subdevice, reason) = (SubDeviceId(member), not_locked.to_string());
+            bus.report(Event::WentOnUnlocked { subdevice, reason });
+            Ok(())
+        }
+        (result, WhenUnlocked::GoOn | WhenUnlocked::StayInSafeOp) => result,
+    }
 }
 
 async fn wait_until_about_right(
@@ -107,7 +134,7 @@ async fn wait_until_about_right(
     wait(bus, segment, limit, check).await
 }
 
-/// Waits until all clocks are locked.
+/// Waits until all clocks are locked, or until the SubDevice goes on without.
 pub(in crate::procedures) async fn wait_for_lock(
     bus: &Bus,
     segment: &SharedSegment,
@@ -136,7 +163,8 @@ pub(in crate::procedures) async fn wait_for_lock(
         let is_locked = clocks.are_set_up() && at_fault.is_none() && hidden.is_none();
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
     };
-    wait(bus, segment, limit, check).await
+    let result = wait(bus, segment, limit, check).await;
+    or_go_on(bus, segment, member, result)
 }
 
 /// Waits until clocks pass a check; the error is the result of the check at the time limit.

@@ -1,0 +1,120 @@
+//! A program beside the application follows the state: a snapshot of the whole, then the events since, by number.
+
+use std::time::Duration;
+
+use ringcat::{Activity, Event, EventsSince, Progress, Snapshot};
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::network::NetworkOptions;
+use scenarios::segments::{descriptions, ring};
+use scenarios::world::World;
+
+const KINDS: [&str; 4] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8"];
+/// Events that the engine keeps.
+const KEPT: usize = 4096;
+
+fn world(seed: u64) -> World {
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    World::in_op(seed, ring(descriptions(&KINDS), options))
+}
+
+fn snapshot(world: &mut World) -> Snapshot {
+    world.application_mut().engine_mut().snapshot()
+}
+
+fn since(world: &mut World, number: u64) -> EventsSince {
+    world.application_mut().engine_mut().events_since(number)
+}
+
+fn disturb(world: &mut World) {
+    world.cut(CableId(2));
+    world.run_cycles(30);
+    world.heal(CableId(2));
+    world.run_cycles(30);
+    world.power_off(DeviceIndex(1));
+    world.run_cycles(30);
+    world.power_on(DeviceIndex(1));
+    world.settle();
+}
+
+// covers: jobs
+#[test]
+fn a_client_that_was_away_reads_all_events_or_how_many_it_missed() {
+    let mut world = world(1);
+    let mark = world.mark();
+    let before = snapshot(&mut world);
+    disturb(&mut world);
+    world.run_cycles(5);
+    let missed = since(&mut world, before.next_event);
+    // The application has fetched all of them meanwhile.
+    assert_eq!(missed.events, world.events(mark));
+    assert!(missed.events.len() > 8 && missed.missed == 0 && missed.epoch == before.epoch, "{missed:?}");
+    let numbers: Vec<u64> = missed.events.iter().map(|event| event.number).collect();
+    assert_eq!(numbers, (before.next_event..missed.next).collect::<Vec<_>>());
+    assert_eq!(since(&mut world, missed.next).events, []);
+    // Longer than the engine keeps.
+    let bus = world.application_mut().engine_mut().bus();
+    for _ in 0..KEPT {
+        bus.report(Event::Skipped { domain: ringcat::DomainId(0) });
+    }
+    let rest = since(&mut world, before.next_event);
+    assert_eq!((rest.events.len(), rest.missed), (KEPT, missed.next - before.next_event));
+    assert_eq!(rest.next, missed.next + KEPT as u64);
+}
+
+// covers: jobs
+#[test]
+fn a_snapshot_and_the_events_before_it_agree_at_every_cycle() {
+    let mut world = world(2);
+    let mut seen = [false; 3];
+    let mut from = snapshot(&mut world).next_event;
+    let mut absent = false;
+    for cycle in 0..400 {
+        match cycle {
+            20 => world.cut(CableId(2)),
+            80 => world.heal(CableId(2)),
+            120 => world.power_off(DeviceIndex(1)),
+            200 => world.power_on(DeviceIndex(1)),
+            _ => {}
+        }
+        world.cycle();
+        let state = snapshot(&mut world);
+        let since = since(&mut world, from);
+        assert_eq!((since.next, since.missed), (state.next_event, 0));
+        from = since.next;
+        for event in since.events {
+            absent = match event.event {
+                Event::Lost { .. } => true,
+                Event::Returned { .. } => false,
+                _ => absent,
+            };
+        }
+        let own = &state.subdevices[1];
+        assert_eq!(own.progress == Progress::Absent, absent, "cycle {cycle}");
+        let states = world.application().states();
+        assert_eq!(
+            (state.activity, state.subdevices.len(), states.len()),
+            (Activity::Active, KINDS.len(), KINDS.len())
+        );
+        let status = world.application().engine().ring_status();
+        assert_eq!(state.ring.changes, status.changes);
+        seen[0] |= own.progress == Progress::Absent;
+        seen[1] |= state.ring.closed == Some(false) && state.ring.break_at.is_some();
+        seen[2] |= own.progress == Progress::Settled && state.ring.closed == Some(true) && cycle > 250;
+    }
+    assert_eq!(seen, [true; 3], "absent, broken, all well again");
+    assert_eq!(snapshot(&mut world).subdevices[2].identity[0], 0x0C47);
+}
+
+// covers: jobs
+#[test]
+fn numbers_of_events_go_on_after_a_stop_and_a_new_scan() {
+    let mut world = world(3);
+    let before = snapshot(&mut world);
+    let now = world.application().now();
+    let engine = world.application_mut().engine_mut();
+    engine.start_stop(ringcat::AlState::Init, Duration::from_secs(1), now);
+    let state = engine.snapshot();
+    assert_eq!((state.activity, state.epoch), (Activity::Scanned, before.epoch));
+    assert!(state.next_event >= before.next_event && state.subdevices.iter().all(|one| one.declared.is_none()));
+    assert_eq!(engine.events_since(0).missed, 0, "the events before the stop are kept");
+}
