@@ -13,6 +13,7 @@ const OTHERS: usize = 32;
 
 /// Kinds of unsolicited mail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Unsolicited {
     /// Fragments of Ethernet frames (EoE).
     Ethernet,
@@ -28,6 +29,7 @@ pub enum Unsolicited {
 
 /// An unsolicited mail.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Unclaimed {
     /// Its protocol.
     pub protocol: Protocol,

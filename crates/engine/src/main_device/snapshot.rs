@@ -255,11 +255,12 @@ impl MainDevice {
     }
 
     fn activity(&self) -> Activity {
-        if self.segment.is_some() {
+        let view = self.segment.view();
+        if view.is_active() {
             Activity::Active
-        } else if self.scanning.get() {
+        } else if view.is_scanning() {
             Activity::Scanning
-        } else if self.scanned_count().is_some() {
+        } else if view.found().is_some() {
             Activity::Scanned
         } else {
             Activity::Unscanned
@@ -268,9 +269,9 @@ impl MainDevice {
 
     fn subdevice_snapshots(&mut self) -> Vec<SubDeviceSnapshot> {
         let scanned = self.subdevices();
-        let mut subdevices: Vec<SubDeviceSnapshot> = match &self.segment {
+        let mut subdevices: Vec<SubDeviceSnapshot> = match self.active() {
             None => Vec::new(),
-            Some(segment) => segment.view().members.iter().enumerate().map(of_member).collect(),
+            Some(segment) => segment.view().members().iter().enumerate().map(of_member).collect(),
         };
         for subdevice in &mut subdevices {
             let found = scanned.iter().find(|info| info.station.0 == subdevice.station);
@@ -283,7 +284,7 @@ impl MainDevice {
     }
 
     fn with_mail(&mut self, subdevice: SubDeviceSnapshot) -> SubDeviceSnapshot {
-        let (address, mailbox) = match (&self.segment, subdevice.declared, subdevice.position) {
+        let (address, mailbox) = match (self.active(), subdevice.declared, subdevice.position) {
             (Some(segment), Some(index), _) => (Address::Declared(SubDeviceId(index)), segment.mailbox(index)),
             (None, _, Some(position)) => {
                 (Address::Scanned(ringcat_wire::address::Position(position)), self.mailbox(position.into()))
