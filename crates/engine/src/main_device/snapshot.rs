@@ -328,7 +328,7 @@ fn of_member((index, member): (usize, &Member)) -> SubDeviceSnapshot {
             SubDeviceState::Settled(_) => Progress::Settled,
         },
         target_state: Some(member.target.code()),
-        ..member.info.as_ref().map(of_info).unwrap_or_default()
+        ..member.info.as_deref().map(of_info).unwrap_or_default()
     }
 }
 
