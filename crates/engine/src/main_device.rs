@@ -123,8 +123,9 @@ impl MainDevice {
     /// A MainDevice that has not sent anything.
     pub fn new(options: Options, now: Instant) -> MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
-        let (mut supervisor, cache) = (supervisor(identity, &options, now), SiiCache::new(options.sii_cache));
+        let mut supervisor = supervisor(identity, &options, now);
         supervisor.set_events(EventLog::new(now.0));
+        let cache = SiiCache::new(options.sii_cache);
         let segment = SharedSegment::idle(&supervisor.bus(), Segment::new(choices(&options)), cache.clone());
         MainDevice {
             supervisor,

@@ -255,12 +255,12 @@ impl MainDevice {
     }
 
     fn activity(&self) -> Activity {
-        let segment = self.segment.view();
-        if segment.is_active() {
+        let view = self.segment.view();
+        if view.is_active() {
             Activity::Active
-        } else if segment.is_scanning() {
+        } else if view.is_scanning() {
             Activity::Scanning
-        } else if self.scanned_count().is_some() {
+        } else if view.found().is_some() {
             Activity::Scanned
         } else {
             Activity::Unscanned
@@ -269,8 +269,10 @@ impl MainDevice {
 
     fn subdevice_snapshots(&mut self) -> Vec<SubDeviceSnapshot> {
         let scanned = self.subdevices();
-        let mut subdevices: Vec<SubDeviceSnapshot> =
-            self.segment.view().members().iter().enumerate().map(of_member).collect();
+        let mut subdevices: Vec<SubDeviceSnapshot> = match self.active() {
+            None => Vec::new(),
+            Some(segment) => segment.view().members().iter().enumerate().map(of_member).collect(),
+        };
         for subdevice in &mut subdevices {
             let found = scanned.iter().find(|info| info.station.0 == subdevice.station);
             subdevice.position = found.map(|info| info.position.0);
@@ -282,10 +284,9 @@ impl MainDevice {
     }
 
     fn with_mail(&mut self, subdevice: SubDeviceSnapshot) -> SubDeviceSnapshot {
-        let is_active = self.segment.view().is_active();
-        let (address, mailbox) = match (is_active, subdevice.declared, subdevice.position) {
-            (true, Some(index), _) => (Address::Declared(SubDeviceId(index)), self.segment.mailbox(index)),
-            (false, _, Some(position)) => {
+        let (address, mailbox) = match (self.active(), subdevice.declared, subdevice.position) {
+            (Some(segment), Some(index), _) => (Address::Declared(SubDeviceId(index)), segment.mailbox(index)),
+            (None, _, Some(position)) => {
                 (Address::Scanned(ringcat_wire::address::Position(position)), self.mailbox(position.into()))
             }
             _ => return subdevice,
