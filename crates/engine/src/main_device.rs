@@ -188,8 +188,8 @@ impl MainDevice {
 
     /// The result of the last scan, once it has ended.
     pub fn scan_result(&self) -> Option<Result<Scan, ScanError>> {
-        if let Some(error) = &*self.scan_error.borrow() {
-            return Some(Err(error.clone()));
+        if let Some(error) = *self.scan_error.borrow() {
+            return Some(Err(error));
         }
         self.segment.view().found().map(|found| Ok(found.scan()))
     }
