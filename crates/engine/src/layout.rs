@@ -12,6 +12,7 @@
 mod chunk;
 mod error;
 mod plan;
+mod repeat;
 mod spec;
 
 use alloc::vec::Vec;
@@ -27,6 +28,7 @@ use spec::Cut;
 
 pub use error::LayoutError;
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
+pub use repeat::{OutputsAgain, Piece, PlannedRepeat, RepeatRule};
 pub use spec::{AreaSpec, Delivers, DomainSpec, LrwPolicy, Rules, Witness};
 
 /// All that the exchange sends.
@@ -35,7 +37,7 @@ pub struct Layout {
     /// By [`DomainId`].
     pub domains: Vec<PlannedDomain>,
     /// Largest number of datagrams in a frame.
-    most: Option<usize>,
+    pub(crate) most: Option<usize>,
 }
 
 /// Data of the supervision datagram: AL status.

@@ -20,6 +20,7 @@ mod mail;
 mod options;
 mod pending;
 mod prepare;
+mod repeats;
 mod services;
 mod states;
 mod steps;

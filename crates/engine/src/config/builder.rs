@@ -7,7 +7,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::{
-    ConfigAddress, IdnWrite, IpSettings, PdoAssignment, PdoEntry, PdoMapping, SdoDownload, StartupAction,
+    ConfigAddress, IdnWrite, IpSettings, PdoAssignment, PdoEntry, PdoMapping, Repetition, SdoDownload, StartupAction,
     StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
 };
 use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
@@ -67,6 +67,13 @@ impl SubDeviceConfig {
     #[must_use]
     pub fn expect_serial(mut self, serial: u32) -> SubDeviceConfig {
         self.expected.serial = Some(serial);
+        self
+    }
+
+    /// What it may receive a second time within a cycle, when a frame was lost and is sent again.
+    #[must_use]
+    pub fn repeat(mut self, repetition: Repetition) -> SubDeviceConfig {
+        self.repetition = repetition;
         self
     }
 

@@ -36,7 +36,8 @@ fn recorded(network: Network, ring: bool, work: impl FnOnce(&mut Recorded)) -> V
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
-    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    let mut application =
+        main_device.activate(automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(false)).expect("it fits");
     settle(&mut application);
     work(&mut application);
     application.stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");

@@ -22,7 +22,7 @@ const OTHER: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x77]);
 fn one_lost_frame_costs_one_cycle_and_one_corrupt_frame_no_more() {
     for ring in [true, false] {
         let network = if ring { ring_of_16(FAST) } else { line(descriptions(&SIXTEEN), NetworkOptions::default()) };
-        let mut world = World::in_op(1, network);
+        let mut world = World::in_op_with_one_try(1, network);
         for cable in 0..SIXTEEN.len() {
             for corrupt in [false, true] {
                 let mark = world.mark();

@@ -48,7 +48,7 @@ fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<us
 // covers: ring-merge
 #[test]
 fn outputs_doubled_at_a_cut_are_incomplete_if_the_second_copy_returns() {
-    let mut world = World::in_op(0, segment());
+    let mut world = World::in_op_with_one_try(0, segment());
     let mut twice = Vec::new();
     for moment in (0..40_000).step_by(500).map(Duration::from_nanos) {
         let (times, delivery, stale) = cut_after(&mut world, moment);

@@ -67,7 +67,8 @@ fn run(seed: u64, path: &Path) -> (usize, Vec<Cycle>) {
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
-    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    let mut application =
+        main_device.activate(automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(false)).expect("it fits");
     let areas: Vec<_> = (0..scan.subdevices.len())
         .flat_map(|subdevice| application.directory().areas(SubDeviceId(subdevice)).to_vec())
         .collect();
