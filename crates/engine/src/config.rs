@@ -12,6 +12,7 @@ mod ip;
 mod matching;
 mod pdo;
 mod register;
+mod repetition;
 mod resolution;
 mod resolve;
 mod startup;
@@ -35,6 +36,7 @@ pub use groups::{Group, groups};
 pub use ip::IpSettings;
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use register::{RegisterAccess, RegisterCommand};
+pub use repetition::Repetition;
 pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
 pub use timeouts::{StateTimeout, Timeouts};
 
@@ -143,6 +145,8 @@ pub struct SubDeviceConfig {
     pub wait_before_safeop: Duration,
     /// SYNC signals of its distributed clock; `None`: no SYNC signals.
     pub sync: Option<SyncSignals>,
+    /// What it may receive a second time within a cycle, when a frame was lost and is sent again.
+    pub repetition: Repetition,
     /// Time that frames take through it; `None`: that of [`ClockConfig::passage`].
     pub passage: Option<Passage>,
     /// Time limits.
@@ -171,6 +175,7 @@ impl Default for SubDeviceConfig {
             sii_to_pdi: false,
             wait_before_safeop: Duration::ZERO,
             sync: None,
+            repetition: Repetition::Automatic,
             passage: None,
             timeouts: Timeouts::default(),
             state_timeouts: Vec::new(),

@@ -11,6 +11,7 @@
 //! before. Only the fast path is inlined (bins `cycle`, `socket_cycle`).
 
 mod access;
+mod again;
 mod clocks;
 pub mod copy;
 pub mod counters;
@@ -24,10 +25,13 @@ mod leaving;
 mod missed;
 mod place;
 mod presence;
+mod proved;
 mod send_service;
 mod service;
 mod template;
+mod tries;
 mod usual;
+mod way;
 mod words;
 
 use alloc::sync::Arc;
@@ -49,6 +53,7 @@ use crate::link::{Link, LinkSet};
 use crate::queue::Producer;
 use crate::ring::{Class, Classified, Identity, Sequence};
 use crate::time::Instant;
+use again::Again;
 use copy::Copies;
 use counters::Tally;
 use evidence::Evidence;
@@ -59,6 +64,8 @@ use leaving::Leaving;
 use missed::{Missed, give_up};
 use service::Service;
 
+/// Cycles between two applications of the learned ways of frames.
+const REFRESH: u64 = 64;
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
 
@@ -101,6 +108,20 @@ pub struct Exchange {
     /// The frame of the last copy taken.
     taken: u16,
     cycle: u64,
+    /// For each frame the one of its further tries. Ids of these count on from those of the frames.
+    again: Vec<Option<Again>>,
+    /// The next check for lost frames.
+    decide_at: Instant,
+    /// There is one frame.
+    is_alone: bool,
+    /// The frame that was sent last.
+    newest: u16,
+    /// When the next cycle is expected to begin.
+    next_at: Instant,
+    /// Shortest period of a domain.
+    base_ns: u64,
+    /// The ring is closed, as far as the ways of frames are concerned.
+    is_closed: bool,
 }
 
 impl Exchange {
@@ -141,22 +162,29 @@ impl Exchange {
             copies: Copies::default(),
             taken: NO_FRAME,
             cycle: 0,
+            again: Vec::new(),
+            decide_at: Instant::NEVER,
+            is_alone: false,
+            newest: NO_FRAME,
+            next_at: Instant::NEVER,
+            base_ns: 0,
+            is_closed: false,
         }
     }
 
     /// Takes a received frame. Any bytes are allowed.
     #[inline(always)]
-    pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
-        if self.receive_usual(arrived_on, bytes) {
+    pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
+        if self.receive_usual(arrived_on, bytes, now) {
             return Received::Taken;
         }
-        self.receive_any(arrived_on, bytes)
+        self.receive_any(arrived_on, bytes, now)
     }
 
     /// Takes a frame that came back on the only link with the same results as the one before. Mostly all frames do. In
     /// all other cases the result is false, and nothing has changed.
     #[inline(always)]
-    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8]) -> bool {
+    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> bool {
         let Some(sequence) = self.identity.main_cyclic(bytes) else { return false };
         let index = self.by_id[usize::from(sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else { return false };
@@ -174,12 +202,22 @@ impl Exchange {
         if let Some(supervision) = frame.supervision() {
             self.board.post_supervision(supervision);
         }
+        if !self.again.is_empty() {
+            if frame.way.is_later(now) {
+                frame.way.learn(tries::sent_at(frame, domain.timeout_ns()), now, false);
+            }
+            if self.is_alone {
+                self.decide_at = Instant::NEVER;
+            } else if index == self.newest {
+                self.rest();
+            }
+        }
         true
     }
 
     /// As [`Exchange::receive`], for any frame.
     #[inline(never)]
-    fn receive_any(&mut self, arrived_on: Link, bytes: &[u8]) -> Received {
+    fn receive_any(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
         let copy = match self.identity.classify(bytes) {
             Classified::Ours(copy) if copy.class == Class::Cyclic => copy,
             Classified::Ours(_) => return Received::Acyclic,
@@ -195,13 +233,25 @@ impl Exchange {
         };
         let index = self.by_id[usize::from(copy.sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
-            self.missed.late(copy.sequence, self.tally.disturbed());
-            return Received::Late;
+            return self.receive_again(copy, arrived_on, bytes);
         };
+        let sends_again = !self.again.is_empty();
+        let timeout_ns = self.domains.get(frame.domain()).filter(|_| sends_again).map(Domain::timeout_ns);
         let domain = self.domains.get_mut(frame.domain());
         let image = domain.map_or_else(|| self.service.image_mut(), Domain::inputs_mut);
         self.taken = index;
-        match frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally) {
+        let was_complete = frame.is_complete();
+        let step = frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally);
+        let is_ours = matches!(step, Step::Waiting | Step::Finished);
+        if let Some(timeout_ns) = timeout_ns
+            && is_ours
+            && frame.is_complete()
+            && !was_complete
+            && frame.way.is_later(now)
+        {
+            frame.way.learn(tries::sent_at(frame, timeout_ns), now, self.is_closed);
+        }
+        let received = match step {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
                 self.evidence.hear_early(frame, &self.board);
@@ -222,7 +272,11 @@ impl Exchange {
                 self.missed.damaged(copy.sequence);
                 Received::Corrupt
             }
+        };
+        if is_ours && sends_again {
+            self.follow_tries(usize::from(index));
         }
+        received
     }
 
     /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire it
@@ -249,10 +303,14 @@ impl Exchange {
         while let Some(set) = domain.oldest() {
             let frames = &self.frames[set.clone()];
             let (mut wkc, mut waiting, mut complete, mut left) = (0, false, true, self.cycle + 1);
-            for frame in frames {
-                waiting |= frame.is_waiting();
-                complete &= frame.is_complete();
-                wkc += frame.wkc();
+            let (mut saved, mut was_sent) = (false, false);
+            for (index, frame) in set.clone().zip(frames) {
+                let outcome = tries::outcome(frame, self.again.get(index));
+                waiting |= outcome.waiting;
+                complete &= outcome.complete;
+                saved |= outcome.saved;
+                was_sent |= outcome.was_sent;
+                wkc += outcome.wkc;
                 left = frame.left();
             }
             if waiting {
@@ -264,12 +322,16 @@ impl Exchange {
                 }
             }
             judged = true;
+            if saved && complete {
+                self.tally.disturbed().saved += 1;
+            }
+            domain.count_tries(was_sent, complete);
             if !domain.judge(wkc, complete, left) {
-                let returned = self.frames[set.clone()].iter().any(|frame| frame.arrivals().arrived != 0);
+                let returned = tries::has_returned(set.clone(), &self.frames, &self.again);
                 let judgement = (wkc, complete, returned);
                 note_change(id, domain, judgement, &self.board, self.tally.disturbed(), &mut self.events);
                 if !complete {
-                    count_errors(&self.frames[set], &self.board);
+                    tries::count_errors(set, &self.frames, &self.again, &self.board);
                 }
             }
         }
@@ -363,11 +425,18 @@ impl Exchange {
                     transmit(Link::Main, bytes);
                     bytes.len()
                 };
+                if !self.again.is_empty() {
+                    self.decide_at = self.decide_at.min(frame.way.depart(now));
+                    self.newest = index as u16;
+                }
                 self.tally.counters.sent += 1;
                 self.tally.counters.bytes += bytes as u64;
             }
         }
         self.cycle += 1;
+        if !self.again.is_empty() && self.cycle.is_multiple_of(REFRESH) {
+            self.refresh_ways();
+        }
         self.board.post_cycle(self.cycle, self.tally.counters.sent);
     }
 
@@ -405,12 +474,6 @@ fn note_change(
     if changed {
         events.push(CyclicEvent::Domain { domain: id.0 as u16, status: domain.status(false) }.pack());
     }
-}
-
-/// Counts the wrong working counters of a judged cycle.
-#[cold]
-fn count_errors(frames: &[CyclicFrame], board: &Board) {
-    frames.iter().for_each(|frame| frame.count_errors(board));
 }
 
 /// Gives up the overdue frames of a domain's oldest cycle. True while others are still expected.

@@ -13,6 +13,7 @@ mod chunk;
 mod error;
 mod fixed;
 mod plan;
+mod repeat;
 mod service;
 mod spec;
 
@@ -30,6 +31,7 @@ use spec::Cut;
 
 pub use error::LayoutError;
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
+pub use repeat::{OutputsAgain, Piece, PlannedRepeat, RepeatRule};
 pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy, Rules, Witness};
 
 /// All that the exchange sends.
@@ -38,7 +40,7 @@ pub struct Layout {
     /// By [`DomainId`].
     pub domains: Vec<PlannedDomain>,
     /// Largest number of datagrams in a frame.
-    most: Option<usize>,
+    pub(crate) most: Option<usize>,
 }
 
 /// Data of the supervision datagram: AL status.

@@ -24,6 +24,7 @@ mod register_error;
 mod registered;
 mod registered_area;
 mod registration;
+mod repeats;
 mod services;
 pub mod snapshot;
 mod states;

@@ -80,6 +80,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             // Read once per wait.
             let looked_at = self.links.now();
             self.take_in(looked_at);
+            if looked_at >= self.cyclic.exchange.decide_at() {
+                self.cyclic.decide(looked_at, &mut self.links);
+            }
             let mut now = looked_at;
             if H::SHARES_LINKS {
                 self.acyclic.work(&mut self.links, &self.window);
@@ -88,7 +91,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             if self.cyclic.begins(now) {
                 return (now, looked_at);
             }
-            let wake = self.cyclic.wake(now).min(self.acyclic.wake());
+            let wake = self.cyclic.wake(now).min(self.acyclic.wake()).min(self.cyclic.exchange.decide_at());
             if H::SHARES_LINKS || self.cyclic.exchange.awaits_copies() {
                 self.links.wait_from(now, wake.max(now));
             } else {
@@ -97,10 +100,16 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
     }
 
-    /// Takes in all frames that have arrived, and lets the acyclic half work if it does so here. The first step of a
-    /// cycle that the application runs itself; more often does no harm.
+    /// Takes in all frames that have arrived, sends those again that are lost, and lets the acyclic half work if it does
+    /// so here. The first step of a cycle that the application runs itself; more often does no harm. A lost frame is
+    /// sent again only if this is called when frames usually are back, at [`Application::receive_again_at`], and once
+    /// more before [`Application::process`].
     pub fn receive(&mut self) {
-        self.take_in(self.links.now());
+        let now = self.links.now();
+        self.take_in(now);
+        if now >= self.cyclic.exchange.decide_at() {
+            self.cyclic.decide(now, &mut self.links);
+        }
         self.acyclic.work(&mut self.links, &self.window);
     }
 
@@ -124,6 +133,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
                 cyclic.note_round_trip(left_at, links.received_at(left_at, now).unwrap_or(now));
             }
         }
+    }
+
+    /// When [`Application::receive`] is to be called again so that a frame that is lost by then is sent again; in the
+    /// distant future if all frames are back. For an application that runs the steps of a cycle itself.
+    pub fn receive_again_at(&self) -> Instant {
+        self.cyclic.exchange.decide_at()
     }
 
     /// Judges a domain by what was received. A step of a cycle that the application runs itself.

@@ -268,10 +268,24 @@ impl Cyclic {
         self.publish();
     }
 
+    /// Sends frames again that are lost; all frames were taken in that had arrived at `looked_at`.
+    #[cold]
+    pub fn decide(&mut self, looked_at: Instant, links: &mut impl Links) {
+        let now = links.now();
+        let Cyclic { exchange, window, .. } = self;
+        exchange.decide(looked_at, now, &mut |link, frame| {
+            if link == Link::Main {
+                window.occupy(Half::Cyclic, now, frame.len());
+            }
+            links.send(link, frame);
+        });
+    }
+
     /// Sends what was queued; the next cycle's frames leave at `next`.
     #[inline(always)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
         let Cyclic { exchange, window, .. } = self;
+        exchange.expect_next(self.next_cycle);
         exchange.send(now, &mut |link, frame| {
             if link == Link::Main {
                 window.occupy(Half::Cyclic, now, frame.len());

@@ -71,6 +71,9 @@ pub struct Mirror {
     areas: Vec<Area>,
     flights: Vec<Option<Flight>>,
     compared: u64,
+    /// Frames of the cycle that is judged next were sent again: fresh inputs do not show that outputs were taken, because
+    /// outputs of some devices are never repeated.
+    pub was_sent_again: bool,
     /// Whether a difference to latched outputs is a failure.
     pub judges_latched: bool,
 }
@@ -82,7 +85,13 @@ impl Mirror {
         for (subdevice, device) in devices.iter().enumerate() {
             areas.extend(device.iter().flat_map(|device| areas_of(directory, subdevice, *device)));
         }
-        Mirror { areas, flights: (0..domains).map(|_| None).collect(), compared: 0, judges_latched: true }
+        Mirror {
+            areas,
+            flights: (0..domains).map(|_| None).collect(),
+            compared: 0,
+            was_sent_again: false,
+            judges_latched: true,
+        }
     }
 
     /// Bytes compared so far.
@@ -122,7 +131,7 @@ impl Mirror {
                 // this one.
                 Direction::Outputs
                     if ((delivery == Delivery::Complete && status.wkc == status.expected)
-                        || exchange.freshness(domain, area.subdevice) == Freshness::Fresh)
+                        || !self.was_sent_again && exchange.freshness(domain, area.subdevice) == Freshness::Fresh)
                         && flight.operating[area.device.0]
                         && uses_outputs(device) =>
                 {

@@ -58,8 +58,8 @@ pub struct Tap {
     cyclic_sent: Instant,
     /// Last sent cyclic frames.
     out: Vec<Out>,
-    /// Marks of sent cyclic frames, until they are taken.
-    departed: Vec<(u8, u8)>,
+    /// Marks of sent cyclic frames with their times, until they are taken.
+    departed: Vec<(Instant, (u8, u8))>,
     /// Copies that came back after newer frames had been sent, or twice.
     outdated: u64,
     /// Whether links can be taken down.
@@ -183,8 +183,8 @@ impl Tap {
         self.outdated
     }
 
-    /// Cyclic frames sent since the last call: byte 1 of the source address, and Idx.
-    pub fn take_departed(&mut self) -> Vec<(u8, u8)> {
+    /// Cyclic frames sent since the last call: time, byte 1 of the source address, and Idx.
+    pub fn take_departed(&mut self) -> Vec<(Instant, (u8, u8))> {
         std::mem::take(&mut self.departed)
     }
 
@@ -215,7 +215,7 @@ impl Tap {
             self.cyclic_sent = now;
             if link == Link::Main {
                 self.out.push(Out { frame, back: 0 });
-                self.departed.push(frame);
+                self.departed.push((now, frame));
             }
         } else {
             self.flight_ns = self.flight_ns.max(now.since(self.cyclic_sent).as_nanos() as u64);

@@ -27,13 +27,15 @@ pub struct Truth {
     /// Departures of the last cycles of each domain, oldest first.
     departures: Vec<VecDeque<Departure>>,
     proven: u64,
+    /// Whether outputs of one cycle must be alike in all its tries. The logs contain damaged frames too.
+    pub compares_outputs: bool,
 }
 
 impl Truth {
     /// For declared SubDevices; `devices` are their devices.
     pub fn new(directory: &Directory, devices: &[Option<DeviceIndex>], domains: usize, under_way: usize) -> Truth {
         let departures = vec![VecDeque::new(); domains];
-        let mut truth = Truth { areas: Vec::new(), under_way, departures, proven: 0 };
+        let mut truth = Truth { areas: Vec::new(), under_way, departures, proven: 0, compares_outputs: false };
         truth.follow(directory, devices);
         truth
     }
@@ -89,6 +91,17 @@ impl Truth {
                     );
                 }
                 Direction::Outputs => {
+                    if self.compares_outputs {
+                        let taken = controller.logical_accesses();
+                        let taken = taken.filter(|it| it.written && is_of_cycle(it) && is_moved(area, it, true));
+                        let mut values = taken.filter_map(|access| bytes_of(area, access));
+                        let first = values.next();
+                        let (device, number) = (area.device.0, domain.0);
+                        assert!(
+                            values.all(|value| Some(value) == first),
+                            "device {device} took different outputs in one cycle of domain {number}",
+                        );
+                    }
                     if status.state != DomainState::Complete || status.wkc != status.expected {
                         continue;
                     }
@@ -104,6 +117,15 @@ impl Truth {
                 }
             }
             self.proven += 1;
+        }
+    }
+
+    /// Frames of the last cycle were sent again with these marks.
+    pub fn send_again(&mut self, frames: &Departure) {
+        for departures in &mut self.departures {
+            if let Some(last) = departures.back_mut() {
+                last.extend(frames);
+            }
         }
     }
 

@@ -28,7 +28,7 @@ pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
 use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
-use crate::truth::Truth;
+use crate::truth::{Departure, Truth};
 
 /// Default cycle time of scenarios.
 pub const CYCLE: Duration = Duration::from_millis(1);
@@ -60,6 +60,8 @@ pub struct World {
     outputs: Vec<Vec<Range<usize>>>,
     domains: usize,
     cycles: u64,
+    /// Number of the application's last cycle.
+    last_cycle: u64,
 }
 
 impl World {
@@ -129,7 +131,9 @@ impl World {
         let truth = Truth::new(application.directory(), &devices, domains, under_way.into());
         journal.status = network.devices().map(|device| device.al_status()).collect();
         let outputs = output_ranges(application.directory(), domains, declared);
-        let mut world = World { seed, application, scan, devices, mirror, truth, journal, outputs, domains, cycles: 0 };
+        let last_cycle = application.pace().cycles;
+        let mut world =
+            World { seed, application, scan, devices, mirror, truth, journal, outputs, domains, cycles: 0, last_cycle };
         world.recognise();
         Ok(world)
     }
@@ -187,7 +191,16 @@ impl World {
         });
         self.cycles += 1;
         let at = self.application.now();
-        let departed = self.application.links_mut().take_departed();
+        let (begun_at, sent) = (self.application.begun_at(), self.application.links_mut().take_departed());
+        // Frames from before the beginning of this cycle belong to the last one, unless other cycles were between.
+        let count = self.application.pace().cycles;
+        let follows = count == std::mem::replace(&mut self.last_cycle, count) + 1;
+        let (again, departed): (Vec<_>, Vec<_>) = sent.into_iter().partition(|(at, _)| follows && *at < begun_at);
+        let marks =
+            |sent: Vec<(Instant, (u8, u8))>| -> Departure { sent.into_iter().map(|(_, frame)| frame).collect() };
+        let (again, departed) = (marks(again), marks(departed));
+        self.truth.send_again(&again);
+        self.mirror.was_sent_again = !again.is_empty();
         let network = self.application.links().network();
         for (domain, status) in due {
             self.truth.judge(status, domain, self.application.exchange(), network);
@@ -370,6 +383,11 @@ impl World {
     /// devices' logs are checked at all times.
     pub fn judge_latched(&mut self, judged: bool) {
         self.mirror.judges_latched = judged;
+    }
+
+    /// From now on outputs of all tries of a cycle must be alike: for worlds in which no frame is damaged.
+    pub fn compare_tries(&mut self) {
+        self.truth.compares_outputs = true;
     }
 
     /// Amount of compared process data: latched bytes, areas in the devices' logs.

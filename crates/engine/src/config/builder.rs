@@ -7,7 +7,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::{
-    ConfigAddress, DeclaredSyncManager, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping,
+    ConfigAddress, DeclaredSyncManager, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping, Repetition,
     SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals,
     Timeouts, Transition, Watchdog,
 };
@@ -73,6 +73,13 @@ impl SubDeviceConfig {
     #[must_use]
     pub fn expect_serial(mut self, serial: u32) -> SubDeviceConfig {
         self.expected.serial = Some(serial);
+        self
+    }
+
+    /// What it may receive a second time within a cycle, when a frame was lost and is sent again.
+    #[must_use]
+    pub fn repeat(mut self, repetition: Repetition) -> SubDeviceConfig {
+        self.repetition = repetition;
         self
     }
 

@@ -48,8 +48,10 @@ impl Exchange {
             let judged = self.domains.get(frame.domain()).map_or(0, Domain::judged);
             (1..=judged).contains(&frame.left())
         };
-        let shown = self.frames.iter().filter(judged);
-        let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice)?))).max_by_key(|it| it.0);
+        let tries = self.again.iter().flatten().map(|again| &again.frame);
+        let shown = self.frames.iter().chain(tries).filter(judged);
+        let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice)?)));
+        let newest = newest.max_by_key(|(left, status)| (*left, *status != 0));
         newest.map(|(_, status)| status)
     }
 
@@ -107,7 +109,7 @@ impl Exchange {
 
     /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered.
     pub fn awaits_copies(&self) -> bool {
-        self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
+        self.decide_at != Instant::NEVER || self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
     }
 
     /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without

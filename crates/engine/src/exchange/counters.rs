@@ -37,6 +37,10 @@ pub struct CyclicCounters {
     pub incomplete: u64,
     /// Words that were not copied from inputs to outputs because their source was stale.
     pub stale_copies: u64,
+    /// Frames that were sent again within their cycle, once for each further try; they also count as sent.
+    pub sent_again: u64,
+    /// Cycles, summed over domains, that are complete because a frame was sent again.
+    pub saved: u64,
 }
 
 /// The counters, and how often any of them was changed that an undisturbed cycle leaves alone.
@@ -62,7 +66,7 @@ impl CyclicCounters {
     }
 
     /// Number of counters.
-    pub const COUNT: usize = 16;
+    pub const COUNT: usize = 18;
 
     /// All counters, to hand them to another thread one by one.
     pub const fn to_words(&self) -> [u64; CyclicCounters::COUNT] {
@@ -83,6 +87,8 @@ impl CyclicCounters {
             skipped,
             incomplete,
             stale_copies,
+            sent_again,
+            saved,
         } = *self;
         [
             sent,
@@ -101,6 +107,8 @@ impl CyclicCounters {
             skipped,
             incomplete,
             stale_copies,
+            sent_again,
+            saved,
         ]
     }
 
@@ -123,6 +131,8 @@ impl CyclicCounters {
             skipped,
             incomplete,
             stale_copies,
+            sent_again,
+            saved,
         ] = words;
         CyclicCounters {
             sent,
@@ -141,6 +151,8 @@ impl CyclicCounters {
             skipped,
             incomplete,
             stale_copies,
+            sent_again,
+            saved,
         }
     }
 }

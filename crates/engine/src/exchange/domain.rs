@@ -27,6 +27,8 @@ const SILENT_CYCLES: u8 = 16;
 
 /// Deadline of the frames of a domain without a period: that of IgH's interface.
 const WITHOUT_PERIOD: Duration = Duration::from_micros(500);
+/// Cycles in which frames are sent again without success before this ends: more than a slow detection of a break takes.
+const FRUITLESS: u8 = 128;
 
 /// A domain of the exchange.
 ///
@@ -48,11 +50,14 @@ pub struct Domain {
     /// The newest set was queued and has not left yet.
     unsent: bool,
     timeout_ns: u64,
+    period_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
     told: Told,
     /// Departure of the last judged flight, as a cycle plus one.
     judged: u64,
+    /// Incomplete cycles in a row in which frames were sent again.
+    fruitless: u8,
 }
 
 /// Last reported state of a domain.
@@ -86,10 +91,12 @@ impl Domain {
             out: 0,
             unsent: false,
             timeout_ns: whole_ns(timeout(planned)),
+            period_ns: whole_ns(planned.period),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
             told: Told::Nothing { silent: 0 },
             judged: 0,
+            fruitless: 0,
         }
     }
 
@@ -167,6 +174,31 @@ impl Domain {
     pub(crate) fn is_full(&self, frames: &[CyclicFrame]) -> bool {
         let mut sets = frames[self.frames()].chunks(self.set.max(1));
         self.set > 0 && sets.all(|set| set.iter().any(CyclicFrame::is_waiting))
+    }
+
+    /// Indices of the frames of the only cycle on the wire, if it has left.
+    pub(crate) fn on_the_wire(&self) -> Option<Range<usize>> {
+        (self.out == 1 && !self.unsent).then(|| self.oldest..self.oldest + self.set)
+    }
+
+    /// A cycle was judged: `was_sent`: frames of it were sent again.
+    #[inline]
+    pub(crate) fn count_tries(&mut self, was_sent: bool, complete: bool) {
+        if was_sent {
+            self.fruitless = if complete { 0 } else { self.fruitless.saturating_add(1) };
+        }
+    }
+
+    /// Whether it is worth it to send frames again: not if that did not help for many cycles, until a cycle is complete.
+    pub(crate) fn may_send_again(&mut self) -> bool {
+        if self.status.state == DomainState::Complete {
+            self.fruitless = 0;
+        }
+        self.fruitless < FRUITLESS
+    }
+
+    pub(crate) fn period_ns(&self) -> u64 {
+        self.period_ns
     }
 
     pub(crate) fn timeout_ns(&self) -> u64 {

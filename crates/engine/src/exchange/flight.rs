@@ -6,6 +6,7 @@
 //! Each copy is judged by itself, and its inputs are delivered when it arrives ([`super::place`]).
 //! While no SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
+mod tries;
 mod variants;
 
 use alloc::boxed::Box;
@@ -20,6 +21,7 @@ use super::place::Place;
 use super::presence::Presence;
 use super::template::Template;
 use super::usual::Usual;
+use super::way::Way;
 use super::words::{Header, header_at, supervision_at, u16_at};
 use crate::board::{Board, Supervision};
 use crate::layout::PlannedFrame;
@@ -66,6 +68,7 @@ pub(crate) struct CyclicFrame {
     deadline: Instant,
     /// Cycle, plus one, in which it left.
     left: u64,
+    pub(crate) way: Way,
     /// Number of changes on the board that are applied.
     followed: u32,
     /// Sum of the working counters of process data over the copies received so far.
@@ -131,6 +134,7 @@ impl CyclicFrame {
             arrivals: Arrivals::default(),
             deadline: Instant::NEVER,
             left: 0,
+            way: Way::default(),
             followed: 0,
             wkc: 0,
             complete: false,

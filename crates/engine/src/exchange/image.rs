@@ -35,7 +35,8 @@ pub(crate) struct Image {
     shares: Box<[[Share; 2]]>,
     /// Shares found so far.
     found: u32,
-    /// Departure of the newest flight of which any copy returned, as a cycle plus one.
+    /// Departure of the newest flight of which any copy returned, as a cycle plus one; one more if its frame was sent
+    /// again.
     pub newest: u64,
 }
 
@@ -70,6 +71,12 @@ impl Image {
             found: 0,
             newest: 0,
         }
+    }
+
+    /// The frame of this cycle was sent again: its inputs are delivered one by one from now on, and inputs of the cycle
+    /// that came before stay.
+    pub fn deliver_singly(&mut self, left: u64) {
+        self.newest = self.newest.max(left + 1);
     }
 
     /// Last arrival of inputs.

@@ -5,6 +5,8 @@
 //! copy shows which of them processed it; the working counter must equal the sum of their increments. Each copy is
 //! judged by itself: in a ring that closes or breaks the same SubDevice may have processed both.
 
+mod tries;
+
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -241,7 +243,7 @@ impl Place {
     /// processed one of them and its inputs are valid, and none processed both.
     pub fn is_complete(&self, links: [bool; 2]) -> bool {
         let arrived = || self.views.iter().zip(links).filter(|(_, arrived)| *arrived).map(|(view, _)| view);
-        let sum = arrived().fold(0, |sum, view| sum + u32::from(view.wkc.0));
+        let sum = self.sum(links);
         if self.is_summed() {
             let needed = self.contributions.iter().filter(|it| it.required || it.is_mapped);
             let needed = needed.map(|it| u32::from(it.wkc.0)).sum();
@@ -260,6 +262,12 @@ impl Place {
             (copies == 1 && brings(it)) || (copies == 0 && !it.required)
         };
         arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
+    }
+
+    /// Sum of the working counters of copies on these links, as last evaluated.
+    fn sum(&self, links: [bool; 2]) -> u32 {
+        let arrived = self.views.iter().zip(links).filter(|(_, arrived)| *arrived);
+        arrived.map(|(view, _)| u32::from(view.wkc.0)).sum()
     }
 
     /// Whether any SubDevice processed the copies on both links, as last evaluated.

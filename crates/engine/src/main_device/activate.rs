@@ -16,6 +16,7 @@ use super::prepare::{
     check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
     witnesses,
 };
+use super::repeats;
 use crate::board::Board;
 use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
@@ -56,6 +57,8 @@ impl MainDevice {
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
         let (specs, layout) = self.lay_out(&declaration, &plans, &found)?;
+        let repeats = repeats::rules(&declaration.subdevices, &plans, &found);
+        let sends_again: Vec<bool> = declaration.domains.iter().map(|domain| domain.sends_again).collect();
         let members = members(declaration, found, &plans, &layout)?;
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
         let directory = Directory::new(&plans, &layout);
@@ -64,6 +67,7 @@ impl MainDevice {
         let board = Arc::new(Board::new(members.len()).with_optional(optional));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        exchange.send_lost_frames_again(&layout, &repeats, |domain| sends_again.get(domain.0) == Some(&true));
         if let Some(config) = &clock_config {
             exchange.set_up_clocks(ClockSetup {
                 epoch: config.epoch,

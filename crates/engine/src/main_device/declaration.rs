@@ -26,6 +26,9 @@ pub struct DomainConfig {
     /// answer to an input is sent as many cycles later, a lost cycle is detected as much later (or when the next one
     /// returns), and each cycle under way has buffers of its own.
     pub under_way: u8,
+    /// Whether lost frames are sent again within their cycle, with one cycle under way; with several they never are. Each
+    /// SubDevice receives a second time what its [`Repetition`](crate::config::Repetition) allows. Off by default.
+    pub sends_again: bool,
     /// Its members; the MainDevice packs their process data.
     pub members: Vec<DomainMember>,
     /// Process data with places of its own, in the order of registration, instead of members
@@ -43,7 +46,14 @@ impl DomainConfig {
 
     /// A domain with one cycle under way.
     pub const fn new(period: Duration, members: Vec<DomainMember>) -> DomainConfig {
-        DomainConfig { period, under_way: 1, members, registered: Vec::new() }
+        DomainConfig { period, under_way: 1, sends_again: false, members, registered: Vec::new() }
+    }
+
+    /// Sets [`DomainConfig::sends_again`].
+    #[must_use]
+    pub const fn with_sends_again(mut self, sends_again: bool) -> DomainConfig {
+        self.sends_again = sends_again;
+        self
     }
 }
 
@@ -112,6 +122,14 @@ impl Declaration {
         for domain in &mut self.domains {
             domain.under_way = cycles;
         }
+        self
+    }
+
+    /// The same declaration, with lost frames of every domain sent again within their cycle, or not (see
+    /// [`DomainConfig::sends_again`]).
+    #[must_use]
+    pub fn with_lost_frames_sent_again(mut self, sends_again: bool) -> Declaration {
+        self.domains.iter_mut().for_each(|domain| domain.sends_again = sends_again);
         self
     }
 

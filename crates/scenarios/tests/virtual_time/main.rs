@@ -39,6 +39,7 @@ mod image_variants;
 mod junctions;
 mod late_writes;
 mod long_segments;
+mod lossless;
 mod mail;
 mod mail_extras;
 mod mail_matrix;

@@ -10,7 +10,7 @@ use std::ops::Range;
 use ringcat_wire::command::Command;
 
 /// Capacity.
-const KEPT: usize = 64;
+const KEPT: usize = 256;
 /// Offset of the second byte of the source address, in which a MainDevice stores the number of a frame (protocol
 /// 9.7.1).
 const FRAME_ID_AT: usize = 7;

@@ -1,0 +1,367 @@
+//! Sends lost frames again within their cycle (decision 0045).
+//!
+//! Input: the times at which frames are lost ([`super::way`]), and the copies that came back. A frame of which the copies
+//! are not back by then, or whose copies show that the ring changed while they were on the wire, is sent again on all
+//! links, as long as it can come back before the next cycle. This is bounded: one check of all frames per call, and at
+//! least one round trip between two tries. It is away from the usual cycle, which only notes the time of the next check.
+
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use super::again::{Again, SyncGrid, Tries, is_mixed};
+use super::domain::Domain;
+use super::flight::{CyclicFrame, Step};
+use super::image::InputNumber;
+use super::missed::give_up;
+use super::{Exchange, Received};
+use crate::board::Board;
+use crate::domain::DomainId;
+use crate::layout::{Layout, RepeatRule};
+use crate::link::{Link, LinkSet};
+use crate::ring::{FrameCopy, Identity, RingState};
+use crate::time::Instant;
+
+impl Exchange {
+    /// From now on lost frames are sent again within their cycle, in domains with one cycle on the wire: `rules` has
+    /// what each SubDevice may receive twice, `layout` is that of this exchange, `is_wanted` selects domains. Not for the
+    /// cyclic path: this allocates.
+    pub fn send_lost_frames_again(
+        &mut self,
+        layout: &Layout,
+        rules: &[RepeatRule],
+        is_wanted: impl Fn(DomainId) -> bool,
+    ) {
+        if !(0..layout.domains.len()).any(|number| is_wanted(DomainId(number))) {
+            return;
+        }
+        let rule = |subdevice: usize| rules.get(subdevice).copied().unwrap_or(RepeatRule::NEVER);
+        let mut again = Vec::with_capacity(self.frames.len());
+        for (id, (domain, planned)) in (0..).map(DomainId).zip(self.domains.iter().zip(&layout.domains)) {
+            if planned.under_way > 1 || !is_wanted(id) {
+                again.extend(domain.frames().map(|_| None));
+                continue;
+            }
+            let mut number = InputNumber { datagram: 0, part: 0 };
+            for (index, frame) in domain.frames().zip(&planned.frames) {
+                let repeat = planned.repeat(frame, layout.most, rule);
+                // A frame leaves without process data until SubDevices answer; the other one has it.
+                let whole = &self.others[index];
+                let new = |repeat| Again::new(&self.identity, whole, (frame, repeat), number, rule);
+                again.push(repeat.as_ref().map(new));
+                number.datagram += frame.datagrams.len();
+                number.part += frame.datagrams.iter().map(|datagram| datagram.input_areas.len()).sum::<usize>();
+            }
+        }
+        self.is_alone = again.len() == 1;
+        self.base_ns = layout.domains.iter().map(|domain| domain.period.as_nanos() as u64).min().unwrap_or(0);
+        self.again = again;
+    }
+
+    /// When [`Exchange::decide`] is to be called, after all frames that have arrived were received.
+    #[inline(always)]
+    pub fn decide_at(&self) -> Instant {
+        self.decide_at
+    }
+
+    /// The next cycle begins then: frames that are sent again must be back before. Without this, a period after the
+    /// departure.
+    #[inline(always)]
+    pub fn expect_next(&mut self, at: Instant) {
+        self.next_at = at;
+    }
+
+    /// How long frames are waited for before they are sent again: the longest such time. `None` before enough frames
+    /// came back, and where nothing is sent again.
+    pub fn waits_for_ns(&self) -> Option<u64> {
+        let can_repeat = |index: &usize| matches!(self.again.get(*index), Some(Some(_)));
+        let known = (0..self.frames.len()).filter(can_repeat).map(|index| &self.frames[index].way);
+        known.filter(|way| way.is_known()).map(|way| way.wait_ns()).max()
+    }
+
+    /// Sends frames again that are lost. All frames that had arrived at `received_at` were received; it is `now`.
+    #[cold]
+    pub fn decide(&mut self, received_at: Instant, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        self.decide_at = Instant::NEVER;
+        let mut has_sent = false;
+        for number in 0..self.domains.len() {
+            let domain = &mut self.domains[number];
+            let Some(set) = domain.on_the_wire().filter(|_| domain.may_send_again()) else { continue };
+            for index in set {
+                match self.next_try(number, index, received_at, now) {
+                    Next::Never => {}
+                    Next::At(at) => self.decide_at = self.decide_at.min(at),
+                    Next::Now => {
+                        if !core::mem::replace(&mut has_sent, true) {
+                            self.board.traffic.post_departure(self.cycle);
+                        }
+                        let lost_at = self.send_again(number, index, now, transmit);
+                        self.decide_at = self.decide_at.min(lost_at);
+                    }
+                }
+            }
+        }
+        if has_sent {
+            self.board.post_cycle(self.cycle, self.tally.counters.sent);
+            // All tries have left; they belong to the last departure.
+            self.board.traffic.post_departure(self.cycle.wrapping_sub(1));
+        }
+    }
+
+    /// When a frame is to be sent again.
+    fn next_try(&mut self, number: usize, index: usize, received_at: Instant, now: Instant) -> Next {
+        let (domain, first) = (&self.domains[number], &self.frames[index]);
+        let Some(Some(again)) = self.again.get_mut(index) else { return Next::Never };
+        let left = first.left();
+        let sent_at = match again.tries(left) {
+            Tries::Over | Tries::Complete => return Next::Never,
+            _ if first.is_complete() || first.is_vacant() || !first.way.is_known() => return Next::Never,
+            Tries::First if !first.is_waiting() => return Next::Never,
+            Tries::Due => Instant(0),
+            Tries::First => sent_at(first, domain.timeout_ns()),
+            Tries::Again => again.sent_at,
+        };
+        let lost_at = Instant(sent_at.0.saturating_add(first.way.wait_ns()));
+        if lost_at > received_at && again.tries(left) != Tries::Due {
+            return Next::At(lost_at);
+        }
+        let end = end_of_cycle(domain, first, self.cycle, self.base_ns, self.next_at);
+        let back = Instant(now.0.saturating_add(first.way.longest_ns()));
+        let is_late =
+            back > end || self.evidence.clocks.passes(again.grids(), self::sent_at(first, domain.timeout_ns()), back);
+        if is_late {
+            let was_sent = again.was_sent(left);
+            again.set_tries(first, Tries::Over);
+            // The last try may still come back.
+            return if was_sent && end > now { Next::At(end) } else { Next::Never };
+        }
+        Next::Now
+    }
+
+    /// Sends a frame again; returns when this try is lost.
+    fn send_again(
+        &mut self,
+        number: usize,
+        index: usize,
+        now: Instant,
+        transmit: &mut impl FnMut(Link, &[u8]),
+    ) -> Instant {
+        let (domain, first) = (&mut self.domains[number], &mut self.frames[index]);
+        let Some(Some(again)) = self.again.get_mut(index) else { return Instant::NEVER };
+        again.load(first, &self.board, now);
+        domain.inputs_mut().deliver_singly(first.left());
+        self.sequence = self.sequence.next();
+        self.by_id[usize::from(self.sequence.frame_id())] = (self.frames.len() + index) as u16;
+        let deadline = Instant(now.0.saturating_add(domain.timeout_ns()));
+        let bytes = again.frame.depart(&self.identity, self.sequence, deadline);
+        let length = bytes.len() as u64;
+        transmit(Link::Main, bytes);
+        if self.links == LinkSet::Ring {
+            Identity::mark_redundant(bytes, true);
+            transmit(Link::Redundant, bytes);
+            Identity::mark_redundant(bytes, false);
+        }
+        let counters = self.tally.disturbed();
+        counters.sent += 1;
+        counters.sent_again += 1;
+        counters.bytes += length;
+        Instant(now.0.saturating_add(self.frames[index].way.wait_ns()))
+    }
+
+    /// Takes a copy of a further try.
+    pub(super) fn receive_again(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
+        let count = self.frames.len();
+        let index = usize::from(self.by_id[usize::from(copy.sequence.frame_id())]).wrapping_sub(count);
+        let Some(Some(again)) = self.again.get_mut(index) else {
+            self.missed.late(copy.sequence, self.tally.disturbed());
+            return Received::Late;
+        };
+        let frame = &mut again.frame;
+        let Some(domain) = self.domains.get_mut(frame.domain()) else { return Received::Other };
+        // A try of an earlier cycle is late, even if none followed.
+        let is_current = self.frames[index].left() == frame.left() && domain.on_the_wire().is_some();
+        let step = if is_current {
+            frame.receive(copy, arrived_on, bytes, domain.inputs_mut(), self.cycle, &mut self.tally)
+        } else {
+            Step::Late
+        };
+        match step {
+            Step::Waiting => {
+                self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
+            }
+            Step::Finished => {
+                self.board.traffic.post_home(frame.sequence());
+                self.tally.counters.received += 1;
+                // Only first tries show the ring and the clocks.
+                frame.close();
+            }
+            Step::Late => {
+                self.missed.late(copy.sequence, self.tally.disturbed());
+                return Received::Late;
+            }
+            Step::Corrupt => {
+                self.tally.disturbed().corrupt += 1;
+                self.missed.damaged(copy.sequence);
+                return Received::Corrupt;
+            }
+        }
+        again.gather_own();
+        self.follow_tries(index);
+        Received::Taken
+    }
+
+    /// A copy of any try was received: settles the cycle of the frame, or has it sent again at once.
+    pub(super) fn follow_tries(&mut self, index: usize) {
+        let is_closed = self.links == LinkSet::Ring && self.evidence.monitor.state() == RingState::Closed;
+        if is_closed != self.is_closed {
+            self.is_closed = is_closed;
+            self.frames.iter_mut().for_each(|frame| frame.way.change(is_closed));
+        }
+        let first = &self.frames[index];
+        let left = first.left();
+        if first.is_complete() && index == usize::from(self.newest) {
+            self.rest();
+        }
+        let first = &self.frames[index];
+        let Some(Some(again)) = self.again.get_mut(index) else { return };
+        if again.was_sent(left) {
+            again.gather_first(first);
+            if first.is_complete() || again.is_proved(first) {
+                let is_first = first.is_complete();
+                again.set_tries(first, if is_first { Tries::Over } else { Tries::Complete });
+                self.settle(index);
+                self.rest();
+                return;
+            }
+        }
+        if again.was_sent(left) && again.frame.is_complete() {
+            // All that may be repeated was; the rest of the first try is lost.
+            again.set_tries(first, Tries::Over);
+            return;
+        }
+        let last = if again.was_sent(left) { &again.frame } else { first };
+        if last.is_complete() || last.is_waiting() || again.tries(left) == Tries::Over {
+            return;
+        }
+        // All copies of the last try are back, and it is incomplete.
+        let is_edge = last.is_doubled() || is_mixed(last);
+        if is_edge {
+            again.set_tries(first, Tries::Due);
+            self.decide_at = Instant(0);
+        } else if again.was_sent(left) {
+            again.set_tries(first, Tries::Over);
+        }
+    }
+
+    /// The frame that was sent last is back: if all are, no check is needed.
+    #[inline(never)]
+    pub(super) fn rest(&mut self) {
+        if self.decide_at != Instant(0) && !self.frames.iter().any(CyclicFrame::is_waiting) {
+            self.decide_at = Instant::NEVER;
+        }
+    }
+
+    /// A cycle is complete because its frame was sent again: the first try is waited for no longer.
+    fn settle(&mut self, index: usize) {
+        let first = &mut self.frames[index];
+        if first.is_waiting() {
+            give_up(first, &mut self.missed, self.tally.disturbed());
+        }
+        self.board.post_lost(self.tally.counters.lost);
+    }
+
+    /// Applies what was learned about the ways of frames that can be sent again.
+    #[cold]
+    pub(super) fn refresh_ways(&mut self) {
+        for (frame, again) in self.frames.iter_mut().zip(&self.again) {
+            if again.is_some() {
+                frame.way.refresh(self.is_closed);
+            }
+        }
+    }
+}
+
+/// When a frame is to be sent again.
+enum Next {
+    Now,
+    At(Instant),
+    Never,
+}
+
+/// Result of the tries of a frame.
+#[derive(Default)]
+pub(super) struct Outcome {
+    pub waiting: bool,
+    pub complete: bool,
+    pub wkc: u32,
+    /// It is complete because it was sent again.
+    pub saved: bool,
+    /// It was sent again.
+    pub was_sent: bool,
+}
+
+/// Result of the tries of a frame.
+pub(super) fn outcome(first: &CyclicFrame, again: Option<&Option<Again>>) -> Outcome {
+    let (waiting, complete, wkc) = (first.is_waiting(), first.is_complete(), first.wkc());
+    let left = first.left();
+    let Some(Some(again)) = again.filter(|again| again.as_ref().is_some_and(|again| again.was_sent(left))) else {
+        return Outcome { waiting, complete, wkc, ..Outcome::default() };
+    };
+    if complete {
+        return Outcome { waiting, complete, wkc, was_sent: true, ..Outcome::default() };
+    }
+    let saved = again.tries(left) == Tries::Complete;
+    Outcome { waiting: waiting && !saved, complete: saved, wkc: again.wkc(), saved, was_sent: true }
+}
+
+/// Counts the wrong working counters of a judged cycle.
+#[cold]
+pub(super) fn count_errors(set: Range<usize>, frames: &[CyclicFrame], again: &[Option<Again>], board: &Board) {
+    for index in set {
+        let first = &frames[index];
+        match again.get(index) {
+            Some(Some(again)) if again.was_sent(first.left()) => again.count_errors(first, board),
+            _ => first.count_errors(board),
+        }
+    }
+}
+
+/// Whether a copy of any try came back.
+#[cold]
+pub(super) fn has_returned(mut set: Range<usize>, frames: &[CyclicFrame], again: &[Option<Again>]) -> bool {
+    set.any(|index| {
+        let again = again.get(index).and_then(Option::as_ref);
+        let again = again.filter(|again| again.was_sent(frames[index].left())).map(|again| &again.frame);
+        frames[index].arrivals().arrived != 0 || again.is_some_and(|frame| frame.arrivals().arrived != 0)
+    })
+}
+
+/// When a frame left that is overdue after this time.
+pub(super) fn sent_at(frame: &CyclicFrame, timeout_ns: u64) -> Instant {
+    Instant(frame.deadline().0.saturating_sub(timeout_ns))
+}
+
+/// When a cycle of a domain is judged: frames must be back before.
+fn end_of_cycle(domain: &Domain, first: &CyclicFrame, cycle: u64, base_ns: u64, next_at: Instant) -> Instant {
+    let period_ns = domain.period_ns();
+    let begun = sent_at(first, domain.timeout_ns());
+    let by_period = Instant(begun.0.saturating_add(period_ns));
+    if next_at == Instant::NEVER || base_ns == 0 {
+        return by_period;
+    }
+    // The next cycle is that of the shortest period.
+    let later = (period_ns / base_ns).saturating_sub(1 + cycle.saturating_sub(first.left()));
+    by_period.min(Instant(next_at.0.saturating_add(later * base_ns)))
+}
+
+impl super::clocks::Clocks {
+    /// Whether outputs that arrive at the latest at `back` pass a SYNC0 signal after the first try. True if the time of
+    /// the SubDevices is unknown.
+    fn passes(&self, grids: &[SyncGrid], first: Instant, back: Instant) -> bool {
+        if grids.is_empty() {
+            return false;
+        }
+        let Some(reference) = self.reference_time() else { return true };
+        let (first, back) = (reference.at(first), reference.at(back));
+        grids.iter().any(|grid| grid.lies_between(first, back))
+    }
+}

@@ -1,0 +1,216 @@
+//! Lost frames are sent again within their cycle: cuts and repairs of a ring, single losses, devices that must not see
+//! outputs twice. Evaluated by the domain's status and by the logs of the devices.
+
+use std::time::Duration;
+
+use ringcat::{ClockConfig, Declaration, DomainState, Options, Scan, SyncSignals, automatic};
+use ringcat_engine::config::Repetition;
+use ringcat_sim::cable::{CableId, Direction};
+use ringcat_sim::device::Device;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::check::Judged;
+use scenarios::segments::{descriptions, line, ring};
+use scenarios::world::World;
+
+const MS: Duration = Duration::from_millis(1);
+const DETECTIONS: [Duration; 4] =
+    [Duration::from_micros(10), Duration::from_micros(100), MS, Duration::from_millis(10)];
+const CYCLES: [Duration; 3] = [Duration::from_micros(250), MS, Duration::from_millis(4)];
+/// Cycles until the ways of frames are known.
+const LEARNING: u64 = 200;
+
+/// SubDevices without a mailbox: their outputs may be repeated.
+fn kinds(count: usize) -> Vec<&'static str> {
+    const KINDS: [&str; 5] =
+        ["digital-output-8", "digital-input-8", "digital-output-16", "digital-input-16", "coupler"];
+    KINDS.into_iter().cycle().take(count).collect()
+}
+
+fn world(network: Network, declare: impl FnOnce(&Scan) -> Declaration) -> World {
+    let declare = |scan: &Scan| declare(scan).with_lost_frames_sent_again(true);
+    let mut world = World::with(0, network, &Options::default(), declare).expect("it starts");
+    world.settle();
+    world.run_cycles(LEARNING);
+    world
+}
+
+/// All of a table, or a part of it in each test run.
+fn is_full() -> bool {
+    std::env::var_os("LOSSLESS").is_some()
+}
+
+/// Lost cycles of the edges of one ring.
+#[derive(Default)]
+struct Row {
+    edges: u64,
+    /// Largest number of lost cycles at a cut and at a repair, and their sums.
+    worst: [usize; 2],
+    sum: [usize; 2],
+    allowed: usize,
+    sent_again: u64,
+}
+
+/// Cuts and repairs each cable in each phase of the cycle.
+fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], phases: u32) -> Row {
+    let network = ring(descriptions(&kinds(count)), NetworkOptions::default().with_detection_delay(detection));
+    let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
+    world.judge_latched(false);
+    world.compare_tries();
+    world.application_mut().links_mut().measure_flights();
+    world.run_cycles(10);
+    let flight = world.application().links().flight_ns();
+    let wait = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
+    let needed = detection.as_nanos() as u64 + 2 * flight + wait;
+    let allowed = (needed.div_ceil(cycle.as_nanos() as u64) as usize).saturating_sub(1);
+    let mut row = Row { allowed, ..Row::default() };
+    let rest = detection.as_nanos().div_ceil(cycle.as_nanos()) as u64 + 80;
+    for cable in cables {
+        for phase in 0..phases {
+            // Ends that detect a repair at different times.
+            let direction = if phase % 2 == 0 { Direction::AToB } else { Direction::BToA };
+            let heal = Fault::HealUnevenly { cable: CableId(*cable), direction, by: detection };
+            for (edge, fault) in [Fault::Cut(CableId(*cable)), heal].into_iter().enumerate() {
+                let mark = world.mark();
+                world.fault_in(cycle * phase / phases, fault.clone());
+                world.run_cycles(rest);
+                let lost = world.incomplete(mark);
+                row.worst[edge] = row.worst[edge].max(lost);
+                row.sum[edge] += lost;
+                row.edges += 1;
+                assert!(
+                    lost <= allowed,
+                    "ring of {count}, cable {cable}, {fault:?} in phase {phase} of {phases}: {lost} cycles lost, \
+                     {allowed} allowed (d {detection:?}, T {cycle:?}, f {flight} ns, r {wait} ns)"
+                );
+            }
+        }
+    }
+    row.sent_again = world.application().cyclic_counters().sent_again;
+    assert_eq!(world.left_op(world.beginning()), []);
+    row
+}
+
+// covers: lossless
+#[test]
+fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
+    println!("{:>4} {:>9} {:>7} {:>7} {:>9} {:>9} {:>6}", "ring", "d", "T", "edges", "lost cut", "repair", "bound");
+    for count in [4, 10, 33] {
+        let all: Vec<usize> = (0..=count).collect();
+        let some = [0, 1, count / 2, count - 1, count];
+        let (cables, phases) = if is_full() { (&all[..], 40) } else { (&some[..], 8) };
+        for detection in DETECTIONS {
+            for cycle in CYCLES {
+                let row = edges(count, detection, cycle, cables, phases);
+                let [cut, repair] = [0, 1].map(|edge| format!("{} ({})", row.worst[edge], row.sum[edge]));
+                let (d, t) = (format!("{detection:?}"), format!("{cycle:?}"));
+                println!("{count:>4} {d:>9} {t:>7} {:>7} {cut:>9} {repair:>9} {:>6}", row.edges, row.allowed);
+                assert!(row.sent_again > 0, "frames were lost at some edge");
+            }
+        }
+    }
+}
+
+// covers: lossless
+#[test]
+fn single_lost_frames_cost_no_cycle() {
+    let rates = [1, 5, 10];
+    let cycles = if is_full() { 100_000 } else { 3_000 };
+    for in_ring in [true, false] {
+        for per_mille in rates {
+            let network = || descriptions(&kinds(10));
+            let options = NetworkOptions::default();
+            let network = if in_ring { ring(network(), options) } else { line(network(), options) };
+            let mut world = world(network, |scan| automatic(&scan.subdevices, MS));
+            world.judge_latched(false);
+            world.compare_tries();
+            let mark = world.mark();
+            world.application_mut().links_mut().lose_per_mille(per_mille, 7);
+            world.run_cycles(cycles);
+            let counters = world.application().cyclic_counters();
+            println!(
+                "ring {in_ring}, {per_mille} per mille: {} sent again, {} saved",
+                counters.sent_again, counters.saved
+            );
+            assert_eq!(world.incomplete(mark), 0);
+            assert!(counters.saved > 0);
+        }
+    }
+}
+
+// covers: lossless
+#[test]
+fn nothing_is_sent_again_in_undisturbed_cycles() {
+    let cycles = if is_full() { 1_000_000 } else { 20_000 };
+    for in_ring in [true, false] {
+        let (described, options) = (descriptions(&kinds(4)), NetworkOptions::default());
+        let network = if in_ring { ring(described, options) } else { line(described, options) };
+        let mut world = world(network, |scan| automatic(&scan.subdevices, MS));
+        world.run_cycles(cycles);
+        assert_eq!(world.application().cyclic_counters().sent_again, 0, "ring: {in_ring}");
+        assert!(world.application().exchange().waits_for_ns().is_some());
+    }
+}
+
+fn latched(world: &World) -> Vec<u64> {
+    world.network().devices().map(Device::outputs_latched).collect()
+}
+
+// covers: lossless
+#[test]
+fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
+    // Servos have CoE, and no command selects free run: they are taken for SM-synchronous.
+    let kinds = ["digital-output-8", "servo", "digital-input-8", "servo", "digital-output-16", "digital-input-8"];
+    let network = ring(descriptions(&kinds), NetworkOptions::default());
+    let mut world = world(network, |scan| {
+        let mut declaration = automatic(&scan.subdevices, MS);
+        declaration.subdevices[3].repetition = Repetition::Everything;
+        declaration
+    });
+    world.judge_latched(false);
+    world.compare_tries();
+    for cable in 1..=kinds.len() {
+        let (before, mark) = (latched(&world), world.mark());
+        let tries = world.application().cyclic_counters().sent_again;
+        world.fault(Fault::Drop { cable: CableId(cable), direction: Some(Direction::AToB), count: 1 });
+        world.run_cycles(3);
+        assert_eq!(world.application().cyclic_counters().sent_again - tries, 1, "cable {cable}");
+        let taken: Vec<u64> = latched(&world).iter().zip(before).map(|(now, before)| now - before).collect();
+        // Devices in front of the loss have processed the first try.
+        let times = |device: usize| if device < cable { 4 } else { 3 };
+        assert_eq!((taken[0], taken[3], taken[4]), (times(0), times(3), times(4)), "cable {cable}");
+        assert_eq!(taken[1], if 1 < cable { 3 } else { 2 }, "cable {cable}: once in each cycle at most");
+        assert!(world.judged(mark).iter().all(|judged| judged.stale.is_empty()), "inputs are read again");
+        // No copy shows that the servo took the outputs of that cycle.
+        let whole = |judged: &&Judged| judged.status.state == DomainState::Complete;
+        let missed = world.judged(mark).iter().filter(|judged| !whole(judged)).count();
+        assert_eq!(missed, 1, "cable {cable}");
+    }
+}
+
+// covers: lossless
+#[test]
+fn outputs_of_subdevices_with_sync_signals_are_not_repeated_across_sync0() {
+    let (mut saved, mut refused) = (0, 0);
+    for shift_ns in (0..1_000_000).step_by(50_000) {
+        let network = line(descriptions(&["servo"; 3]), NetworkOptions::default());
+        let mut world = world(network, |scan| {
+            let mut declaration = automatic(&scan.subdevices, MS);
+            declaration.clocks = Some(ClockConfig::default());
+            for subdevice in &mut declaration.subdevices {
+                subdevice.sync = Some(SyncSignals::sync0(1_000_000, shift_ns));
+            }
+            declaration
+        });
+        world.judge_latched(false);
+        let before = world.application().cyclic_counters();
+        world.fault(Fault::Drop { cable: CableId(1), direction: Some(Direction::AToB), count: 1 });
+        world.run_cycles(10);
+        let after = world.application().cyclic_counters();
+        assert_eq!(after.saved - before.saved, after.sent_again - before.sent_again, "shift {shift_ns} ns");
+        saved += after.saved - before.saved;
+        refused += u64::from(after.sent_again == before.sent_again);
+    }
+    println!("{saved} saved, {refused} refused");
+    assert!(saved >= 10 && refused >= 1 && saved + refused == 20, "{saved} {refused}");
+}
