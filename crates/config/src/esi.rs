@@ -13,6 +13,7 @@ mod modules;
 mod number;
 mod parse;
 mod references;
+mod rules;
 pub mod sii;
 mod values;
 
@@ -28,6 +29,7 @@ pub use model::{
 };
 pub use modules::{PlacedModule, place_modules};
 pub use references::{NoReferences, References, read_with};
+pub use rules::{Choice, choose};
 pub use values::{Part, parts};
 
 use crate::xml;

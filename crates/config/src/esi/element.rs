@@ -211,7 +211,13 @@ impl<'a> Element<'a> {
     /// An error about this element.
     pub fn error(&self, problem: EsiProblem) -> EsiError {
         let place = Some(self.file.lines.place(self.node.range().start));
-        EsiError { file: self.file.name.to_owned(), place, device: self.device(), element: self.path(), problem }
+        EsiError {
+            file: self.file.name.into(),
+            place,
+            device: self.device().into(),
+            element: self.path().into(),
+            problem,
+        }
     }
 
     /// An error about the value of this element.

@@ -13,13 +13,13 @@ const MAX_NOTICES: usize = 200;
 #[non_exhaustive]
 pub struct EsiError {
     /// The file, as the caller named it.
-    pub file: String,
+    pub file: Box<str>,
     /// Position, if the error has one.
     pub place: Option<Place>,
     /// `Type` of the device or module concerned; may be empty.
-    pub device: String,
+    pub device: Box<str>,
     /// The element, from the root; empty if no element is at fault.
-    pub element: String,
+    pub element: Box<str>,
     /// The error.
     pub problem: EsiProblem,
 }
@@ -85,17 +85,16 @@ impl EsiError {
             XmlProblem::Syntax { reason } => EsiProblem::Xml { reason },
             XmlProblem::NotXml => EsiProblem::WrongFile { kind: "no XML file".to_owned() },
         };
-        let file = file.to_owned();
-        EsiError { file, place: error.place, device: String::new(), element: String::new(), problem }
+        EsiError { file: file.into(), place: error.place, device: "".into(), element: "".into(), problem }
     }
 
     /// A rule that does not hold for a device, at a line of its file.
     pub(crate) fn rule(file: &str, line: u32, device: &str, reason: impl Into<String>) -> EsiError {
         EsiError {
-            file: file.to_owned(),
+            file: file.into(),
             place: (line > 0).then_some(Place { line, column: 1 }),
-            device: device.to_owned(),
-            element: String::new(),
+            device: device.into(),
+            element: "".into(),
             problem: EsiProblem::Rule { reason: reason.into() },
         }
     }

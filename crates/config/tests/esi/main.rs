@@ -5,6 +5,7 @@ mod bad_files;
 mod images;
 mod reading;
 mod real_files;
+mod slots;
 
 /// A coupler, a terminal without mailbox, one with CoE and a dictionary, a modular drive.
 pub const ACME: &str = include_str!("../files/acme.xml");
