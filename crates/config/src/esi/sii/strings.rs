@@ -76,7 +76,7 @@ mod tests {
         let long = "x".repeat(300);
         assert_eq!(each.add(&long), 3);
         assert_eq!(each.bytes().len(), 1 + 2 + 2 + 1 + 255);
-        (0..300).for_each(|n| drop(each.add(&n.to_string())));
+        (0..300).for_each(|n| _ = each.add(&n.to_string()));
         assert_eq!((each.bytes()[0], each.left_out), (255, 48));
     }
 }
