@@ -143,7 +143,7 @@ fn descriptions() -> Vec<Esi> {
 }
 
 /// The description of an identity: the same revision, or the one with the same low word and the nearest high word.
-fn description_of<'a>(all: &'a [Esi], vendor: u32, product: u32, revision: u32) -> Option<(&'a Esi, &'a Device)> {
+fn description_of(all: &[Esi], vendor: u32, product: u32, revision: u32) -> Option<(&Esi, &Device)> {
     let devices = all.iter().flat_map(|esi| esi.devices.iter().map(move |device| (esi, device)));
     let same = devices.filter(|(_, it)| (it.vendor_id, it.product_code) == (vendor, product));
     same.min_by_key(|(_, it)| (it.revision as u16 != revision as u16, it.revision.abs_diff(revision)))
