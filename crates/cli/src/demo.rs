@@ -87,7 +87,7 @@ fn show(arguments: &DemoArguments) -> Result<Report, Error> {
 
 fn load(arguments: &DemoArguments) -> Result<Segment, Error> {
     Ok(match &arguments.segment {
-        Some(path) => Segment::load(path)?,
+        Some(path) => ringcat::esi::load_segment(path)?,
         None => Segment::from_toml(DEMO, Path::new("."))?,
     })
 }

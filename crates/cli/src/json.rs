@@ -15,5 +15,6 @@ pub mod line;
 pub mod ring;
 pub mod run;
 pub mod scan;
+pub mod sii;
 pub mod sim;
 pub mod values;

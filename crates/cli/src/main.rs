@@ -19,6 +19,7 @@ mod ring;
 mod run;
 mod run_log;
 mod scan;
+mod sii;
 mod sim;
 mod surroundings;
 mod table;
@@ -116,6 +117,10 @@ enum Command {
     ///
     /// An ENI is a network that TwinCAT, EC-Engineer or another tool has configured. No interface is needed.
     Eni(eni_summary::EniArguments),
+    /// EEPROM images (SII): from a device description, compared, to one
+    ///
+    /// Descriptions are ESI files of vendors, see docs/esi.md. No interface is needed.
+    Sii(sii::SiiArguments),
     /// Measures round trips, cycle rates and start-up
     Bench(bench::BenchArguments),
 }
@@ -142,6 +147,7 @@ fn main() -> ExitCode {
         Command::Capture(arguments) => capture::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
+        Command::Sii(arguments) => sii::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     })
 }
@@ -158,6 +164,7 @@ impl Command {
             Command::Capture(_) => "capture",
             Command::Sim(_) => "sim",
             Command::Eni(_) => "eni",
+            Command::Sii(arguments) => arguments.name(),
             Command::Bench(arguments) => arguments.name(),
         }
     }

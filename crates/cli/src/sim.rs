@@ -14,9 +14,9 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::eni::EniFile;
+use ringcat::esi::load_segment;
 use ringcat::sim::cable::HostLink;
 use ringcat::sim::network::Network;
-use ringcat::sim::segment::Segment;
 use ringcat_link::{CarrierWatch, monotonic};
 
 use crate::ending::EndRequest;
@@ -147,7 +147,7 @@ fn load(arguments: &SimArguments) -> Result<Network, Failure> {
             let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
             (path.display(), file.simulated(arguments.links.redundant.is_some())?)
         }
-        (None, Some(path)) => (path.display(), Network::from_description(Segment::load(path)?)?),
+        (None, Some(path)) => (path.display(), Network::from_description(load_segment(path)?)?),
         (None, None) => return Err(Failure::new("expected --segment FILE.toml or --eni FILE")),
     };
     if network.host_cable(HostLink::Main).is_none() {

@@ -7,28 +7,27 @@
 
 mod element;
 mod error;
-mod guard;
 mod kind;
-mod limits;
 mod model;
 mod parse;
-mod quoted;
-mod text;
 
-pub use error::{Contradiction, EniError, Place, Problem};
+pub use crate::xml::Place;
+pub(crate) use crate::xml::shown as quoted;
+pub use crate::xml::{MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_NODES, MAX_SUBDEVICES, MAX_UNKNOWN};
+pub use error::{Contradiction, EniError, Problem};
 pub use kind::FileKind;
-pub use limits::{MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_NODES, MAX_SUBDEVICES, MAX_UNKNOWN};
 pub use model::{
     BitRange, CoeCommand, CopyInfo, CyclicCommand, CyclicState, CyclicTask, Datagram, DistributedClock, EcatCommand,
     Eni, EoeCommand, Frame, HotConnect, ImageSide, Mailbox, MailboxBuffer, MailboxStates, MainDevice, Pdo, PdoEntry,
     Poll, Port, PreviousPort, ProcessData, ProcessImage, RawMailCommand, Requires, SoeCommand, SubDevice,
     SyncManagerKind, SyncManagerSettings, Target, Transition, Unknown, Validate, Variable,
 };
-pub(crate) use quoted::shown as quoted;
+
+use crate::xml;
 
 /// Reads an ENI.
 pub fn read(bytes: &[u8]) -> Result<Eni, EniError> {
-    let text = text::decode(bytes)?;
-    guard::check(&text)?;
+    let text = xml::decode(bytes).map_err(|error| EniError::of_xml(error, bytes))?;
+    xml::check(&text).map_err(|error| EniError::of_xml(error, bytes))?;
     parse::parse(&text)
 }

@@ -8,7 +8,9 @@
 
 mod configuration;
 pub mod eni;
+pub mod esi;
 mod follow;
+mod xml;
 
 pub use configuration::{Configuration, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable};
 pub use follow::follow;

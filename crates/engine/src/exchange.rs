@@ -61,7 +61,7 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use leaving::Leaving;
-use missed::{Missed, give_up};
+use missed::{Missed, give_up_overdue};
 use service::Service;
 
 /// Cycles between two applications of the learned ways of frames.
@@ -474,29 +474,6 @@ fn note_change(
     if changed {
         events.push(CyclicEvent::Domain { domain: id.0 as u16, status: domain.status(false) }.pack());
     }
-}
-
-/// Gives up the overdue frames of a domain's oldest cycle. True while others are still expected.
-#[cold]
-fn give_up_overdue(
-    domain: &Domain,
-    frames: &mut [CyclicFrame],
-    set: Range<usize>,
-    now: Instant,
-    missed: &mut Missed,
-    counters: &mut CyclicCounters,
-) -> bool {
-    // Links keep the order of frames: a frame overtaken by a later one is lost, whatever the time.
-    let now = if domain.is_overtaken(frames) { Instant::NEVER } else { now };
-    let mut pending = false;
-    for frame in frames[set].iter_mut().filter(|frame| frame.is_waiting()) {
-        if frame.overdue(now) {
-            give_up(frame, missed, counters);
-        } else {
-            pending = true;
-        }
-    }
-    pending
 }
 
 #[cfg(test)]

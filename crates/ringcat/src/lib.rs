@@ -43,6 +43,7 @@
 //! | `packet` (default) | network interfaces ([`packet::PacketLinks`]), captures ([`tee::Tee`]), `realtime` |
 //! | `sim` | links into a simulated segment, in virtual or in real time; the simulator itself as `sim` |
 //! | `eni` | networks from an ENI, its variables by name; what a file says as `config` |
+//! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that speak Ethernet over EtherCAT |
 //! | `tracing` | events of the acyclic half for a `tracing` subscriber |
@@ -58,6 +59,8 @@ pub mod eni;
 #[cfg(feature = "eoe")]
 pub mod eoe;
 mod error;
+#[cfg(feature = "esi")]
+pub mod esi;
 pub mod event_log;
 #[cfg(feature = "gateway")]
 pub mod gateway;
@@ -195,7 +198,7 @@ pub use ringcat_engine::topology::Topology;
 #[cfg(feature = "packet")]
 pub use ringcat_link::recorder::Tap;
 
-#[cfg(feature = "eni")]
+#[cfg(any(feature = "eni", feature = "esi"))]
 pub use ringcat_config as config;
 #[cfg(feature = "packet")]
 pub use ringcat_link::realtime;

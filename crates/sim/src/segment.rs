@@ -4,6 +4,7 @@
 //! options from which [`Network::from_description`](crate::network::Network::from_description) makes a segment. An
 //! error names file, line and device.
 
+mod described;
 mod devices;
 mod error;
 mod format;
@@ -16,7 +17,9 @@ use std::path::Path;
 use crate::cable::CableSpec;
 use crate::description::DeviceDescription;
 use crate::network::NetworkOptions;
+use described::Sources;
 
+pub use described::{DescribedDevice, DescribedDevices, DescriptionFault, NoDescriptions};
 pub use error::SegmentError;
 
 /// The segment file of the demonstration: a ring of couplers, terminals and a servo drive.
@@ -39,11 +42,20 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Reads a segment file. Paths of SII images are relative to it.
+    /// Reads a segment file. Paths of SII images are relative to it. Devices of description files (ESI) need
+    /// [`Segment::load_with`].
     ///
     /// # Errors
     /// A file that cannot be read, and the errors of [`Segment::from_toml`].
     pub fn load(path: &Path) -> Result<Segment, SegmentError> {
+        Segment::load_with(path, &NoDescriptions)
+    }
+
+    /// The same, with devices of description files.
+    ///
+    /// # Errors
+    /// The errors of [`Segment::load`], and those of the description files.
+    pub fn load_with(path: &Path, descriptions: &dyn DescribedDevices) -> Result<Segment, SegmentError> {
         let bytes =
             std::fs::read(path).map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -52,7 +64,7 @@ impl Segment {
             SegmentError::new("expected UTF-8 text").at_line(line).in_file(path)
         })?;
         let base_dir = path.parent().unwrap_or(Path::new("."));
-        Segment::from_toml(&text, base_dir).map_err(|error| error.in_file(path))
+        Segment::from_toml_with(&text, base_dir, descriptions).map_err(|error| error.in_file(path))
     }
 
     /// Reads the text of a segment file. Paths of SII images are relative to `base_dir`.
@@ -61,10 +73,22 @@ impl Segment {
     /// Text that is not TOML, unknown or missing keys, values out of range, unknown device types, SII images that
     /// cannot be read, duplicate names, and cables with a missing end or at a port with another cable.
     pub fn from_toml(text: &str, base_dir: &Path) -> Result<Segment, SegmentError> {
+        Segment::from_toml_with(text, base_dir, &NoDescriptions)
+    }
+
+    /// The same, with devices of description files, whose paths are relative to `base_dir` too.
+    ///
+    /// # Errors
+    /// The errors of [`Segment::from_toml`], and those of the description files.
+    pub fn from_toml_with(
+        text: &str,
+        base_dir: &Path,
+        descriptions: &dyn DescribedDevices,
+    ) -> Result<Segment, SegmentError> {
         keys::check(text)?;
         let file = format::File::parse(text)?;
         let options = file.options(text)?;
-        let plan = devices::describe(&file, text, base_dir, options.seed)?;
+        let plan = devices::describe(&file, text, &Sources { base_dir, descriptions }, options.seed)?;
         let cables = topology::plug(&file, text, &plan)?;
         Ok(Segment {
             name: file.segment.name.clone().unwrap_or_else(|| String::from("segment")),

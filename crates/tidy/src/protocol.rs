@@ -68,12 +68,12 @@ fn is_section(word: &str) -> bool {
     word.split('.').all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Capital letters, a hyphen, two digits.
+/// Two capital letters, a hyphen, two or three digits.
 pub fn is_statement(word: &str) -> bool {
     let (letters, number) = word.split_once('-').unwrap_or_default();
     letters.len() == 2
         && letters.bytes().all(|b| b.is_ascii_uppercase())
-        && number.len() == 2
+        && (2..=3).contains(&number.len())
         && number.bytes().all(|b| b.is_ascii_digit())
 }
 

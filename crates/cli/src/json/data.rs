@@ -10,6 +10,7 @@ use super::eni::EniFile;
 use super::ring::Ring;
 use super::run::Run;
 use super::scan::Scan;
+use super::sii::{SiiBuilt, SiiCompared, SiiSkeleton};
 use super::sim::Sim;
 
 /// The keys of one command.
@@ -24,6 +25,9 @@ pub enum Data {
     Capture(Capture),
     Sim(Sim),
     Eni(Box<EniFile>),
+    SiiBuilt(SiiBuilt),
+    SiiCompared(SiiCompared),
+    SiiSkeleton(SiiSkeleton),
     Demo(Demo),
     Echo(Echo),
     RoundTrip(RoundTrip),

@@ -10,7 +10,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::Value;
 
-use super::{bench, capture, clocks, demo, eni, line, ring, run, scan, sim};
+use super::{bench, capture, clocks, demo, eni, line, ring, run, scan, sii, sim};
 
 /// Lines around the tables.
 const BEGIN: &str =
@@ -93,6 +93,9 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("`capture`", keys::<capture::Capture>()),
         ("`sim`", keys::<sim::Sim>()),
         ("`eni`", keys::<eni::EniFile>()),
+        ("`sii build`", keys::<sii::SiiBuilt>()),
+        ("`sii compare`", keys::<sii::SiiCompared>()),
+        ("`sii skeleton`", keys::<sii::SiiSkeleton>()),
         ("`demo`", keys::<demo::Demo>()),
         ("`bench echo`", keys::<bench::Echo>()),
         ("`bench round-trip`", keys::<bench::RoundTrip>()),

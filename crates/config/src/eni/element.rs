@@ -6,38 +6,24 @@ use std::net::Ipv4Addr;
 
 use roxmltree::Node;
 
-use super::error::{EniError, Place, Problem};
-use super::limits::MAX_UNKNOWN;
+use super::error::{EniError, Problem};
 use super::model::Unknown;
-use super::quoted::shown;
+use crate::xml::{Lines, MAX_UNKNOWN, Place, shown};
 
 /// Data shared by all elements of a file.
 pub(super) struct File<'a> {
-    text: &'a str,
-    /// Offset of the first byte of each line.
-    lines: Vec<usize>,
+    lines: Lines<'a>,
     unknown: RefCell<Vec<Unknown>>,
     more_unknown: Cell<usize>,
 }
 
 impl<'a> File<'a> {
     pub fn new(text: &'a str) -> File<'a> {
-        let behind_breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
-        File {
-            text,
-            lines: std::iter::once(0).chain(behind_breaks).collect(),
-            unknown: RefCell::default(),
-            more_unknown: Cell::default(),
-        }
+        File { lines: Lines::new(text), unknown: RefCell::default(), more_unknown: Cell::default() }
     }
 
     pub fn place(&self, at: usize) -> Place {
-        let line = self.lines.partition_point(|begin| *begin <= at);
-        let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(0);
-        // The column of a file without line breaks can be in the millions: characters are counted only in short lines.
-        let before = self.text.get(begin..at).unwrap_or_default();
-        let column = if before.len() > 4096 { before.len() } else { before.chars().count() };
-        Place { line: line as u32, column: (column + 1) as u32 }
+        self.lines.place(at)
     }
 
     /// Unknown elements, and the number of those that are not listed.

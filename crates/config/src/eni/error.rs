@@ -3,21 +3,7 @@
 use std::fmt;
 
 use super::kind::FileKind;
-
-/// A position in a file. Lines and columns start at 1; columns count characters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Place {
-    /// Line.
-    pub line: u32,
-    /// Column.
-    pub column: u32,
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}, column {}", self.line, self.column)
-    }
-}
+use crate::xml::{Place, XmlError, XmlProblem};
 
 /// Why a file cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,6 +81,17 @@ impl EniError {
     /// An error at a position, without an element.
     pub(crate) fn at(place: Place, problem: Problem) -> EniError {
         EniError { place: Some(place), element: String::new(), problem }
+    }
+
+    /// An error about the bytes or the XML of a file; files that are not XML are named by their kind.
+    pub(crate) fn of_xml(error: XmlError, bytes: &[u8]) -> EniError {
+        let problem = match error.problem {
+            XmlProblem::TooMuch { what, limit } => Problem::TooMuch { what, limit },
+            XmlProblem::Encoding { reason } => Problem::Encoding { reason },
+            XmlProblem::Syntax { reason } => Problem::Xml { reason },
+            XmlProblem::NotXml => Problem::WrongFile { kind: FileKind::of_bytes(bytes) },
+        };
+        EniError { place: error.place, element: String::new(), problem }
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use roxmltree::Node;
 
-use super::quoted::shown;
+use crate::xml::shown;
 
 /// The kind of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]

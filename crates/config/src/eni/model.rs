@@ -6,7 +6,7 @@ mod mailbox;
 
 use ringcat_wire::address::LogicalAddress;
 
-use super::error::Place;
+use crate::xml::Place;
 
 pub use command::{Datagram, EcatCommand, Requires, Target, Transition, Validate};
 pub use cyclic::{CopyInfo, CyclicCommand, CyclicState, CyclicTask, Frame, ImageSide, ProcessImage, Variable};

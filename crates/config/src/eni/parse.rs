@@ -6,19 +6,15 @@ mod cyclic;
 mod mailbox;
 mod process_data;
 
-use roxmltree::{Document, ParsingOptions};
-
 use super::element::{Element, File};
-use super::error::{EniError, Place, Problem};
+use super::error::{EniError, Problem};
 use super::kind::FileKind;
-use super::limits::{MAX_NODES, MAX_SUBDEVICES};
 use super::model::{DistributedClock, Eni, HotConnect, MailboxStates, MainDevice, Port, PreviousPort, SubDevice};
-use super::quoted::shown;
+use crate::xml::{self, MAX_SUBDEVICES, shown};
 
 /// The model of a file.
 pub(super) fn parse(text: &str) -> Result<Eni, EniError> {
-    let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options).map_err(|error| not_xml(text, &error))?;
+    let document = xml::parse(text).map_err(|error| EniError::of_xml(error, text.as_bytes()))?;
     let root = document.root_element();
     let file = File::new(text);
     if let Some(kind) = FileKind::of(root) {
@@ -32,29 +28,6 @@ pub(super) fn parse(text: &str) -> Result<Eni, EniError> {
     eni.made_by = comments.map(|text| text.trim().to_owned()).find(|text| text.to_lowercase().contains("created"));
     (eni.unknown, eni.more_unknown) = file.into_unknown();
     Ok(eni)
-}
-
-fn not_xml(text: &str, error: &roxmltree::Error) -> EniError {
-    if !text.trim_start().starts_with('<') {
-        return EniError::of_file(Problem::WrongFile { kind: FileKind::of_bytes(text.as_bytes()) });
-    }
-    if matches!(error, roxmltree::Error::NodesLimitReached) {
-        return EniError::of_file(Problem::TooMuch { what: "XML nodes", limit: MAX_NODES as usize });
-    }
-    if matches!(error, roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream) {
-        let reason = "the file is truncated: an element has no end; copy or export the file again".to_owned();
-        return EniError::at(File::new(text).place(text.len()), Problem::Xml { reason });
-    }
-    let at = error.pos();
-    let mut reason = match error {
-        roxmltree::Error::DtdDetected => "a document type definition (DTD) is not read".to_owned(),
-        other => other.to_string(),
-    };
-    // The message already contains the position at its beginning.
-    if let Some(begin) = reason.rfind(" at ") {
-        reason.truncate(begin);
-    }
-    EniError::at(Place { line: at.row, column: at.col }, Problem::Xml { reason })
 }
 
 fn configuration(root: Element<'_>) -> Result<Eni, EniError> {

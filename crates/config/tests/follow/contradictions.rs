@@ -76,7 +76,7 @@ fn al_control_must_request_the_state_of_its_transition() {
     has(&refused(&[("<Data>1200</Data>", "<Data>1800</Data>")]), &["AL control at the transition IP", "got 0x08"]);
 }
 
-// covers: eni-cabling
+// covers: eni-image
 #[test]
 fn previous_ports_must_exist_and_form_paths_to_the_first_subdevice() {
     let to = "<Port>C</Port><PhysAddr>1001</PhysAddr>";

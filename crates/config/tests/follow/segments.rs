@@ -11,7 +11,7 @@ fn addresses(configuration: &ringcat_config::Configuration) -> Vec<ConfigAddress
     configuration.declaration.subdevices.iter().map(|config| config.address).collect()
 }
 
-// covers: 8.1, eni-cabling
+// covers: 8.1, eni-image
 #[test]
 fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file() {
     let swapped = changed(&[
@@ -49,7 +49,7 @@ const GROUP: &str = "<HotConnect><GroupName>Gripper</GroupName><GroupMemberCnt>2
 /// `PreviousPort` of the second SubDevice, which becomes the head of a group.
 const HEAD: &str = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1001</PhysAddr></PreviousPort>";
 
-// covers: 8.2, eni-cabling
+// covers: 8.2, eni-image
 #[test]
 fn a_hot_connect_group_is_found_by_alias_and_its_members_follow_it() {
     let configuration = changed(&[(HEAD, GROUP)]);
@@ -61,7 +61,7 @@ fn a_hot_connect_group_is_found_by_alias_and_its_members_follow_it() {
     assert_eq!(configuration.groups, ["Gripper"]);
 }
 
-// covers: eni-cabling
+// covers: eni-image
 #[test]
 fn a_group_may_be_identified_by_its_eeprom_or_its_switch() {
     let eeprom = "<IdentifyCmd><Cmd>2</Cmd><Adp>0</Adp><Ado>1282</Ado><Data>000104000000</Data></IdentifyCmd>\

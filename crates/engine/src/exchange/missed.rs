@@ -4,10 +4,13 @@
 //! affected.
 
 use alloc::boxed::Box;
+use core::ops::Range;
 
 use super::counters::CyclicCounters;
+use super::domain::Domain;
 use super::flight::CyclicFrame;
 use crate::ring::Sequence;
+use crate::time::Instant;
 
 /// Fate of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,6 +77,29 @@ pub(crate) fn give_up(frame: &mut CyclicFrame, missed: &mut Missed, counters: &m
     } else {
         counters.half += 1;
     }
+}
+
+/// Gives up the overdue frames of a domain's oldest cycle. True while others are still expected.
+#[cold]
+pub(super) fn give_up_overdue(
+    domain: &Domain,
+    frames: &mut [CyclicFrame],
+    set: Range<usize>,
+    now: Instant,
+    missed: &mut Missed,
+    counters: &mut CyclicCounters,
+) -> bool {
+    // Links keep the order of frames: a frame overtaken by a later one is lost, whatever the time.
+    let now = if domain.is_overtaken(frames) { Instant::NEVER } else { now };
+    let mut pending = false;
+    for frame in frames[set].iter_mut().filter(|frame| frame.is_waiting()) {
+        if frame.overdue(now) {
+            give_up(frame, missed, counters);
+        } else {
+            pending = true;
+        }
+    }
+    pending
 }
 
 #[cfg(test)]

@@ -26,8 +26,8 @@ pub struct DomainConfig {
     /// answer to an input is sent as many cycles later, a lost cycle is detected as much later (or when the next one
     /// returns), and each cycle under way has buffers of its own.
     pub under_way: u8,
-    /// Whether lost frames are sent again within their cycle, with one cycle under way; with several they never are. Each
-    /// SubDevice receives a second time what its [`Repetition`](crate::config::Repetition) allows. Off by default.
+    /// Whether lost frames are sent again within their cycle, with one cycle under way; with several they never are.
+    /// Each SubDevice receives a second time what its [`Repetition`](crate::config::Repetition) allows. Off by default.
     pub sends_again: bool,
     /// Its members; the MainDevice packs their process data.
     pub members: Vec<DomainMember>,

@@ -24,6 +24,7 @@ pub struct Scan {
 
 /// The SubDevices that the last scan found. Members and SubDevices without a declaration share their data with it.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Found {
     /// By position.
     pub subdevices: Vec<Rc<SubDeviceInfo>>,

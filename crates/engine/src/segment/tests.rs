@@ -62,6 +62,11 @@ fn node(high: u8) -> NodeStatus {
     NodeStatus { dl_status, receive_times: None, ports: [PortKind::Mii; 4] }
 }
 
+fn ring_rules() -> Rules<'static> {
+    let lrw = Default::default();
+    Rules { links: LinkSet::Ring, supervision: true, lrw, witnesses: &[], session: 0, max_datagrams: None }
+}
+
 impl Ring {
     fn closed(count: usize) -> Ring {
         Ring::with_clocks(count, Clocks::undeclared())
@@ -88,18 +93,10 @@ impl Ring {
             closings: Vec::new(),
             version: 0,
         };
-        let rules = Rules {
-            links: LinkSet::Ring,
-            supervision: true,
-            lrw: Default::default(),
-            witnesses: &[],
-            session: 0,
-            max_datagrams: None,
-        };
         let declared = Declared {
             members: (0..count).map(member).collect(),
             unassigned: Vec::new(),
-            layout: Layout::with(&[], rules).unwrap(),
+            layout: Layout::with(&[], ring_rules()).unwrap(),
             clocks,
             cabling,
             ring: RingStatus { redundancy: Redundancy::Unknown, ..RingStatus::default() },

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::bench::Bench;
 use crate::said;
 
-// covers: CR-16, 8, eni-lrw, eni-run
+// covers: CR-16, 8, eni-run
 #[test]
 fn an_eni_with_lrw_runs_on_a_ring_of_interfaces_only_if_split() {
     let Some(mut bench) = Bench::new(2) else { return };

@@ -328,7 +328,7 @@ fn a_mapping_that_differs_from_the_sii_is_set_by_the_file() {
     assert_eq!(plant.device(DRIVE).outputs(), [1, 2, 3, 4, 0, 0]);
 }
 
-// covers: CR-16, 9.2.2, eni-lrw
+// covers: CR-16, 9.2.2, eni-run
 #[test]
 fn an_lrw_of_a_file_is_refused_on_two_links_by_name_unless_it_may_be_split() {
     let files = std::iter::once(("machine", Some(machine()), vec![1, 2, 3, 4]));

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use scenarios::dice::Dice;
-use scenarios::fuzz_targets::{TARGETS, Target, eni, mutate, seeds};
+use scenarios::fuzz_targets::{TARGETS, Target, eni, esi, mutate, seeds};
 use scenarios::seeds::from_environment;
 
 /// Mutants of each file of a corpus.
@@ -93,6 +93,24 @@ fn mutants_of_an_eni_are_consistent_configurations_or_errors() {
             }
             let share = followed * 100 / (ENI_MUTANTS + 1);
             assert!((10..90).contains(&share), "{share} % are followed: the changes are too small or too large");
+        }
+    }
+}
+
+// covers: esi-read
+#[test]
+fn mutants_of_an_esi_are_descriptions_with_images_or_errors() {
+    for seed in from_environment().unwrap_or(12..13) {
+        let mut dice = Dice::new(seed);
+        for text in [esi::WHOLE, esi::SMALL] {
+            let mut readable = 0;
+            for number in 0..=ENI_MUTANTS {
+                let mutant = if number == 0 { text.to_owned() } else { eni::mutate(text, &mut dice) };
+                let _running = Running("esi", mutant.as_bytes());
+                readable += usize::from(esi::is_read(mutant.as_bytes()));
+            }
+            let share = readable * 100 / (ENI_MUTANTS + 1);
+            assert!((10..90).contains(&share), "{share} % are read: the changes are too small or too large");
         }
     }
 }

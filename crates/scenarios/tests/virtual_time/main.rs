@@ -26,6 +26,7 @@ mod double_faults;
 mod eeprom;
 mod eeprom_writes;
 mod eni;
+mod esi;
 mod ethernet;
 mod explorer;
 mod failures;

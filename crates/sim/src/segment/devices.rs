@@ -4,6 +4,7 @@ use core::time::Duration;
 use std::path::Path;
 
 use super::SegmentError;
+use super::described::{DescribedDevice, Sources};
 use super::format::{DeviceEntry, File, Place, duration, line};
 use super::services::services;
 use crate::catalogue;
@@ -29,7 +30,7 @@ pub(super) struct PlannedDevice {
 pub(super) fn describe(
     file: &File,
     text: &str,
-    base_dir: &Path,
+    sources: &Sources<'_>,
     seed: u64,
 ) -> Result<Vec<PlannedDevice>, SegmentError> {
     let mut plan: Vec<PlannedDevice> = Vec::new();
@@ -39,7 +40,7 @@ pub(super) fn describe(
         let here = line(text, &spanned.span());
         let name = name(entry, number);
         let error = |message: String, at: usize| SegmentError::new(message).about(&name).at_line(at);
-        let template = template(entry, &name, base_dir).map_err(|(message, span)| {
+        let template = template(entry, &name, sources).map_err(|(message, span)| {
             let at = span.map_or(here, |span| line(text, &span));
             error(message, at)
         })?;
@@ -68,7 +69,8 @@ pub(super) fn describe(
 
 /// Name of a device; generated if the table has none.
 fn name(entry: &DeviceEntry, number: usize) -> String {
-    let stem = entry.kind.as_ref().or(entry.sii.as_ref()).map_or("device", |kind| kind.get_ref());
+    let stem =
+        entry.kind.as_ref().or(entry.sii.as_ref()).or(entry.esi.as_ref()).map_or("device", |kind| kind.get_ref());
     let stem = Path::new(stem).file_stem().and_then(|stem| stem.to_str()).unwrap_or("device");
     let given = entry.name.as_ref().map(|name| name.get_ref().clone());
     given.unwrap_or_else(|| format!("{}-{}", stem.replace('.', "-"), number + 1))
@@ -89,8 +91,10 @@ fn check_name(name: &str, plan: &[PlannedDevice]) -> Result<(), String> {
 }
 
 /// The device of one table.
-fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDescription, (String, Place)> {
+fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<DeviceDescription, (String, Place)> {
+    let base_dir = sources.base_dir;
     let mut description = match (&entry.kind, &entry.sii) {
+        _ if entry.esi.is_some() => described(entry, name, sources)?,
         (Some(kind), None) => {
             let known = || catalogue::names().collect::<Vec<_>>().join(", ");
             catalogue::by_name(kind.get_ref()).ok_or_else(|| {
@@ -109,9 +113,37 @@ fn template(entry: &DeviceEntry, name: &str, base_dir: &Path) -> Result<DeviceDe
         (Some(_), Some(file)) => return Err(("expected either type or sii, got both".into(), Some(file.span()))),
         (None, None) => return Err(("expected type or sii, got neither".into(), None)),
     };
+    let of_esi = entry.revision.as_ref().map(|it| ("revision", it.span()));
+    let of_esi = of_esi.or(entry.modules.first().map(|it| ("modules", it.span())));
+    if let (None, Some((key, span))) = (&entry.esi, of_esi) {
+        return Err((format!("{key}: only for a device of a description file (key esi)"), Some(span)));
+    }
     settings(entry, &mut description)?;
     services(entry, &mut description, base_dir)?;
     Ok(description)
+}
+
+/// A device of a description file.
+fn described(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<DeviceDescription, (String, Place)> {
+    if let Some(sii) = &entry.sii {
+        return Err(("expected either esi or sii, got both".into(), Some(sii.span())));
+    }
+    let Some(esi) = &entry.esi else { return Err(("expected esi".into(), None)) };
+    let wanted = DescribedDevice {
+        path: sources.base_dir.join(esi.get_ref()),
+        kind: entry.kind.as_ref().map(|kind| kind.get_ref().clone()),
+        revision: entry.revision.as_ref().map(|revision| *revision.get_ref()),
+        modules: entry.modules.iter().map(|module| module.get_ref().clone()).collect(),
+    };
+    sources.descriptions.device(&wanted, name).map_err(|fault| {
+        let span = match fault.key {
+            "type" => entry.kind.as_ref().map(|kind| kind.span()),
+            "revision" => entry.revision.as_ref().map(|revision| revision.span()),
+            "modules" => entry.modules.first().map(|module| module.span()),
+            _ => None,
+        };
+        (format!("{}: {}", fault.key, fault.message), span.or(Some(esi.span())))
+    })
 }
 
 /// The other keys of a table.

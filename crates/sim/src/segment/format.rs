@@ -46,6 +46,10 @@ pub(super) struct DeviceEntry {
     #[serde(rename = "type")]
     pub(super) kind: Option<Spanned<String>>,
     pub(super) sii: Option<Spanned<String>>,
+    pub(super) esi: Option<Spanned<String>>,
+    pub(super) revision: Option<Spanned<u32>>,
+    #[serde(default)]
+    pub(super) modules: Vec<Spanned<String>>,
     pub(super) count: Option<Spanned<usize>>,
     pub(super) alias: Option<u16>,
     pub(super) serial: Option<u32>,

@@ -153,6 +153,11 @@ impl<'a> Categories<'a> {
         Categories { image, at }
     }
 
+    /// The categories of an image, without a check of its fixed area; ends at invalid bytes.
+    pub const fn of_image(image: &'a [u8]) -> Categories<'a> {
+        Categories::new(image, super::SiiHeader::LEN)
+    }
+
     /// Byte offset of the next category header, of the end marker, or of invalid bytes.
     pub(super) const fn position(&self) -> usize {
         self.at

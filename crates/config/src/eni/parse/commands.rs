@@ -6,7 +6,7 @@ use ringcat_wire::command::{Addressing, Command};
 use crate::eni::element::Element;
 use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{Datagram, EcatCommand, Requires, Target, Transition, Validate};
-use crate::eni::quoted::shown;
+use crate::xml::shown;
 
 /// Maximum number of data bytes of a datagram (protocol 1.3).
 const MAX_DATA: u16 = 1486;

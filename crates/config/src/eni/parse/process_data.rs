@@ -5,7 +5,7 @@ use crate::eni::error::{EniError, Problem};
 use crate::eni::model::{
     BitRange, ImageSide, Pdo, PdoEntry, ProcessData, ProcessImage, SyncManagerKind, SyncManagerSettings, Variable,
 };
-use crate::eni::quoted::shown;
+use crate::xml::shown;
 
 /// PDOs that can be assigned to a SyncManager: subindices of an object (protocol 6.3).
 const ASSIGNED: usize = 255;

@@ -13,6 +13,7 @@ use crate::segment::breaks::{is_broken, locate_breaks};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::segment::reading::Reading;
+use crate::segment::ring::Words;
 use crate::segment::versions::Versions;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
@@ -113,9 +114,10 @@ impl Segment {
         &mut self,
         versions: Versions,
         found: &[Option<NodeStatus>],
-        now: Instant,
+        (words, now): (&Words, Instant),
         effects: &mut Effects,
     ) {
+        self.end_silence(words, now);
         if versions.cabling == self.cabling.version {
             self.observe_local_rings(found, now, effects);
         }

@@ -64,14 +64,12 @@ impl Segment {
             Observation::Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
             Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
-
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
 
             Observation::Wanted(wanted) => self.slot.want(wanted),
             Observation::Undisturbed(number) => self.slot.end(number),
             Observation::Isolated { versions, found, words } => {
-                self.end_silence(&words, now);
-                self.observe_isolated(versions, found, now, effects);
+                self.observe_isolated(versions, found, (&words, now), effects);
             }
             Observation::PortsOrdered { station, control } => self.begin_order(station, control),
             Observation::PortsWritten(station) => self.end_order(station),

@@ -21,7 +21,7 @@ fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan,
     (scan, told.iter().map(ToString::to_string).collect())
 }
 
-// covers: 8.2, eni-cabling
+// covers: 8.2, eni-image
 #[test]
 fn cables_as_in_the_file_are_not_reported_even_in_an_open_ring() {
     let file = machine();
@@ -36,7 +36,7 @@ fn cables_as_in_the_file_are_not_reported_even_in_an_open_ring() {
     }
 }
 
-// covers: 8.2, eni-cabling
+// covers: 8.2, eni-image
 #[test]
 fn a_moved_cable_is_reported_with_both_places() {
     let file = machine();

@@ -7,8 +7,7 @@ use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use super::error::{EniError, Place, Problem};
-use super::kind::FileKind;
+use super::error::{Place, XmlError, XmlProblem};
 use super::limits::MAX_BYTES;
 use super::quoted::shown;
 
@@ -16,9 +15,9 @@ use super::quoted::shown;
 const DECLARATION: usize = 256;
 
 /// The text of a file.
-pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, EniError> {
+pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, XmlError> {
     if bytes.len() > MAX_BYTES {
-        return Err(EniError::of_file(Problem::TooMuch { what: "bytes", limit: MAX_BYTES }));
+        return Err(XmlError::of_file(XmlProblem::TooMuch { what: "bytes", limit: MAX_BYTES }));
     }
     let (encoding, mark) = match Encoding::for_bom(bytes) {
         Some(found) => found,
@@ -30,8 +29,23 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, EniError> {
     }
 }
 
+/// The text of a file that may declare a one-byte encoding although its bytes are UTF-8: then these count. The flag
+/// says that this differs from the declaration.
+pub(crate) fn decode_utf8_first(bytes: &[u8]) -> Result<(Cow<'_, str>, bool), XmlError> {
+    let is_small = bytes.len() <= MAX_BYTES;
+    if is_small
+        && !bytes.is_ascii()
+        && let Ok(text) = std::str::from_utf8(bytes)
+        && Encoding::for_bom(bytes).is_none()
+        && without_mark(bytes)? != UTF_8
+    {
+        return Ok((Cow::Borrowed(text), true));
+    }
+    decode(bytes).map(|text| (text, false))
+}
+
 /// The encoding of a file without byte order mark.
-fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, EniError> {
+fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, XmlError> {
     match bytes {
         [b'<', 0, ..] => return Ok(UTF_16LE),
         [0, b'<', ..] => return Ok(UTF_16BE),
@@ -43,7 +57,7 @@ fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, EniError> {
         Some(encoding) => Ok(encoding),
         None => {
             let reason = format!("the encoding {} is not known: save the file as UTF-8", shown(&label));
-            Err(EniError::at(Place { line: 1, column: 1 }, Problem::Encoding { reason }))
+            Err(XmlError::at(Place { line: 1, column: 1 }, XmlProblem::Encoding { reason }))
         }
     }
 }
@@ -58,21 +72,21 @@ fn declared(bytes: &[u8]) -> Option<String> {
 }
 
 /// The error for the first line that is not in the encoding.
-fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> EniError {
+fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> XmlError {
     if bytes.trim_ascii_start().first() != Some(&b'<') {
-        return EniError::of_file(Problem::WrongFile { kind: FileKind::of_bytes(bytes) });
+        return XmlError::of_file(XmlProblem::NotXml);
     }
     let reason = format!(
         "the bytes are not in {}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)",
         encoding.name()
     );
-    let problem = Problem::Encoding { reason };
+    let problem = XmlProblem::Encoding { reason };
     if encoding != UTF_8 {
-        return EniError::of_file(problem);
+        return XmlError::of_file(problem);
     }
     let valid = std::str::from_utf8(bytes).err().map_or(0, |error| error.valid_up_to());
     let line = bytes[..valid].iter().filter(|byte| **byte == b'\n').count() + 1;
     let begin = bytes[..valid].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
     let column = String::from_utf8_lossy(&bytes[begin..valid]).chars().count() + 1;
-    EniError::at(Place { line: line as u32, column: column as u32 }, problem)
+    XmlError::at(Place { line: line as u32, column: column as u32 }, problem)
 }

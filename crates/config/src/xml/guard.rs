@@ -1,11 +1,11 @@
 //! A first pass over the text that limits the work of the XML reader: depth, attributes and namespaces, which the
 //! reader processes in quadratic time. It does not check well-formedness; the reader does.
 
-use super::error::{EniError, Place, Problem};
+use super::error::{Place, XmlError, XmlProblem};
 use super::limits::{MAX_ATTRIBUTES, MAX_DEPTH};
 
-/// Refuses a text with more levels or attributes than an ENI has.
-pub(super) fn check(text: &str) -> Result<(), EniError> {
+/// Refuses a text with more levels or attributes than such files have.
+pub(crate) fn check(text: &str) -> Result<(), XmlError> {
     let bytes = text.as_bytes();
     let mut depth = 0_usize;
     let mut namespaces = 0_usize;
@@ -26,7 +26,7 @@ pub(super) fn check(text: &str) -> Result<(), EniError> {
                 TagKind::Close => depth = depth.saturating_sub(1),
                 TagKind::Empty => {}
             }
-            let limit = |what, limit| Err(EniError::at(place(text, begin), Problem::TooMuch { what, limit }));
+            let limit = |what, limit| Err(XmlError::at(place(text, begin), XmlProblem::TooMuch { what, limit }));
             if depth > MAX_DEPTH {
                 return limit("levels of elements", MAX_DEPTH);
             }

@@ -1,0 +1,148 @@
+//! Object dictionaries (protocol ES-20 to ES-24, ES-72 to ES-74).
+
+use super::pdo::slot_index;
+use crate::esi::element::Element;
+use crate::esi::error::{EsiError, EsiProblem};
+use crate::esi::limits::MAX_ELEMENTS;
+use crate::esi::model::{Access, ArrayBounds, DataType, Dictionary, Flags, Object, ObjectInfo, SubItem, SubItemInfo};
+
+/// All states with a mailbox: PREOP, SAFEOP, OP.
+const ALL_STATES: u8 = 7;
+
+pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
+    element.knows(&["UnitTypes", "DataTypes", "Objects", "VendorSpecific"]);
+    let mut data_types: Vec<DataType> = Vec::new();
+    for of in element.child("DataTypes").into_iter().flat_map(|types| types.children("DataType")) {
+        data_types.push(data_type(of)?);
+    }
+    data_types.sort_by(|a, b| a.name.cmp(&b.name).then(a.line.cmp(&b.line)));
+    for pair in data_types.windows(2).filter(|pair| pair[0].name == pair[1].name) {
+        element.note(format!("DataType \"{}\": the one of line {} counts", pair[0].name, pair[0].line));
+    }
+    data_types.dedup_by(|later, first| later.name == first.name);
+    let objects = element.child("Objects").into_iter().flat_map(|objects| objects.children("Object"));
+    Ok(Dictionary { line: element.line(), data_types, objects: objects.map(object).collect::<Result<_, _>>()? })
+}
+
+fn data_type(element: Element<'_>) -> Result<DataType, EsiError> {
+    let array = element.child("ArrayInfo").map(array).transpose()?;
+    let choice = |of: Element<'_>| -> Result<_, EsiError> {
+        // Some enumerations have values of 64 bits; they are names for values that cannot occur.
+        Ok((of.number_of::<i64>("Enum").ok().flatten().unwrap_or_default(), of.names("Text")?))
+    };
+    Ok(DataType {
+        line: element.line(),
+        name: element.text_of("Name").trim().to_owned(),
+        base: element.child("BaseType").map(|base| base.raw().trim().to_owned()).filter(|base| !base.is_empty()),
+        bit_size: element.number_of("BitSize")?.unwrap_or(0),
+        array,
+        sub_items: element.children("SubItem").map(sub_item).collect::<Result<_, _>>()?,
+        choices: element.children("EnumInfo").map(choice).collect::<Result<_, _>>()?,
+    })
+}
+
+fn array(element: Element<'_>) -> Result<ArrayBounds, EsiError> {
+    let elements: u32 = element.number_of("Elements")?.unwrap_or(0);
+    if elements > MAX_ELEMENTS {
+        return Err(element.error(EsiProblem::TooMuch { what: "elements of an array", limit: MAX_ELEMENTS as usize }));
+    }
+    Ok(ArrayBounds { first: element.number_of("LBound")?.unwrap_or(0), elements })
+}
+
+fn sub_item(element: Element<'_>) -> Result<SubItem, EsiError> {
+    Ok(SubItem {
+        sub_index: element.number_of("SubIdx")?,
+        name: element.text_of("Name").trim().to_owned(),
+        data_type: element.text_of("Type").trim().to_owned(),
+        bit_size: element.number_of("BitSize")?.unwrap_or(0),
+        bit_offset: element.number_of("BitOffs")?.unwrap_or(0),
+        flags: element.child("Flags").map(flags).transpose()?,
+    })
+}
+
+fn object(element: Element<'_>) -> Result<Object, EsiError> {
+    let index = element.required("Index")?;
+    let mut object = Object {
+        line: element.line(),
+        index: slot_index(index)?,
+        overwritten_by_module: index.is("OverwrittenByModule")?,
+        name: element.names("Name")?,
+        data_type: element.text_of("Type").trim().to_owned(),
+        bit_size: element.number_of("BitSize")?.unwrap_or(0),
+        flags: element.child("Flags").map(flags).transpose()?.unwrap_or_default(),
+        ..Object::default()
+    };
+    if let Some(info) = element.child("Info") {
+        object.info = values(info)?;
+        for item in info.children("SubItem") {
+            let info = item.child("Info").map(values).transpose()?.unwrap_or_default();
+            object.sub_items.push(SubItemInfo { name: item.text_of("Name").trim().to_owned(), info });
+        }
+    }
+    Ok(object)
+}
+
+fn values(element: Element<'_>) -> Result<ObjectInfo, EsiError> {
+    // The old notation is a number, or a real number in some files, which is not used.
+    let old = |name: &str| {
+        let child = element.child(name)?;
+        match child.number::<i64>() {
+            Ok(number) => Some(number.to_le_bytes().to_vec()),
+            Err(_) => {
+                child.note(format!("{name} is not a whole number of 32 bits: not used"));
+                None
+            }
+        }
+    };
+    let text = || element.child("DefaultString").map(|text| text.text().into_bytes());
+    Ok(ObjectInfo {
+        default: element.hex_of("DefaultData")?.or_else(text).or_else(|| old("DefaultValue")),
+        minimum: element.hex_of("MinData")?.or_else(|| old("MinValue")),
+        maximum: element.hex_of("MaxData")?.or_else(|| old("MaxValue")),
+        unit: element.number_of("Unit")?,
+    })
+}
+
+fn flags(element: Element<'_>) -> Result<Flags, EsiError> {
+    let mut flags = Flags::default();
+    if let Some(access) = element.child("Access") {
+        flags.access = access_rights(access);
+    }
+    if let Some(mapping) = element.child("PdoMapping") {
+        let text = mapping.raw().to_ascii_uppercase();
+        flags.tx_mappable = text.contains('T');
+        flags.rx_mappable = text.contains('R');
+    }
+    flags.is_backup = element.number_of::<u32>("Backup")?.is_some_and(|number| number != 0);
+    flags.is_setting = element.number_of::<u32>("Setting")?.is_some_and(|number| number != 0);
+    Ok(flags)
+}
+
+fn access_rights(element: Element<'_>) -> Access {
+    let text = element.raw();
+    let limited = |attribute: &str| element.attribute(attribute).map_or(ALL_STATES, states);
+    let (read, write) = (limited("ReadRestrictions"), limited("WriteRestrictions"));
+    match text.trim().to_ascii_lowercase().as_str() {
+        "rw" => Access { read, write },
+        "wo" => Access { read: 0, write },
+        "ro" => Access { read, write: 0 },
+        other => {
+            element.note(format!("Access {}: taken as ro", crate::xml::shown(other)));
+            Access { read, write: 0 }
+        }
+    }
+}
+
+/// The states of a restriction: bits of PREOP, SAFEOP, OP.
+fn states(text: &str) -> u8 {
+    let named = text.split('_').map(|state| match state.trim().to_ascii_lowercase().as_str() {
+        "preop" => 1,
+        "safeop" => 2,
+        "op" => 4,
+        _ => 0,
+    });
+    match named.fold(0, |all, one| all | one) {
+        0 => ALL_STATES,
+        states => states,
+    }
+}

@@ -1,0 +1,19 @@
+//! XML files of configuration tools: bytes to text, limits, positions. [`crate::eni`] and [`crate::esi`] read them.
+
+mod document;
+mod error;
+mod guard;
+mod limits;
+mod lines;
+mod quoted;
+mod text;
+
+pub use error::Place;
+pub use limits::{MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_NODES, MAX_SUBDEVICES, MAX_UNKNOWN};
+
+pub(crate) use document::parse;
+pub(crate) use error::{XmlError, XmlProblem};
+pub(crate) use guard::check;
+pub(crate) use lines::Lines;
+pub(crate) use quoted::shown;
+pub(crate) use text::{decode, decode_utf8_first};

@@ -1,0 +1,134 @@
+//! Generated bad files: each is refused with file, line and reason, in bounded time and memory.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use ringcat_config::esi::{self, References};
+
+use crate::ACME;
+
+/// The error of a file.
+fn refusal(text: impl AsRef<[u8]>) -> String {
+    let begin = Instant::now();
+    let error = esi::read("bad.xml", text.as_ref()).expect_err("it is refused").to_string();
+    assert!(begin.elapsed() < Duration::from_secs(20), "in bounded time");
+    assert!(error.starts_with("bad.xml:") && error.len() < 600, "{error}");
+    error
+}
+
+/// The error of the file with a text replaced.
+fn changed(from: &str, to: &str) -> String {
+    assert!(ACME.contains(from), "{from}");
+    refusal(ACME.replacen(from, to, 1))
+}
+
+// covers: esi-read, ES-04
+#[test]
+fn a_truncated_file_is_refused_at_every_length() {
+    for length in (1..ACME.trim_end().len()).step_by(97) {
+        let Some(text) = ACME.get(..length) else { continue };
+        refusal(text);
+    }
+    assert!(refusal(&ACME[..9000]).contains("truncated"));
+}
+
+// covers: esi-read, ES-04
+#[test]
+fn nested_elements_and_entities_are_refused_before_they_cost_memory() {
+    let nested = format!("{}{}", "<a>".repeat(1_000_000), "</a>".repeat(1_000_000));
+    assert_eq!(refusal(nested), "bad.xml:1: too much for a device description: more than 64 levels of elements");
+    let entities = "<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">";
+    let bomb = format!("<!DOCTYPE a [{entities}]>\n<EtherCATInfo>&b;</EtherCATInfo>");
+    assert!(refusal(bomb).contains("document type definition"));
+    assert!(changed("Acme drives", "&unknown;").contains("bad.xml:12: not well-formed"));
+    assert!(changed("Acme drives", &"x".repeat(1_100_000)).contains("bytes of a text"));
+    let attributes: String = (0..200).map(|n| format!(" a{n}=\"1\"")).collect();
+    assert!(changed("<Groups", &format!("<Groups{attributes}")).contains("attributes of an element"));
+}
+
+// covers: esi-read, ES-05
+#[test]
+fn wrong_encodings_and_other_files_are_named() {
+    assert!(refusal([0xFF, 0xFE, b'<', 0, 0]).contains("not readable as text"), "half a character of UTF-16");
+    let mut bytes = ACME.as_bytes().to_vec();
+    bytes[600] = 0xFF;
+    assert!(refusal(&bytes).contains("the bytes are not in UTF-8"));
+    assert!(refusal(ACME.replacen("UTF-8", "klingon", 1)).contains("encoding"));
+    for (text, kind) in [
+        ("", "no XML file"),
+        ("\u{7f}ELF", "no XML file"),
+        ("<EtherCATConfig/>", "a network configuration (ENI), which `ringcat eni` reads"),
+        ("<EtherCATInfoList/>", "a list that `ethercat xml` prints"),
+        ("<EtherCATDict/>", "an object dictionary"),
+        ("<html/>", "an XML file with the root \"html\""),
+    ] {
+        let error = refusal(text);
+        assert!(error.contains(kind), "{error}");
+    }
+}
+
+// covers: esi-read, ES-10, ES-11, ES-25
+#[test]
+fn values_out_of_range_and_duplicates_name_line_and_device() {
+    for (from, to, expected) in [
+        ("#x00000C47", "#x1000000C47", "bad.xml:6: EtherCATInfo/Vendor/Id: expected a number of 32 bits"),
+        ("#x00001008", "#x1334910000", "bad.xml:25: device \"AD08\": Device/Type: expected a number of 32 bits in the"),
+        (
+            "<ByteSize>512<",
+            "<ByteSize>99999999<",
+            "device \"AD08\": Device/Eeprom/ByteSize: expected 1 to 8388608 bytes",
+        ),
+        ("<BitLen>4</BitLen>", "<BitLen>70000</BitLen>", "Device/RxPdo/Entry/BitLen: expected a number of 16 bits"),
+        ("<ConfigData>0401", "<ConfigData>401", "expected bytes as pairs of hexadecimal digits"),
+        ("<Elements>3<", "<Elements>4000000000<", "more than 65536 elements of an array"),
+        ("<Transition>PS<", "<Transition>XY<", "expected a transition IP, PS, SO, SP, OP or OS, got \"XY\""),
+        ("Physics=\"KK\"", "Physics=\"KQ\"", "expected up to 4 of Y, K, H and blank"),
+        ("LW_EQ_HW_EQ_OR_G", "SOMETIMES", "expected a rule such as EQ"),
+        ("SdoInfo=\"true\"", "SdoInfo=\"maybe\"", "expected 0, 1, true or false in the attribute SdoInfo"),
+        ("<Index>#x1600</Index>", "", "bad.xml:32: device \"AD08\": Device/RxPdo: Index is missing"),
+        (
+            "#x00001008\" RevisionNo=\"#x00120000",
+            "#x00001001\" RevisionNo=\"#x00010000",
+            "the device with product code 0x00001001, revision 0x00010000 is defined in line 15 already",
+        ),
+        ("<Id>", "<Idd>", "not well-formed XML"),
+    ] {
+        let error = changed(from, to);
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// Files by name.
+struct Files(BTreeMap<String, String>);
+
+impl References for Files {
+    fn open(&self, path: &str) -> Option<Vec<u8>> {
+        self.0.get(path).map(|text| text.clone().into_bytes())
+    }
+}
+
+// covers: esi-read, ES-07
+#[test]
+fn references_in_circles_or_out_of_the_folder_are_refused() {
+    let file = |to: &str| {
+        let vendor = "<Vendor><Id>1</Id></Vendor><Descriptions/>";
+        format!("<EtherCATInfo>\n<InfoReference>{to}</InfoReference>{vendor}</EtherCATInfo>")
+    };
+    let read = |first: &str, files: &[(&str, String)]| {
+        let files = files.iter().map(|(name, text)| ((*name).to_owned(), text.clone())).collect();
+        esi::read_with("bad.xml", file(first).as_bytes(), &Files(files)).map_err(|error| error.to_string())
+    };
+    let circle = read("a.xml", &[("a.xml", file("b.xml")), ("b.xml", file("A.xml"))]).unwrap_err();
+    assert!(circle.starts_with("b.xml:2: InfoReference \"A.xml\": the file refers to itself"), "{circle}");
+    let own = read("BAD.xml", &[]).unwrap_err();
+    assert!(own.starts_with("bad.xml:2: InfoReference"), "{own}");
+    for path in ["../a.xml", "/etc/passwd", "C:\\a.xml", "a/../../b.xml", ""] {
+        let error = read(path, &[]).unwrap_err();
+        assert!(error.contains("has to stay in the folder"), "{error}");
+    }
+    let chain: Vec<(String, String)> =
+        (0..100).map(|n| (format!("{n}.xml"), file(&format!("{}.xml", n + 1)))).collect();
+    let chain: Vec<(&str, String)> = chain.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
+    assert!(read("0.xml", &chain).unwrap_err().contains("more than 64 files"));
+    assert!(read("sub\\a.xml", &[("sub/a.xml", file("b.xml")), ("sub/b.xml", file("gone.xml"))]).is_ok());
+}

@@ -1,0 +1,185 @@
+//! SII images from descriptions: literal images of three small descriptions, and the images of vendors if they are
+//! beside the repository.
+
+use std::fs;
+
+use ringcat_config::esi::sii::{self, Likeness, SiiOptions, SiiProfile};
+use ringcat_config::esi::{self, Device, Esi};
+use ringcat_wire::sii::Sii;
+
+use crate::real_files::{files, model, name};
+
+/// A terminal with two outputs of one bit (protocol ES-179).
+const OUTPUTS: &str = include_str!("../files/outputs.xml");
+
+/// A drive with mailbox and clock (protocol ES-181).
+const DRIVE: &str = include_str!("../files/drive.xml");
+
+fn read(text: &str) -> Esi {
+    esi::read("acme.xml", text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn bytes(text: &str) -> Vec<u8> {
+    let digits: Vec<u8> = text.chars().filter_map(|c| c.to_digit(16)).map(|digit| digit as u8).collect();
+    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
+}
+
+fn built(text: &str, change: impl Fn(&mut SiiOptions)) -> Vec<u8> {
+    let esi = read(text);
+    let mut options = SiiOptions::default();
+    options.physical_layer = Some(0);
+    change(&mut options);
+    let image = sii::build(&esi, &esi.devices[0], &options).unwrap_or_else(|error| panic!("{error}"));
+    assert!(Sii::parse(&image.bytes).is_ok());
+    image.bytes
+}
+
+// covers: esi-use, ES-80, ES-86, ES-87, ES-91, ES-92, ES-93, ES-94, ES-78, ES-83, ES-179
+#[test]
+fn a_terminal_has_the_literal_image_of_twincat() {
+    let image = built(OUTPUTS, |_| {});
+    let mut expected = vec![0xFF; 512];
+    let mut put = |at: usize, text: &str| {
+        let data = bytes(text);
+        expected[at..at + data.len()].copy_from_slice(&data);
+    };
+    put(0, "04010000000001000000000000002A00 FF010000020001000300000000000000");
+    put(0x20, &"00".repeat(0x5C));
+    put(0x7C, "03000100");
+    put(0x80, "0A001200 0702413202496F0741636D6520494F064132203243680443682031034F75740443682032");
+    put(0xA8, "1E001000 020001040000000000000000 88FF0300 1100 0000 000000000000000000000000");
+    put(0xCC, "28000100 01FF 29000400 000F010044000903 2B000100 F0FF");
+    put(0xE4, "33001400 0016010000051100 0070010601010000 0116020000071000 0000000000030000 1070010601010000 FFFF");
+    assert_eq!(image, expected);
+}
+
+// covers: ES-88, ES-180
+#[test]
+fn another_language_changes_its_strings_only() {
+    let english = built(OUTPUTS, |_| {});
+    let german = built(OUTPUTS, |options| options.language = 1031);
+    let found = sii::compare(&english, &german);
+    let fields: Vec<_> = found.differences.iter().map(|it| (it.field.as_str(), it.got.as_str())).collect();
+    let expected =
+        [("string \"Acme IO\"", ""), ("general: group name", "\"Acme EA\""), ("string \"Acme EA\"", "present")];
+    assert_eq!(fields, expected);
+    assert_eq!(english.len(), german.len());
+}
+
+// covers: ES-82, ES-89, ES-97, ES-180
+#[test]
+fn siitool_has_another_order_and_a_category_per_pdo() {
+    let image = built(OUTPUTS, |options| options.profile = SiiProfile::Siitool);
+    let sii = Sii::parse(&image).unwrap();
+    let strings: Vec<_> = sii.strings().iter().map(String::from_utf8_lossy).collect();
+    assert_eq!(strings, ["Io", "A2 2Ch", "Ch 1", "Out", "Ch 2", "Out"]);
+    let general = sii.general().unwrap();
+    assert_eq!([general.group, general.order, general.name, general.group_again], [1, 0, 2, 1]);
+    let kinds: Vec<u16> = sii.categories().map(|category| category.kind.code()).collect();
+    assert_eq!(kinds, [10, 30, 40, 41, 51, 51]);
+    assert_eq!(image.len(), sii.used(), "it ends with the end marker");
+}
+
+// covers: ES-80, ES-91, ES-93, ES-98, ES-99, ES-100, ES-171, ES-181
+#[test]
+fn a_drive_has_mailboxes_clock_modes_and_a_category_of_its_vendor() {
+    let image = built(DRIVE, |options| options.sync1_factor = true);
+    assert_eq!(
+        image[..0x3A],
+        bytes(
+            "050C0100640000000000000000003500 FF010000100000000000010000000000 0000000000000000 0010F400F410F400 \
+         0010800080108000 0E00"
+        )
+    );
+    let category = |code: u16| {
+        let sii = Sii::parse(&image).unwrap();
+        sii.categories().find(|it| it.kind.code() == code).map(|it| it.data.to_vec()).unwrap_or_default()
+    };
+    assert_eq!(category(10), bytes("0602443102447206447269766573084431204472697665074672656552756E024443"));
+    assert_eq!(category(30), bytes("02000104 00 27 01 01 000000 1C 0000 03 00 3101 3401 000000000000000000000000"));
+    assert_eq!(category(40), bytes("010203FF"));
+    assert_eq!(category(41), bytes("0010800026000101 8010800022000102 0011020064000103 0014000020000004"));
+    assert_eq!(
+        category(60),
+        bytes("000000000000000000000000000000000000050000000000 00000000E0B1FFFF00000000FFFF00030100060000000000")
+    );
+    assert_eq!(category(2), bytes("0100"));
+    let twincat = built(DRIVE, |_| {});
+    let fields: Vec<_> = sii::compare(&image, &twincat).differences.into_iter().map(|it| it.field).collect();
+    assert_eq!(fields, ["clock mode 1: factor of SYNC1"]);
+}
+
+// covers: ES-84, ES-85, ES-96
+#[test]
+fn an_image_that_does_not_fit_is_refused_unless_the_pdos_are_left_out() {
+    let small = OUTPUTS.replace("<ByteSize>512<", "<ByteSize>256<");
+    let esi = read(&small);
+    let refused = sii::build(&esi, &esi.devices[0], &SiiOptions::default()).unwrap_err().to_string();
+    assert!(refused.starts_with("acme.xml:8: device \"A2\": the image needs 274 bytes, ByteSize is 256"), "{refused}");
+    let without = built(&small, |options| options.without_pdos = true);
+    let sii = Sii::parse(&without).unwrap();
+    assert_eq!(sii.categories().map(|it| it.kind.code()).collect::<Vec<_>>(), [10, 30, 40, 41, 43]);
+    assert_eq!(sii.strings().count(), 4, "their strings are left out too");
+    let wide = OUTPUTS.replacen("<BitLen>1<", "<BitLen>300<", 1);
+    let esi = read(&wide);
+    let refused = sii::build(&esi, &esi.devices[0], &SiiOptions::default()).unwrap_err().to_string();
+    assert!(refused.contains("acme.xml:5: device \"A2\": PDO 0x1600 has an entry of 300 bits"), "{refused}");
+}
+
+// covers: ES-105
+#[test]
+fn a_description_made_of_an_image_gives_the_same_image() {
+    for text in [OUTPUTS, DRIVE] {
+        let image = built(text, |options| options.sync1_factor = true);
+        let again = built(&sii::skeleton(&image).unwrap(), |options| options.sync1_factor = true);
+        assert_eq!(sii::compare(&image, &again).differences, []);
+        assert_eq!(image, again);
+    }
+}
+
+/// All real descriptions.
+fn descriptions() -> Vec<Esi> {
+    files("esi").iter().map(|path| model(path)).collect()
+}
+
+/// The description of an identity: the same revision, or the one with the same low word and the nearest high word.
+fn description_of(all: &[Esi], vendor: u32, product: u32, revision: u32) -> Option<(&Esi, &Device)> {
+    let devices = all.iter().flat_map(|esi| esi.devices.iter().map(move |device| (esi, device)));
+    let same = devices.filter(|(_, it)| (it.vendor_id, it.product_code) == (vendor, product));
+    same.min_by_key(|(_, it)| (it.revision as u16 != revision as u16, it.revision.abs_diff(revision)))
+}
+
+// covers: ES-101, ES-102, esi-use
+#[test]
+fn images_of_vendors_are_built_byte_for_byte_or_differ_in_listed_fields() {
+    let all = descriptions();
+    let mut alike = 0;
+    for path in files("sii").iter().filter(|path| path.extension().is_some_and(|ending| ending == "bin")) {
+        let image = fs::read(path).unwrap();
+        let Ok(parsed) = Sii::parse(&image) else { continue };
+        let identity = parsed.header().identity;
+        let found = description_of(&all, identity.vendor_id, identity.product_code, identity.revision);
+        let Some((esi, device)) = found else { continue };
+        let (options, found) = sii::most_alike(esi, device, &image).unwrap_or_else(|error| panic!("{error}"));
+        println!(
+            "{}: {} {:#x} {} {}: {:?}",
+            name(path),
+            esi.file,
+            device.revision,
+            options.profile,
+            options.language,
+            found.likeness
+        );
+        for it in &found.differences {
+            println!(
+                "    {}: image {}, built {}{}",
+                it.field,
+                it.expected,
+                it.got,
+                if it.is_individual { " (individual)" } else { "" }
+            );
+        }
+        alike += usize::from(found.likeness <= Likeness::Individual);
+    }
+    assert!(all.is_empty() || alike >= 4, "{alike}");
+}

@@ -1,0 +1,14 @@
+//! Device descriptions (ESI, ETG.2000) from files: `ringcat-config` reads them, this module opens files and makes
+//! simulated devices of them. See `docs/esi.md`.
+
+#[cfg(feature = "sim")]
+mod device;
+mod file;
+#[cfg(feature = "sim")]
+mod objects;
+#[cfg(feature = "sim")]
+mod segment;
+
+pub use file::{EsiFailure, load};
+#[cfg(feature = "sim")]
+pub use segment::{EsiDevices, load_segment};

@@ -1,0 +1,108 @@
+//! A simulated device from a description: the SII image as a tool writes it, PDOs also where the image has no room for
+//! them or modules bring them, the object dictionary with its defaults.
+
+use ringcat_config::esi::sii::{SiiOptions, SiiProfile, build, code_of};
+use ringcat_config::esi::{Device, Esi, Pdo, PlacedModule, SyncManagerRole, place_modules};
+use ringcat_sim::description::{DeviceDescription, PdoDescription, PdoEntryDescription};
+use ringcat_wire::sii::PdoDirection;
+
+use super::objects;
+
+/// Bits of a part of an entry that the format cannot hold in one.
+const PART: u16 = 248;
+
+/// The device with its modules; the error is in words.
+pub(super) fn describe(
+    esi: &Esi,
+    device: &Device,
+    modules: &[Option<String>],
+    name: &str,
+) -> Result<DeviceDescription, String> {
+    let placed = place_modules(esi, device, modules).map_err(|error| error.to_string())?;
+    let with = |without_pdos: bool| {
+        let mut options = SiiOptions::of(SiiProfile::TwinCat, 1033);
+        options.without_pdos = without_pdos;
+        // The modes of a clock need the factor, whatever tools write.
+        options.sync1_factor = true;
+        build(esi, device, &options)
+    };
+    // As TwinCAT does with an image that is too large.
+    let (image, has_pdos) = match with(false) {
+        Ok(image) => (image, true),
+        Err(_) => (with(true).map_err(|error| error.to_string())?, false),
+    };
+    let image = DeviceDescription::from_sii(image.bytes, name);
+    let mut description = image.map_err(|error| format!("{}: {}: {error}", esi.file, device.kind.trim()))?;
+    if !has_pdos {
+        description.pdos = of_device(device);
+    }
+    add_modules(esi, device, &placed, &mut description)?;
+    description.objects = objects::objects(esi, device, &placed, &description.pdos)?;
+    description.controller_fmmus = device.info.fmmu_count.filter(|count| *count > 0);
+    Ok(description)
+}
+
+/// PDOs of the description, where the image has none.
+fn of_device(device: &Device) -> Vec<PdoDescription> {
+    let rx = device.rx_pdos.iter().map(|pdo| described(device, pdo, PdoDirection::Rx));
+    rx.chain(device.tx_pdos.iter().map(|pdo| described(device, pdo, PdoDirection::Tx))).collect()
+}
+
+/// A PDO; it is assigned only to a SyncManager of its direction.
+fn described(device: &Device, pdo: &Pdo, direction: PdoDirection) -> PdoDescription {
+    let wanted = match direction {
+        PdoDirection::Rx => SyncManagerRole::Outputs,
+        PdoDirection::Tx => SyncManagerRole::Inputs,
+    };
+    let fits = |number: &u8| device.sync_managers.get(usize::from(*number)).is_some_and(|sm| sm.role == wanted);
+    PdoDescription {
+        direction,
+        index: pdo.index.index,
+        name: pdo.name.english().to_owned(),
+        sync_manager: pdo.sync_manager.filter(fits),
+        flags: 0,
+        entries: pdo.entries.iter().flat_map(entry).collect(),
+    }
+}
+
+/// An entry; one of more than 255 bits in several parts.
+fn entry(of: &ringcat_config::esi::PdoEntry) -> Vec<PdoEntryDescription> {
+    let part = |index, sub_index, bits: u16| PdoEntryDescription {
+        index,
+        sub_index,
+        name: of.name.english().to_owned(),
+        data_type: code_of(&of.data_type).and_then(|code| u8::try_from(code).ok()).unwrap_or(0),
+        bit_length: bits as u8,
+    };
+    if of.bit_length <= u8::MAX.into() {
+        return vec![part(of.index.index, of.sub_index, of.bit_length)];
+    }
+    let parts = (0..of.bit_length).step_by(PART.into());
+    parts.map(|begin| part(0, 0, (of.bit_length - begin).min(PART))).collect()
+}
+
+/// PDOs of the modules, behind those of the device; what stood in for missing ones goes.
+fn add_modules(
+    esi: &Esi,
+    device: &Device,
+    placed: &[PlacedModule<'_>],
+    description: &mut DeviceDescription,
+) -> Result<(), String> {
+    let mut added = Vec::new();
+    for module in placed {
+        for (pdos, direction) in
+            [(&module.module.rx_pdos, PdoDirection::Rx), (&module.module.tx_pdos, PdoDirection::Tx)]
+        {
+            let pdos = module.pdos(esi, pdos).map_err(|error| error.to_string())?;
+            added.extend(pdos.iter().map(|pdo| described(device, pdo, direction)));
+        }
+    }
+    if added.is_empty() {
+        return Ok(());
+    }
+    let of_file = |index: u16| device.rx_pdos.iter().chain(&device.tx_pdos).any(|pdo| pdo.index.index == index);
+    let is_new = |index: u16| added.iter().any(|pdo| pdo.index == index);
+    description.pdos.retain(|pdo| of_file(pdo.index) && !is_new(pdo.index));
+    description.pdos.extend(added);
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! A description from a file, with the files that it refers to.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use ringcat_config::eni::MAX_BYTES;
+use ringcat_config::esi::{Esi, EsiError, References, read_with};
+
+/// Why a description cannot be used.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum EsiFailure {
+    /// The file cannot be read.
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        error: io::Error,
+    },
+    /// Its content is refused.
+    Esi(Box<EsiError>),
+}
+
+impl fmt::Display for EsiFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            EsiFailure::Read { path, error } => write!(f, "{}: cannot be read: {error}", path.display()),
+            EsiFailure::Esi(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for EsiFailure {}
+
+/// Reads a file with its modules and dictionaries.
+///
+/// # Errors
+/// [`EsiFailure`]: a file that cannot be read, or with file, line and device what is wrong in it.
+pub fn load(path: &Path) -> Result<Esi, EsiFailure> {
+    let bytes = bytes_of(path).map_err(|error| EsiFailure::Read { path: path.to_owned(), error })?;
+    let folder = Folder(path.parent().unwrap_or(Path::new("")));
+    let name = path.display().to_string();
+    read_with(&name, &bytes, &folder).map_err(|error| EsiFailure::Esi(Box::new(error)))
+}
+
+/// At most one byte more than may be, whatever a device or a pipe has.
+pub(super) fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The folder of a description. Names of files count in either case.
+struct Folder<'a>(&'a Path);
+
+impl References for Folder<'_> {
+    fn open(&self, path: &str) -> Option<Vec<u8>> {
+        let mut at = self.0.to_owned();
+        for part in path.split('/') {
+            let exact = at.join(part);
+            at = if exact.exists() { exact } else { named(&at, part)? };
+        }
+        bytes_of(&at).ok()
+    }
+}
+
+/// The entry of a folder with this name in either case.
+fn named(folder: &Path, name: &str) -> Option<PathBuf> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let is_it = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().to_lowercase() == name.to_lowercase();
+    entries.into_iter().find(is_it).map(|entry| entry.path())
+}

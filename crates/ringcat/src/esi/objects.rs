@@ -1,0 +1,137 @@
+//! The object dictionary of a simulated device from a description. PDO mappings, PDO assignments and the identity
+//! follow from the rest of the device, as the simulator makes them.
+
+use std::collections::BTreeMap;
+
+use ringcat_config::esi::{Device, Dictionary, Esi, Object as EsiObject, Part, PlacedModule, parts};
+use ringcat_sim::application::dictionary::{Access, Entry, Object, ObjectRole};
+use ringcat_sim::description::{PdoDescription, data_type};
+use ringcat_wire::mailbox::coe::AccessRights;
+use ringcat_wire::sii::PdoDirection;
+
+/// Objects that the simulator makes: identity, SyncManager types, PDO assignments, synchronisation, mappings.
+fn is_derived(index: u16) -> bool {
+    matches!(index, 0x1018 | 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C00..=0x1C5F)
+}
+
+/// Configured and detected idents of modules.
+const CONFIGURED_IDENTS: u16 = 0xF030;
+const DETECTED_IDENTS: u16 = 0xF050;
+/// Bytes of a number.
+const NUMBER: usize = 8;
+
+/// The objects of device and modules.
+pub(super) fn objects(
+    esi: &Esi,
+    device: &Device,
+    placed: &[PlacedModule<'_>],
+    pdos: &[PdoDescription],
+) -> Result<Vec<Object>, String> {
+    let mut objects: BTreeMap<u16, Object> = BTreeMap::new();
+    let mut add = |dictionary: &Dictionary, object: &EsiObject| {
+        let index = object.index.index;
+        if !is_derived(index) {
+            objects.insert(index, converted(dictionary, object));
+        }
+    };
+    for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
+        dictionary.objects.iter().for_each(|object| add(dictionary, object));
+    }
+    for module in placed {
+        for dictionary in module.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
+            for object in &dictionary.objects {
+                let object = module.object(esi, object).map_err(|error| error.to_string())?;
+                add(dictionary, &object);
+            }
+        }
+    }
+    if device.slots.as_ref().is_some_and(|slots| slots.download_idents) {
+        for (index, name, access) in [
+            (CONFIGURED_IDENTS, "Configured module idents", Access::ReadWrite),
+            (DETECTED_IDENTS, "Detected module idents", Access::ReadOnly),
+        ] {
+            objects.insert(index, idents(index, name, access, placed));
+        }
+    }
+    add_mapped(pdos, &mut objects);
+    Ok(objects.into_values().collect())
+}
+
+/// Detected modules by slot; the configured ones are zero until they are written.
+fn idents(index: u16, name: &str, access: Access, placed: &[PlacedModule<'_>]) -> Object {
+    let last = placed.iter().map(|module| module.slot + 1).max().unwrap_or(0);
+    let ident = |slot: u16| {
+        let module = placed.iter().find(|module| module.slot == slot && access == Access::ReadOnly);
+        module.map_or(0, |module| module.module.ident)
+    };
+    let mut entries = vec![Entry::new(0, data_type::U8, access, &[last as u8])];
+    for slot in 0..last {
+        entries.push(Entry::new((slot + 1) as u8, data_type::U32, access, &ident(slot).to_le_bytes()));
+    }
+    Object { index, name: name.into(), role: ObjectRole::Plain, entries }
+}
+
+fn converted(dictionary: &Dictionary, object: &EsiObject) -> Object {
+    let parts = parts(dictionary, object);
+    let is_single = parts.len() == 1;
+    let entries = parts.iter().map(|part| entry(part, is_single)).collect();
+    Object { index: object.index.index, name: object.name.english().into(), role: ObjectRole::Plain, entries }
+}
+
+fn entry(part: &Part, is_single: bool) -> Entry {
+    let rights = part.flags.access;
+    let access = match (rights.read, rights.write) {
+        (_, 0) => Access::ReadOnly,
+        (0, _) => Access::WriteOnly,
+        (_, 1) => Access::ReadWritePreOp,
+        (_, _) => Access::ReadWrite,
+    };
+    let more = [
+        (part.flags.rx_mappable, AccessRights::RX_MAPPABLE),
+        (part.flags.tx_mappable, AccessRights::TX_MAPPABLE),
+        (part.flags.is_backup, AccessRights::BACKUP),
+        (part.flags.is_setting, AccessRights::SETTING),
+    ];
+    let more = more.into_iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
+    let code = u8::try_from(part.data_type).unwrap_or(data_type::OCTET_STRING);
+    let made = Entry::new(part.sub_index, code, access, &part.default).allow(more);
+    let made = if is_single { made } else { made.named(&part.name) };
+    match (&part.minimum, &part.maximum) {
+        (Some(low), Some(high)) if is_unsigned(code) && low.len() <= NUMBER && part.default.len() < NUMBER => {
+            made.within(number(low), number(high))
+        }
+        _ => made,
+    }
+}
+
+/// Types of unsigned numbers, whose limits compare as they are.
+fn is_unsigned(code: u8) -> bool {
+    matches!(code, data_type::U8 | data_type::U16 | data_type::U32)
+}
+
+fn number(bytes: &[u8]) -> i64 {
+    let mut value = [0; NUMBER];
+    let length = bytes.len().min(NUMBER);
+    value[..length].copy_from_slice(&bytes[..length]);
+    i64::from_le_bytes(value)
+}
+
+/// Mapped entries that the dictionary of the file does not have, in objects that it has.
+fn add_mapped(pdos: &[PdoDescription], objects: &mut BTreeMap<u16, Object>) {
+    for pdo in pdos {
+        let (access, right) = match pdo.direction {
+            PdoDirection::Rx => (Access::ReadWrite, AccessRights::RX_MAPPABLE),
+            PdoDirection::Tx => (Access::ReadOnly, AccessRights::TX_MAPPABLE),
+        };
+        for mapped in pdo.entries.iter().filter(|entry| entry.index != 0) {
+            let Some(object) = objects.get_mut(&mapped.index) else { continue };
+            if object.entries.iter().any(|entry| entry.sub_index == mapped.sub_index) {
+                continue;
+            }
+            let zeros = vec![0; usize::from(mapped.bit_length).div_ceil(8)];
+            let entry = Entry::new(mapped.sub_index, mapped.data_type, access, &zeros);
+            object.entries.push(entry.named(&mapped.name).allow(right));
+            object.entries.sort_by_key(|entry| entry.sub_index);
+        }
+    }
+}
