@@ -32,7 +32,7 @@ pub use error::LayoutError;
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
 pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy, Rules, Witness};
 
-/// All that the exchange sends.
+/// The frames that the exchange sends.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
     /// By [`DomainId`].

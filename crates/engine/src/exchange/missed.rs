@@ -12,7 +12,7 @@ use crate::ring::Sequence;
 /// Fate of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Fate {
-    /// Unknown, or it came in time.
+    /// Unknown, or in time.
     #[default]
     None,
     /// A damaged copy of it came.
