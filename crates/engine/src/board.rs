@@ -168,7 +168,7 @@ impl Board {
         }
     }
 
-    /// Says which SubDevices may be missing without a domain being incomplete.
+    /// Sets which SubDevices may be missing without a domain being incomplete.
     #[must_use]
     pub fn with_optional(mut self, optional: Vec<bool>) -> Board {
         self.optional = optional;

@@ -96,7 +96,7 @@ pub struct Exchange {
     sequence: Sequence,
     by_id: [u16; 256],
     frames: Vec<CyclicFrame>,
-    /// For each frame the one that replaces it when one of its SubDevices gets its FMMUs, or the one that it replaced.
+    /// For each frame its replacement when one of its SubDevices gets its FMMUs, or the frame that it replaced.
     others: Vec<CyclicFrame>,
     domains: Vec<Domain>,
     evidence: Evidence,
@@ -181,8 +181,8 @@ impl Exchange {
         self.receive_any(arrived_on, bytes, now)
     }
 
-    /// Takes a frame that came back on the only link with the same results as the one before. Mostly all frames do. In
-    /// all other cases the result is false, and nothing has changed.
+    /// Takes a frame that came back on the only link with the same results as the previous one, which is the usual
+    /// case. In all other cases the result is false, and nothing has changed.
     #[inline(always)]
     fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> bool {
         let Some(sequence) = self.identity.main_cyclic(bytes) else { return false };
@@ -279,12 +279,12 @@ impl Exchange {
         received
     }
 
-    /// Judges a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire it
-    /// judges each that has come back, in the order of departure; the state of the newest one stays.
+    /// Evaluates a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire
+    /// it evaluates each that has come back, in the order of departure; the state of the newest one stays.
     #[inline(always)]
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
-        // Mostly there is one frame per cycle, one cycle on the wire, and all as in the cycle before.
+        // The usual case: one frame per cycle, one cycle on the wire, the same results as in the previous cycle.
         if let Some(frame) = domain.only().and_then(|at| self.frames.get(at))
             && frame.is_complete()
             && !frame.is_waiting()

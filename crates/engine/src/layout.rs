@@ -34,7 +34,7 @@ pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, Planned
 pub use repeat::{OutputsAgain, Piece, PlannedRepeat, RepeatRule};
 pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy, Rules, Witness};
 
-/// All that the exchange sends.
+/// The frames that the exchange sends.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
     /// By [`DomainId`].

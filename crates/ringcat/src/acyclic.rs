@@ -14,21 +14,21 @@ use crate::not_ready::{KeptEvents, Reason};
 use crate::subdevice::{SubDeviceName, info};
 use crate::window::{Half, Window};
 
-/// What an application needs of the acyclic half, wherever that runs.
+/// Functions of the acyclic half for an application, in either thread.
 pub trait AcyclicHalf {
     /// Whether its frames come over the links of the cyclic half.
     const SHARES_LINKS: bool;
 
-    /// Takes in a frame of its class that arrived on shared links.
+    /// Takes a frame of its class that arrived on shared links.
     fn receive(&mut self, link: Link, frame: &[u8], now: Instant);
 
-    /// Goes on with its work, and sends on shared links as far as the window allows.
+    /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
 
     /// When it has work again.
     fn wake(&self) -> Instant;
 
-    /// How far each declared SubDevice is. Not for the cyclic path.
+    /// The present state of each declared SubDevice. Not for the cyclic path.
     fn states(&self) -> Vec<SubDeviceState>;
 
     /// Whether every declared SubDevice is in its target state.
@@ -43,20 +43,20 @@ pub trait AcyclicHalf {
     /// Its counters. Not for the cyclic path.
     fn counters(&self) -> AcyclicCounters;
 
-    /// What the scan found about a declared SubDevice. Not for the cyclic path.
+    /// Data of the scan about a declared SubDevice. Not for the cyclic path.
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo>;
 
-    /// Looks at the events that wait; they stay to be taken. Not for the cyclic path.
+    /// Evaluates the waiting events; they remain to be taken. Not for the cyclic path.
     fn keep_events(&mut self, now: Instant);
 
     /// The declared SubDevices that are not in their states, and why. Not for the cyclic path.
     ///
     /// # Errors
-    /// Its thread is gone.
+    /// Its thread has ended.
     fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error>;
 }
 
-/// The acyclic half in the thread of the cycles, on the same links: what tests and simple applications use.
+/// The acyclic half in the thread of the cycles, on the same links: for tests and simple applications.
 #[derive(Debug)]
 pub struct Inline {
     pub(crate) engine: Engine,
@@ -123,7 +123,7 @@ impl AcyclicHalf for Inline {
     }
 }
 
-/// Does to a link what procedures ask for, if they do.
+/// Carries out a procedure's command to a link, if there is one.
 pub(crate) fn carry_out_link_order(engine: &mut Engine, links: &mut impl Links) {
     if let Some((link, disconnect)) = engine.take_link_order() {
         let done = links.force_disconnect(link, disconnect);
@@ -131,8 +131,8 @@ pub(crate) fn carry_out_link_order(engine: &mut Engine, links: &mut impl Links) 
     }
 }
 
-/// Lets procedures go on and sends what they ask for, as far as the window allows. True where something has to wait for
-/// the next window.
+/// Runs procedures and sends their datagrams as far as the window allows. True if datagrams have to wait for the next
+/// window.
 pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
     engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
     engine.poll(links.now());
@@ -140,8 +140,7 @@ pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window)
     if !engine.wants_to_send() {
         return false;
     }
-    // Procedures have taken their time, the kernel takes some for each frame: the window is looked at as late as
-    // possible.
+    // Procedures have taken time, and the kernel takes time for each frame: the window is read as late as possible.
     let now = links.now();
     let budget = window.bytes(now);
     if budget > 0 {

@@ -1,15 +1,15 @@
 //! A MainDevice that exchanges process data.
 //!
-//! [`Application::cycle`] waits for the next cycle, judges the domains that are due, lets the application work on them,
-//! and sends. An application with a loop of its own takes the steps itself: [`Application::receive`],
+//! [`Application::cycle`] waits for the next cycle, evaluates the domains that are due, runs the application's work on
+//! them, and sends. An application with its own loop calls the steps itself: [`Application::receive`],
 //! [`Application::process`], [`Application::queue`], [`Application::send`].
 //!
-//! What makes a cycle begin is a [`Trigger`]: usually the time, on a fixed grid. A cycle that begins late is counted
-//! ([`Pace`]); those that a stall of the machine has passed over altogether are left out, so that frames are not sent
-//! in bursts to catch up.
+//! A [`Trigger`] starts each cycle: by default the time, on a fixed grid. A cycle that begins late is counted
+//! ([`Pace`]). Cycles that a stall of the machine has missed completely are left out, so that no bursts of frames are
+//! sent.
 //!
-//! The acyclic half runs in the same thread and on the same links ([`Inline`]): it works while a cycle is waited for.
-//! Or it has a thread and links of its own ([`crate::supervisor_thread`]).
+//! The acyclic half runs in the same thread and on the same links ([`Inline`]) while the application waits for a cycle,
+//! or in its own thread on its own links ([`crate::supervisor_thread`]).
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -38,13 +38,13 @@ use crate::window::Window;
 /// Cycles with zeroed outputs before an orderly stop.
 const LAST_CYCLES: u32 = 3;
 
-/// What outputs show at an orderly stop.
+/// Values of the outputs during an orderly stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LastOutputs {
     /// Zero.
     Zero,
-    /// What the application wrote last.
+    /// The values that the application wrote last.
     Held,
 }
 
@@ -72,8 +72,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         result
     }
 
-    /// Receives, and lets the acyclic half work if it does so here, until the cycle begins. Returns the time, and when
-    /// the look for frames began that was the last one.
+    /// Receives frames, and runs the acyclic half if it shares the links, until the cycle begins. Returns the time, and
+    /// the time at which the last check for frames began.
     #[inline(always)]
     fn wait_for_cycle(&mut self) -> (Instant, Instant) {
         loop {
@@ -100,10 +100,10 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
     }
 
-    /// Takes in all frames that have arrived, sends those again that are lost, and lets the acyclic half work if it does
-    /// so here. The first step of a cycle that the application runs itself; more often does no harm. A lost frame is
-    /// sent again only if this is called when frames usually are back, at [`Application::receive_again_at`], and once
-    /// more before [`Application::process`].
+    /// Takes all frames that have arrived, sends lost frames again, and runs the acyclic half if it shares the links.
+    /// First step of a cycle in the application's own loop; further calls are harmless. A lost frame is sent again only
+    /// if this is called when frames usually are back, at [`Application::receive_again_at`], and once more before
+    /// [`Application::process`].
     pub fn receive(&mut self) {
         let now = self.links.now();
         self.take_in(now);
@@ -113,7 +113,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.acyclic.work(&mut self.links, &self.window);
     }
 
-    /// Takes in all frames that have arrived.
+    /// Takes all frames that have arrived.
     #[inline(always)]
     fn take_in(&mut self, now: Instant) {
         let Application { links, acyclic, cyclic, .. } = self;
@@ -141,48 +141,48 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.exchange.decide_at()
     }
 
-    /// Judges a domain by what was received. A step of a cycle that the application runs itself.
+    /// Evaluates a domain: gives up its overdue frames and compares its working counters. Step of a cycle in the
+    /// application's own loop.
     pub fn process(&mut self, domain: DomainId) -> DomainStatus {
         self.cyclic.process(domain, self.links.now())
     }
 
-    /// Puts a domain's outputs into its frames. False where all its cycles are still under way. A step of a cycle
-    /// that the application runs itself.
+    /// Copies a domain's outputs into its frames. False if all its cycles are still under way: the domain is skipped.
+    /// Step of a cycle in the application's own loop.
     pub fn queue(&mut self, domain: DomainId) -> bool {
         self.cyclic.exchange.queue(domain, self.links.now())
     }
 
-    /// Sends what was queued; the acyclic half then has the wire for about a period. The last step of a cycle that the
-    /// application runs itself.
+    /// Sends the queued frames; the acyclic half may then use the wire for about one period. Last step of a cycle in
+    /// the application's own loop.
     pub fn send(&mut self) {
         let now = self.links.now();
         self.cyclic.send_by_hand(now, &mut self.links);
         self.acyclic.work(&mut self.links, &self.window);
     }
 
-    /// What a cycle works on, between [`Application::process`] and [`Application::queue`].
+    /// Process data of all domains, to be used between [`Application::process`] and [`Application::queue`].
     pub fn process_data(&mut self) -> ProcessData<'_> {
         self.cyclic.data(self.links.now())
     }
 
-    /// Chooses what makes a cycle begin; the time unless another trigger is chosen.
+    /// Sets the trigger of the cycles; the default is the time.
     pub fn set_trigger(&mut self, trigger: Trigger) {
         self.cyclic.set_trigger(trigger);
     }
 
-    /// Has inputs copied to outputs in every cycle, in place of the copies that were set before: what came in with this
-    /// cycle's frames leaves with its next ones, whatever `work` writes there. A source in a domain with a longer
-    /// period may be as old as that; `max_age` is what it may be older, in cycles. To be called before the cycles
-    /// begin.
+    /// Sets the inputs that are copied to outputs in every cycle, replacing the previous table. Inputs received with
+    /// this cycle's frames leave with its next ones, regardless of what `work` writes to these outputs. The tolerated
+    /// age of a source is the period of its domain plus `max_age` cycles. To be called before the cycles begin.
     ///
     /// # Errors
-    /// Sources that are no inputs, targets that are no outputs or have two sources, different lengths.
+    /// A source is not an input, a target is not an output or has two sources, or lengths differ.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         self.cyclic.set_copies(rules)
     }
 
-    /// How cycles follow the reference clock, with [`Trigger::ReferenceClock`]: the last phase error, and whether it is
-    /// small.
+    /// The control loop that follows the reference clock, with [`Trigger::ReferenceClock`]: the last phase error, and
+    /// whether errors are small.
     pub fn follower(&self) -> Option<&Follower> {
         self.cyclic.follower()
     }
@@ -192,8 +192,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.begun_at()
     }
 
-    /// A few more cycles, with all outputs zero where `outputs` says so. Afterwards the wire belongs to the acyclic
-    /// half.
+    /// Runs the last cycles before a stop, with all outputs zero if `outputs` requests it. Afterwards only the acyclic
+    /// half uses the wire.
     pub(crate) fn last_cycles(&mut self, outputs: LastOutputs) {
         self.cyclic.set_trigger(Trigger::Time);
         for _ in 0..LAST_CYCLES {
@@ -206,13 +206,13 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.retire();
     }
 
-    /// How well the cycles keep to their grid.
+    /// Counts and delays of the cycles on their grid.
     pub fn pace(&self) -> Pace {
         self.cyclic.pace.shown()
     }
 
-    /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface, whenever the
-    /// copy was read ([`Links::received_at`]).
+    /// Times from the sending of a cycle's frames to the arrival of each copy at the interface, independent of when a
+    /// thread reads the copy ([`Links::received_at`]).
     pub fn round_trips(&self) -> &Histogram {
         self.cyclic.news.round_trips()
     }
@@ -232,7 +232,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         &self.cyclic.directory
     }
 
-    /// How far each declared SubDevice is.
+    /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
         self.acyclic.states()
     }
@@ -258,7 +258,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.acyclic.ring_status()
     }
 
-    /// State of the ring as process data shows it.
+    /// State of the ring as the cyclic frames show it.
     pub fn ring(&self) -> RingState {
         self.cyclic.exchange.ring()
     }
@@ -278,12 +278,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.links.now()
     }
 
-    /// The cyclic half, for what is not offered here.
+    /// The cyclic half, for functions without a method here.
     pub fn exchange(&self) -> &Exchange {
         &self.cyclic.exchange
     }
 
-    /// The cyclic half, for what is not offered here.
+    /// The cyclic half, for functions without a method here.
     pub fn exchange_mut(&mut self) -> &mut Exchange {
         &mut self.cyclic.exchange
     }
@@ -300,11 +300,11 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 }
 
 impl<L: Links> Application<L, Inline> {
-    /// Runs cycles until work has ended that a service or a [`SubDevice`](crate::SubDevice) has begun, and hands out
-    /// its result. What is not done in time is given up.
+    /// Runs cycles until a service, for example of a [`SubDevice`](crate::SubDevice), has ended, and returns its
+    /// result. After the limit the service is cancelled.
     ///
     /// # Errors
-    /// [`Error::TimedOut`], or the work failed.
+    /// [`Error::TimedOut`], or the error of the service.
     pub fn cycle_until<T, E>(
         &mut self,
         mut pending: Pending<Result<T, E>>,
@@ -329,17 +329,17 @@ impl<L: Links> Application<L, Inline> {
         }
     }
 
-    /// Events that were not taken in time and that were dropped.
+    /// Number of events that were dropped because they were not taken in time.
     pub fn events_dropped(&self) -> u64 {
         self.acyclic.events_dropped()
     }
 
-    /// The acyclic half, for what is not offered here.
+    /// The acyclic half, for functions without a method here.
     pub fn engine(&self) -> &Engine {
         &self.acyclic.engine
     }
 
-    /// The acyclic half, for what is not offered here.
+    /// The acyclic half, for functions without a method here.
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.acyclic.engine
     }

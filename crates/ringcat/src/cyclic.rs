@@ -1,7 +1,7 @@
-//! The cyclic half as the runtime runs it: when a cycle begins, which domains are due in it, what is counted.
+//! The cyclic half in this runtime: the beginning of cycles, the due domains, the counters.
 //!
-//! Nothing here waits, allocates or locks. What each cycle calls is inlined on purpose: its calls alone would take a
-//! tenth of its instructions (bin `socket_cycle`).
+//! Nothing here waits, allocates or locks. Functions that each cycle calls are inlined on purpose: the calls alone
+//! would take a tenth of a cycle's instructions (bin `socket_cycle`).
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,11 +19,11 @@ use crate::pace::{PaceNs, Trigger};
 use crate::process_data::{ProcessData, Rate};
 use crate::window::{Half, SHORTEST, Window};
 
-/// A cycle is late when it begins this part of its period after its time.
+/// A cycle is late when its delay reaches this fraction of its period.
 const LATE_FRACTION: u64 = 10;
-/// Between two looks whether a pause has ended.
+/// Interval of the check whether a pause has ended.
 const PAUSE_LOOK: Duration = Duration::from_micros(20);
-/// Period of an application without domains that have one.
+/// Period of an application without a domain that has one.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
 
 #[derive(Debug)]
@@ -34,12 +34,12 @@ pub(crate) struct Cyclic {
     pub news: Arc<News>,
     rates: Vec<Rate>,
     period_ns: u64,
-    /// A cycle is late when it begins so long after its time.
+    /// A cycle is late when its delay reaches this time.
     late_ns: u64,
     trigger: Trigger,
-    /// Moves the grid after the reference clock, with [`Trigger::ReferenceClock`].
+    /// Shifts the grid to follow the reference clock, with [`Trigger::ReferenceClock`].
     follower: Option<Follower>,
-    /// The reading of that clock that was used last.
+    /// Time of the last used reading of that clock.
     followed: Instant,
     /// When the last cycle began.
     begun_at: Instant,
@@ -50,10 +50,10 @@ pub(crate) struct Cyclic {
     cycle: u64,
     /// Most cycles of a domain that may be under way at once.
     under_way: u32,
-    /// A cycle was due and waits because the acyclic half has asked for a pause.
+    /// A cycle is due and waits because the acyclic half requests a pause.
     held: bool,
     window: Arc<Window>,
-    /// Disturbances that the news include.
+    /// Number of disturbances that the news include.
     published: u64,
 }
 
@@ -106,27 +106,27 @@ impl Cyclic {
         self.exchange.set_copies(&rules)
     }
 
-    /// Takes in a frame of the cyclic class or of an unknown sender. When it left, if it is a copy that was waited for.
+    /// Takes a frame of the cyclic class or of an unknown sender. Returns its departure if it is an expected copy.
     #[inline(always)]
     pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) -> Option<Instant> {
         let taken = self.exchange.receive(link, frame, now) == Received::Taken;
         taken.then(|| self.exchange.taken_left_at())
     }
 
-    /// Notes when a copy arrived at the interface that had left then.
+    /// Records the arrival at the interface of a copy with this departure.
     #[inline(always)]
     pub fn note_round_trip(&self, left_at: Instant, received_at: Instant) {
         self.news.round_trips().record_ns(received_at.0.saturating_sub(left_at.0));
     }
 
-    /// Whether a cycle begins now. One that is due waits where the acyclic half has asked for a pause.
+    /// Whether a cycle begins now. A due cycle waits while the acyclic half requests a pause.
     #[inline(always)]
     pub fn begins(&mut self, now: Instant) -> bool {
         let is_due = now >= self.next_cycle || (self.may_begin_early() && now >= self.earliest);
         is_due && !self.is_held_back(now)
     }
 
-    /// Whether the cycle that is due has to wait.
+    /// Whether the due cycle has to wait.
     #[inline(always)]
     fn is_held_back(&mut self, now: Instant) -> bool {
         let pause_until = self.exchange.pause_until();
@@ -138,11 +138,11 @@ impl Cyclic {
         is_paused
     }
 
-    /// When to look again whether a cycle begins, unless a frame arrives before.
+    /// Time of the next check whether a cycle begins, unless a frame arrives before.
     #[inline(always)]
     pub fn wake(&self, now: Instant) -> Instant {
         if now < self.exchange.pause_until() {
-            // A pause may end earlier than was asked for.
+            // A pause may end earlier than requested.
             return now + PAUSE_LOOK;
         }
         if self.may_begin_early() { self.earliest.min(self.next_cycle) } else { self.next_cycle }
@@ -153,8 +153,8 @@ impl Cyclic {
         matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
-    /// A cycle begins: notes how late it is, judges what is due. All frames were taken in that had arrived at
-    /// `looked_at`; only what was overdue by then is given up, however long this thread was held up since.
+    /// Begins a cycle: records its delay, evaluates the due domains. All frames that had arrived at `looked_at` are
+    /// taken. Only frames that were overdue at that time are given up, however long this thread was delayed since.
     #[inline(always)]
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
@@ -166,7 +166,8 @@ impl Cyclic {
         }
     }
 
-    /// Notes how late the cycle is, and when the next one begins; leaves out those whose time has passed meanwhile.
+    /// Records the delay of the cycle, and sets the time of the next one; leaves out cycles with a time that has
+    /// passed.
     #[inline(always)]
     fn keep_pace(&mut self, now: Instant) {
         let is_held = core::mem::take(&mut self.held);
@@ -186,7 +187,7 @@ impl Cyclic {
         self.pace.skipped += self.pass_over(now, delay);
     }
 
-    /// Notes that the cycle is late, or later than any before.
+    /// Records that the cycle is late, or later than all before.
     #[cold]
     fn note_late(&mut self, delay: u64) {
         self.pace.disturbances += 1;
@@ -194,7 +195,7 @@ impl Cyclic {
         self.pace.late += u64::from(delay > self.late_ns);
     }
 
-    /// Notes when the next cycle begins; returns how many are left out because their time has passed.
+    /// Sets the time of the next cycle; returns the number of cycles left out because their time has passed.
     #[inline(always)]
     fn pass_over(&mut self, now: Instant, delay: u64) -> u64 {
         let passed_over = if delay < self.period_ns { 0 } else { delay / self.period_ns };
@@ -214,7 +215,7 @@ impl Cyclic {
         passed_over
     }
 
-    /// Moves the next cycle after the reference clock, once for each reading of it.
+    /// Shifts the next cycle to follow the reference clock, once for each reading of it.
     #[cold]
     fn follow_reference(&mut self) {
         let Some(follower) = &mut self.follower else { return };
@@ -237,7 +238,7 @@ impl Cyclic {
         self.begun_at
     }
 
-    /// What the application works on.
+    /// Process data for the application.
     pub fn data(&mut self, now: Instant) -> ProcessData<'_> {
         ProcessData {
             exchange: &mut self.exchange,
@@ -248,7 +249,7 @@ impl Cyclic {
         }
     }
 
-    /// The cycle ends: what is due is sent.
+    /// Ends the cycle: sends the due domains.
     #[inline(always)]
     pub fn end(&mut self, now: Instant, links: &mut impl Links) {
         for (number, rate) in self.rates.iter().enumerate() {
@@ -281,7 +282,7 @@ impl Cyclic {
         });
     }
 
-    /// Sends what was queued; the next cycle's frames leave at `next`.
+    /// Sends the queued frames; the next cycle's frames leave at `next`.
     #[inline(always)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
         let Cyclic { exchange, window, .. } = self;
@@ -296,7 +297,7 @@ impl Cyclic {
         self.window.expect_cycle(next);
     }
 
-    /// Evaluates a domain, for an application that runs the steps of a cycle itself.
+    /// Evaluates a domain, for an application with its own loop.
     pub fn process(&mut self, domain: DomainId, now: Instant) -> DomainStatus {
         let status = self.exchange.process(domain, now);
         if let Some(rate) = self.rates.get_mut(domain.0) {
@@ -305,8 +306,7 @@ impl Cyclic {
         status
     }
 
-    /// Sends what was queued, for an application that runs the steps of a cycle itself: the next one is expected one
-    /// period later.
+    /// Sends the queued frames, for an application with its own loop: the next cycle is expected one period later.
     pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
         self.pace.cycles += 1;
         self.next_cycle = Instant(now.0.saturating_add(self.period_ns));
@@ -336,7 +336,7 @@ impl Cyclic {
         }
     }
 
-    /// No cycle follows: the wire belongs to the other half.
+    /// No cycle follows: only the acyclic half uses the wire.
     pub fn retire(&self) {
         self.window.expect_cycle(Instant::NEVER);
     }

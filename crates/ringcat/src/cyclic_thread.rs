@@ -1,10 +1,10 @@
-//! Cycles in a thread of their own, beside the supervisor's.
+//! Cycles in their own thread, beside the supervisor thread.
 //!
-//! What the application computes in a cycle is a closure that this thread runs. Other threads look at [`News`], and ask
-//! the supervisor's thread.
+//! The thread runs a closure of the application in each cycle. Other threads read [`News`], and call services of the
+//! supervisor thread.
 //!
-//! A panic of that closure does not take the bus down: cycles go on with outputs zero until [`CyclicThread::end`] hands
-//! the application back with the panic's message, to be stopped in order.
+//! A panic of the closure does not stop the bus: cycles continue with zero outputs until [`CyclicThread::end`] returns
+//! the application and the panic message, for an orderly stop.
 
 use std::any::Any;
 use std::fmt;
@@ -21,7 +21,7 @@ use crate::news::News;
 use crate::process_data::ProcessData;
 use crate::supervisor_thread::SupervisorThread;
 
-/// An application whose cycles run in a thread of their own. They end when this is dropped.
+/// An application with cycles in their own thread. They end when this is dropped.
 #[derive(Debug)]
 pub struct CyclicThread<L> {
     supervisor: SupervisorThread,
@@ -65,7 +65,7 @@ impl<L> From<Box<Panicked<L>>> for Error {
     }
 }
 
-/// What a panic says.
+/// The message of a panic.
 fn message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
@@ -73,13 +73,13 @@ fn message(payload: &(dyn Any + Send)) -> String {
 }
 
 impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
-    /// Runs the cycles in a thread of their own, each with `work`, until that breaks or [`CyclicThread::end`] is
-    /// called. `prepare` runs in the thread first: the place to set its priority and processor. `work` is in the cyclic
-    /// path: it must not allocate, lock or wait. Should it panic, it is not called any more, and cycles go on with
-    /// outputs zero.
+    /// Runs the cycles in their own thread. Each cycle calls `work`, until it returns `Break` or [`CyclicThread::end`]
+    /// is called. `prepare` runs in the thread first, for example to set its priority and processor. `work` is in the
+    /// cyclic path: it must not allocate, lock or wait. After a panic it is not called again, and cycles continue with
+    /// zero outputs.
     ///
     /// # Errors
-    /// The system has no more threads.
+    /// The system cannot start a thread.
     pub fn start_cycles(
         mut self,
         prepare: impl FnOnce() + Send + 'static,
@@ -92,8 +92,8 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
         let body = move || {
             prepare();
             while !ended.load(Ordering::Relaxed) {
-                // The closure is not called again after a panic. What it has left half done is the image, which is
-                // zeroed.
+                // The closure is not called again after a panic. Only the image may be half written, and its outputs
+                // are set to zero.
                 match catch_unwind(AssertUnwindSafe(|| self.cycle(&mut work))) {
                     Ok(ControlFlow::Continue(())) => self.cyclic.publish_foreign(),
                     Ok(ControlFlow::Break(())) => break,
@@ -116,12 +116,12 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
 }
 
 impl<L> CyclicThread<L> {
-    /// What the cycles make known.
+    /// Figures that the cycles publish.
     pub fn news(&self) -> &News {
         &self.news
     }
 
-    /// The same, to be looked at when the cycles have ended too.
+    /// The same, also readable after the cycles have ended.
     pub fn news_handle(&self) -> Arc<News> {
         self.news.clone()
     }
@@ -131,18 +131,18 @@ impl<L> CyclicThread<L> {
         &self.supervisor
     }
 
-    /// Whether the closure runs no more: it has asked for the end, or has panicked.
+    /// Whether the closure has ended: it has returned `Break`, or has panicked.
     pub fn has_ended(&self) -> bool {
         self.panicked.load(Ordering::Acquire) || self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Ends the cycles after the one that runs, and hands back the application, to be stopped or to go on.
+    /// Ends the cycles after the one that runs, and returns the application, which can be stopped or run cycles again.
     ///
     /// # Errors
     /// The closure has panicked; the application comes with the error.
     ///
     /// # Panics
-    /// The thread itself has: a fault of this crate, with the message of that panic.
+    /// The thread itself has panicked: a fault of this crate, with the message of that panic.
     pub fn end(mut self) -> Ended<L> {
         self.end.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {
@@ -157,7 +157,7 @@ impl<L> Drop for CyclicThread<L> {
     fn drop(&mut self) {
         self.end.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been told by the panic handler.
+            // The panic handler has reported a panic of the thread.
             let _ = thread.join();
         }
     }

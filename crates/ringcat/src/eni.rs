@@ -1,7 +1,8 @@
-//! Networks from an ENI (EtherCAT Network Information, ETG.2100): the file says what is configured, the engine how.
+//! Networks from an ENI (EtherCAT Network Information, ETG.2100): the file gives the configuration, the engine carries
+//! it out.
 //!
 //! `ringcat-config` reads the file; [`EniImage`] is its process image at run time; [`segment`] makes a simulated
-//! segment of it, to try it without hardware. See `docs/eni.md`.
+//! segment of it, to test it without hardware. See `docs/eni.md`.
 
 mod cables;
 mod file;

@@ -1,11 +1,11 @@
-//! Ethernet over EtherCAT as network interfaces of this host: one for each SubDevice that speaks EoE.
+//! Ethernet over EtherCAT as network interfaces of this host: one for each SubDevice that supports EoE.
 //!
-//! [`SupervisorThread::start_ethernet`] makes interfaces as SubDevices are found, and from then on the supervisor's
-//! thread moves frames between them and the mailboxes: what the host sends is taken as far as the queue of the
-//! SubDevice has room, and waits in the kernel otherwise. While a SubDevice is away its interface has no carrier;
-//! addresses, routes and its place in a bridge stay. Interfaces go when the MainDevice stops.
+//! [`SupervisorThread::start_ethernet`] creates an interface for each SubDevice that is found. From then on the
+//! supervisor thread moves frames between interfaces and mailboxes. It takes frames of the host while the queue of the
+//! SubDevice has room; further frames wait in the kernel. While a SubDevice is absent its interface has no carrier, but
+//! keeps its addresses, its routes and its bridge. The interfaces are removed when the MainDevice stops.
 //!
-//! An interface that cannot be made is told once, and everything else goes on.
+//! An interface that cannot be created is reported once; all other interfaces work.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,23 +22,24 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Interval of the search for new SubDevices and of the update of statistics.
 const LOOK: Duration = Duration::from_millis(20);
-/// Frames that one interface may hand to the host in one go, so that the others and the bus have their turn.
+/// Maximum number of frames of one interface in one turn, so that other interfaces and the bus are served too.
 const BURST: usize = 64;
-/// News that are kept until they are taken.
+/// Maximum number of news that are kept until they are taken.
 const NEWS: usize = 64;
 
-/// A network interface of the host, seen from its other end.
+/// A network interface of the host, from the side of the MainDevice.
 pub trait HostInterface: Send {
-    /// Takes the oldest frame that the host sent; its length, `None` where there is none.
+    /// Copies the oldest frame that the host sent into `room`. Returns its length in bytes; `None` if there is no
+    /// frame.
     fn receive(&mut self, room: &mut [u8]) -> Option<usize>;
 
-    /// Hands a frame to the host; false where it does not take it.
+    /// Passes a frame to the host; false if the host does not accept it.
     fn send(&mut self, frame: &[u8]) -> bool;
 
-    /// Whether frames can pass.
+    /// Sets whether the interface has a carrier, so that frames can pass.
     fn set_carrier(&mut self, carrier: bool);
 
-    /// Whether the host still has it.
+    /// Whether the interface still exists on the host.
     fn exists(&self) -> bool {
         true
     }
@@ -54,7 +55,7 @@ impl HostInterface for TapInterface {
     }
 
     fn set_carrier(&mut self, carrier: bool) {
-        // A kernel that cannot shows a carrier all the time; frames are dropped then.
+        // A kernel without support for this always shows a carrier; frames are then dropped.
         TapInterface::set_carrier(self, carrier);
     }
 
@@ -63,16 +64,16 @@ impl HostInterface for TapInterface {
     }
 }
 
-/// Makes an interface of this name and address.
+/// Creates an interface with this name and MAC address.
 pub type MakeInterface = Box<dyn FnMut(&str, [u8; 6]) -> Result<Box<dyn HostInterface>, TapError> + Send>;
 
-/// How interfaces are named and addressed.
+/// Names and MAC addresses of the interfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EthernetOptions {
     /// Number of this MainDevice, for names.
     pub index: u16,
-    /// Address of the main link: the interfaces' own are made from it.
+    /// MAC address of the main link; the addresses of the interfaces are derived from it.
     pub main: [u8; 6],
 }
 
@@ -103,29 +104,29 @@ impl EthernetOptions {
     }
 }
 
-/// Something that happened to an interface.
+/// A change of an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EthernetNews {
-    /// It was made.
+    /// It was created.
     Made {
         /// Its name.
         name: String,
         /// The SubDevice, by its index in the declaration.
         subdevice: SubDeviceId,
     },
-    /// Another program removed it. It is made again.
+    /// Another program removed it. It is created again.
     Removed {
         /// Its name.
         name: String,
     },
-    /// It cannot be made. Frames of that SubDevice do not pass.
+    /// It cannot be created. Frames of its SubDevice are not transferred.
     Refused(TapError),
-    /// Its SubDevice can be reached, or no longer.
+    /// Its SubDevice answers, or no longer answers.
     Carrier {
         /// Its name.
         name: String,
-        /// Whether frames can pass.
+        /// Whether the interface has a carrier, so that frames can pass.
         carrier: bool,
     },
 }
@@ -144,7 +145,7 @@ impl fmt::Display for EthernetNews {
     }
 }
 
-/// What passes one interface.
+/// State and counters of one interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EthernetInterface {
@@ -154,7 +155,7 @@ pub struct EthernetInterface {
     pub subdevice: EthernetSubDevice,
     /// Counters, rates and the queue; `tx` is to the SubDevice.
     pub status: EthernetStatus,
-    /// Frames that the host did not take: its interface is switched off.
+    /// Frames that the host did not accept because the interface is switched off.
     pub refused: u64,
 }
 
@@ -176,12 +177,12 @@ impl Shared {
     }
 }
 
-/// The interfaces; dropped, they are removed.
+/// The interfaces. They are removed when this is dropped.
 #[derive(Debug)]
 pub struct Ethernet(Arc<Shared>);
 
 impl Ethernet {
-    /// The interfaces that there are, with what has passed them, some milliseconds old.
+    /// The present interfaces with their counters, some milliseconds old.
     pub fn interfaces(&self) -> Vec<EthernetInterface> {
         self.0.told().interfaces.clone()
     }
@@ -199,10 +200,11 @@ impl Drop for Ethernet {
 }
 
 impl SupervisorThread {
-    /// Makes a network interface for each SubDevice that speaks EoE as soon as it is known, from activation on.
+    /// Creates a network interface for each SubDevice that supports EoE as soon as the SubDevice is known, from
+    /// activation on.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn start_ethernet(&self, options: EthernetOptions) -> Result<Ethernet, Error> {
         let make = |name: &str, mac| {
             let tap = TapInterface::create(name, mac)?;
@@ -214,7 +216,7 @@ impl SupervisorThread {
     /// As [`SupervisorThread::start_ethernet`], with interfaces of another kind.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn start_ethernet_on(&self, options: EthernetOptions, make: MakeInterface) -> Result<Ethernet, Error> {
         let shared = Arc::new(Shared::default());
         let mut switch = Switch {
@@ -245,13 +247,13 @@ struct Switch {
     make: MakeInterface,
     shared: Arc<Shared>,
     ends: Vec<End>,
-    /// SubDevices whose interface cannot be made.
+    /// SubDevices with an interface that cannot be created.
     refused: Vec<SubDeviceId>,
     look_at: Instant,
 }
 
 impl Switch {
-    /// Moves frames; true at the end.
+    /// Moves frames between interfaces and mailboxes; true when the interfaces are dropped.
     fn work(&mut self, engine: &mut Engine, now: Instant) -> bool {
         if self.shared.ended.load(Ordering::Relaxed) {
             self.ends.clear();
@@ -271,7 +273,7 @@ impl Switch {
         false
     }
 
-    /// Interfaces for those that have appeared, none for those of a MainDevice that has stopped.
+    /// Creates interfaces for new SubDevices; removes those of a stopped MainDevice.
     fn look(&mut self, engine: &mut Engine) {
         let found = engine.ethernet_subdevices();
         self.ends.retain(|end| {
@@ -307,7 +309,7 @@ impl Switch {
             Some(EthernetInterface { name: name.clone(), subdevice: *subdevice, status, refused: *refused })
         });
         let interfaces: Vec<EthernetInterface> = interfaces.collect();
-        // The last figures stay when the interfaces go.
+        // The last counters are kept when the interfaces are removed.
         if !interfaces.is_empty() {
             self.shared.told().interfaces = interfaces;
         }
@@ -316,7 +318,7 @@ impl Switch {
     fn make(&mut self, subdevice: EthernetSubDevice) -> Result<End, TapError> {
         let mut name = self.options.name(&subdevice);
         if self.ends.iter().any(|end| end.name == name) {
-            // An alias that two of them have names neither.
+            // An alias that two SubDevices share is not used in names.
             name = self.options.name(&EthernetSubDevice::new(subdevice.subdevice, subdevice.position, 0));
         }
         let interface = (self.make)(&name, self.options.mac(&subdevice))?;
@@ -332,12 +334,12 @@ fn tell(shared: &Shared, news: EthernetNews) {
 }
 
 impl End {
-    /// Moves frames both ways; whether the carrier has to change, and to what.
+    /// Moves frames in both directions. Returns the new carrier state if it has to change.
     fn pass(&mut self, engine: &mut Engine) -> Option<bool> {
         let mut room = [0; MAX_FRAME + 1];
         let port = engine.ethernet_port(self.subdevice.subdevice.0);
         let Some(port) = port.filter(|port| port.is_up()) else {
-            // What was sent to a SubDevice that is away must not reach it when it is back.
+            // Frames for an absent SubDevice must not reach it after its return.
             for _ in 0..QUEUE {
                 if self.interface.receive(&mut room).is_none() {
                     break;

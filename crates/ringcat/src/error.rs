@@ -1,4 +1,4 @@
-//! What can go wrong before and after the cycles.
+//! Errors of the library before and after the cycles.
 
 use core::fmt;
 use std::time::Duration;
@@ -34,9 +34,9 @@ pub enum Error {
     Service(ServiceError),
     /// A service of one SubDevice failed.
     SubDevice(Box<SubDeviceError>),
-    /// SubDevices were not in their states in time.
+    /// SubDevices did not reach their target states in time.
     NotReady(NotReady),
-    /// Process data is not as the application expects it.
+    /// An object is not mapped as the application expects.
     Map(MapError),
     /// A value has more bits than its place in the process data.
     DoesNotFit(DoesNotFit),
@@ -44,27 +44,27 @@ pub enum Error {
     Write(WriteError),
     /// The declaration has no such domain.
     NoDomain(NoDomain),
-    /// Work did not end in time.
+    /// A service did not end in time.
     TimedOut {
         /// The limit.
         limit: Duration,
     },
-    /// The segment could not be stopped in order.
+    /// The orderly stop failed.
     Stop(StopError),
     /// The simulated segment cannot be built.
     #[cfg(feature = "sim")]
     Segment(SegmentError),
-    /// The system has no more threads.
+    /// The system cannot start a thread.
     Thread(std::io::Error),
     /// The mailbox gateway cannot listen.
     #[cfg(feature = "gateway")]
     Gateway {
-        /// Where.
+        /// The address of the gateway.
         address: std::net::SocketAddr,
-        /// The system's answer.
+        /// The error of the system.
         cause: std::io::Error,
     },
-    /// The closure that the cycles ran has panicked, with this message.
+    /// The closure of the cycles has panicked, with this message.
     Panicked(String),
     /// The thread of the acyclic half has ended, or the MainDevice was stopped meanwhile.
     Gone,

@@ -1,10 +1,10 @@
-//! Events as lines of a log, condensed: the first of a kind one by one, then how many there were.
+//! Events as lines of a log, condensed: a line for each of the first events of a kind, then counts.
 //!
-//! A machine that is too slow for its cycle leaves cycles out and misses frames all the time. A line for each of them
-//! buries everything else; lines up to some number hide the next break. So the first twenty of a kind have a line each,
-//! then their number has one, at pauses that grow while it lasts. After a quiet time it begins anew. Only kinds that
-//! come by the thousand are condensed: judgements of process data, skipped and left out cycles, frames of other
-//! MainDevices.
+//! A machine that is too slow for its cycle leaves out cycles and misses frames continuously. A line for each of them
+//! hides all other events; a fixed number of lines hides the next break. So each of the first twenty events of a kind
+//! has a line. Further events are counted, and lines with the count follow at growing intervals. After a quiet time
+//! each event has a line again. Only kinds that may occur thousands of times are condensed: changes of domain states,
+//! skipped and left out cycles, frames of other MainDevices.
 //!
 //! ```
 //! use ringcat::event_log::EventLog;
@@ -28,12 +28,12 @@ use ringcat_engine::time::Instant;
 
 use crate::text::{Names, describe};
 
-/// So many of a kind have a line each.
+/// Number of events of a kind that have a line each.
 const ONE_BY_ONE: u32 = 20;
-/// Then they are counted for so long before the count has a line, and for twice as long each time.
+/// First interval of counting before a line with the count; each further interval is twice as long.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
-/// Without any for so long, the next ones have a line each again.
+/// After this time without an event of the kind, each event has a line again.
 const QUIET: Duration = Duration::from_secs(10);
 
 /// A condensed log of events. It makes lines; the application prints or stores them.
@@ -41,12 +41,12 @@ const QUIET: Duration = Duration::from_secs(10);
 pub struct EventLog {
     begin: Instant,
     names: Names,
-    /// Number of changes of domain states, and the last of them in words.
+    /// Changes of domain states, and the text of the last one.
     judgements: Crowd,
     judged: String,
     /// Cycles whose frames were still out when the next one was due.
     still_out: Crowd,
-    /// Cycles that this machine was too late for, and how many of them the log knows of.
+    /// Cycles that were left out because this machine was late, and the number that the log has counted.
     left_out: Crowd,
     left_out_before: u64,
     /// Frames of other MainDevices.
@@ -72,7 +72,7 @@ impl EventLog {
         }
     }
 
-    /// The same, with a line for each event, however often it comes, or not.
+    /// Sets whether each event has a line, without condensing.
     pub fn one_by_one(self, one_by_one: bool) -> EventLog {
         EventLog { one_by_one, ..self }
     }
@@ -82,12 +82,12 @@ impl EventLog {
         &self.names
     }
 
-    /// A line of something that happened at a time: milliseconds since the beginning, and the words.
+    /// A line with a time, in milliseconds since the beginning, and a text.
     pub fn line(&self, at: Instant, words: &str) -> String {
         format!("{:>12.3} ms  {words}", at.since(self.begin).as_secs_f64() * 1e3)
     }
 
-    /// The line of an event, unless it is one of many and is counted.
+    /// The line of an event; `None` if the event is only counted.
     pub fn event(&mut self, event: &TimedEvent) -> Option<String> {
         let words = describe(event, &self.names);
         let crowd = match &event.event {
@@ -103,15 +103,15 @@ impl EventLog {
         is_shown.then(|| self.line(event.at, &words))
     }
 
-    /// The line of cycles that were left out since the last call, unless they are counted; `skipped` is their number so
-    /// far ([`Pace::skipped`](crate::Pace::skipped)).
+    /// The line for cycles that were left out since the last call; `None` if they are only counted. `skipped` is their
+    /// number so far ([`Pace::skipped`](crate::Pace::skipped)).
     pub fn left_out(&mut self, skipped: u64, now: Instant) -> Option<String> {
         let more = skipped.saturating_sub(std::mem::replace(&mut self.left_out_before, skipped));
         let is_shown = more > 0 && (self.one_by_one || self.left_out.note(more, now));
         is_shown.then(|| self.line(now, &format!("this machine: {more} cycles left out")))
     }
 
-    /// Lines for counted events, as far as they are due. To be called regularly.
+    /// The due lines with numbers of counted events. To be called regularly.
     pub fn counts(&mut self, now: Instant) -> Vec<String> {
         let judged = &self.judged;
         let words = [
@@ -122,7 +122,7 @@ impl EventLog {
                 format!("process data: {count} cycles skipped within {within:.0?}, frames were still out")
             }),
             self.judgements.count(now).map(|(count, within)| {
-                format!("process data: judged anew {count} times within {within:.0?}, now {judged}")
+                format!("process data: state changed {count} times within {within:.0?}, now {judged}")
             }),
             self.foreign
                 .count(now)
@@ -132,12 +132,12 @@ impl EventLog {
     }
 }
 
-/// Events of one kind that may come by the thousand.
+/// Events of one kind that may occur thousands of times.
 #[derive(Debug, Default)]
 struct Crowd {
-    /// How many had a line each.
+    /// Number of events with a line each.
     shown: u32,
-    /// How many have not been in a line yet, and since when they are counted.
+    /// Number of events without a line so far, and the time since which they are counted.
     held: u64,
     since: Instant,
     pause: Duration,
@@ -146,7 +146,7 @@ struct Crowd {
 }
 
 impl Crowd {
-    /// Takes note of some more; whether they have a line of their own.
+    /// Counts further events. True if they have a line of their own.
     fn note(&mut self, more: u64, now: Instant) -> bool {
         if self.held == 0 && now.since(self.last) >= QUIET {
             *self = Crowd::default();
@@ -164,7 +164,7 @@ impl Crowd {
         false
     }
 
-    /// How many had no line of their own, and within how long, if a line for their number is due.
+    /// Number of counted events and the time in which they occurred, if a line for them is due.
     fn count(&mut self, now: Instant) -> Option<(u64, Duration)> {
         let within = now.since(self.since);
         if self.held == 0 || within < self.pause {
@@ -178,7 +178,7 @@ impl Crowd {
 mod tests {
     use super::*;
 
-    /// Something every millisecond from one second to another: how many have a line each, and the counts.
+    /// An event every millisecond between two seconds: number of single lines, and the counts.
     fn storm(crowd: &mut Crowd, from: u64, to: u64) -> (usize, Vec<u64>) {
         let (mut one_by_one, mut counts) = (0, Vec::new());
         for ms in from * 1_000..to * 1_000 {
@@ -197,7 +197,7 @@ mod tests {
         assert_eq!(one_by_one, ONE_BY_ONE as usize);
         assert_eq!(counts[..4], [1_001, 2_001, 4_001, 8_001]);
         assert!(counts.len() < 20 && counts.iter().all(|count| *count <= 60_001), "{counts:?}");
-        // What is held has its line, however long it is quiet.
+        // Counted events get their line even after a long quiet time.
         let held = crowd.held;
         assert!(held > 0);
         assert_eq!(crowd.count(Instant(700_000_000_000)).map(|(count, _)| count), Some(held));

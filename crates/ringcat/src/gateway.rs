@@ -1,5 +1,4 @@
-//! The mailbox gateway of a MainDevice whose acyclic half has a thread of its own; its clients are
-//! [`ringcat_gateway`]'s.
+//! The mailbox gateway of a MainDevice with its acyclic half in its own thread; [`ringcat_gateway`] serves the clients.
 
 pub use ringcat_gateway::{Gateway, GatewayCounters, GatewayOptions, RelayCounters};
 
@@ -10,7 +9,7 @@ impl SupervisorThread {
     /// Opens the mailbox gateway. SubDevices answer from activation on.
     ///
     /// # Errors
-    /// The address cannot be listened on, the system has no more threads, or the thread of the acyclic half is gone.
+    /// The address cannot be bound, the system cannot start a thread, or the thread of the acyclic half has ended.
     pub fn start_gateway(&self, options: GatewayOptions) -> Result<Gateway, Error> {
         let failed = |cause| Error::Gateway { address: options.address, cause };
         let (gateway, mut passage) = Gateway::open(options).map_err(failed)?;

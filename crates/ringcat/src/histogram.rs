@@ -1,7 +1,7 @@
-//! How often times of which length occurred: round trips, delays of wake-ups.
+//! Histograms of times: round trips, delays of wake-ups.
 //!
-//! Recording takes a few instructions and no memory. Times are kept with an error of at most an eighth. One thread
-//! records; others may look meanwhile.
+//! Recording takes a few instructions and does not allocate. Times are kept with an error of at most one eighth. One
+//! thread records; other threads may read at the same time.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,7 +12,7 @@ const FINE: usize = 8;
 /// Enough for any 64-bit number of nanoseconds.
 const BUCKETS: usize = 62 * FINE;
 
-/// Counts of times by their length. The one thread that records needs no read-modify-write for it.
+/// Counts of times by their length. Only one thread records, so no read-modify-write is needed.
 #[derive(Debug)]
 pub struct Histogram {
     buckets: Box<[AtomicU64; BUCKETS]>,
@@ -59,7 +59,7 @@ impl Histogram {
         }
     }
 
-    /// Forgets everything. For the thread that records.
+    /// Clears all counts. For the thread that records.
     pub fn clear(&self) {
         for word in self.buckets.iter().chain([&self.longest_ns]) {
             set(word, 0);
@@ -67,22 +67,22 @@ impl Histogram {
         set(&self.shortest_ns, u64::MAX);
     }
 
-    /// How many times were counted.
+    /// Number of counted times.
     pub fn count(&self) -> u64 {
         self.buckets.iter().map(get).sum()
     }
 
-    /// The shortest.
+    /// The shortest time.
     pub fn shortest(&self) -> Duration {
         Duration::from_nanos(if self.count() == 0 { 0 } else { get(&self.shortest_ns) })
     }
 
-    /// The longest.
+    /// The longest time.
     pub fn longest(&self) -> Duration {
         Duration::from_nanos(get(&self.longest_ns))
     }
 
-    /// At least this part of all times, in parts per million, is not longer than the result.
+    /// Quantile: at least this share of all times, in parts per million, is not longer than the result.
     pub fn quantile(&self, parts_per_million: u32) -> Duration {
         let rank = (u128::from(self.count()) * u128::from(parts_per_million)).div_ceil(1_000_000) as u64;
         let mut seen = 0;

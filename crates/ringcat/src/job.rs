@@ -1,7 +1,7 @@
-//! Work in the thread of the acyclic half whose result is asked for from another thread.
+//! Work in the thread of the acyclic half, with a result for another thread.
 //!
-//! A [`Job`] and the [`Reply`] to it share a slot. The thread fills it, once; the job waits for it, polls it or is
-//! awaited as a future. The type of the result is known at both ends.
+//! A [`Job`] and its [`Reply`] share a slot for a typed result. The thread fills the slot once. The owner of the job
+//! waits for the result, polls it, or awaits the job as a future.
 
 use std::fmt;
 use std::future::Future;
@@ -15,8 +15,8 @@ use ringcat_engine::time::Instant;
 
 use crate::error::Error;
 
-/// Work under way in the thread of a [`SupervisorThread`](crate::SupervisorThread). Dropped, it is aborted: an SDO
-/// transfer at the SubDevice, too.
+/// Work under way in the thread of a [`SupervisorThread`](crate::SupervisorThread). Dropping the job aborts the work,
+/// an SDO transfer also at the SubDevice.
 ///
 /// ```
 /// # use std::time::Duration;
@@ -34,10 +34,10 @@ pub struct Job<T> {
     thread: Box<dyn InOrder>,
 }
 
-/// Work under way in the thread: it has a turn in each of the thread's turns, until it has ended.
+/// Work under way in the thread. Each turn of the thread calls it; it returns true when it has ended.
 pub(crate) type Task = Box<dyn FnMut(&mut Engine, Instant) -> bool>;
 
-/// The thread, as jobs see it: requests are processed in order. It runs as long as one of these exists.
+/// Access of jobs to the thread, which processes requests in order. The thread runs as long as one of these exists.
 pub(crate) trait InOrder: Send + Sync {
     /// Waits until the thread has processed all earlier requests.
     fn catch_up(&self) -> Result<(), Error>;
@@ -46,7 +46,7 @@ pub(crate) trait InOrder: Send + Sync {
     fn wake(&self);
 }
 
-/// The other end of a job, in the thread. Dropped without a result, it reports that there will be none.
+/// The end of a job in the thread. If it is dropped without a result, the job fails.
 pub(crate) struct Reply<T> {
     slot: Arc<Slot<T>>,
 }
@@ -57,12 +57,12 @@ struct Slot<T> {
 }
 
 enum State<T> {
-    /// The work goes on; the waker of the task that awaits its end.
+    /// The work runs; waker of the task that awaits its end.
     Running(Option<Waker>),
     Done(T),
-    /// There will be no result: it was taken, or the work was ended before it had one.
+    /// No result will come: it was taken, or the work was ended before.
     Gone,
-    /// The result is not wanted.
+    /// The job was aborted: no result is needed.
     Aborted,
 }
 
@@ -84,7 +84,7 @@ impl<T> Slot<T> {
 }
 
 impl<T> State<T> {
-    /// The result, once; `None` while the work goes on.
+    /// Takes the result, once; `None` while the work runs.
     fn take(&mut self) -> Option<Result<T, Error>> {
         match std::mem::replace(self, State::Gone) {
             State::Done(result) => Some(Ok(result)),
@@ -112,7 +112,7 @@ impl<T: 'static> Reply<T> {
         matches!(*self.slot.state(), State::Running(_))
     }
 
-    /// Work of the engine, as a task that ends with it.
+    /// A task that runs until a procedure of the engine has ended.
     pub(crate) fn follow(self, mut pending: Pending<T>) -> Task {
         Box::new(move |_, _| {
             let is_running = pending.is_running();
@@ -120,12 +120,12 @@ impl<T: 'static> Reply<T> {
                 self.send(result);
                 return true;
             }
-            // What the MainDevice has ended by a stop has no result.
+            // A procedure that was ended by a stop of the MainDevice has no result.
             !is_running || !self.is_wanted()
         })
     }
 
-    /// A question to the engine, as a task that ends with its answer.
+    /// A task that calls `question` until it returns a result.
     pub(crate) fn answer(self, mut question: impl FnMut(&mut Engine) -> Option<T> + 'static) -> Task {
         Box::new(move |engine, _| match question(engine) {
             Some(found) => {
@@ -147,7 +147,7 @@ impl<T> Job<T> {
     /// Waits for the end.
     ///
     /// # Errors
-    /// [`Error::Gone`]: the thread is gone, the MainDevice was stopped meanwhile, or the result was taken before.
+    /// [`Error::Gone`]: the thread has ended, the MainDevice was stopped meanwhile, or the result was taken before.
     pub fn wait(self) -> Result<T, Error> {
         let mut state = self.slot.state();
         loop {
@@ -158,7 +158,7 @@ impl<T> Job<T> {
         }
     }
 
-    /// Waits for the end, for so long at most; `None` where the work goes on.
+    /// Waits for the end until a limit; `None` if the work still runs.
     pub fn wait_for(&mut self, limit: Duration) -> Option<Result<T, Error>> {
         let begin = WallClock::now();
         let mut state = self.slot.state();
@@ -174,18 +174,18 @@ impl<T> Job<T> {
         }
     }
 
-    /// The result, once; `None` while the work goes on.
+    /// Takes the result, once; `None` while the work runs.
     pub fn take(&mut self) -> Option<Result<T, Error>> {
         self.slot.state().take()
     }
 
-    /// Ends the work: an SDO transfer is aborted at the SubDevice, too. Waits until that has begun.
+    /// Aborts the work, an SDO transfer also at the SubDevice. Waits until the abort has begun.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn abort(self) -> Result<(), Error> {
         self.slot.end(State::Aborted);
-        // The thread looks at what it has under way in order: this comes behind the work.
+        // The thread works in order: this request is processed after the abort.
         self.thread.catch_up()
     }
 }
@@ -194,7 +194,7 @@ impl<T, E> Job<Result<T, E>>
 where
     Error: From<E>,
 {
-    /// Waits for the end, with one error for what failed and for a thread that is gone.
+    /// Waits for the end, with one error type for failed work and for an ended thread.
     ///
     /// # Errors
     /// As [`Job::wait`], or the work failed.

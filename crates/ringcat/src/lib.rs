@@ -34,7 +34,7 @@
 //!
 //! The module `guide` leads from here to a drive with clocks.
 //!
-//! Frames, time and waiting come from the [`Links`]; everything that EtherCAT is lives in [`ringcat_engine`].
+//! [`Links`] provide frames, time and waiting; the EtherCAT protocol itself is in [`ringcat_engine`].
 //!
 //! # Features
 //!
@@ -42,13 +42,13 @@
 //! |---|---|
 //! | `packet` (default) | network interfaces ([`packet::PacketLinks`]), captures ([`tee::Tee`]), `realtime` |
 //! | `sim` | links into a simulated segment, in virtual or in real time; the simulator itself as `sim` |
-//! | `eni` | networks from an ENI, its variables by name; what a file says as `config` |
+//! | `eni` | networks from an ENI, its variables by name; the parsed file as `config` |
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
-//! | `eoe` | network interfaces of the host for SubDevices that speak Ethernet over EtherCAT |
+//! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
 //! | `tracing` | events of the acyclic half for a `tracing` subscriber |
 //!
-//! Without any of them an application brings its own [`Links`].
+//! Without these features an application implements [`Links`] itself.
 
 pub mod acyclic;
 pub mod application;

@@ -1,4 +1,4 @@
-//! Limits of a transfer by mailbox, by name.
+//! Limits of a mailbox transfer.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use ringcat_engine::mail::Limits;
 /// Largest number of bytes of a read by default.
 const DEFAULT_BYTES: usize = 1 << 20;
 
-/// How long one message of a transfer may take, and how much a read takes.
+/// Limits of a transfer: times of one message, and size of a read.
 ///
 /// ```
 /// use std::time::Duration;
@@ -20,11 +20,11 @@ const DEFAULT_BYTES: usize = 1 << 20;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TransferLimits {
-    /// Until the SubDevice's mailbox takes a message; 100 ms unless set.
+    /// Limit until the SubDevice's mailbox accepts a message; 100 ms unless set.
     pub request: Duration,
-    /// Until the answer to a message is there; 1 s unless set.
+    /// Limit until the answer to a message arrives; 1 s unless set.
     pub answer: Duration,
-    /// Most bytes that a read takes; 1 MiB unless set. A longer object or file is an error.
+    /// Maximum number of bytes of a read; 1 MiB unless set. A longer object or file is an error.
     pub bytes: usize,
 }
 
@@ -41,21 +41,21 @@ impl TransferLimits {
         TransferLimits { request, answer, bytes: DEFAULT_BYTES }
     }
 
-    /// The same, with this time for a message to be taken.
+    /// Sets [`TransferLimits::request`].
     #[must_use]
     pub const fn request(mut self, limit: Duration) -> TransferLimits {
         self.request = limit;
         self
     }
 
-    /// The same, with this time for an answer.
+    /// Sets [`TransferLimits::answer`].
     #[must_use]
     pub const fn answer(mut self, limit: Duration) -> TransferLimits {
         self.answer = limit;
         self
     }
 
-    /// The same, with at most so many bytes to be read.
+    /// Sets [`TransferLimits::bytes`].
     #[must_use]
     pub const fn bytes(mut self, limit: usize) -> TransferLimits {
         self.bytes = limit;

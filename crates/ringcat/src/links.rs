@@ -1,4 +1,4 @@
-//! What a MainDevice sends and receives through, and where its time comes from.
+//! The network interfaces of a MainDevice, and its clock.
 
 use std::task::Waker;
 
@@ -17,27 +17,27 @@ pub trait Links {
     /// Addresses of the main interface and, if there is one, of the redundant interface.
     fn addresses(&self) -> (MacAddress, Option<MacAddress>);
 
-    /// Sends a frame, without FCS. A link that is down swallows it.
+    /// Sends a frame, without FCS. A link that is down drops it.
     fn send(&mut self, link: Link, frame: &[u8]);
 
-    /// Hands the oldest frame that has arrived to `take`; false where there is none.
+    /// Passes the oldest frame that has arrived to `take`; false if there is none.
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
 
-    /// When the frame that was handed out last arrived at the interface, where these links know that better than by the
-    /// time at which it was taken. It left at `sent_at`, and was taken at about `now`: a time that is not between them
-    /// is determined anew. Without a system call.
+    /// Arrival time at the interface of the frame that was last passed to `take`; `None` if these links know only the
+    /// time at which it was taken. The frame left at `sent_at`, and was taken at about `now`: a time that is not
+    /// between them is determined again. Without a system call.
     fn received_at(&mut self, _sent_at: Instant, _now: Instant) -> Option<Instant> {
         None
     }
 
-    /// Whether an interface has a carrier; `None` where these links do not tell. Cheap: an atomic or two.
+    /// Whether an interface has a carrier; `None` if these links do not report it. Cheap: reads one or two atomics.
     fn carrier(&self, _link: Link) -> Option<bool> {
         None
     }
 
-    /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before a wait
-    /// ends it at once. `None` where these links have none: the acyclic half in a thread of its own then reads its
-    /// requests every half millisecond.
+    /// A handle with which other threads end [`Links::wait`] and [`Links::wait_from`]; a wake-up before a wait ends it
+    /// at once. `None` if these links have none: the acyclic half in its own thread then reads its requests every half
+    /// millisecond.
     fn waker(&self) -> Option<Waker> {
         None
     }
@@ -50,13 +50,13 @@ pub trait Links {
         self.wait(until);
     }
 
-    /// Waits until the time has come. No frame is expected: one that arrives all the same may end the wait or not.
+    /// Waits until the time has come. No frame is expected: a frame that arrives may end the wait or not.
     fn sleep(&mut self, until: Instant) {
         self.wait(until);
     }
 
-    /// Takes a link down so that its partner notices, or brings it back. False where that is not possible. Not called
-    /// in the cyclic path of an application whose halves have threads of their own.
+    /// Takes a link down so that its partner detects it, or brings it up again. False if that is not possible. Not
+    /// called in the cyclic path of an application with its halves in two threads.
     fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
         let _ = (link, disconnect);
         false

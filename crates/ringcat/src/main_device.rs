@@ -1,4 +1,4 @@
-//! A MainDevice on its links before it is active.
+//! A MainDevice with its links, before activation.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use crate::error::Error;
 use crate::links::Links;
 use crate::window::{DEFAULT_BUDGET, Window};
 
-/// How a MainDevice works. The addresses come from the links.
+/// Options of a MainDevice. The MAC addresses come from the links.
 ///
 /// ```
 /// use std::time::Duration;
@@ -39,29 +39,30 @@ pub struct Options {
     pub sii_cache: bool,
     /// SubDevices with dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
-    /// Whether a supervision datagram rides with the process data. Without it nothing is noticed by itself.
+    /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
+    /// automatically.
     pub supervision: bool,
     /// How marks are written into source addresses (protocol 9.7.1).
     pub source_address: MacCodec,
-    /// For so long the number of SubDevices must not change at the beginning of a scan.
+    /// Time for which the number of SubDevices must be unchanged at the beginning of a scan.
     pub settle: Duration,
-    /// So long a scan waits for the first SubDevice.
+    /// Maximum wait of a scan for the first SubDevice.
     pub patience: Duration,
-    /// What becomes of rings behind junctions. A connection that is added makes it strict.
+    /// Handling of rings behind junctions. An added connection makes it strict.
     pub junctions: JunctionMode,
     /// Whether the cabling is scanned again, as by [`Services::rescan`](crate::Services::rescan), when a hot connect
-    /// group has joined or left, as soon as nothing is broken: positions, places of breaks and errors of cables are
-    /// then those of the segment as it is. Without it, a group has none until a rescan is requested.
+    /// group has joined or left, as soon as nothing is broken. Positions, places of breaks and errors of cables then
+    /// follow the present segment; otherwise a group has no position until a rescan is requested.
     pub follow_groups: bool,
-    /// Whether the redundant link may be taken down for a moment, when ports have changed, to find out where a line is
-    /// crossed ([`Links::force_disconnect`]). Without, a closed ring shows only that there is a crossing.
+    /// Whether the redundant link may be taken down for a moment, when ports have changed, to locate a crossed line
+    /// ([`Links::force_disconnect`]). Otherwise a closed ring shows only that a line is crossed.
     pub enhanced_line_crossed: bool,
-    /// Datagrams that a frame may hold, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators take
-    /// fewer (often 15): the scan fails then ([`ScanError::FrameLimit`](crate::ScanError)). Less than 3
-    /// counts as 3.
+    /// Maximum number of datagrams in a frame, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators
+    /// accept fewer (often 15): the scan then fails with [`ScanError::FrameLimit`](crate::ScanError). Values below 3
+    /// are raised to 3.
     pub max_datagrams_per_frame: Option<u16>,
-    /// Bytes that everything but process data may send in a cycle, on each link; never more than what is left of the
-    /// cycle's time on the wire, and a longest frame at least. SubDevices share it fairly.
+    /// Maximum number of bytes per cycle and link for everything but process data. The limit never exceeds the wire
+    /// time that process data leaves free in the cycle, and is at least one longest frame. SubDevices share it fairly.
     pub acyclic_bytes: usize,
 }
 
@@ -84,77 +85,77 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The same, with SII contents kept or not, see [`Options::sii_cache`].
+    /// Sets [`Options::sii_cache`].
     #[must_use]
     pub fn with_sii_cache(mut self, sii_cache: bool) -> Options {
         self.sii_cache = sii_cache;
         self
     }
 
-    /// The same, with these dictionaries read for PDOs, see [`Options::pdos`].
+    /// Sets [`Options::pdos`].
     #[must_use]
     pub fn with_pdos(mut self, pdos: ReadPdos) -> Options {
         self.pdos = pdos;
         self
     }
 
-    /// The same, with or without the supervision datagram, see [`Options::supervision`].
+    /// Sets [`Options::supervision`].
     #[must_use]
     pub fn with_supervision(mut self, supervision: bool) -> Options {
         self.supervision = supervision;
         self
     }
 
-    /// The same, with marks in source addresses written so, see [`Options::source_address`].
+    /// Sets [`Options::source_address`].
     #[must_use]
     pub fn with_source_address(mut self, source_address: MacCodec) -> Options {
         self.source_address = source_address;
         self
     }
 
-    /// The same, with this time without a change at the beginning of a scan, see [`Options::settle`].
+    /// Sets [`Options::settle`].
     #[must_use]
     pub fn with_settle(mut self, settle: Duration) -> Options {
         self.settle = settle;
         self
     }
 
-    /// The same, with this time for the first SubDevice to answer, see [`Options::patience`].
+    /// Sets [`Options::patience`].
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Options {
         self.patience = patience;
         self
     }
 
-    /// The same, with this treatment of rings behind junctions, see [`Options::junctions`].
+    /// Sets [`Options::junctions`].
     #[must_use]
     pub fn with_junctions(mut self, junctions: JunctionMode) -> Options {
         self.junctions = junctions;
         self
     }
 
-    /// The same, with or without scans of the cabling for hot connect groups, see [`Options::follow_groups`].
+    /// Sets [`Options::follow_groups`].
     #[must_use]
     pub fn with_follow_groups(mut self, follow_groups: bool) -> Options {
         self.follow_groups = follow_groups;
         self
     }
 
-    /// The same, with or without a link taken down to find crossed lines, see [`Options::enhanced_line_crossed`].
+    /// Sets [`Options::enhanced_line_crossed`].
     #[must_use]
     pub fn with_enhanced_line_crossed(mut self, enhanced_line_crossed: bool) -> Options {
         self.enhanced_line_crossed = enhanced_line_crossed;
         self
     }
 
-    /// The same, with so many bytes per cycle for everything but process data, see [`Options::acyclic_bytes`].
+    /// Sets [`Options::acyclic_bytes`].
     #[must_use]
     pub fn with_acyclic_bytes(mut self, acyclic_bytes: usize) -> Options {
         self.acyclic_bytes = acyclic_bytes;
         self
     }
 
-    /// The same, with at most so many datagrams in a frame, see [`Options::max_datagrams_per_frame`].
+    /// Sets [`Options::max_datagrams_per_frame`].
     #[must_use]
     pub fn with_max_datagrams_per_frame(mut self, datagrams: u16) -> Options {
         self.max_datagrams_per_frame = Some(datagrams);
@@ -179,7 +180,7 @@ impl Options {
     }
 }
 
-/// A MainDevice that has links and sends nothing by itself yet.
+/// A MainDevice with links, before activation. It sends only while one of its methods runs.
 #[derive(Debug)]
 pub struct MainDevice<L> {
     links: L,
@@ -188,7 +189,7 @@ pub struct MainDevice<L> {
 }
 
 impl<L: Links> MainDevice<L> {
-    /// A MainDevice on these links.
+    /// Creates a MainDevice on these links.
     pub fn request(links: L, options: &Options) -> MainDevice<L> {
         let engine = options.engine(&links);
         MainDevice { links, engine, acyclic_bytes: options.acyclic_bytes }
@@ -197,12 +198,13 @@ impl<L: Links> MainDevice<L> {
     /// Scans the segment; all SubDevices are in INIT afterwards.
     ///
     /// # Errors
-    /// No answer, no SubDevices, a count that does not settle, or an SII that cannot be read.
+    /// [`Error::Scan`]: no frame returns, no SubDevice answers, the number of SubDevices does not settle, an SII cannot
+    /// be read, and others ([`ScanError`](crate::ScanError)).
     pub fn scan(&mut self) -> Result<Scan, Error> {
         self.scan_with(|_| ())
     }
 
-    /// Like [`MainDevice::scan`], and hands out each event as it comes.
+    /// Scans like [`MainDevice::scan`], and calls `on_event` for each event.
     ///
     /// # Errors
     /// As [`MainDevice::scan`].
@@ -223,13 +225,13 @@ impl<L: Links> MainDevice<L> {
     /// Inspects the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
-    /// Frames that are lost repeatedly, no SubDevice that answers, or SubDevices that are added or lost meanwhile.
+    /// Frames are lost repeatedly, no SubDevice answers, or SubDevices are added or lost meanwhile.
     pub fn inspect_ring(&mut self) -> Result<RingInspection, Error> {
         let bus = self.engine.bus();
         Ok(self.run(inspect_ring(bus))?)
     }
 
-    /// Receives, lets procedures go on, sends.
+    /// Receives frames, runs procedures, sends frames.
     fn work(&mut self) {
         let MainDevice { links, engine, .. } = self;
         let now = links.now();
@@ -241,7 +243,7 @@ impl<L: Links> MainDevice<L> {
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
     }
 
-    /// Waits for the next thing to happen.
+    /// Waits for a frame or a deadline.
     fn wait(&mut self) {
         if let Some(wake) = self.engine.next_deadline() {
             self.links.wait(wake);
@@ -263,7 +265,7 @@ impl<L: Links> MainDevice<L> {
         &mut self.engine
     }
 
-    /// Waits for the end of work. Nothing here stops the engine meanwhile, so there is one.
+    /// Waits for the result of a procedure. Nothing stops the engine meanwhile, so there always is a result.
     pub(crate) fn finish<T: 'static>(&mut self, mut work: Pending<T>) -> T {
         loop {
             self.work();
@@ -274,11 +276,11 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Lays out process data, starts the configuration of all SubDevices, and hands out the running application.
+    /// Lays out process data, starts the configuration of all SubDevices, and returns the running application.
     ///
     /// # Errors
-    /// A declaration that does not fit what was scanned, or process data that does not fit frames. The MainDevice comes
-    /// back with the error, for another try.
+    /// The declaration does not fit the scan, or process data does not fit into frames. The error contains the
+    /// MainDevice for another attempt.
     pub fn activate(mut self, declaration: Declaration) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         match self.load(declaration) {
             Ok(()) => self.apply(),
@@ -286,29 +288,29 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// First of the steps that [`MainDevice::activate`] takes at once: a declaration is loaded. It takes the place of
-    /// one that was loaded before, with all connections.
+    /// First of the steps that [`MainDevice::activate`] combines: loads a declaration. It replaces a previously loaded
+    /// one, with all added connections.
     ///
     /// # Errors
-    /// What is wrong with the declaration by itself.
+    /// Errors in the declaration alone.
     pub fn load(&mut self, declaration: Declaration) -> Result<(), Error> {
         Ok(self.engine.load(declaration)?)
     }
 
-    /// Second step, as often as needed: the connection of a ring behind a junction is added; the mode is strict then.
+    /// Second step, as often as needed: adds the connection of a ring behind a junction. The mode is then strict.
     ///
     /// # Errors
-    /// Nothing is loaded, or the connection cannot be.
+    /// Nothing is loaded, or the connection is wrong.
     pub fn add_junction_connection(&mut self, connection: JunctionConnection) -> Result<(), Error> {
         Ok(self.engine.add_junction_connection(connection).map_err(ActivateError::Junction)?)
     }
 
-    /// Last step: lays out process data, starts the configuration of all SubDevices, and hands out the running
+    /// Last step: lays out process data, starts the configuration of all SubDevices, and returns the running
     /// application.
     ///
     /// # Errors
-    /// Nothing is loaded, or it does not fit what was scanned. A ring that was declared is tried: one that does not
-    /// close there is refused. The MainDevice comes back with the error, and what was loaded with it.
+    /// Nothing is loaded, the declaration does not fit the scan, or a declared ring does not close as declared (each is
+    /// tested). The error contains the MainDevice; the declaration stays loaded.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         let window = Arc::new(Window::new(self.acyclic_bytes));
         let check = self.engine.start_connection_check();
@@ -334,7 +336,7 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Counters of what was sent and received so far.
+    /// Counters of frames and datagrams of the acyclic half so far.
     pub fn acyclic_counters(&self) -> AcyclicCounters {
         self.engine.counters()
     }
@@ -345,13 +347,13 @@ impl<L: Links> MainDevice<L> {
     }
 }
 
-/// A declaration that was not activated. As an error it drops the MainDevice; `?` turns it into an [`Error`] or into a
-/// `Box<dyn std::error::Error>`.
+/// A refused activation, with the MainDevice. `?` converts it into an [`Error`] or a `Box<dyn std::error::Error>`, and
+/// drops the MainDevice.
 #[non_exhaustive]
 pub struct Refused<M> {
-    /// Why.
+    /// The cause.
     pub error: Error,
-    /// The MainDevice as it was.
+    /// The MainDevice, unchanged.
     pub main_device: M,
 }
 

@@ -1,4 +1,4 @@
-//! Process data by index or name, with its type: where it lies is looked up once, before the cycles.
+//! Process data by index or name, with its type: its place is determined once, before the cycles.
 //!
 //! [`Application::input`] and [`Application::output`] check that the object is mapped, in which direction and with how
 //! many bits, and hand out an [`Input`] or [`Output`] that [`ProcessData::get`](crate::ProcessData::get) and
@@ -27,7 +27,8 @@ use crate::value::Number;
 use search::Search;
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
-    /// What a declared SubDevice sends of this object. Not for the cyclic path, as all of these: they allocate.
+    /// The input with this object, sent by a declared SubDevice. Not for the cyclic path: this and the following
+    /// methods allocate.
     ///
     /// ```
     /// # use std::time::Duration;
@@ -58,7 +59,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         Ok(Input::new(entry))
     }
 
-    /// What a declared SubDevice receives of this object; as [`Application::input`].
+    /// The output with this object, received by a declared SubDevice; as [`Application::input`].
     ///
     /// # Errors
     /// As [`Application::input`].
@@ -67,17 +68,17 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         Ok(Output::new(entry))
     }
 
-    /// What a declared SubDevice sends by this name, as its SII or dictionary gives it: `"Position"`, or with the PDO's
-    /// name before it where several have it, `"Channel 1.Input"`.
+    /// The input with this name in the SII or dictionary of a declared SubDevice: `"Position"`, or with the PDO's name
+    /// before it if several objects have the name, `"Channel 1.Input"`.
     ///
     /// # Errors
-    /// As [`Application::input`], or several have the name.
+    /// As [`Application::input`], or the name is not unique.
     pub fn input_named<T: Number>(&self, subdevice: SubDeviceId, name: &str) -> Result<Input<T>, MapError> {
         let entry = self.search(subdevice)?.typed::<T>(&Wanted::Name(name.to_owned()), Direction::Inputs)?;
         Ok(Input::new(entry))
     }
 
-    /// What a declared SubDevice receives by this name; as [`Application::input_named`].
+    /// The output with this name; as [`Application::input_named`].
     ///
     /// # Errors
     /// As [`Application::input_named`].
@@ -94,7 +95,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.search(subdevice)?.bits(&Wanted::Index { index, sub_index }, Direction::Outputs)
     }
 
-    /// All that is mapped of a declared SubDevice, in the order of its SyncManagers.
+    /// All mapped objects of a declared SubDevice, in the order of its SyncManagers.
     ///
     /// # Errors
     /// There is no such SubDevice.

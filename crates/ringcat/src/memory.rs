@@ -1,7 +1,7 @@
 //! Links in memory: frames go into rings of fixed size, a peer answers in the same process.
 //!
-//! For tests, benches and for applications with another way to the wire. Nothing is allocated after
-//! construction; what does not fit is counted.
+//! For tests, benches, and applications with their own access to the wire. Nothing is allocated after construction;
+//! frames that do not fit are counted.
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
@@ -33,7 +33,7 @@ impl FrameRing {
         FrameRing { slots: vec![slot; capacity.max(1)], head: 0, count: 0, overflowed: 0 }
     }
 
-    /// Appends a frame; false, and counted, where the queue is full or the frame longer than any may be.
+    /// Appends a frame. False if the queue is full or the frame is too long; such frames are counted.
     pub fn push(&mut self, link: Link, frame: &[u8]) -> bool {
         if self.count == self.slots.len() || frame.len() > MAX_FRAME_VLAN {
             self.overflowed += 1;
@@ -85,7 +85,7 @@ impl FrameRing {
 pub struct MemoryLinks {
     /// Frames that were sent, for the peer to take.
     pub sent: FrameRing,
-    /// Frames that the peer puts back.
+    /// Frames from the peer.
     pub arriving: FrameRing,
     now: Instant,
     addresses: (MacAddress, Option<MacAddress>),

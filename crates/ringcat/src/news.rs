@@ -1,6 +1,7 @@
-//! What the cyclic thread makes known to others: atomics that it alone writes, once a cycle, without waiting.
+//! Figures of the cyclic thread for other threads: atomics that only this thread writes, once per cycle, without
+//! waiting.
 //!
-//! Each number is right for itself; two of them may be of neighbouring cycles.
+//! Each number is consistent by itself; two numbers may be from adjacent cycles.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
@@ -31,7 +32,7 @@ pub struct Phase {
 pub struct News {
     pace: [AtomicU64; 6],
     counters: [AtomicU64; COUNTERS],
-    /// Working counter and what was expected; state and how often the domain was skipped.
+    /// Working counter and expected working counter; state, and number of times that the domain was skipped.
     domains: Box<[[AtomicU64; 2]]>,
     round_trips: Histogram,
     wake_ups: Histogram,
@@ -85,7 +86,7 @@ impl News {
         }
     }
 
-    /// How well the cycles keep to their times.
+    /// Counts and delays of the cycles.
     pub fn pace(&self) -> Pace {
         let [cycles, late, skipped, paused, last_delay, longest_delay] = load(&self.pace);
         let [last_delay, longest_delay] = [last_delay, longest_delay].map(Duration::from_nanos);
@@ -120,7 +121,7 @@ impl News {
         &self.round_trips
     }
 
-    /// How long after their time cycles began.
+    /// Delays of the beginning of cycles.
     pub fn wake_ups(&self) -> &Histogram {
         &self.wake_ups
     }
@@ -143,7 +144,7 @@ impl News {
         self.spread.load(Ordering::Relaxed).checked_sub(1).map(|ns| ns as u32)
     }
 
-    /// Has the histograms begin anew with the next cycle.
+    /// Clears the histograms with the next cycle.
     pub fn restart_histograms(&self) {
         self.restart.store(true, Ordering::Relaxed);
     }
@@ -187,7 +188,7 @@ impl News {
         self.spread.store(spread_ns.map_or(0, |ns| u64::from(ns) + 1), Ordering::Relaxed);
     }
 
-    /// What changes in each cycle.
+    /// Publishes the figures that change in each cycle.
     #[inline(always)]
     pub(crate) fn publish_cycle(&self, pace: &PaceNs, counters: &CyclicCounters, ring: RingState) {
         let ring = match ring {
@@ -205,13 +206,13 @@ impl News {
         set(received, counters.received);
     }
 
-    /// Whether histograms are to begin anew.
+    /// Whether the histograms are to be cleared.
     #[inline(always)]
     pub(crate) fn is_restart_wanted(&self) -> bool {
         self.restart.load(Ordering::Relaxed)
     }
 
-    /// What changes where a cycle was disturbed.
+    /// Publishes the figures that change only when a cycle was disturbed.
     #[cold]
     pub(crate) fn publish_rest(&self, pace: &PaceNs, counters: &CyclicCounters) {
         let PaceNs { cycles, late, skipped, paused, last_delay, longest_delay, disturbances: _ } = *pace;

@@ -1,4 +1,4 @@
-//! Which SubDevices are not in their states, and why, as events tell.
+//! SubDevices that are not in their states, with the reasons from events.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -12,13 +12,13 @@ use crate::subdevice::SubDeviceName;
 /// Events that are kept for the application while it waits; older ones are dropped and counted.
 const KEPT: usize = 4096;
 
-/// SubDevices that were not in their states when the time was over.
+/// SubDevices that were not in their states at the time limit.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct NotReady {
-    /// How long was waited.
+    /// The time limit.
     pub limit: Duration,
-    /// Which are not there yet, and why.
+    /// The SubDevices that are not in their states, with the reasons.
     pub subdevices: Vec<(SubDeviceName, Reason)>,
 }
 
@@ -30,7 +30,7 @@ pub enum Reason {
     Absent,
     /// It is being configured, or waits for the next attempt.
     Configuring {
-        /// What the last attempt failed for, where one has.
+        /// Reason of the last failed attempt, if there is one.
         failed: Option<String>,
     },
 }
@@ -58,12 +58,12 @@ impl fmt::Display for NotReady {
 
 impl std::error::Error for NotReady {}
 
-/// What configuration failed for last, by index in the declaration.
+/// Reasons of the last failed configurations, by index in the declaration.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Failures(Vec<Option<String>>);
 
 impl Failures {
-    /// Learns from an event, and logs it. Each event comes here once, on its way to the application.
+    /// Evaluates an event, and logs it. Each event passes here once, before the application takes it.
     pub fn observe(&mut self, timed: &TimedEvent) {
         #[cfg(feature = "tracing")]
         crate::trace::tell(timed);
@@ -79,13 +79,13 @@ impl Failures {
                     *reason = None;
                 }
             }
-            // What is declared next has other indices.
+            // The next declaration has other indices.
             Event::ScanFinished { .. } => self.0.clear(),
             _ => {}
         }
     }
 
-    /// Those that are not in their states, with their reasons.
+    /// SubDevices that are not in their states, with the reasons.
     pub fn explain(&self, engine: &Engine) -> Vec<(SubDeviceName, Reason)> {
         let explain = |(index, state): (usize, SubDeviceState)| {
             let name = SubDeviceName::of(engine, Address::Declared(SubDeviceId(index)));
@@ -109,7 +109,7 @@ pub(crate) struct KeptEvents {
 }
 
 impl KeptEvents {
-    /// Looks at all events that wait, and keeps them.
+    /// Evaluates all waiting events, and keeps them.
     pub fn take_in(&mut self, mut next: impl FnMut() -> Option<TimedEvent>) {
         while let Some(event) = next() {
             self.failures.observe(&event);

@@ -1,8 +1,8 @@
-//! How well cycles keep to their times, and what makes them begin.
+//! Triggers of cycles, and counts and delays of cycles.
 
 use std::time::Duration;
 
-/// What makes a cycle begin.
+/// Trigger of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Trigger {
@@ -16,10 +16,10 @@ pub enum Trigger {
         /// From the multiples of the period in system time to the beginning of cycles, in nanoseconds; may be negative.
         phase_ns: i64,
     },
-    /// The return of the last cycle's frames; where several cycles may be under way, of the oldest one's. Where they do
-    /// not return, a cycle begins as many periods after the last one as cycles may be under way.
+    /// The return of the last cycle's frames; if several cycles may be under way, the return of the oldest one. If they
+    /// do not return, the next cycle begins after as many periods as cycles may be under way.
     FramesReturned {
-        /// From the beginning of the last cycle to that of the next at the least; zero for cycles back to back.
+        /// Shortest time from the beginning of a cycle to that of the next; zero for cycles back to back.
         at_least: Duration,
     },
 }
@@ -33,7 +33,7 @@ pub(crate) struct PaceNs {
     pub paused: u64,
     pub last_delay: u64,
     pub longest_delay: u64,
-    /// How often anything was changed but `cycles` and `last_delay`.
+    /// Number of changes of fields other than `cycles` and `last_delay`.
     pub disturbances: u64,
 }
 
@@ -45,7 +45,7 @@ impl PaceNs {
     }
 }
 
-/// How well the cycles keep to their times. None of it is the wire's fault.
+/// Counts and delays of the cycles. Their cause is the host, not the wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Pace {
@@ -57,8 +57,8 @@ pub struct Pace {
     pub skipped: u64,
     /// Cycles that began later because the wire had to be empty while propagation delays were measured.
     pub paused: u64,
-    /// How late the last cycle began.
+    /// Delay of the last cycle.
     pub last_delay: Duration,
-    /// How late the latest cycle began.
+    /// Longest delay of a cycle.
     pub longest_delay: Duration,
 }

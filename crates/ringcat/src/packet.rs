@@ -1,7 +1,7 @@
 //! Links that are network interfaces: one packet socket each, or two where both halves have threads of their own.
 //!
-//! Time is `CLOCK_MONOTONIC`. How [`Links::wait`] waits is the user's choice ([`ReceiveMode`]): asleep, spinning, or
-//! one after the other. A link that goes down swallows frames and works again as soon as it is back.
+//! Time is `CLOCK_MONOTONIC`. [`ReceiveMode`] selects how [`Links::wait`] waits: asleep, spinning, or first spinning,
+//! then asleep. A link that is down drops frames, and works again as soon as it is up.
 
 use std::task::Waker;
 use std::time::Duration;
@@ -26,14 +26,14 @@ const _: () = assert!(RING_FRAMES as usize > ringcat_engine::ring::MAX_IN_FLIGHT
 pub struct PacketLinks {
     main: PacketSocket,
     redundant: Option<PacketSocket>,
-    /// Where the last frame was taken from.
+    /// Link of the last taken frame.
     taken_from: Link,
     mode: ReceiveMode,
-    /// How long frames take, for hybrid waits.
+    /// Usual return time of frames, for hybrid waits.
     usual: UsualReturn,
     /// A frame was sent since the last wait.
     has_sent: bool,
-    /// Polls the carriers; not for the cyclic half, which goes by what comes back.
+    /// Polls the carriers; not for the cyclic half, which evaluates returned frames only.
     carriers: Option<CarrierWatch>,
     /// Ends waits from other threads; not for the cyclic half, which waits for frames and times alone.
     wake_up: Option<WakeUp>,
@@ -57,13 +57,13 @@ impl PacketLinks {
     /// Opens the interfaces.
     ///
     /// # Errors
-    /// An interface that is not there or carries no Ethernet, or a missing permission.
+    /// An interface does not exist or is not Ethernet, or a permission is missing.
     pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
         PacketLinks::open_class(main, redundant, mode, ClassFilter::All)?.watch_carriers(main, redundant)
     }
 
-    /// Opens the interfaces twice: for the frames of the cyclic half, to be waited for in this mode, and for those of
-    /// the acyclic half, to be slept for.
+    /// Opens the interfaces twice: for the cyclic half, which waits for frames in this mode, and for the acyclic half,
+    /// which sleeps.
     ///
     /// # Errors
     /// As [`PacketLinks::open`].
@@ -125,7 +125,7 @@ impl PacketLinks {
         Ok(self)
     }
 
-    /// What an interface has sent, received and lost; `None` where there is none.
+    /// Counters of frames sent, received and lost by an interface; `None` if there is no such interface.
     pub fn counters(&self, link: Link) -> Option<LinkCounters> {
         match link {
             Link::Main => Some(self.main.counters()),
@@ -149,14 +149,14 @@ impl Links for PacketLinks {
         self.has_sent = true;
         match link {
             Link::Main => self.main.send(frame),
-            // The socket counts what it could not send; the engine notices by what does not come back.
+            // The socket counts frames that it could not send; the engine detects that they do not return.
             Link::Redundant => self.redundant.as_mut().is_some_and(|socket| socket.send(frame)),
         };
     }
 
     #[inline(always)]
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        // One call of `take`, so that it is inlined. Frames that are left out are behind it the next time.
+        // Only one call of `take`, so that the compiler inlines it. The loop skips frames that the socket rejects.
         loop {
             let (link, socket) = match &mut self.redundant {
                 _ if self.main.has_frame() => (Link::Main, &mut self.main),
@@ -218,7 +218,7 @@ impl Links for PacketLinks {
     #[inline(always)]
     fn sleep(&mut self, until: Instant) {
         match self.mode {
-            // A processor that is spun on stays awake and answers at once.
+            // A spinning processor does not enter a sleep state, and reacts at once.
             ReceiveMode::BusyPoll => self.wait(until),
             _ => monotonic::sleep_until_ns(until.0),
         }

@@ -1,4 +1,4 @@
-//! What an application works on within a cycle.
+//! Process data as an application reads and writes it within a cycle.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -23,16 +23,16 @@ pub(crate) struct Rate {
 /// In which cycles a domain is due.
 #[derive(Clone, Copy, Debug)]
 enum Due {
-    /// In each.
+    /// In each cycle.
     Always,
-    /// In every one of so many.
+    /// In every n-th cycle.
     Every(u64),
-    /// In the first that begins at or after each multiple of its period, both in nanoseconds.
+    /// In the first cycle that begins at or after each multiple of its period; both in nanoseconds.
     Between { cycle_ns: u64, period_ns: u64 },
 }
 
 impl Rate {
-    /// A domain with this period in cycles of that length; one without a period is due in each cycle.
+    /// Rate of a domain with this period, in cycles of this length. A domain without a period is due in each cycle.
     pub fn new(period: Duration, cycle: Duration) -> Rate {
         let [period_ns, cycle_ns] =
             [period, cycle].map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX).max(1));
@@ -44,7 +44,7 @@ impl Rate {
         Rate { due, status: DomainStatus::default() }
     }
 
-    /// Whether the domain is due in a cycle. Most are due in each: no division then.
+    /// Whether the domain is due in a cycle. The usual rate, each cycle, needs no division.
     #[inline(always)]
     pub fn is_due(&self, cycle: u64) -> bool {
         matches!(self.due, Due::Always) || self.is_due_now(cycle)
@@ -60,7 +60,7 @@ impl Rate {
         }
     }
 
-    /// Most cycles from one exchange of the domain to the next.
+    /// Largest number of cycles from one exchange of the domain to the next.
     pub fn cycles(&self) -> u64 {
         match self.due {
             Due::Always => 1,
@@ -105,7 +105,7 @@ impl ProcessData<'_> {
         self.rates.get(domain.0).is_some_and(|rate| rate.is_due(self.cycle))
     }
 
-    /// Value of an entry, zero-extended; [`ProcessData::get`] knows its type.
+    /// Value of an entry, zero-extended; [`ProcessData::get`] returns a typed value.
     pub fn read(&self, entry: &Entry) -> u64 {
         self.exchange.read(entry)
     }
@@ -115,7 +115,7 @@ impl ProcessData<'_> {
         entry.read_signed(self.exchange.image(entry.domain))
     }
 
-    /// Sets an output to an unsigned value; [`ProcessData::set`] knows its type and cannot fail.
+    /// Sets an output to an unsigned value; [`ProcessData::set`] takes a typed value and cannot fail.
     ///
     /// # Errors
     /// The entry is an input or not in the image, or the value has more bits. Nothing is changed then.
@@ -147,7 +147,7 @@ impl ProcessData<'_> {
         Ok(())
     }
 
-    /// An entry that may be written by value.
+    /// Checks that an entry can be written by value.
     fn check(&self, entry: &Entry) -> Result<(), WriteError> {
         let start = u64::from(entry.bit_offset);
         let bits = start..start + u64::from(entry.bit_length);
@@ -277,7 +277,7 @@ impl ProcessData<'_> {
         }
     }
 
-    /// How old a SubDevice's inputs are.
+    /// Age of a SubDevice's inputs in a domain.
     pub fn freshness(&self, domain: DomainId, subdevice: SubDeviceId) -> Freshness {
         self.exchange.freshness(domain, subdevice.0)
     }

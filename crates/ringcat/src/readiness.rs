@@ -15,17 +15,17 @@ use crate::supervisor_thread::SupervisorThread;
 const LOOK: Duration = Duration::from_millis(1);
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
-    /// Runs cycles until every declared SubDevice is in its target state (OP unless declared otherwise), optional ones
-    /// that do not answer left aside. Outputs stay as they are. Events stay to be taken.
+    /// Runs cycles until every declared SubDevice is in its target state (OP unless declared otherwise), except
+    /// optional SubDevices that do not answer. Outputs are unchanged. Events remain to be taken.
     ///
     /// # Errors
-    /// [`Error::NotReady`]: the limit is over; it names each SubDevice that is not ready, with the reason. The
-    /// application may go on.
+    /// [`Error::NotReady`]: the limit has passed; the error names each SubDevice that is not ready, with the reason.
+    /// The application may continue.
     pub fn wait_until_op(&mut self, limit: Duration) -> Result<(), Error> {
         self.wait_until_op_with(limit, |_| ())
     }
 
-    /// The same, with what the application does in each cycle meanwhile.
+    /// As [`Application::wait_until_op`]; each cycle calls `work`.
     ///
     /// # Errors
     /// As [`Application::wait_until_op`].
@@ -36,7 +36,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     ) -> Result<(), Error> {
         let end = self.now() + limit;
         loop {
-            // What a thread has published may be of the application before; the engine knows.
+            // The published state may be that of the previous application; the engine has the present state.
             if self.all_settled() && self.acyclic.not_ready()?.is_empty() {
                 return Ok(());
             }
@@ -55,7 +55,7 @@ impl SupervisorThread {
     /// [`Application::wait_until_op`].
     ///
     /// # Errors
-    /// [`Error::NotReady`]: the time is over. [`Error::Gone`]: the thread is gone.
+    /// [`Error::NotReady`]: the limit has passed. [`Error::Gone`]: the thread has ended.
     pub fn wait_until_op(&self, limit: Duration) -> Result<(), Error> {
         let begin = WallClock::now();
         while !(self.all_settled() && self.not_ready()?.is_empty()) {

@@ -1,14 +1,14 @@
-//! Services of the acyclic half that concern the whole segment, and the four forms in which all services come.
+//! Services for the whole segment, and the four forms of all services of the acyclic half.
 //!
-//! Each service is written once and works in four forms. The services of a single SubDevice are methods of
-//! [`SubDevice`](crate::SubDevice), which is made from the same four values:
+//! Each service has four forms, by the value on which it is called. Services of a single SubDevice are methods of
+//! [`SubDevice`](crate::SubDevice), which is created from the same values:
 //!
 //! | called on | form | the method returns |
 //! |---|---|---|
 //! | [`MainDevice`] | before activation; receives and sends until the end | `Result<T, Error>` |
 //! | [`SupervisorThread`] | from any thread, before and during process data; waits for the end | `Result<T, Error>` |
-//! | [`SupervisorThread::background`] | the same, without waiting | [`Job`]: to wait for or poll, a future |
-//! | [`Application`] in one thread | goes on while cycles go on | [`Pending`]: polled |
+//! | [`SupervisorThread::background`] | the same, without waiting | [`Job`]: wait, poll, or await it |
+//! | [`Application`] in one thread | runs while cycles run | [`Pending`]: polled |
 
 use std::time::Duration;
 
@@ -50,7 +50,7 @@ pub trait Services: Sized {
     /// How the caller gets a result that needs no frame.
     type Immediate<T>;
 
-    /// Starts work of the engine. All other services are made of this one.
+    /// Starts an async function of the engine. All other services use this method.
     fn call<T, E>(
         self,
         start: impl FnOnce(&mut Engine) -> Pending<Result<T, E>> + Send + 'static,
@@ -112,7 +112,7 @@ pub trait Services: Sized {
     }
 
     /// The whole state of the MainDevice at one moment: SubDevices, ring, clocks, groups, counters, and the number of
-    /// the next event. What happens later has that number or a higher one.
+    /// the next event. Later events have that number or a higher one.
     fn snapshot(self) -> Self::Immediate<Snapshot> {
         self.immediately(|engine| engine.snapshot())
     }
@@ -139,7 +139,7 @@ pub trait Services: Sized {
     }
 }
 
-/// Waits for the end.
+/// Waits until the service has ended.
 impl Services for &SupervisorThread {
     type Outcome<T, E> = Result<T, Error>;
     type Immediate<T> = Result<T, Error>;
@@ -163,13 +163,13 @@ impl Services for &SupervisorThread {
 pub struct Background<'a>(&'a SupervisorThread);
 
 impl SupervisorThread {
-    /// The same services, each as a [`Job`] that goes on while the caller does something else.
+    /// The same services without waiting: each returns a [`Job`].
     pub fn background(&self) -> Background<'_> {
         Background(self)
     }
 }
 
-/// Does not wait for the end.
+/// Does not wait.
 impl Services for Background<'_> {
     type Outcome<T, E> = Job<Result<T, E>>;
     type Immediate<T> = Result<T, Error>;
@@ -188,7 +188,7 @@ impl Services for Background<'_> {
     }
 }
 
-/// Receives and sends until the end.
+/// Receives and sends until the service has ended.
 impl<L: Links> Services for &mut MainDevice<L> {
     type Outcome<T, E> = Result<T, Error>;
     type Immediate<T> = T;
@@ -208,7 +208,7 @@ impl<L: Links> Services for &mut MainDevice<L> {
     }
 }
 
-/// Goes on while cycles go on.
+/// Runs while cycles run.
 impl<L: Links> Services for &mut Application<L, Inline> {
     type Outcome<T, E> = Pending<Result<T, E>>;
     type Immediate<T> = T;

@@ -1,5 +1,5 @@
-//! A simulated segment in real time whose links may be used by two threads: for trying applications whose halves have
-//! threads of their own, without an interface.
+//! A simulated segment in real time with links for two threads: to test applications with both halves in their own
+//! threads, without an interface.
 //!
 //! Virtual time follows the wall clock. Each call to send, receive or wait brings the segment up to date first.
 
@@ -54,7 +54,7 @@ pub struct SharedSegment {
 }
 
 impl SharedSegment {
-    /// Links into a network for the cyclic and for the acyclic half; two of each where something is plugged into its
+    /// Links into a network for the cyclic and for the acyclic half; two of each if a cable is connected to its
     /// redundant host interface.
     pub fn halves(network: Network) -> (SharedSegment, SharedSegment) {
         let ring = network.host_cable(HostLink::Redundant).is_some();
@@ -70,7 +70,7 @@ impl SharedSegment {
     }
 }
 
-/// A shared segment from outside of its links.
+/// Access to a shared segment from outside of its links.
 #[derive(Clone, Debug)]
 pub struct Plant {
     inner: Arc<Mutex<Inner>>,

@@ -1,7 +1,7 @@
 //! Links that end in a simulated segment in the same thread.
 //!
-//! In virtual time waiting costs nothing. Paced, the simulator is held back to the pace of the wall clock: a stall of
-//! the machine then stalls both sides alike and is not mistaken for a lost frame.
+//! In virtual time waiting takes no real time. Paced, virtual time does not run ahead of the wall clock. A stall of the
+//! machine then stops host and segment alike, and no frame counts as lost.
 
 use std::time::{Duration, Instant as WallClock};
 
@@ -16,11 +16,11 @@ use ringcat_wire::frame::MacAddress;
 
 use crate::links::Links;
 
-/// Address of the main interface: locally administered would set the bit that controllers set, so a plain one.
+/// Address of the main interface: not locally administered, because controllers set that bit.
 pub(crate) const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
 /// Address of the redundant interface.
 pub(crate) const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
-/// Being ahead of the wall clock by less than this is not worth a sleep.
+/// No sleep while virtual time is ahead of the wall clock by less than this.
 const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
 
 /// A simulated segment as links.
@@ -34,7 +34,7 @@ pub struct SimulatedSegment {
 }
 
 impl SimulatedSegment {
-    /// Links into a network; two of them where something is plugged into its redundant host interface.
+    /// Links into a network; two of them if a cable is connected to its redundant host interface.
     pub fn new(network: Network) -> SimulatedSegment {
         let ring = network.host_cable(HostLink::Redundant).is_some();
         SimulatedSegment { network, ring, arrived: None, pace: None, stalled: Duration::ZERO }
@@ -52,7 +52,7 @@ impl SimulatedSegment {
         self.stalled = Duration::ZERO;
     }
 
-    /// How far virtual time fell behind the wall clock at most since [`SimulatedSegment::pace`].
+    /// Largest delay of virtual time behind the wall clock since [`SimulatedSegment::pace`].
     pub fn stalled(&self) -> Duration {
         self.stalled
     }
@@ -62,7 +62,7 @@ impl SimulatedSegment {
         &self.network
     }
 
-    /// The segment behind the links, to bring about faults.
+    /// The segment behind the links, to inject faults.
     pub fn network_mut(&mut self) -> &mut Network {
         &mut self.network
     }

@@ -1,4 +1,4 @@
-//! How far SubDevices and clocks are: the mandatory ones, groups that join and leave, differences to the reference.
+//! States of mandatory SubDevices, of hot connect groups and of clocks.
 
 use ringcat_engine::main_device::{ClockStatus, GroupState};
 
@@ -14,7 +14,7 @@ impl<L: Links> Application<L, Inline> {
         self.engine().mandatory_settled()
     }
 
-    /// How far each hot connect group is, by its number. Not for the cyclic path.
+    /// The state of each hot connect group, by its number. Not for the cyclic path.
     pub fn groups(&self) -> Vec<GroupState> {
         self.engine().groups()
     }
@@ -30,15 +30,15 @@ impl SupervisorThread {
     /// Whether every declared SubDevice that is not optional is in its target state.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn mandatory_settled(&self) -> Result<bool, Error> {
         self.with(|engine| engine.mandatory_settled())
     }
 
-    /// How far each hot connect group is, by its number.
+    /// The state of each hot connect group, by its number.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn groups(&self) -> Result<Vec<GroupState>, Error> {
         self.with(|engine| engine.groups())
     }
@@ -46,7 +46,7 @@ impl SupervisorThread {
     /// Each distributed clock: delay, drift, difference to the reference clock. Empty if the declaration has no clocks.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn clocks(&self) -> Result<Vec<ClockStatus>, Error> {
         self.with(|engine| engine.clocks())
     }

@@ -12,11 +12,11 @@ use crate::main_device::MainDevice;
 use crate::supervisor_thread::SupervisorThread;
 
 impl<L: Links> Application<L, Inline> {
-    /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
-    /// down to a state. Hands back the MainDevice, which may scan again.
+    /// Stops in order: runs a few more cycles, with all outputs zero if `outputs` requests it, then brings all
+    /// SubDevices down to a state. Returns the MainDevice, which may scan again.
     ///
     /// # Errors
-    /// SubDevices that do not get to the state in time, or a bus that fails.
+    /// SubDevices do not reach the state in time, or the bus fails.
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
         self.last_cycles(outputs);
         self.acyclic.engine.start_stop(state, limit, self.links.now());
@@ -27,11 +27,11 @@ impl<L: Links> Application<L, Inline> {
 }
 
 impl<L: Links> Application<L, SupervisorThread> {
-    /// An orderly stop: a few more cycles, with all outputs zero where `outputs` says so, then all SubDevices are taken
-    /// down to a state. Hands back the MainDevice, which may scan again, and the links of the cycles.
+    /// Stops in order: runs a few more cycles, with all outputs zero if `outputs` requests it, then brings all
+    /// SubDevices down to a state. Returns the MainDevice, which may scan again, and the links of the cycles.
     ///
     /// # Errors
-    /// SubDevices that do not get to the state in time, or a bus that fails.
+    /// SubDevices do not reach the state in time, or the bus fails.
     pub fn stop(
         mut self,
         outputs: LastOutputs,

@@ -1,17 +1,16 @@
-//! One SubDevice, and what can be asked of it.
+//! Services of one SubDevice.
 //!
-//! A [`SubDevice`] is made from what it is reached by, and every method works in the form of that (see
-//! [`Services`]):
+//! One of four values creates a [`SubDevice`], and determines the form of all its methods (see [`Services`]):
 //!
-//! | made by | form | a method returns |
+//! | created by | form | a method returns |
 //! |---|---|---|
 //! | [`MainDevice::subdevice`] | before activation, by position; waits for the end | `Result<T, Error>` |
 //! | [`SupervisorThread::subdevice`] | from any thread; waits for the end | `Result<T, Error>` |
 //! | [`Background::subdevice`] | from any thread, without waiting | [`Job`](crate::Job): a future |
-//! | [`Application::subdevice`] in one thread | goes on while cycles go on | [`Pending`](crate::Pending): polled |
+//! | [`Application::subdevice`] in one thread | runs while cycles run | [`Pending`](crate::Pending): polled |
 //!
-//! What is made from a thread's handle can be copied and used again and again. In one thread it borrows the
-//! application, so it is made anew for each use: `application.subdevice(drive).sdo_read::<u32>(0x6064, 0)`.
+//! A [`SubDevice`] of a supervisor thread can be copied and used repeatedly. In one thread it borrows the application,
+//! so create it for each use: `application.subdevice(drive).sdo_read::<u32>(0x6064, 0)`.
 
 mod bus;
 mod error;
@@ -43,7 +42,7 @@ use crate::main_device::MainDevice;
 use crate::services::{Background, Services};
 use crate::supervisor_thread::SupervisorThread;
 
-/// One SubDevice: its objects, files, registers, states. How a method's result comes back is the form of `S`.
+/// One SubDevice: its objects, files, registers, states. `S` determines how a method returns its result.
 ///
 /// ```
 /// use ringcat::{Error, SubDeviceId, SupervisorThread};
@@ -64,32 +63,32 @@ pub struct SubDevice<S> {
 }
 
 impl<S: Services> SubDevice<S> {
-    /// A SubDevice that is reached by `services`.
+    /// The services of a SubDevice, in the form of `services`.
     pub fn new(services: S, address: impl Into<Address>) -> SubDevice<S> {
         SubDevice { services, address: address.into(), limits: TransferLimits::default(), within: None }
     }
 
-    /// The same, with other limits for the messages of a transfer.
+    /// Sets the limits for the messages of a transfer.
     #[must_use]
     pub fn limits(mut self, limits: TransferLimits) -> SubDevice<S> {
         self.limits = limits;
         self
     }
 
-    /// The same, with a limit for a whole service. What is not done by then is given up; the SubDevice is
-    /// informed where the protocol permits it. Without it, only single messages have limits.
+    /// Sets a limit for a whole service. At the limit the service is cancelled, also at the SubDevice if the protocol
+    /// permits it. Without this limit only single messages have limits.
     #[must_use]
     pub fn within(mut self, limit: Duration) -> SubDevice<S> {
         self.within = Some(limit);
         self
     }
 
-    /// How it was named.
+    /// The address with which it was created.
     pub fn address(&self) -> Address {
         self.address
     }
 
-    /// Asks the engine for something; `number` is how it knows the SubDevice.
+    /// Starts a service in the engine; `number` is the SubDevice's number there.
     fn ask<T, E, W>(self, work: impl FnOnce(&mut Engine, usize) -> W + Send + 'static) -> S::Outcome<T, SubDeviceError>
     where
         T: Send + 'static,
@@ -100,7 +99,7 @@ impl<S: Services> SubDevice<S> {
         services.call(move |engine| start(engine, address, within, work))
     }
 
-    /// Asks the SubDevice's mailbox for something. Before activation, a SubDevice in INIT is brought to PREOP.
+    /// Starts a service of the SubDevice's mailbox. Before activation, a SubDevice in INIT is brought to PREOP.
     fn ask_mailbox<T, E, W>(self, work: impl FnOnce(Mailbox) -> W + Send + 'static) -> S::Outcome<T, SubDeviceError>
     where
         T: Send + 'static,
@@ -121,7 +120,7 @@ impl<L: Links> MainDevice<L> {
 }
 
 impl<L: Links> Application<L, Inline> {
-    /// A declared SubDevice; its services go on while cycles go on.
+    /// A declared SubDevice; its services run while cycles run.
     pub fn subdevice(&mut self, subdevice: SubDeviceId) -> SubDevice<&mut Application<L, Inline>> {
         SubDevice::new(self, subdevice)
     }
@@ -135,7 +134,7 @@ impl SupervisorThread {
 }
 
 impl<'a> Background<'a> {
-    /// A SubDevice of which nothing is waited for; as [`SupervisorThread::subdevice`].
+    /// A SubDevice with services that do not wait; as [`SupervisorThread::subdevice`].
     pub fn subdevice(self, address: impl Into<Address>) -> SubDevice<Background<'a>> {
         SubDevice::new(self, address)
     }

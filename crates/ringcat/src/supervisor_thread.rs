@@ -1,9 +1,9 @@
-//! The acyclic half in a thread of its own, with links of its own.
+//! The acyclic half in its own thread, with its own links.
 //!
 //! The thread sleeps until a frame, a deadline or a request comes, and reads once per cycle whether the cyclic half has
 //! posted anything new; the cyclic half makes no system call for this. It sends in the windows that the cyclic half
-//! leaves ([`crate::window`]). So neither half waits for the other, and an application that only runs its cycles has a
-//! living bus behind it.
+//! leaves ([`crate::window`]). So neither half waits for the other, and supervision goes on for an application that
+//! only runs its cycles.
 
 mod worker;
 
@@ -39,10 +39,10 @@ use crate::subdevice::{SubDeviceName, info};
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
-/// A thread that waits for a scan looks at other things this often.
+/// Interval of other work in a thread that waits for a scan.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
-/// A MainDevice whose acyclic half runs in a thread of its own: a handle, of which any thread may have one.
+/// Handle of a MainDevice with its acyclic half in its own thread. Any thread may have a copy.
 ///
 /// The thread ends when the last handle is dropped.
 #[derive(Clone, Debug)]
@@ -64,7 +64,7 @@ impl SupervisorThread {
     /// set its priority and processor.
     ///
     /// # Errors
-    /// The system has no more threads.
+    /// The system cannot start a thread.
     pub fn start<L>(links: L, options: &Options, prepare: impl FnOnce() + Send + 'static) -> Result<Self, Error>
     where
         L: Links + Send + 'static,
@@ -78,7 +78,7 @@ impl SupervisorThread {
         let (shared, windows) = (published.clone(), window.clone());
         let body = move || {
             prepare();
-            // The engine is made here because its procedures stay in the thread that made them.
+            // The engine is created in this thread, because its procedures cannot move to another one.
             let engine = options.engine(&links);
             Worker::new(links, engine, windows, outgoing, shared).run(&incoming);
         };
@@ -87,7 +87,7 @@ impl SupervisorThread {
         Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, waker, thread: Some(thread) })))
     }
 
-    /// Has the thread begin a task.
+    /// Starts a task in the thread.
     fn begin(&self, begin: impl FnOnce(&mut Engine, Instant) -> Task + Send + 'static) -> Result<(), Error> {
         self.request(Attention::Engine, begin)
     }
@@ -103,45 +103,44 @@ impl SupervisorThread {
         Ok(())
     }
 
-    /// Starts work of the engine in the thread. The one way from a thread of the application to the engine's and back.
+    /// Starts work of the engine in the thread. All services from other threads use this method.
     pub(crate) fn start_work<T: Send + 'static>(
         &self,
         start: impl FnOnce(&mut Engine) -> Pending<T> + Send + 'static,
     ) -> Job<T> {
         let (job, reply) = job(self.clone());
-        // Where the thread is gone the reply is dropped, and the job knows.
+        // If the thread has ended the reply is dropped, and the job fails.
         let _ = self.begin(move |engine, _| reply.follow(start(engine)));
         job
     }
 
-    /// Has the thread ask its engine a question again and again until there is an answer.
+    /// Calls `question` in each turn of the thread until it returns a result.
     fn ask<R: Send + 'static>(&self, question: impl FnMut(&mut Engine) -> Option<R> + Send + 'static) -> Job<R> {
         let (job, reply) = job(self.clone());
         let _ = self.begin(move |_, _| reply.answer(question));
         job
     }
 
-    /// Has the thread do something with its engine in each of its turns, until it says true.
+    /// Calls a closure with the engine in each turn of the thread, until it returns true.
     #[cfg(any(feature = "eoe", feature = "gateway"))]
     pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
         self.request(Attention::Often, move |_, _| Box::new(work))
     }
 
-    /// Has the thread do something with its engine, and waits for what comes out.
+    /// Runs `act` with the engine in the thread, and waits for its result.
     ///
     /// # Errors
-    /// The thread is gone.
+    /// The thread has ended.
     pub fn with<R: Send + 'static>(&self, act: impl FnOnce(&mut Engine) -> R + Send + 'static) -> Result<R, Error> {
         let mut act = Some(act);
         self.ask(move |engine| act.take().map(|act| act(engine))).wait()
     }
 
-    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, whose
-    /// mailboxes it may take. SubDevices are named by their index in the declaration, before activation by their
-    /// position.
+    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, and may take
+    /// mailboxes from it. SubDevices are named by their index in the declaration, before activation by their position.
     ///
     /// # Errors
-    /// The thread is gone, or the MainDevice was stopped meanwhile.
+    /// The thread has ended, or the MainDevice was stopped meanwhile.
     pub fn run<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Result<T, Error>
     where
         T: Send + 'static,
@@ -166,12 +165,13 @@ impl SupervisorThread {
     /// Scans the segment; all SubDevices are in INIT afterwards.
     ///
     /// # Errors
-    /// No answer, no SubDevices, a count that does not settle, or an SII that cannot be read.
+    /// [`Error::Scan`]: no frame returns, no SubDevice answers, the number of SubDevices does not settle, an SII cannot
+    /// be read, and others ([`ScanError`](crate::ScanError)).
     pub fn scan(&self) -> Result<Scan, Error> {
         self.scan_while(|| ())
     }
 
-    /// Like [`SupervisorThread::scan`], and runs `meanwhile` every now and then: to take events, for example.
+    /// Scans like [`SupervisorThread::scan`], and calls `meanwhile` about every 10 ms, for example to take events.
     ///
     /// # Errors
     /// As [`SupervisorThread::scan`].
@@ -188,12 +188,12 @@ impl SupervisorThread {
         Ok(result?)
     }
 
-    /// Lays out process data, starts the configuration of all SubDevices, and hands out the running application, whose
-    /// cycles use `links`: they carry the frames of the cyclic half, on the same interfaces.
+    /// Lays out process data, starts the configuration of all SubDevices, and returns the running application. Its
+    /// cycles use `links`, which carry the frames of the cyclic half on the same interfaces.
     ///
     /// # Errors
-    /// A declaration that does not fit what was scanned, or process data that does not fit frames. Everything comes
-    /// back with the error, for another try.
+    /// The declaration does not fit the scan, or process data does not fit into frames. The error contains the handle
+    /// and the links for another attempt.
     pub fn activate<C: Links>(self, declaration: Declaration, links: C) -> Activated<C> {
         match self.load(declaration) {
             Ok(()) => self.apply(links),
@@ -201,10 +201,10 @@ impl SupervisorThread {
         }
     }
 
-    /// First of the steps that [`SupervisorThread::activate`] takes at once, as [`crate::MainDevice::load`].
+    /// First of the steps that [`SupervisorThread::activate`] combines, as [`crate::MainDevice::load`].
     ///
     /// # Errors
-    /// What is wrong with the declaration by itself.
+    /// Errors in the declaration alone.
     pub fn load(&self, declaration: Declaration) -> Result<(), Error> {
         Ok(self.with(move |engine| engine.load(declaration))??)
     }
@@ -212,7 +212,7 @@ impl SupervisorThread {
     /// Second step, as [`crate::MainDevice::add_junction_connection`].
     ///
     /// # Errors
-    /// Nothing is loaded, or the connection cannot be.
+    /// Nothing is loaded, or the connection is wrong.
     pub fn add_junction_connection(&self, connection: JunctionConnection) -> Result<(), Error> {
         let added = self.with(move |engine| engine.add_junction_connection(connection))?;
         Ok(added.map_err(ActivateError::Junction)?)
@@ -221,9 +221,9 @@ impl SupervisorThread {
     /// Last step, as [`crate::MainDevice::apply`]; cycles run on `links`.
     ///
     /// # Errors
-    /// Nothing is loaded, or it does not fit what was scanned.
+    /// Nothing is loaded, or the declaration does not fit the scan.
     pub fn apply<C: Links>(self, links: C) -> Activated<C> {
-        // From then on the windows of the cyclic half count, so its first cycle must not be long in coming.
+        // From then on the windows of the cyclic half apply, so its first cycle must begin soon.
         let apply = || self.with(move |engine| engine.apply())?.map_err(Error::from);
         match self.check_connections().and_then(|()| apply()) {
             Ok(active) => {
@@ -234,13 +234,13 @@ impl SupervisorThread {
         }
     }
 
-    /// Whether rings that were declared close where they are said to.
+    /// Checks that the declared rings close as declared.
     fn check_connections(&self) -> Result<(), Error> {
         let checked = self.start_work(|engine| engine.start_connection_check()).wait()?;
         Ok(checked.map_err(ActivateError::Junction)?)
     }
 
-    /// Takes all SubDevices down to a state.
+    /// Brings all SubDevices down to a state.
     pub(crate) fn stop(&self, state: AlState, limit: Duration) -> Result<(), Error> {
         let (begun, reply) = job(self.clone());
         self.begin(move |engine, now| {
@@ -254,12 +254,12 @@ impl SupervisorThread {
         self.0.published.rest.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Events that were not taken in time and were dropped.
+    /// Number of events that were dropped because they were not taken in time.
     pub fn events_dropped(&self) -> u64 {
         self.rest().events_dropped
     }
 
-    /// How far each declared SubDevice is, at most some milliseconds old.
+    /// State of each declared SubDevice, at most some milliseconds old.
     pub fn states(&self) -> Vec<SubDeviceState> {
         self.rest().states
     }
@@ -269,7 +269,7 @@ impl SupervisorThread {
         self.rest().ring
     }
 
-    /// Whether every declared SubDevice is in its target state. A look at an atomic.
+    /// Whether every declared SubDevice is in its target state. Reads one atomic.
     pub fn all_settled(&self) -> bool {
         self.0.published.settled.load(Ordering::Acquire)
     }
@@ -308,7 +308,7 @@ impl Drop for Handle {
         self.requests = None;
         self.wake();
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been told by the panic handler.
+            // The panic handler has reported a panic of the thread.
             let _ = thread.join();
         }
     }
@@ -357,5 +357,5 @@ impl AcyclicHalf for SupervisorThread {
     }
 }
 
-/// A running application, or both parts for another try.
+/// A running application, or the handle and the links for another attempt.
 pub type Activated<C> = Result<Application<C, SupervisorThread>, Box<Refused<(SupervisorThread, C)>>>;

@@ -5,8 +5,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use ringcat_engine::time::Instant;
 use ringcat_wire::time::DcTime;
 
-/// What [`crate::ClockConfig::epoch`] must be so that clocks show the time of day: the system time when the host's
-/// monotonic time was zero. Zero where the host believes to live before 2000. `now` is the monotonic time now.
+/// Value of [`crate::ClockConfig::epoch`] with which the clocks show the time of day: the system time when the host's
+/// monotonic time was zero. Zero if the host's time is before the year 2000. `now` is the monotonic time now.
 pub fn epoch(now: Instant) -> u64 {
     let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let time = u64::try_from(unix.as_nanos()).ok().and_then(DcTime::from_unix_ns);

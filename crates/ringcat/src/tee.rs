@@ -1,8 +1,8 @@
-//! Links that are recorded: whatever passes goes on as before, and into a capture too.
+//! Links with a capture: all frames pass unchanged, and are recorded.
 //!
-//! In go any [`Links`] and a [`Tap`], out come links. Frames are stamped with the links' own time, sent ones before
-//! they are handed on, received ones when they are taken. Interface 0 of the capture is the main link, 1 the redundant
-//! one. One tap serves one thread; tees of several threads write into one file.
+//! Input: any [`Links`] and a [`Tap`]. Output: links. Frames are recorded with the time of the links: sent frames
+//! before they are passed on, received frames when they are taken. Interface 0 of the capture is the main link, 1 the
+//! redundant one. One tap serves one thread; tees of several threads write into one file.
 
 use std::task::Waker;
 
@@ -22,7 +22,7 @@ pub struct Tee<L> {
 }
 
 impl<L: Links> Tee<L> {
-    /// Records what passes these links; without a tap nothing is.
+    /// Records the frames of these links; without a tap nothing is recorded.
     pub fn new(links: L, tap: impl Into<Option<Tap>>) -> Tee<L> {
         let mut tap = tap.into();
         if let Some(tap) = &mut tap {

@@ -33,7 +33,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| subdevices::describe(event, names, *occupants))
         .or_else(|| clocks::describe(event, names, *occupants))
         .or_else(|| of_process_data(event));
-    // No event is without a line here; a newer engine may report others.
+    // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))
 }
 

@@ -1,8 +1,8 @@
 //! Events as `tracing` events, for an application that logs by a subscriber (feature `tracing`).
 //!
-//! The acyclic half tells each event once, in its own thread where it has one, with the target `ringcat`, the text of
-//! [`describe`] and the field `at_ns`. What stands in the way of process data or of redundancy is a warning, judgements
-//! of single cycles are for debugging, everything else is information. The cyclic half tells nothing by itself.
+//! The acyclic half reports each event once, in its own thread if it has one, with the target `ringcat`, the text of
+//! [`describe`] and the field `at_ns`. Events that impair process data or redundancy are warnings, states of single
+//! cycles are debug messages, all others are information. The cyclic half itself reports nothing.
 
 use ringcat_engine::event::{Event, TimedEvent};
 use tracing::{Level, enabled, event};
@@ -11,7 +11,7 @@ use crate::text::{Names, describe};
 
 const TARGET: &str = "ringcat";
 
-/// Tells an event.
+/// Reports an event.
 pub(crate) fn tell(timed: &TimedEvent) {
     match level(&timed.event) {
         Level::WARN if enabled!(target: TARGET, Level::WARN) => {

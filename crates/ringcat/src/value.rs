@@ -6,27 +6,27 @@
 pub trait Number: Copy + Send + 'static + sealed::Sealed {
     /// Name of the type in messages.
     const NAME: &'static str;
-    /// Bits that it has in process data.
+    /// Number of bits in process data.
     const BITS: u16;
-    /// Bytes that it has in an object or a register.
+    /// Number of bytes in an object or a register.
     const BYTES: usize;
 
-    /// From the lower [`Number::BITS`] bits.
+    /// Decodes the lower [`Number::BITS`] bits.
     fn from_bits(bits: u64) -> Self;
 
-    /// As its lower [`Number::BITS`] bits.
+    /// Encodes into the lower [`Number::BITS`] bits.
     fn to_bits(self) -> u64;
 }
 
 /// What an object holds: a [`Number`], bytes, or text.
 pub trait ObjectValue: Sized + Send + 'static {
-    /// Bytes that the object must have; `None` where any number will do.
+    /// Size of the object in bytes; `None` if any size is allowed.
     const BYTES: Option<usize>;
 
-    /// From an object's bytes, which are as many as [`ObjectValue::BYTES`] says.
+    /// Decodes the bytes of an object; their number is [`ObjectValue::BYTES`], if it is given.
     fn decode(bytes: Vec<u8>) -> Self;
 
-    /// As an object's bytes.
+    /// Encodes the bytes of an object.
     fn encode(self) -> Vec<u8>;
 }
 

@@ -1,9 +1,9 @@
 //! When frames of the acyclic half may leave: between the frames of two cycles.
 //!
-//! The cyclic half says when its next frames leave, both halves say when what they sent will have left the interface.
-//! Each word has one writer, so the halves may live in threads of their own. Both links carry the same frames; one
-//! account serves both. Besides, the acyclic half has a budget per cycle, so that a long cycle does not fill the queues
-//! of the interface at once.
+//! The cyclic half posts when its next frames leave. Each half posts when its sent frames will have left the interface.
+//! Each word has one writer, so the halves may run in different threads. Both links carry the same frames, so one
+//! account is enough. The acyclic half also has a budget per cycle, so that a long cycle does not fill the queues of
+//! the interface at once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -11,14 +11,13 @@ use std::time::Duration;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, MIN_FRAME, WIRE_OVERHEAD, wire_time_ns};
 
-/// Before a cycle begins, the wire is left to itself for so long: an acyclic frame that is under way then has passed
-/// the interface.
+/// Time before a cycle in which no acyclic frame is sent: a frame that was sent before has then left the interface.
 const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
-/// A pause between two cycles that is shorter has no room for a frame: there is no window to keep then.
+/// A shorter gap between two cycles has no room for a frame, so there is no window.
 pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wire_time_ns(MAX_FRAME) / 2);
-/// A cyclic half that is so much later than it said has stopped: no cyclic frames follow then.
+/// A cyclic half that is later than posted by more than this has stopped: no cyclic frames follow.
 const SILENCE_NS: u64 = 20_000_000;
-/// A cycle that is due may begin any moment: the wire is looked at again after this.
+/// Interval of the check for room while a cycle is due, because it may begin at any moment.
 const LOOK_AGAIN: Duration = Duration::from_micros(50);
 /// Shortest time between two readings of what the cyclic half posts.
 const SHORTEST_READING: Duration = Duration::from_micros(500);
@@ -32,19 +31,19 @@ pub enum Half {
     Acyclic,
 }
 
-/// Bytes that the acyclic half may send in a cycle where nothing else was said: the wire time of about 10 ms.
+/// Default number of bytes that the acyclic half may send in a cycle: the wire time of about 10 ms.
 pub const DEFAULT_BUDGET: usize = 128 * 1024;
 
-/// What both halves know of the wire.
+/// Use of the wire by both halves.
 #[derive(Debug)]
 pub struct Window {
     /// Bytes that the acyclic half may send in a cycle.
     budget: usize,
-    /// The end of the cycle in which it sent last, and what it has sent in it.
+    /// End of the cycle in which it sent last, and the bytes that it sent in that cycle.
     spent: [AtomicU64; 2],
     /// When frames of the cyclic half leave next; never without a cyclic half.
     next_cycle: AtomicU64,
-    /// When what each half sent will have left.
+    /// When the sent frames of each half will have left.
     free: [AtomicU64; 2],
 }
 
@@ -55,7 +54,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Windows in which the acyclic half may send so many bytes per cycle, and a longest frame at least.
+    /// Windows with this number of bytes per cycle for the acyclic half, at least one longest frame.
     pub fn new(budget: usize) -> Window {
         let zero = || AtomicU64::new(0);
         Window {
@@ -71,7 +70,7 @@ impl Window {
         self.budget
     }
 
-    /// Says when cyclic frames leave next.
+    /// Posts when cyclic frames leave next.
     #[inline(always)]
     pub fn expect_cycle(&self, at: Instant) {
         self.next_cycle.store(at.0, Ordering::Relaxed);
@@ -90,7 +89,7 @@ impl Window {
         }
     }
 
-    /// What the acyclic half has sent in the cycle that ends then.
+    /// Bytes that the acyclic half has sent in the cycle that ends at `next`.
     fn spent_before(&self, next: u64) -> u64 {
         let [of, spent] = &self.spent;
         if of.load(Ordering::Relaxed) == next { spent.load(Ordering::Relaxed) } else { 0 }
@@ -135,7 +134,7 @@ impl Window {
         if next == Instant::NEVER { earliest } else { (next + LOOK_AGAIN).max(earliest) }
     }
 
-    /// When to look again for room that there is not now.
+    /// When to check again for room on the wire.
     pub fn look_again(&self, now: Instant) -> Instant {
         let next = Instant(self.next_cycle.load(Ordering::Relaxed));
         next.max(now) + LOOK_AGAIN

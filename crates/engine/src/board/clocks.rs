@@ -98,7 +98,7 @@ impl ClockWords {
         self.holds.store(holds.wrapping_add(1), Ordering::Release);
     }
 
-    /// Number of stops so far.
+    /// Number of stops of the distribution so far.
     pub(crate) fn holds(&self) -> u32 {
         self.holds.load(Ordering::Acquire)
     }

@@ -20,7 +20,7 @@ pub struct Traffic {
     home: AtomicU16,
     /// The last frame of which one copy but not yet all returned, by the link it was sent on.
     half_home: [AtomicU16; 2],
-    /// End of the pause that the supervisor asks for.
+    /// End of the pause that the supervisor requests.
     pause_until: AtomicU64,
 }
 
@@ -62,7 +62,7 @@ impl Traffic {
         self.begun.load(Ordering::Acquire).wrapping_add(1)
     }
 
-    /// Asks the exchange to begin no cycle earlier than this.
+    /// Requests that the exchange begins no cycle earlier than this.
     pub(crate) fn ask_for_pause(&self, until: Instant) {
         self.pause_until.store(until.0, Ordering::Relaxed);
     }

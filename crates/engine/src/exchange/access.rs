@@ -40,8 +40,8 @@ impl Exchange {
         domain.freshness(subdevice)
     }
 
-    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the last judged cycle of its domain; zero
-    /// where it did not answer. `None` before the first cycle, and where its frames do not show it
+    /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the last evaluated cycle of its domain;
+    /// zero where it did not answer. `None` before the first cycle, and where its frames do not show it
     /// ([`crate::layout::Witness`]).
     pub fn al_status(&self, subdevice: usize) -> Option<u8> {
         let judged = |frame: &&CyclicFrame| {
@@ -129,7 +129,7 @@ impl Exchange {
         self.evidence.clocks.set_up(setup);
     }
 
-    /// Sets the application's time now, in nanoseconds of system time: bus shift leads the reference clock to it.
+    /// Sets the application's time now, in nanoseconds of system time: bus shift steers the reference clock to it.
     /// Without it, host time plus the epoch of the configuration is used. The first time may also be the grid of SYNC
     /// pulses (`PulseGrid`); 0 counts as not set.
     pub fn set_application_time(&mut self, time: u64, now: Instant) {

@@ -151,9 +151,9 @@ pub(crate) struct Clocks {
     times: [Option<ReferenceTime>; 2],
     /// Last reading, used while there is no reference.
     last: Option<ReferenceTime>,
-    /// Difference between the steered reference and the other one.
+    /// Difference between the steered reference and the segment's reference.
     lead: Option<Lead>,
-    /// Difference between the segment's reference and the time that it is led to, and its last value.
+    /// Difference between the segment's reference and the time that it is to follow, and its last value.
     behind: Option<Lead>,
     led: Option<ReferenceTime>,
     /// The application's time, and when it was set.
@@ -255,7 +255,7 @@ impl Clocks {
     }
 
     /// The references that receive another time than their own, and that time, by the link of the copy. In an open ring
-    /// each copy passes a reference of its own; the leading one may follow the host while the other one follows it.
+    /// each copy passes another reference: the first may follow the host, the second follows the first.
     fn steering(&mut self, distributes: bool, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
         let steered = steered.filter(|_| distributes);
@@ -269,8 +269,8 @@ impl Clocks {
         }
     }
 
-    /// Time written to the segment's reference: that of the host or of the application. Once the difference to that is
-    /// known, its own reading corrected by a part of the difference.
+    /// Time written to the segment's reference: that of the host or of the application. Once the difference to that
+    /// time is known: the reading of the reference, corrected by a part of the difference.
     fn leading(&mut self, leader: Option<Link>, board: &Board, now: Instant) -> Option<(StationAddress, u32)> {
         let leader = leader?;
         let station = self.references.on(leader)?;
@@ -304,7 +304,7 @@ impl Clocks {
     /// Evaluates the end of a flight.
     pub(crate) fn observe(&mut self, seen: &Seen, arrivals: Arrivals, board: &Board, events: &mut Producer) {
         let mut is_closed = false;
-        // A flight that left before the latest post read clocks that are references no more.
+        // A flight that left before the latest post has read clocks that are no longer references.
         if seen.references == self.changes {
             let steered = self.observe_references(seen, board.clocks.is_window_watched());
             is_closed = steered && arrivals.verdict() == Some(RingState::Closed);
@@ -319,9 +319,9 @@ impl Clocks {
         }
         self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 && seen.monitors {
-            // While no time is distributed, differences are those of a frame that took another way. A steered reference
-            // and the clocks in front of a reference show the jitter of the host; the supervisor checks each of the
-            // other clocks then.
+            // While no time is distributed, differences come from a frame on another path. A steered reference and the
+            // clocks in front of a reference show the jitter of the host; the supervisor checks each of the other
+            // clocks then.
             let is_steered = self.references.leader().1.is_some() || board.clocks.is_host_told();
             let is_meant = !is_held && !is_steered;
             self.judge_spread(seen.spread, is_meant, board, events);
@@ -356,7 +356,7 @@ impl Clocks {
         true
     }
 
-    /// Takes the time that the segment's reference showed to a frame.
+    /// Takes the time of the segment's reference as a frame read it.
     fn observe_led(&mut self, time: u64, sent_at: Instant) {
         let wanted = match self.led {
             Some(led) if led.sent_at == sent_at => led.time,

@@ -86,9 +86,9 @@ pub enum CopyError {
     },
     /// Two rules copy to the same bits.
     Overlap {
-        /// One rule.
+        /// The first rule.
         rule: usize,
-        /// The other one.
+        /// The second rule.
         with: usize,
     },
 }
@@ -136,7 +136,7 @@ pub(super) struct Copies {
     sources: Box<[Source]>,
     /// Ordered by the domain of the target.
     pieces: Box<[Piece]>,
-    /// Of these, those of each domain.
+    /// The pieces of each domain.
     by_domain: Box<[Range<usize>]>,
     /// Rules whose source was stale at the last copy.
     stale: Box<[bool]>,

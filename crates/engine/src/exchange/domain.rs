@@ -1,7 +1,7 @@
 //! A domain: image, state of its working counters, age of its SubDevices' inputs, and its cycles on the wire.
 //!
-//! Inputs of a SubDevice are fresh where it put all of them into frames of the last judged cycle; otherwise they keep
-//! their last value.
+//! Inputs of a SubDevice are fresh where it put all of them into frames of the last evaluated cycle; otherwise they
+//! keep their last value.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -41,11 +41,11 @@ pub struct Domain {
     frames: Range<usize>,
     /// Frames of a set.
     set: usize,
-    /// First frame of the oldest set that was queued and not judged yet.
+    /// First frame of the oldest set that was queued and not evaluated yet.
     oldest: usize,
     /// First frame of the set that was queued last.
     newest: usize,
-    /// Number of sets that were queued and not judged yet.
+    /// Number of sets that were queued and not evaluated yet.
     out: usize,
     /// The newest set was queued and has not left yet.
     unsent: bool,
@@ -54,7 +54,7 @@ pub struct Domain {
     members: Vec<Member>,
     status: DomainStatus,
     told: Told,
-    /// Departure of the last judged flight, as a cycle plus one.
+    /// Departure of the last evaluated flight, as a cycle plus one.
     judged: u64,
     /// Incomplete cycles in a row in which frames were sent again.
     fruitless: u8,
@@ -63,7 +63,7 @@ pub struct Domain {
 /// Last reported state of a domain.
 #[derive(Clone, Copy, Debug)]
 enum Told {
-    /// None: no SubDevice has answered so far. Cycles judged since SubDevices take part.
+    /// None: no SubDevice has answered so far. Cycles evaluated since SubDevices take part.
     Nothing { silent: u8 },
     /// At least one state was reported.
     Something,
@@ -118,7 +118,7 @@ impl Domain {
         self.frames.clone()
     }
 
-    /// Indices of the frames to judge next; `None` where all are judged.
+    /// Indices of the frames to evaluate next; `None` where all are evaluated.
     pub(crate) fn oldest(&self) -> Option<Range<usize>> {
         (self.out > 0).then(|| self.oldest..self.oldest + self.set)
     }
@@ -129,8 +129,8 @@ impl Domain {
         (self.out == 1 && self.set == 1).then_some(self.oldest)
     }
 
-    /// Judges the only cycle on the wire where it is complete like the one before; false, and nothing is judged, where
-    /// the one before was not, or no SubDevice answered.
+    /// Evaluates the only cycle on the wire if it is complete like the previous one. False, and nothing is evaluated,
+    /// if the previous one was incomplete or no SubDevice answered.
     #[inline]
     pub(crate) fn judge_again(&mut self, wkc: u32, left: u64) -> bool {
         let is_again = wkc > 0 && self.status.state == DomainState::Complete;
@@ -223,12 +223,12 @@ impl Domain {
         self.note_loaded(next);
     }
 
-    /// Notes that the next set was queued; none is.
+    /// Notes that the next set was queued. No other set is queued.
     #[inline(always)]
     pub(crate) fn note_loaded(&mut self, next: usize) {
         self.newest = next;
         if self.out > 0 && next == self.oldest {
-            // It was never judged.
+            // It was never evaluated.
             self.oldest = self.after(self.oldest);
         } else {
             self.out += 1;
@@ -266,9 +266,9 @@ impl Domain {
         DomainStatus { pending, ..self.status }
     }
 
-    /// Judges the oldest cycle on the wire, which left in cycle `left` minus one: the sum of its working counters, and
-    /// whether each datagram has exactly the expected one. True where it was complete like the one before; otherwise
-    /// [`Domain::change_state`] follows.
+    /// Evaluates the oldest cycle on the wire, which left in cycle `left` minus one: the sum of its working counters,
+    /// and whether each datagram has exactly the expected one. True where it was complete like the one before;
+    /// otherwise [`Domain::change_state`] follows.
     pub(crate) fn judge(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
         self.status.wkc = wkc;
         self.oldest = self.after(self.oldest);
@@ -277,7 +277,7 @@ impl Domain {
         complete && wkc > 0 && self.status.state == DomainState::Complete
     }
 
-    /// Updates the state after a judged cycle of which any copy returned or none. True where the state is to be
+    /// Updates the state after an evaluated cycle of which any copy returned or none. True where the state is to be
     /// reported: it has changed, or process data has been silent since activation though SubDevices take part.
     pub(crate) fn change_state(&mut self, wkc: u32, complete: bool, returned: bool, is_awaited: bool) -> bool {
         self.status.returned = returned;
@@ -310,7 +310,7 @@ impl Domain {
         self.image.moment(input).came
     }
 
-    /// Departure of the last judged flight, as a cycle plus one.
+    /// Departure of the last evaluated flight, as a cycle plus one.
     pub(crate) fn judged(&self) -> u64 {
         self.judged
     }

@@ -1,10 +1,10 @@
-//! A frame of a domain and its flights (round trips): load, depart, receive the copies, judge, deliver or give up.
+//! A frame of a domain and its flights (round trips): load, depart, receive the copies, evaluate, deliver or give up.
 //!
 //! A frame here is on the wire at most once at a time, so its bytes are built once: a flight changes the frame id, the
 //! Idx bytes and the outputs. Reads leave as zeros and working counters as zero, because returned bytes are never
 //! written here. A domain with several cycles on the wire has each of its frames that many times; they share the image.
-//! Each copy is judged by itself, and its inputs are delivered when it arrives ([`super::place`]).
-//! While no SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
+//! Each copy is evaluated by itself, and its inputs are delivered when it arrives ([`super::place`]). While no
+//! SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
 mod tries;
 mod variants;

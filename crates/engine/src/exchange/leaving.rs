@@ -7,7 +7,7 @@ use crate::link::{Link, LinkSet};
 use crate::ring::{Identity, Sequence};
 use crate::time::Instant;
 
-/// What frames need that leave on two links or carry datagrams of distributed clocks.
+/// Data for frames that leave on two links or carry datagrams of distributed clocks.
 pub(super) struct Leaving<'a> {
     pub identity: &'a Identity,
     pub links: LinkSet,

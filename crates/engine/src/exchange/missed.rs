@@ -15,7 +15,7 @@ use crate::time::Instant;
 /// Fate of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Fate {
-    /// Unknown, or it came in time.
+    /// Unknown, or in time.
     #[default]
     None,
     /// A damaged copy of it came.

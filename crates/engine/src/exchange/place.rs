@@ -3,7 +3,7 @@
 //!
 //! A working counter to which only one SubDevice adds is exact. Where several add, the presence datagram of the same
 //! copy shows which of them processed it; the working counter must equal the sum of their increments. Each copy is
-//! judged by itself: in a ring that closes or breaks the same SubDevice may have processed both.
+//! evaluated by itself: in a ring that closes or breaks the same SubDevice may have processed both.
 
 mod tries;
 
@@ -72,7 +72,7 @@ pub(crate) enum Brought {
     Nothing,
     /// Those of some SubDevices, or all, which lie apart from each other in the image.
     InRuns,
-    /// All inputs, one piece of the image.
+    /// All inputs, as one piece of the image.
     All,
 }
 
@@ -453,7 +453,7 @@ impl Span {
         self.image_at <= image.start && image.end <= self.image_at + self.length
     }
 
-    /// Whether another one follows directly.
+    /// Whether `next` follows directly.
     fn reaches(&self, next: &Span) -> bool {
         self.frame_at + self.length == next.frame_at && self.image_at + self.length == next.image_at
     }

@@ -3,7 +3,7 @@
 //!
 //! Input: a copy of the frame that came back. Output: which SubDevices processed it, once each, and in which state. A
 //! byte that stayed zero belongs to a SubDevice that is absent or has lost its FMMUs, because no AL status is zero. A
-//! copy mostly shows the same as the one before on its link: then it is not evaluated again.
+//! copy usually shows the same as the previous copy on its link: then it is not evaluated again.
 
 use alloc::boxed::Box;
 use alloc::vec;

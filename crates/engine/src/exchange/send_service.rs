@@ -8,8 +8,8 @@ use crate::link::Link;
 use crate::time::Instant;
 
 impl Exchange {
-    /// Has the datagrams of supervision and clocks leave though the home domain does not: with another domain, or in a
-    /// frame of their own.
+    /// Sends the datagrams of supervision and clocks although the home domain does not leave: with another domain, or
+    /// in a separate frame.
     #[cold]
     pub(super) fn send_service(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
         let Carrier::Alone(index) = self.service.place(&self.domains, &mut self.frames, &self.board, now) else {

@@ -1,8 +1,8 @@
 //! Supervision and distributed clocks in cycles in which the home domain does not leave.
 //!
-//! Their datagrams travel in a frame of the home domain ([`Layout::home`]). When that domain is not queued, a frame of
-//! another domain that leaves anyway takes them; when none does, they leave in a frame of their own. While a frame
-//! with them is on the wire, no other one takes them.
+//! Their datagrams are part of a frame of the home domain ([`Layout::home`]). When that domain is not queued, a frame
+//! of another queued domain carries them; when no domain is queued, a separate frame does. While a frame with them is
+//! on the wire, no other frame carries them.
 
 use alloc::vec::Vec;
 
@@ -18,13 +18,13 @@ use crate::time::Instant;
 #[derive(Debug)]
 pub(super) struct Service {
     home: usize,
-    /// Index of the frame of their own; `None` without supervision and clocks.
+    /// Index of the separate frame; `None` without supervision and clocks.
     alone: Option<usize>,
     /// By domain.
     spares: Vec<Option<Spare>>,
     /// No frame of another domain has the datagrams.
     is_home: bool,
-    /// The frame of their own delivers nothing.
+    /// The separate frame has no inputs.
     image: Image,
 }
 
@@ -37,7 +37,7 @@ struct Spare {
     frames: Vec<[CyclicFrame; 2]>,
 }
 
-/// What carries the datagrams in a cycle.
+/// Carrier of the datagrams in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Carrier {
     /// A frame of a domain, or none is needed.
@@ -47,7 +47,7 @@ pub(super) enum Carrier {
 }
 
 impl Service {
-    /// Builds the frames; that of their own goes to the end of `frames`.
+    /// Builds the frames; appends the separate frame to `frames`.
     pub fn new(identity: &Identity, all_links: u8, layout: &Layout, frames: &mut Vec<CyclicFrame>) -> Service {
         let none = InputNumber { datagram: 0, part: 0 };
         let spares = (0..layout.domains.len()).map(|domain| Spare::new(identity, all_links, layout, domain)).collect();
@@ -59,7 +59,7 @@ impl Service {
         Service { home, alone, spares, is_home: true, image: Image::new(0, core::iter::empty()) }
     }
 
-    /// Whether the home domain leaves with the datagrams, and no other one has them.
+    /// Whether the home domain leaves with the datagrams, and no other domain has them.
     #[inline(always)]
     pub fn leaves_at_home(&self, domains: &[Domain]) -> bool {
         self.is_home && domains.get(self.home).is_some_and(Domain::is_queued)
@@ -84,7 +84,7 @@ impl Service {
         if is_placed { Carrier::Domain } else { Carrier::Alone(alone) }
     }
 
-    /// Target of the inputs in the frame of their own: none.
+    /// Target of the inputs in the separate frame: none.
     pub fn image_mut(&mut self) -> &mut Image {
         &mut self.image
     }

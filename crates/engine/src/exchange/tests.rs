@@ -79,7 +79,7 @@ impl Ring {
         self.exchange.receive(arrived_on, bytes, self.now)
     }
 
-    /// Lets the cycle pass and judges.
+    /// Lets the cycle pass and evaluates.
     fn judge(&mut self) -> DomainStatus {
         self.now += PERIOD;
         self.exchange.process(DOMAIN, self.now)

@@ -1,6 +1,6 @@
-//! What copies of a frame mostly show: the same as the copy before on their link.
+//! The usual result of a copy: the same as that of the previous copy on its link.
 //!
-//! Input: the places in a frame that tell what SubDevices did with it, and a copy that was evaluated. Output: whether a
+//! Input: the places in a frame that show how SubDevices processed it, and a copy that was evaluated. Output: whether a
 //! later copy shows exactly the same in all of them, so that its results are those of the copy before. Inputs are not
 //! among these places; the presence datagram is compared by itself ([`super::presence`]).
 
@@ -26,7 +26,7 @@ const SUPERVISION_TAIL: usize = OVERHEAD + SUPERVISION_LEN - HEADER_WORD;
 /// Bytes of a header that [`HEADER_MASK`] covers.
 const HEADER_WORD: usize = 8;
 
-/// The places of one link's copies, with what the last evaluated copy showed in them.
+/// The places of one link's copies, with their content in the last evaluated copy.
 #[derive(Debug, Default)]
 pub(super) struct Usual {
     is_known: bool,
@@ -56,13 +56,13 @@ impl Usual {
         Usual { is_known: false, checks: words(&bits), wkc: 0, supervision: 0 }
     }
 
-    /// Whether a copy shows the same as the one that was noted last.
+    /// Whether a copy shows the same as the last noted copy.
     #[inline(always)]
     pub fn is_shown_by(&self, bytes: &[u8]) -> bool {
         self.is_known && self.checks.iter().all(|check| word_at(bytes, check.at) & check.mask == check.word)
     }
 
-    /// Notes what an evaluated copy showed.
+    /// Notes the result of an evaluated copy.
     #[cold]
     pub fn note(&mut self, bytes: &[u8], wkc: u32, supervision: u64) {
         for check in &mut self.checks {

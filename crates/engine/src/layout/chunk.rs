@@ -1,8 +1,8 @@
-//! Which areas travel in one frame, and which of them share datagrams.
+//! Assigns areas to frames, and combines areas in common datagrams.
 //!
-//! Input: the areas of a domain in order, and how the inputs of each SubDevice are witnessed. Output: chunks that fit a
-//! frame. Within a chunk, areas of SubDevices with a presence byte share datagrams; the others have datagrams of their
-//! own where a shared working counter would hide missing inputs.
+//! Input: the areas of a domain in order, and the witness of each SubDevice's inputs. Output: chunks that fit a frame.
+//! Within a chunk, areas of SubDevices with a presence byte share datagrams; the others have datagrams of their own
+//! where a shared working counter would hide missing inputs.
 
 use alloc::collections::BTreeSet;
 use alloc::vec;
@@ -88,7 +88,7 @@ impl Group {
     }
 }
 
-/// Areas that travel in one frame.
+/// Areas in one frame.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
     /// First the areas with common datagrams, then outputs of SubDevices without a presence byte, then one group for
@@ -159,7 +159,7 @@ impl Chunk {
         }
         let mut own = Group { lrw, ..Group::default() };
         for area in &first {
-            // Outputs alone may share: the sum tells whether all SubDevices took them.
+            // Outputs alone may share: the sum shows whether all SubDevices took them.
             let is_plain = area.direction == Direction::Outputs && !(lrw && has_inputs);
             if is_plain { self.groups[PLAIN].add(*area) } else { own.add(*area) }
         }

@@ -1,4 +1,4 @@
-//! Places in the image that were given before the layout: areas lie there, whatever their order on the wire.
+//! Places in the image that were given before the layout, independent of the order of areas on the wire.
 //!
 //! Input: the areas of a domain, and first bytes for them. Output: the areas in an order that a frame can carry, and
 //! the place of each.

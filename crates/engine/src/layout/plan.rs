@@ -54,9 +54,9 @@ pub struct PlannedFrame {
     pub datagrams: Vec<PlannedDatagram>,
     /// The presence datagram behind them, where a working counter of inputs has several SubDevices.
     pub presence: Option<PlannedPresence>,
-    /// Whether the supervision datagram rides in this frame.
+    /// Whether this frame contains the supervision datagram.
     pub supervision: bool,
-    /// Whether the datagrams of distributed clocks ride in this frame.
+    /// Whether this frame contains the datagrams of distributed clocks.
     pub clocks: bool,
 }
 

@@ -1,7 +1,7 @@
 //! Frames for the datagrams that do not depend on a domain: supervision and distributed clocks.
 //!
-//! They travel in a frame of the home domain, the one with the shortest period. When that one does not leave, they
-//! travel in a frame of another domain that has room for them; when no domain leaves, in a frame of their own.
+//! They are part of a frame of the home domain, which has the shortest period. When the home domain does not leave, a
+//! frame of another domain with enough room carries them; when no domain leaves, a separate frame does.
 
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 

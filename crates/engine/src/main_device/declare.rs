@@ -38,7 +38,7 @@ impl Declaration {
         SubDeviceId(self.subdevices.len() - 1)
     }
 
-    /// Adds a domain with this period; zero for a domain that the application exchanges when it likes.
+    /// Adds a domain with this period; zero for a domain that the application exchanges at irregular times.
     pub fn add_domain(&mut self, period: Duration) -> DomainId {
         self.domains.push(DomainConfig::new(period, vec![]));
         DomainId(self.domains.len() - 1)

@@ -1,8 +1,8 @@
 //! Places that are known before activation: an entry has its final place as soon as it is registered.
 //!
-//! Input: a declaration, and what the scan found of a SubDevice. Output: the place of an entry in the image of its
-//! domain. The whole SyncManager of the entry comes into the image, padded to bytes, behind those registered before;
-//! a later registration moves nothing. This is how programs for IgH's interface place process data.
+//! Input: a declaration, and the scan data of a SubDevice. Output: the place of an entry in the image of its domain.
+//! The whole SyncManager of the entry comes into the image, padded to bytes, behind those registered before; a later
+//! registration moves nothing. This is how programs for IgH's interface place process data.
 
 use alloc::vec::Vec;
 
@@ -25,7 +25,7 @@ const MOST_FMMUS: u8 = 16;
 const MOST_BYTES: u32 = 1 << 31;
 
 impl Declaration {
-    /// What a scan has found of a declared SubDevice; `None` where it is absent or another one.
+    /// Scan data of a declared SubDevice; `None` if it is absent or has another identity.
     pub fn found<'a>(&self, scanned: &'a [SubDeviceInfo], subdevice: SubDeviceId) -> Option<&'a SubDeviceInfo> {
         match resolve(&self.subdevices, scanned).get(subdevice.0)? {
             Resolution::Found { info, .. } => scanned.get(*info),
@@ -124,7 +124,7 @@ impl Declaration {
     }
 
     /// The working counter that IgH's interface names as expected for a domain of registered process data: as if the
-    /// image was exchanged piece by piece, each piece of at most 1486 bytes in one LRW, LWR or LRD.
+    /// image was exchanged in pieces of at most 1486 bytes, each in one LRW, LWR or LRD.
     /// [`crate::domain::DomainStatus::expected`] counts the datagrams that are in use here.
     pub fn expected_wkc_as_igh(&self, domain: DomainId) -> u32 {
         let areas = self.domains.get(domain.0).into_iter().flat_map(|domain| &domain.registered);
@@ -144,7 +144,7 @@ impl Declaration {
         }
     }
 
-    /// The place of a SyncManager: the one it has, or the next one.
+    /// The place of a SyncManager: its present one, or the next free one.
     fn place(
         &mut self,
         domain: DomainId,

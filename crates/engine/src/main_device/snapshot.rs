@@ -1,9 +1,9 @@
 //! The whole state of the MainDevice at one moment, for programs that read it from outside.
 //!
-//! Input: what the MainDevice knows between two calls of [`MainDevice::poll`], so all parts belong to the same moment.
-//! Output: [`Snapshot`], plain numbers and names; with the feature `serde` its types can be written in any format.
-//! Together with [`MainDevice::events_since`] a program follows the state without a gap: it reads a snapshot, and later
-//! the events from [`Snapshot::next_event`] on.
+//! Input: the state of the MainDevice between two calls of [`MainDevice::poll`], so all parts belong to the same
+//! moment. Output: [`Snapshot`], plain numbers and names; with the feature `serde` its types can be written in any
+//! format. Together with [`MainDevice::events_since`] a program follows the state without a gap: it reads a snapshot,
+//! and later the events from [`Snapshot::next_event`] on.
 
 use alloc::string::String;
 use alloc::vec::Vec;

@@ -1,8 +1,8 @@
-//! The cables of a network compared with `PreviousPort` of a file (protocol 8.2): which SubDevice is connected to which
-//! port of which other.
+//! The cables of a network compared with `PreviousPort` of a file (protocol 8.2): the neighbour and the port of each
+//! SubDevice.
 //!
-//! A difference is told and no more: process data finds its SubDevices by their order, but a search for a broken
-//! cable with the drawing of the machine in hand wants to know.
+//! A difference is only reported: process data depends on the order of the SubDevices, not on their ports. But the
+//! search for a broken cable with the drawing of the machine needs the real cabling.
 
 use ringcat_config::eni::Port;
 use ringcat_engine::config::{Resolution, resolve};
@@ -17,9 +17,8 @@ use super::file::{Difference, EniFile};
 const LETTERS: [char; 4] = ['A', 'B', 'C', 'D'];
 
 impl EniFile {
-    /// Cables that are not where `PreviousPort` says. Nothing is told of what does not show: of SubDevices that are
-    /// missing, of the place where a ring is open, of rings behind junctions, or while crossed lines make neighbours
-    /// doubtful.
+    /// Cables that differ from `PreviousPort`. No difference is reported where the cabling is unknown: at missing
+    /// SubDevices, where a ring is open, in rings behind junctions, and while crossed lines make neighbours uncertain.
     pub fn compare_cables(&self, found: &[SubDeviceInfo], topology: &Topology) -> Vec<Difference> {
         let facts = &self.configuration.subdevices;
         let configs = &self.configuration.declaration.subdevices;
@@ -47,7 +46,7 @@ impl EniFile {
             let said = match facts.plugged_into {
                 Some((previous, port)) => match place[previous] {
                     Some(node) => Some(PortOf::new(Position(node as u16), number(port))),
-                    // Missing, so that the next one is plugged in elsewhere.
+                    // A missing SubDevice: the next one is connected elsewhere.
                     None => continue,
                 },
                 // A group's head may be connected anywhere.
@@ -55,7 +54,7 @@ impl EniFile {
                 None => None,
             };
             let got = topology.connection_to(node).map(|cable| cable.near);
-            // Behind the place where a ring is open nothing shows.
+            // The cabling where a ring is open is unknown.
             if said == got || (got.is_none() && topology.redundant_head == Some(node)) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! An ENI from a file: read, followed, and ready to be activated.
+//! An ENI from a file: parsed, evaluated, and ready for activation.
 
 use std::fmt;
 use std::fs::File;
@@ -20,13 +20,13 @@ use ringcat_wire::address::Position;
 use super::segment::segment;
 use crate::text::Names;
 
-/// A file with what follows from it.
+/// An ENI with the configuration derived from it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct EniFile {
     /// Content of the file.
     pub eni: Eni,
-    /// What follows.
+    /// The configuration derived from it.
     pub configuration: Configuration,
 }
 
@@ -36,11 +36,11 @@ pub struct EniFile {
 pub struct LoadError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The fault.
     pub cause: LoadFailure,
 }
 
-/// What is wrong with a file.
+/// A fault of a file.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum LoadFailure {
@@ -48,19 +48,19 @@ pub enum LoadFailure {
     Read(io::Error),
     /// It is larger than any ENI.
     TooLarge,
-    /// It is no ENI, or one that cannot be followed.
+    /// It is not an ENI, or its content cannot be used.
     Eni(Box<EniError>),
 }
 
-/// Where a network is not that of a file.
+/// A difference between a network and a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Difference {
     /// Index in the file; `None` for a SubDevice that is not in it.
     pub subdevice: Option<SubDeviceId>,
-    /// The network cannot be activated so.
+    /// The network cannot be activated with this difference.
     pub is_grave: bool,
-    /// What.
+    /// The difference, as text for the operator.
     pub text: String,
 }
 
@@ -90,7 +90,7 @@ impl EniFile {
     /// [`LoadError`]: with line, column and element where something in it is wrong.
     pub fn load(path: &Path) -> Result<EniFile, LoadError> {
         let failed = |cause| LoadError { path: path.to_owned(), cause };
-        // No more than may be, whatever the file says about its length: a device or a pipe has none.
+        // The limit applies to the bytes that are read: a device or a pipe reports no length.
         let mut bytes = Vec::new();
         let room = MAX_BYTES as u64 + 1;
         let read = File::open(path).and_then(|file| file.take(room).read_to_end(&mut bytes));
@@ -111,8 +111,8 @@ impl EniFile {
         Ok(EniFile { eni, configuration })
     }
 
-    /// What is activated. With `split_lrw` the engine is free to send LRD and LWR where the file has an LRW over
-    /// several SubDevices, as it must with two links (protocol CR-16, 9.2.2).
+    /// The declaration to activate. With `split_lrw` the engine may send LRD and LWR where the file has an LRW over
+    /// several SubDevices, which is required with two links (protocol CR-16, 9.2.2).
     pub fn declaration(&self, split_lrw: bool) -> Declaration {
         let mut declaration = self.configuration.declaration.clone();
         if split_lrw {
@@ -121,7 +121,7 @@ impl EniFile {
         declaration
     }
 
-    /// What people call the SubDevices: name and station address of the file.
+    /// Names of the SubDevices for messages: name and station address of the file.
     pub fn names(&self) -> Names {
         let name = |facts: &ringcat_config::SubDeviceFacts| match facts.station {
             Some(station) => format!("{} ({station})", facts.name),
@@ -130,8 +130,8 @@ impl EniFile {
         Names(self.configuration.subdevices.iter().map(name).collect())
     }
 
-    /// Whether the SubDevices that a scan found are those of the file: each that is missing, another one, or not in the
-    /// file.
+    /// Compares the SubDevices of a scan with the file. Returns each SubDevice that is missing, has another identity,
+    /// or is not in the file.
     pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
         let configs = &self.configuration.declaration.subdevices;
         let names = self.names().0;
@@ -172,14 +172,14 @@ impl EniFile {
     /// A simulated segment as in the file; with `ring` its end is connected to the redundant interface.
     ///
     /// # Errors
-    /// [`SegmentError`]: cables that do not fit.
+    /// [`SegmentError`]: the cables do not fit.
     #[cfg(feature = "sim")]
     pub fn simulated(&self, ring: bool) -> Result<Network, SegmentError> {
         Network::from_description(segment(&self.eni, &self.configuration, ring))
     }
 }
 
-/// Position of the SubDevice that is in the place of another one.
+/// Position of a SubDevice with another identity than expected.
 const fn in_its_place(error: &ConfigError) -> Option<Position> {
     match error {
         ConfigError::Mismatch { position, .. } => Some(*position),

@@ -1,7 +1,7 @@
-//! The process image of an ENI at run time: what the application sees, as the file lays it out (protocol 8.1).
+//! The process image of an ENI at run time, in the layout of the file (protocol 8.1).
 //!
-//! On the wire process data lies as the engine lays it out; here it is copied from there and back. What is copied is
-//! worked out when the network is active; in a cycle nothing is allocated and nothing waits.
+//! The engine has its own layout on the wire; this module copies between both. The list of copies is built after
+//! activation. In a cycle the module neither allocates nor waits.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use ringcat_engine::main_device::{Directory, SubDeviceId};
 use super::value::{Value, VariableType};
 use crate::process_data::ProcessData;
 
-/// Bits of a piece that does not begin and end with bytes on both sides.
+/// Maximum bits of a piece that is not aligned to bytes on both sides.
 const WORD_BITS: u32 = 64;
 /// Bits of one copy from input to output.
 const COPY_BITS: u32 = 0x8000;
@@ -41,7 +41,7 @@ pub struct EniVariable {
     pub name: String,
     /// Its type.
     pub data_type: VariableType,
-    /// In which image.
+    /// Its image.
     pub direction: Direction,
     /// First bit in that image.
     pub bit: u32,
@@ -61,14 +61,14 @@ pub enum ImageError {
     Outside {
         /// Index in the declaration.
         subdevice: SubDeviceId,
-        /// In which image.
+        /// Its image.
         direction: Direction,
         /// First bit behind the part.
         end: u64,
         /// Bits of the image.
         image: u64,
     },
-    /// The SubDevice has less process data than the file gives it places.
+    /// The SubDevice has less process data than the file has places for.
     TooShort {
         /// Index in the declaration.
         subdevice: SubDeviceId,
@@ -156,25 +156,25 @@ impl EniImage {
         })
     }
 
-    /// Takes over what the last cycle brought: the first thing in a cycle. Inputs of a SubDevice that did not answer
-    /// keep their values ([`EniImage::freshness`]).
+    /// Copies the inputs of the last cycle into the image. To be called first in a cycle. Inputs of a SubDevice that
+    /// did not answer keep their values ([`EniImage::freshness`]).
     pub fn take_inputs(&mut self, data: &ProcessData<'_>) {
         self.take_inputs_of(data.exchange);
     }
 
-    /// Hands the outputs over to what is sent next: the last thing in a cycle.
+    /// Copies the outputs into the process data that is sent next. To be called last in a cycle.
     pub fn give_outputs(&self, data: &mut ProcessData<'_>) {
         self.give_outputs_to(data.exchange);
     }
 
-    /// As [`EniImage::take_inputs`], for an application that takes the steps of a cycle itself.
+    /// As [`EniImage::take_inputs`], for an application with its own loop.
     pub fn take_inputs_of(&mut self, exchange: &Exchange) {
         for piece in &self.input_pieces {
             piece.copy(exchange.image(piece.domain), piece.wire, &mut self.inputs, piece.file);
         }
     }
 
-    /// As [`EniImage::give_outputs`], for an application that takes the steps of a cycle itself.
+    /// As [`EniImage::give_outputs`], for an application with its own loop.
     pub fn give_outputs_to(&self, exchange: &mut Exchange) {
         for piece in &self.output_pieces {
             piece.copy(&self.outputs, piece.file, exchange.image_mut(piece.domain), piece.wire);
@@ -201,7 +201,7 @@ impl EniImage {
         &self.variables
     }
 
-    /// The variable of this name; one of them where several have it.
+    /// The variable with this name; any one of them if the name is not unique.
     pub fn variable(&self, name: &str) -> Option<&EniVariable> {
         let found = self.by_name.binary_search_by(|number| self.variables[*number].name.as_str().cmp(name)).ok()?;
         self.variables.get(self.by_name[found])
@@ -231,7 +231,7 @@ impl EniImage {
         variable.direction == Direction::Outputs
     }
 
-    /// How old an input variable is: the age of its SubDevice's inputs.
+    /// Age of an input variable: that of its SubDevice's inputs.
     pub fn freshness(&self, variable: &EniVariable, data: &ProcessData<'_>) -> Freshness {
         match (variable.domain, variable.subdevice) {
             (Some(domain), Some(subdevice)) => data.freshness(domain, subdevice),
@@ -239,13 +239,13 @@ impl EniImage {
         }
     }
 
-    /// What the file copies from inputs to outputs in every cycle, for
+    /// The copies from inputs to outputs in every cycle that the file declares, for
     /// [`Application::set_copies`](crate::Application::set_copies).
     pub fn copies(&self) -> &[CopyRule] {
         &self.copies
     }
 
-    /// SubDevices that have places in the file and no process data, in a domain or at all.
+    /// SubDevices with places in the file but without process data, in a domain or at all.
     pub fn unplaced(&self) -> &[SubDeviceId] {
         &self.unplaced
     }
@@ -259,7 +259,7 @@ impl EniImage {
 }
 
 impl EniVariable {
-    /// Its place in its image, as the engine's typed access takes it.
+    /// Its place in its image, for the engine's typed access.
     const fn entry(&self) -> Entry {
         let bit_length = if self.bits > WORD_BITS { WORD_BITS } else { self.bits };
         Entry { domain: DomainId(0), bit_offset: self.bit, bit_length: bit_length as u16 }
@@ -317,7 +317,7 @@ impl Builder<'_> {
         areas.map(|found| (found.domain, 8 * found.placed.image_offset, 8 * u32::from(found.placed.area.length)))
     }
 
-    /// Some bits of an area on the wire; fewer than wanted where the SubDevice has fewer.
+    /// Bits of an area on the wire; fewer than requested if the SubDevice has fewer.
     fn pieces(&self, area: &ImageArea, first: u32, bits: u32) -> Vec<Piece> {
         let mut pieces = Vec::new();
         // Behind the first bit of the row.

@@ -1,8 +1,8 @@
-//! A simulated segment from an ENI, so that an owner of a file can try it without hardware.
+//! A simulated segment from an ENI, to test a file without hardware.
 //!
-//! Each SubDevice is what the file says of it: identity, ports, SyncManagers, mailbox, PDOs, a clock where the file has
-//! DC, and the objects that its start-up commands write. What the file does not know, such as the name in the SII or
-//! the behaviour of a drive, is plain: inputs are what the outputs were.
+//! Each simulated SubDevice follows the file: identity, ports, SyncManagers, mailbox, PDOs, a clock where the file has
+//! DC, and the objects that its start-up commands write. Data that the file does not contain, such as the name in the
+//! SII or the behaviour of a drive, has simple defaults: inputs repeat the outputs.
 
 mod cables;
 mod device;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a variable's type makes of its bits.
+/// Interpretation of a variable's bits by its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum VariableType {
@@ -37,7 +37,7 @@ pub enum Value {
 }
 
 impl VariableType {
-    /// By its name; upper and lower case are the same.
+    /// The type by its name, case-insensitive.
     pub fn named(name: &str) -> VariableType {
         match name.trim().to_ascii_uppercase().as_str() {
             "BOOL" | "BIT" => VariableType::Bool,
@@ -52,7 +52,7 @@ impl VariableType {
         }
     }
 
-    /// The value of so many bits; those beyond them are zero.
+    /// The value of `length` bits; the bits above them are zero.
     pub fn value(self, bits: u64, length: u16) -> Value {
         match (self, length) {
             (VariableType::Bool, _) => Value::Bool(bits != 0),
@@ -67,8 +67,8 @@ impl VariableType {
         }
     }
 
-    /// The bits of a value as text: `true`, `-5`, `0x1F`, `2.5`. `None` where it is no value of this type,
-    /// or has more bits than there are.
+    /// Parses a value from text (`true`, `-5`, `0x1F`, `2.5`) into bits. `None` if the text is not a value of this
+    /// type, or needs more than `length` bits.
     pub fn parse(self, text: &str, length: u16) -> Option<u64> {
         let text = text.trim();
         let mask = if length >= 64 { u64::MAX } else { (1 << length) - 1 };

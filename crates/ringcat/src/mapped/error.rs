@@ -1,4 +1,4 @@
-//! Why process data is not found, with what there is instead.
+//! Why process data is not found, with the objects that are mapped.
 
 use std::fmt;
 
@@ -47,7 +47,7 @@ pub struct MappedObject {
     pub entry: Entry,
     /// Its name; empty where neither SII nor dictionary give one.
     pub name: String,
-    /// Name of the PDO in which it is; may be empty.
+    /// Name of its PDO; may be empty.
     pub pdo: String,
 }
 
@@ -86,7 +86,7 @@ pub enum MapError {
     NotDeclared {
         /// The index.
         subdevice: SubDeviceId,
-        /// SubDevices that it has.
+        /// Number of declared SubDevices.
         declared: usize,
     },
     /// It is not mapped.
@@ -132,7 +132,7 @@ pub enum MapError {
         name: String,
         /// The wanted object.
         wanted: Wanted,
-        /// Those that have it.
+        /// The objects with this name.
         found: Vec<MappedObject>,
     },
 }
@@ -150,7 +150,7 @@ impl fmt::Display for MapError {
             MapError::Direction { subdevice, name, object } => {
                 let other = match object.direction {
                     Direction::Inputs => "the SubDevice sends it, so it cannot be set",
-                    Direction::Outputs => "the SubDevice receives it: look for an output",
+                    Direction::Outputs => "the SubDevice receives it: use an output",
                 };
                 let (at, label) = (called(*subdevice, name), object.label());
                 write!(f, "{at}: {label} is an {}: {other}", noun(object.direction))
@@ -160,7 +160,7 @@ impl fmt::Display for MapError {
                 write!(f, "{at}: {label}: {number} has {expected} bits, {is} bits are mapped")
             }
             MapError::Ambiguous { subdevice, name, wanted, found } => {
-                write!(f, "{}: {wanted} is the name of several: ", called(*subdevice, name))?;
+                write!(f, "{}: several objects have the name {wanted}: ", called(*subdevice, name))?;
                 list(f, found)
             }
         }

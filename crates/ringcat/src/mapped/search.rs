@@ -1,4 +1,4 @@
-//! Looks for an object of a SubDevice in its process data, by index or name.
+//! Finds an object in the process data of a SubDevice, by index or name.
 
 use ringcat_engine::exchange::Entry;
 use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
@@ -11,7 +11,7 @@ use crate::value::Number;
 /// Between the names of a PDO and of its entry.
 const SEPARATOR: char = '.';
 
-/// All that is mapped of one SubDevice.
+/// All mapped objects of one SubDevice.
 pub(super) struct Search {
     subdevice: SubDeviceId,
     name: String,
@@ -60,8 +60,8 @@ impl Search {
         Ok(OutputBits::new(object.entry, ObjectOf::new((subdevice, object.index, object.sub_index))))
     }
 
-    /// A mapped object. One that is mapped in both directions is found in the wanted one; of one
-    /// that is mapped more than once in it by index, the first place.
+    /// Finds a mapped object. If it is mapped in both directions, the wanted direction counts. If it is mapped there
+    /// more than once, a search by index returns the first place.
     fn find(self, wanted: &Wanted, direction: Direction) -> Result<MappedObject, MapError> {
         let Search { subdevice, name, mapped } = self;
         let fits = |object: &&MappedObject| match wanted {
@@ -90,8 +90,8 @@ fn is_called(object: &MappedObject, name: &str) -> bool {
     !object.name.is_empty() && (object.name == name || with_pdo() == Some(object.name.as_str()))
 }
 
-/// Names of a PDO and of the entry in it that is this object; of the PDO that is assigned by default where several have
-/// it.
+/// Names of a PDO and of the entry in it that is this object; if several PDOs contain it, those of the PDO that is
+/// assigned by default.
 fn names(pdos: &[PdoInfo], direction: Direction, object: (u16, u8)) -> (String, String) {
     let of_direction = || pdos.iter().filter(|pdo| pdo.direction == direction);
     let assigned = of_direction().filter(|pdo| pdo.sync_manager.is_some());

@@ -1,4 +1,4 @@
-//! What needs no mailbox: states, registers, ports, the EEPROM, error counters.
+//! Services without a mailbox: states, registers, ports, the EEPROM, error counters.
 
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::Address;
@@ -17,9 +17,9 @@ use crate::value::{Number, ObjectValue};
 const STATUS_BYTES: usize = 6;
 
 impl<S: Services> SubDevice<S> {
-    /// Brings it to a state while the others go on: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A declared
-    /// SubDevice is configured again on the way up, keeps the state also over a loss of power, and goes back to the
-    /// state before where it refuses. Before activation the states are INIT, PREOP and BOOT.
+    /// Brings the SubDevice to a state while all others continue: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A
+    /// declared SubDevice is configured again on the way up, and is brought back to the state after a loss of power. If
+    /// it refuses the state, it goes back to the previous one. Before activation the states are INIT, PREOP and BOOT.
     pub fn request_state(self, state: AlState) -> S::Outcome<(), SubDeviceError> {
         let address = self.address;
         self.ask(move |engine, number| {
@@ -31,8 +31,8 @@ impl<S: Services> SubDevice<S> {
         })
     }
 
-    /// The state in which it is, read from it now. One that has left its state by itself, or has refused one, also has
-    /// the error flag and a code.
+    /// Reads its AL status and AL status code (registers 0x0130 and 0x0134) now. After a refused state, or a change of
+    /// state by itself, the error flag is set and the code gives the reason.
     pub fn state(self) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
         self.ask(move |engine, number| {
             let read = engine.start_register_read(number, map::AL_STATUS, STATUS_BYTES);
@@ -44,7 +44,7 @@ impl<S: Services> SubDevice<S> {
         })
     }
 
-    /// What the scan found about it; `None` for a declared SubDevice that was not there.
+    /// Data of the scan; `None` for a declared SubDevice that the scan did not find.
     pub fn info(self) -> S::Outcome<Option<SubDeviceInfo>, SubDeviceError> {
         self.ask(move |engine, number| {
             let info = info(engine, number);
@@ -68,28 +68,28 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, number| engine.start_register_read(number, address, length).ended())
     }
 
-    /// Writes a register or memory: a number or bytes. Where a frame is lost, it may be written twice.
+    /// Writes a register or memory: a number or bytes. If a frame is lost, it may be written twice.
     pub fn register_write<T: ObjectValue>(self, address: RegisterAddress, value: T) -> S::Outcome<(), SubDeviceError> {
         let data = value.encode();
         self.ask(move |engine, number| engine.start_register_write(number, address, data).ended())
     }
 
-    /// What a port does about its loop.
+    /// Reads the loop control of a port.
     pub fn port(self, port: u8) -> S::Outcome<LoopControl, SubDeviceError> {
         self.ask(move |engine, number| engine.start_port_read(number, port).ended())
     }
 
-    /// Opens or closes a port. SubDevices behind one that is closed get no frames.
+    /// Opens or closes a port. SubDevices behind a closed port get no frames.
     pub fn set_port(self, port: u8, control: LoopControl) -> S::Outcome<(), SubDeviceError> {
         self.ask(move |engine, number| engine.start_port_set(number, port, control).ended())
     }
 
-    /// Cuts it off by closing the ports of its neighbours; [`Services::open_blocked`] opens them again.
+    /// Isolates the SubDevice by closing the ports of its neighbours; [`Services::open_blocked`] opens them again.
     pub fn block(self) -> S::Outcome<Vec<BlockedPort>, SubDeviceError> {
         self.ask(move |engine, number| engine.start_block(number).ended())
     }
 
-    /// Resets its controller. A declared SubDevice is lost and found again, and configured anew.
+    /// Resets its controller. A declared SubDevice is lost, found again and configured again.
     pub fn reset_controller(self) -> S::Outcome<(), SubDeviceError> {
         self.ask(move |engine, number| engine.start_reset(number).ended())
     }
@@ -111,17 +111,17 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, number| engine.start_alias_write(number, alias, force).ended())
     }
 
-    /// Has its controller load its configuration from the EEPROM again.
+    /// Reloads the configuration of its controller from the EEPROM.
     pub fn sii_reload(self) -> S::Outcome<(), SubDeviceError> {
         self.ask(move |engine, number| engine.start_sii_reload(number).ended())
     }
 
-    /// Reads its error counters now; it is a declared SubDevice.
+    /// Reads the error counters of a declared SubDevice now.
     pub fn read_statistics(self) -> S::Outcome<Statistics, SubDeviceError> {
         self.ask(move |engine, number| engine.start_statistics_read(number).ended())
     }
 
-    /// Clears its error counters, and what was kept of them; it is a declared SubDevice.
+    /// Clears the error counters of a declared SubDevice, and their totals.
     pub fn clear_statistics(self) -> S::Outcome<(), SubDeviceError> {
         self.ask(move |engine, number| engine.start_statistics_clear(number).ended())
     }

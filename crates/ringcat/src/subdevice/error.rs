@@ -1,4 +1,4 @@
-//! Why something that was asked of one SubDevice was not done.
+//! Errors of services of one SubDevice.
 
 use std::error::Error as StdError;
 use std::fmt;
@@ -21,11 +21,11 @@ use super::name::SubDeviceName;
 pub struct SubDeviceError {
     /// The SubDevice.
     pub subdevice: SubDeviceName,
-    /// What happened.
+    /// The cause.
     pub failure: SubDeviceFailure,
 }
 
-/// What happened.
+/// The cause.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SubDeviceFailure {
@@ -37,33 +37,33 @@ pub enum SubDeviceFailure {
     Active,
     /// The declaration has no SubDevice with this index.
     NotDeclared {
-        /// SubDevices that it has, with indices from 0.
+        /// Number of declared SubDevices; indices count from 0.
         declared: usize,
     },
     /// The scan found no SubDevice at this position.
     NoPosition {
-        /// SubDevices that it found, at positions from 0.
+        /// Number of SubDevices found; positions count from 0.
         scanned: usize,
     },
     /// It has no mailbox.
     NoMailbox,
     /// The object or register has another number of bytes than the type.
     Size {
-        /// What was read: object or register.
+        /// The object or register.
         what: String,
         /// Bytes of the type.
         expected: usize,
         /// Bytes that came.
         got: usize,
     },
-    /// The whole of it took longer than [`SubDevice::within`](super::SubDevice::within) allows.
+    /// The whole service took longer than [`SubDevice::within`](super::SubDevice::within) allows.
     TimedOut {
         /// The limit.
         limit: Duration,
     },
     /// An SDO transfer failed.
     Sdo(SdoError),
-    /// A question about the object dictionary failed.
+    /// An SDO information request failed.
     Information(InformationError),
     /// A file transfer failed.
     Foe(FoeError),

@@ -30,7 +30,7 @@ impl<S: Services> SubDevice<S> {
         })
     }
 
-    /// Writes a file; the result is how many bytes it has.
+    /// Writes a file; the result is its size in bytes.
     pub fn foe_write(self, file: impl Into<String>, data: Vec<u8>) -> S::Outcome<u64, SubDeviceError> {
         let options = self.file_options();
         self.foe_write_with(file, data, options, |_| ())

@@ -1,4 +1,4 @@
-//! CoE: objects of a SubDevice, and what it says about them.
+//! CoE: objects of a SubDevice and their descriptions.
 
 use ringcat_engine::mail::coe::history::{self, History};
 use ringcat_engine::mail::coe::information::{self, Entry as ObjectEntry, Object};
@@ -12,7 +12,7 @@ use crate::value::ObjectValue;
 impl<S: Services> SubDevice<S> {
     /// Reads one entry of an object: a number of exactly its size, bytes, or text.
     ///
-    /// It fails where there is no such entry, or it has another size than the type.
+    /// It fails if there is no such entry, or if its size differs from that of the type.
     pub fn sdo_read<T: ObjectValue>(self, index: u16, sub_index: u8) -> S::Outcome<T, SubDeviceError> {
         self.read_object(SdoAddress::new(index, sub_index))
     }

@@ -49,7 +49,7 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { command::start(&mailbox, drive, idn, limits).await })
     }
 
-    /// How far a procedure command is.
+    /// Reads the state of a procedure command.
     pub fn soe_command_state(self, drive: u8, idn: Idn) -> S::Outcome<CommandState, SubDeviceError> {
         let limits = self.limits.of_message();
         self.ask_mailbox(move |mailbox| async move { command::state(&mailbox, drive, idn, limits).await })

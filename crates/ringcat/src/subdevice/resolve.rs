@@ -1,4 +1,4 @@
-//! Finds the SubDevice that an application names, and its name for messages.
+//! Finds a SubDevice by its address, and its name for messages.
 
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::{Address, MainDevice as Engine};

@@ -12,7 +12,7 @@ use super::error::{SubDeviceError, SubDeviceFailure};
 use super::name::SubDeviceName;
 use super::resolve::{find, info};
 
-/// Starts work on a SubDevice, with its name in what goes wrong.
+/// Starts work on a SubDevice; errors contain its name.
 pub(super) fn start<T, E, W>(
     engine: &mut Engine,
     address: Address,
@@ -62,12 +62,12 @@ where
     })
 }
 
-/// What is done about a mailbox that is not in use.
+/// Handling of a mailbox that is not in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opening {
-    /// Its SubDevice is brought to PREOP; for those that are not declared.
+    /// The SubDevice is brought to PREOP; for undeclared SubDevices.
     BringToPreOp,
-    /// Nothing.
+    /// No action.
     LeftAlone,
 }
 
@@ -80,7 +80,7 @@ impl Opening {
     }
 }
 
-/// A mailbox, and what brings its SubDevice to PREOP before it is used.
+/// A mailbox, and the procedure that brings its SubDevice to PREOP first.
 type Reached = (Mailbox, Option<Pending<Result<(), ConfigureError>>>);
 
 fn reach(engine: &mut Engine, number: usize, opening: Opening) -> Result<Reached, SubDeviceFailure> {

@@ -20,13 +20,13 @@ use crate::links::Links;
 use crate::not_ready::Failures;
 use crate::window::Window;
 
-/// Work that reads other threads' queues, and requests on links without a waker, wait for so long at most.
+/// Longest sleep while tasks read queues of other threads, or while links have no waker.
 const LONGEST_SLEEP: Duration = Duration::from_micros(500);
-/// And for so long after a recent request, so that a sequence of requests does not wait for each one.
+/// Longest sleep soon after a request, so that a sequence of requests does not wait for each one.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
-/// How long that is.
+/// Time after a request in which [`SHORT_SLEEP`] applies.
 const ATTENTIVE: Duration = Duration::from_millis(2);
-/// What others may see is brought up to date this often where no event does it earlier.
+/// Interval at which states are published, unless an event causes it earlier.
 const PUBLISH: Duration = Duration::from_millis(10);
 /// Events that may wait to be fetched; further ones are dropped and counted.
 const EVENTS: usize = 4096;
@@ -39,17 +39,17 @@ pub(super) struct Request {
     pub begin: Begin,
 }
 
-/// When work that has begun has a turn.
+/// When a task is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Attention {
-    /// When the engine has done something.
+    /// When the engine has worked.
     Engine,
     /// Every half millisecond: it reads queues that other threads fill.
     #[cfg(any(feature = "eoe", feature = "gateway"))]
     Often,
 }
 
-/// What the thread makes known.
+/// Data that the thread publishes.
 #[derive(Debug, Default)]
 pub(super) struct Published {
     pub settled: AtomicBool,
@@ -178,7 +178,7 @@ impl<L: Links> Worker<L> {
         wake.min(self.blocked_until.unwrap_or(Instant::NEVER)).min(longest)
     }
 
-    /// Begins what was asked for, and gives all tasks a turn; true where any has ended.
+    /// Begins requested work, and calls all tasks; true if any has ended.
     fn answer(&mut self) -> bool {
         let now = self.links.now();
         let Worker { asked, tasks, engine, .. } = self;
@@ -188,7 +188,7 @@ impl<L: Links> Worker<L> {
         tasks.len() < before
     }
 
-    /// True where there were any.
+    /// Passes on all events; true if there were any.
     fn pass_on_events(&mut self) -> bool {
         let now = self.links.now();
         let mut any = false;

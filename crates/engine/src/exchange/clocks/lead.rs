@@ -7,14 +7,15 @@
 //! near:
 //!
 //! * a second reference, which has followed the same clock as the first one and so differs by nanoseconds for seconds,
-//!   is left alone; it is steered when its mean has drifted away, and then by a mean, in every cycle;
-//! * one that follows the host is steered in every cycle, by a small part of a long mean. The written value is that
-//!   much less than its last reading: the jitter of one cycle is taken back in the next.
+//!   is not steered until its mean has drifted away, and then by a mean, in every cycle;
+//! * a reference that follows the host is steered in every cycle, by a small part of a long mean. The written value is
+//!   that much less than its last reading: the jitter of one cycle is taken back in the next.
 
 use crate::time::Instant;
 
-/// Fewest cycles whose mean tells the difference between the ways from the host to both references. Of references that
-/// have followed one clock until now, the number that makes the mean as exact as [`EXACT_NS`].
+/// Smallest number of cycles for a mean of the difference between the ways from the host to both references. For
+/// references that have followed one clock until now, the number of cycles that makes the mean as exact as
+/// [`EXACT_NS`].
 const GAP_CYCLES: u32 = 16;
 /// Most cycles of that mean: free-running clocks drift apart meanwhile.
 const MOST_GAP_CYCLES: u32 = 4_096;
@@ -44,7 +45,7 @@ const DIFFERENCE_DEPTH: u32 = 3;
 const CHANGE_DEPTH: u32 = 8;
 /// Upper limit of the unexpected part.
 const UNEXPECTED_NS: i64 = 20_000;
-/// Upper limit of a difference: frames may carry nonsense.
+/// Upper limit of a difference: frames may contain any value.
 const ABSURD_NS: i64 = 1 << 40;
 /// Upper limit of the time between two differences.
 const LONGEST_NS: u64 = 10_000_000;
@@ -68,8 +69,8 @@ const MOST_PPB: i64 = 800_000;
 struct Law {
     /// Filter depth of the difference that decides what to do.
     slow_depth: u32,
-    /// With this, a difference is limited to this distance from the mean: a stall of the host says nothing about
-    /// clocks.
+    /// With this, a difference is limited to this distance from the mean: a stall of the host carries no information
+    /// about clocks.
     outlier_ns: i64,
     /// From this difference on the clock is far away.
     far_ns: i64,
@@ -96,7 +97,7 @@ enum Mode {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
     law: Law,
-    /// The difference when both show the same time: their ways from the host are not equally long.
+    /// The difference while both show the same time, because their ways from the host have different lengths.
     gap: i64,
     /// Sum of the differences of this mean, and their largest number.
     sum: i64,

@@ -45,7 +45,7 @@ fn entry(domain: usize, bit_offset: u32, bit_length: u16) -> Entry {
     Entry { domain: DomainId(domain), bit_offset, bit_length }
 }
 
-/// One cycle: judges, queues, sends; each SubDevice answers with these inputs, `None` for no answer. Returns the
+/// One cycle: evaluates, queues, sends; each SubDevice answers with these inputs, `None` for no answer. Returns the
 /// outputs that left.
 fn cycle(exchange: &mut Exchange, now: &mut Instant, inputs: [Option<&[u8]>; 2]) -> [Vec<u8>; 2] {
     now.0 += 1_000_000;

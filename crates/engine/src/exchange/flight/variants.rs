@@ -10,7 +10,7 @@ use crate::ring::Identity;
 
 impl CyclicFrame {
     /// A frame that replaces this one while none of its SubDevices has its FMMUs: without process data, which no
-    /// SubDevice would answer. Its working counters are zero, and it stands for the same inputs and outputs.
+    /// SubDevice would answer. Its working counters are zero, and it represents the same inputs and outputs.
     pub(crate) fn vacant(&self, identity: &Identity, planned: &PlannedFrame) -> CyclicFrame {
         let bare = PlannedFrame { datagrams: Vec::new(), presence: None, ..*planned };
         // The working counters of places outside are zero: they need no check.
@@ -22,7 +22,7 @@ impl CyclicFrame {
         }
     }
 
-    /// Takes the place of a loaded frame with the same process data, which does not leave.
+    /// Replaces a loaded frame with the same process data, which does not leave.
     pub(crate) fn take_over(&mut self, loaded: &CyclicFrame) {
         self.clear(loaded.left);
         for place in &self.places {

@@ -208,7 +208,7 @@ proptest! {
             let there = back.into_iter().zip(lost).filter(|(_, lost)| !(may_lose && *lost));
             copies.extend(there.map(|((link, bytes), _)| Copy { flight, link, bytes }));
         }
-        // Each cycle was judged once.
+        // Each cycle was evaluated once.
         ring.now += 10 * PERIOD;
         ring.exchange.process(DOMAIN, ring.now);
         let count = |wanted: &dyn Fn(&Flight) -> bool| flights.iter().filter(|flight| wanted(flight)).count() as u64;

@@ -1,4 +1,4 @@
-//! Which device is connected to which: as `PreviousPort` says, otherwise to the previous device in the file.
+//! Cables between simulated devices: as in `PreviousPort`, otherwise to the previous device in the file.
 
 use ringcat_config::eni::Port as FilePort;
 use ringcat_sim::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
@@ -10,15 +10,15 @@ use ringcat_wire::register::PortKind;
 /// Ports to the next SubDevices, in the order in which free ports are used.
 const FURTHER: [Port; 3] = [Port::B, Port::D, Port::C];
 
-/// What is plugged in where.
+/// Devices, used ports and cables so far.
 struct Plan<'a> {
     devices: &'a mut [DeviceDescription],
     taken: Vec<[bool; 4]>,
     cables: Vec<CableSpec>,
 }
 
-/// All cables: cable n ends at SubDevice n, the last one closes the ring. Ports that the file does not have but uses
-/// are given to the devices.
+/// All cables: cable n ends at SubDevice n, the last one closes the ring. Devices also get the ports that the file uses
+/// without declaring them.
 pub(super) fn plug(
     devices: &mut [DeviceDescription],
     plugged_into: &[Option<(usize, FilePort)>],
@@ -74,8 +74,7 @@ impl Plan<'_> {
         self.cables.push(CableSpec { a, b, delay: DEFAULT_CABLE_DELAY });
     }
 
-    /// A free port of a device, or of the nearest one in front of it; port B of the previous device where none is
-    /// free.
+    /// A free port of a device, or of the nearest device before it; port B of the previous device where none is free.
     fn further(&mut self, index: usize, wanted: usize) -> Endpoint {
         let all = std::iter::once(wanted).chain((0..index).rev());
         let mut ports = all.flat_map(|device| FURTHER.map(|port| (device, port)));
@@ -86,7 +85,7 @@ impl Plan<'_> {
         self.take(device, port)
     }
 
-    /// Where a cable to the host fits: the last free port that is no EBUS, else the last free one.
+    /// The port for the cable to the host: the last free port that is not EBUS, otherwise the last free port.
     fn end_of_ring(&mut self) -> Endpoint {
         let count = self.devices.len();
         let free: Vec<(usize, Port)> = (0..count)

@@ -21,20 +21,20 @@ use ringcat_wire::sii::{
 
 use super::objects;
 
-/// A mailbox of a device whose file gives it none though it sends mail.
+/// Mailbox of a device with mailbox commands but without a mailbox in the file.
 const MAILBOX: MailboxLayout =
     MailboxLayout { receive_offset: 0x1000, receive_size: 128, send_offset: 0x1080, send_size: 128 };
 /// Time from a request to its answer.
 const ANSWER: Duration = Duration::from_micros(200);
-/// Where process data of a device begins whose file does not say.
+/// Start of the process data of a device if the file does not give it.
 const PROCESS_DATA_START: u16 = 0x1800;
-/// An index for PDOs that the file does not describe, by SyncManager.
+/// Index of PDOs that the file does not describe, by SyncManager.
 const UNNAMED: [u16; 2] = [0x17F0, 0x1BF0];
-/// Bits of an entry without a name, at most: a multiple of 8 that fits into a byte.
+/// Maximum number of bits of an entry without a name: a multiple of 8 that fits into a byte.
 const GAP: u32 = 248;
-/// Bits of a PDO of which nothing is known.
+/// Bits of an unknown PDO.
 const UNKNOWN_PDO: u8 = 16;
-/// The SII of a device with long lists of PDOs.
+/// Bytes of the SII, enough for long lists of PDOs.
 const SII_BYTES: usize = 2048;
 
 pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> DeviceDescription {
@@ -76,8 +76,8 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device
 }
 
-/// Registers that a controller loads from its EEPROM are what the file expects them to be. Other registers are those of
-/// the simulated controller, whatever the file expects.
+/// Registers that a controller loads from its EEPROM get the values that the file expects. All other registers keep
+/// those of the simulated controller.
 fn loaded_registers(subdevice: &SubDevice, device: &mut DeviceDescription) {
     let checks =
         subdevice.init_commands.iter().filter_map(|command| match (&command.validate, command.datagram.target) {
@@ -103,7 +103,7 @@ fn loaded_registers(subdevice: &SubDevice, device: &mut DeviceDescription) {
     }
 }
 
-/// Devices of one name get their station address behind it.
+/// Appends the station address to names that several devices have.
 pub(super) fn tell_apart(eni: &Eni, devices: &mut [DeviceDescription]) {
     let mut names = BTreeSet::new();
     for (number, device) in devices.iter_mut().enumerate() {
@@ -166,7 +166,7 @@ const fn layout(receive_offset: u16, receive_size: u16, send_offset: u16, send_s
     MailboxLayout { receive_offset, receive_size, send_offset, send_size }
 }
 
-/// Those that are named, and those whose commands there are.
+/// The protocols that the file names, and those of its commands.
 fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
     let Some(mailbox) = mailbox else { return MailboxProtocols(0) };
     let bit = |name: &str| match name.trim().to_ascii_lowercase().as_str() {
@@ -187,8 +187,8 @@ fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
     MailboxProtocols(used.into_iter().filter(|(used, _)| *used).fold(named, |all, (_, one)| all | one))
 }
 
-/// What a file without commands to SyncManagers may mean: mailboxes, then the SyncManagers to which it assigns PDOs, or
-/// outputs and inputs as long as in the image.
+/// SyncManagers of a device without commands for them in the file: mailboxes, then the SyncManagers to which the file
+/// assigns PDOs, or outputs and inputs with the lengths of the image.
 fn guessed(
     subdevice: &SubDevice,
     config: &SubDeviceConfig,
@@ -227,8 +227,8 @@ fn guessed(
     declared
 }
 
-/// SyncManagers to which commands of the file assign PDOs, one behind the other. Nothing says how long a PDO is that is
-/// only assigned: it gets two bytes.
+/// SyncManagers to which commands of the file assign PDOs, one behind the other. The length of a PDO that is only
+/// assigned is unknown: it gets two bytes.
 fn assigned(config: &SubDeviceConfig) -> Vec<DeclaredSyncManager> {
     let mut start = PROCESS_DATA_START;
     let sync_manager = |assignment: &PdoAssignment| {
@@ -278,8 +278,8 @@ fn sync_managers(declared: &[DeclaredSyncManager]) -> Vec<SyncManagerDescription
     described
 }
 
-/// Those that the file declares in SyncManagers, then those that are only described. Where they do not fill their
-/// SyncManager, a PDO without names does.
+/// PDOs that the file declares in SyncManagers, then PDOs that it only describes. A PDO without names fills the rest of
+/// a SyncManager.
 fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescription> {
     let of_file = subdevice.process_data.iter().flat_map(|data| &data.pdos);
     let names = |index: u16| of_file.clone().find(|pdo| pdo.index == index);
@@ -367,8 +367,8 @@ fn entry(entry: &PdoEntry) -> PdoEntryDescription {
     }
 }
 
-/// PDOs as long as their SyncManager. One that the file assigns without saying what it maps, or another one where there
-/// is none, has what is missing; where the file's PDOs are too long, one without names stands for all.
+/// PDOs with the length of their SyncManager. A PDO that the file assigns without a mapping, or an additional PDO, gets
+/// the missing bits. PDOs that are too long are replaced by one PDO without names.
 fn filled(
     mut mapped: Vec<PdoDescription>,
     sync_manager: u8,
@@ -390,7 +390,7 @@ fn filled(
     mapped
 }
 
-/// Entries without names of so many bits in all.
+/// Entries without names, with this number of bits in total.
 fn gaps(bits: u32) -> Vec<PdoEntryDescription> {
     let starts = (0..bits).step_by(GAP as usize);
     let entry = |start: u32| PdoEntryDescription {
@@ -410,7 +410,7 @@ fn without_names(sync_manager: u8, direction: PdoDirection, length: u16) -> PdoD
     PdoDescription { direction, index, name: String::new(), sync_manager: Some(sync_manager), flags: 0, entries }
 }
 
-/// It takes the SYNC signals of the file.
+/// The clock of the device, with the SYNC signals of the file.
 fn clock(config: &SubDeviceConfig) -> DcDescription {
     let mode = config.sync.map(|signals| DcMode {
         sync0_cycle_ns: signals.sync0_cycle_ns,

@@ -1,4 +1,4 @@
-//! Objects and IDNs that take what the start-up commands of a file write.
+//! Objects and IDNs that accept the start-up commands of a file.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +10,13 @@ use ringcat_wire::mailbox::coe::DataType;
 use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::sii::{PdoDirection, SyncManagerKind};
 
-/// Objects of communication, assignment and mapping among them, follow from the rest of the device.
+/// First index after the communication objects. Those (PDO assignment and mapping among them) follow from the rest of
+/// the device.
 const OF_PROFILE: u16 = 0x2000;
 /// Drives that a device may have.
 const MAX_DRIVES: u8 = 8;
 
-/// A type for so many bits.
+/// A data type with this number of bits.
 pub(super) const fn data_type(bits: u16) -> u8 {
     match bits {
         1 => data_type::BOOL,
@@ -44,7 +45,7 @@ pub(super) fn assigned(subdevice: &SubDevice, sync_manager: u8) -> Vec<u16> {
     places.into_values().collect()
 }
 
-/// Objects beside those that are mapped.
+/// Objects that the commands write, in addition to the mapped ones.
 pub(super) fn objects(
     subdevice: &SubDevice,
     pdos: &[PdoDescription],
@@ -65,7 +66,7 @@ pub(super) fn objects(
     let objects = written.into_iter().filter_map(|(index, mut entries)| {
         let mapped = mapped(index, pdos);
         if entries.keys().all(|sub_index| mapped.iter().any(|entry| entry.sub_index == *sub_index)) {
-            // It is there already, and can be written where it is an output.
+            // The object exists already, and is writable if it is an output.
             let outputs = mapped.iter().all(|entry| entry.access == Access::ReadWrite);
             if outputs {
                 return None;
@@ -85,7 +86,8 @@ pub(super) fn objects(
     objects.collect()
 }
 
-/// Objects below the profiles that nothing else makes: neither assignment nor mapping of a known PDO nor identity.
+/// Communication objects that no other part of the device creates: neither assignment nor mapping of a known PDO nor
+/// identity.
 fn is_lonely(index: u16, pdos: &[PdoDescription], declared: &[SyncManagerDescription]) -> bool {
     let number = usize::from(index.saturating_sub(ASSIGNMENT_BASE));
     let exchanges = |sm: &SyncManagerDescription| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs);
@@ -97,7 +99,7 @@ fn is_lonely(index: u16, pdos: &[PdoDescription], declared: &[SyncManagerDescrip
     !is_there
 }
 
-/// An entry that takes this; one that is written with different lengths takes any.
+/// Adds an entry for this value; an entry that is written with different lengths accepts any length.
 fn add(entries: &mut BTreeMap<u8, Entry>, sub_index: u8, data: &[u8]) {
     let differs = entries.get(&sub_index).is_some_and(|known| known.value.len() != data.len());
     let bits = u16::try_from(8 * data.len()).unwrap_or(u16::MAX);
