@@ -69,6 +69,9 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
                 let (chain, contents) = loop {
                     let trust = words.trust();
                     let read = categories(&mut eeprom, &area, Extent::Shared(&words)).await?;
+                    if !words.suit(&read.0) {
+                        break categories(&mut eeprom, &area, Extent::Own).await?;
+                    }
                     // Trust only decreases, so this ends.
                     if words.trust() == trust {
                         break read;
@@ -121,7 +124,7 @@ async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, words: &SharedWords) 
         if eeprom.bytes(block.first, block.count, ahead).await.is_err() {
             return;
         }
-        words.report(eeprom.station(), block.kind, eeprom.own_words(block.first, block.count));
+        words.report(eeprom.station(), blocks.before(&block), eeprom.own_words(block.first, block.count));
     }
 }
 
@@ -185,8 +188,8 @@ async fn categories(
                 Extent::Headers => None,
                 Extent::Own => Some(eeprom.bytes(word, words, then).await?),
                 Extent::Shared(shared) => {
-                    let data = eeprom.bytes_with(word, words, then, |word| shared.confirmed(word)).await?;
-                    shared.report(eeprom.station(), category.kind, eeprom.own_words(word, words));
+                    let data = eeprom.bytes_with(word, words, then, |word| shared.confirmed(&chain, word)).await?;
+                    shared.report(eeprom.station(), &chain, eeprom.own_words(word, words));
                     Some(data)
                 }
             };

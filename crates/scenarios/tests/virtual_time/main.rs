@@ -69,6 +69,7 @@ mod ring_remerge;
 mod ring_services;
 mod services;
 mod several_areas;
+mod shared_sii;
 mod slow_eeprom;
 mod start_up;
 mod startup_commands;
