@@ -31,7 +31,7 @@ struct Shared {
     trust: Trust,
     /// Words with names.
     names: Range<u32>,
-    /// The chain of categories of those that help.
+    /// The chain of categories in the EEPROMs of the SubDevices that share words.
     chain: Vec<CategoryHeader>,
 }
 
