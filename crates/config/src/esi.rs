@@ -1,5 +1,5 @@
 //! Device descriptions (ESI, ETG.2000; protocol 12): input is the bytes of a file, output an [`Esi`] or an error with
-//! file, line, device and element. No files are opened here; [`References`] hands in those that a file refers to.
+//! file, line, device and element. No files are opened here; [`References`] provides the files to which a file refers.
 //!
 //! The reader is lenient where the files of vendors differ (order of elements, `0x` numbers, encodings, unknown
 //! elements and attributes, which are notices) and strict where a wrong guess would result in a wrong device: numbers

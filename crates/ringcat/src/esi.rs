@@ -1,5 +1,5 @@
-//! Device descriptions (ESI, ETG.2000) from files: `ringcat-config` reads them, this module opens files and makes
-//! simulated devices of them. See `docs/esi.md`.
+//! Device descriptions (ESI, ETG.2000) from files: `ringcat-config` parses them, this module opens files and creates
+//! simulated devices from them. See `docs/esi.md`.
 
 #[cfg(feature = "sim")]
 mod device;

@@ -76,7 +76,7 @@ impl Segment {
         Segment::from_toml_with(text, base_dir, &NoDescriptions)
     }
 
-    /// The same, with devices of description files, whose paths are relative to `base_dir` too.
+    /// The same, with devices of description files; their paths are also relative to `base_dir`.
     ///
     /// # Errors
     /// The errors of [`Segment::from_toml`], and those of the description files.

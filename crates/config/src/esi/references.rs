@@ -59,7 +59,7 @@ struct Files<'a> {
 }
 
 impl Files<'_> {
-    /// Modules of referenced files, also of those that these refer to.
+    /// Modules of referenced files, including indirectly referenced files.
     fn modules(&mut self, esi: &mut Esi) -> Result<(), EsiError> {
         let mut waiting: Vec<(String, u32, String)> =
             esi.references.iter().map(|it| (esi.file.clone(), it.line, it.path.clone())).collect();

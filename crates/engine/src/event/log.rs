@@ -1,5 +1,6 @@
-//! Events in the order of their numbers: those that the application has not fetched, and the last ones that it has, for
-//! clients that were away. The log is bounded: the oldest are dropped, and unfetched ones among them counted.
+//! Events in the order of their numbers: events that the application has not fetched, and the last fetched ones for
+//! clients that were disconnected. The log is bounded: the oldest events are dropped, and dropped events that were not
+//! fetched are counted.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;

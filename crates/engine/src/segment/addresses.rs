@@ -29,7 +29,7 @@ impl Addresses {
         self.changes
     }
 
-    /// The temporary address to assign next, without those that are in use. If all are, any.
+    /// The next temporary address to assign that is not in use; any address if all are in use.
     pub fn next(&self, is_in_use: impl Fn(StationAddress) -> bool) -> StationAddress {
         let at = |place: u16| StationAddress(FIRST + (self.next + place) % COUNT);
         (0..COUNT).map(at).find(|address| !is_in_use(*address)).unwrap_or(at(0))

@@ -68,7 +68,7 @@ impl Slot {
         self.next_number
     }
 
-    /// An empty slot, whose numbers differ from those before.
+    /// An empty slot, with other numbers than before.
     pub fn emptied(&self) -> Slot {
         let isolations = self.isolations.wrapping_add(1);
         Slot { running: None, waiting: Vec::new(), isolations, next_number: self.next_number }

@@ -246,7 +246,7 @@ impl Segment {
         !is_isolating && versions.isolations == self.slot.isolations() && versions.addresses == self.addresses.version()
     }
 
-    /// Whether so many searches for SubDevices failed that the number of datagrams per frame is to be tested.
+    /// Whether enough searches for SubDevices have failed for a test of the number of datagrams per frame.
     pub fn are_frames_doubtful(&self) -> bool {
         self.addresses.are_frames_doubtful()
     }

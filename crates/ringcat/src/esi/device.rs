@@ -1,5 +1,5 @@
-//! A simulated device from a description: the SII image as a tool writes it, PDOs also where the image has no room for
-//! them or modules bring them, the object dictionary with its defaults.
+//! A simulated device from a description: the SII image as a tool writes it, the PDOs (also those of modules, and those
+//! without room in the image), the object dictionary with its defaults.
 
 use ringcat_config::esi::sii::{SiiOptions, SiiProfile, build, code_of};
 use ringcat_config::esi::{Device, Esi, Pdo, PlacedModule, SyncManagerRole, place_modules};
@@ -8,10 +8,10 @@ use ringcat_wire::sii::PdoDirection;
 
 use super::objects;
 
-/// Bits of a part of an entry that the format cannot hold in one.
+/// Bits of a part of an entry that is too long for the format.
 const PART: u16 = 248;
 
-/// The device with its modules; the error is in words.
+/// The device with its modules; the error is a message.
 pub(super) fn describe(
     esi: &Esi,
     device: &Device,
@@ -22,11 +22,11 @@ pub(super) fn describe(
     let with = |without_pdos: bool| {
         let mut options = SiiOptions::of(SiiProfile::TwinCat, 1033);
         options.without_pdos = without_pdos;
-        // The modes of a clock need the factor, whatever tools write.
+        // The modes of a clock need the factor, independent of the tool.
         options.sync1_factor = true;
         build(esi, device, &options)
     };
-    // As TwinCAT does with an image that is too large.
+    // TwinCAT does the same with an image that is too large.
     let (image, has_pdos) = match with(false) {
         Ok(image) => (image, true),
         Err(_) => (with(true).map_err(|error| error.to_string())?, false),
@@ -42,7 +42,7 @@ pub(super) fn describe(
     Ok(description)
 }
 
-/// PDOs of the description, where the image has none.
+/// PDOs of the description, if the image has none.
 fn of_device(device: &Device) -> Vec<PdoDescription> {
     let rx = device.rx_pdos.iter().map(|pdo| described(device, pdo, PdoDirection::Rx));
     rx.chain(device.tx_pdos.iter().map(|pdo| described(device, pdo, PdoDirection::Tx))).collect()
@@ -65,7 +65,7 @@ fn described(device: &Device, pdo: &Pdo, direction: PdoDirection) -> PdoDescript
     }
 }
 
-/// An entry; one of more than 255 bits in several parts.
+/// An entry; an entry of more than 255 bits is split into several parts.
 fn entry(of: &ringcat_config::esi::PdoEntry) -> Vec<PdoEntryDescription> {
     let part = |index, sub_index, bits: u16| PdoEntryDescription {
         index,
@@ -81,7 +81,7 @@ fn entry(of: &ringcat_config::esi::PdoEntry) -> Vec<PdoEntryDescription> {
     parts.map(|begin| part(0, 0, (of.bit_length - begin).min(PART))).collect()
 }
 
-/// PDOs of the modules, behind those of the device; what stood in for missing ones goes.
+/// Adds the PDOs of the modules behind those of the device, and removes placeholders of missing PDOs.
 fn add_modules(
     esi: &Esi,
     device: &Device,

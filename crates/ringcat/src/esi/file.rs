@@ -1,4 +1,4 @@
-//! A description from a file, with the files that it refers to.
+//! A description from a file, with the files to which it refers.
 
 use std::fmt;
 use std::fs::{self, File};
@@ -19,7 +19,7 @@ pub enum EsiFailure {
         /// The reason.
         error: io::Error,
     },
-    /// Its content is refused.
+    /// Its content is not valid.
     Esi(Box<EsiError>),
 }
 
@@ -37,7 +37,7 @@ impl std::error::Error for EsiFailure {}
 /// Reads a file with its modules and dictionaries.
 ///
 /// # Errors
-/// [`EsiFailure`]: a file that cannot be read, or with file, line and device what is wrong in it.
+/// [`EsiFailure`]: a file cannot be read, or its content is wrong; the error names file, line and device.
 pub fn load(path: &Path) -> Result<Esi, EsiFailure> {
     let bytes = bytes_of(path).map_err(|error| EsiFailure::Read { path: path.to_owned(), error })?;
     let folder = Folder(path.parent().unwrap_or(Path::new("")));
@@ -45,14 +45,14 @@ pub fn load(path: &Path) -> Result<Esi, EsiFailure> {
     read_with(&name, &bytes, &folder).map_err(|error| EsiFailure::Esi(Box::new(error)))
 }
 
-/// At most one byte more than may be, whatever a device or a pipe has.
+/// Reads at most one byte more than the limit, also from a device or a pipe.
 pub(super) fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// The folder of a description. Names of files count in either case.
+/// The folder of a description. File names are compared case-insensitively.
 struct Folder<'a>(&'a Path);
 
 impl References for Folder<'_> {
@@ -66,7 +66,7 @@ impl References for Folder<'_> {
     }
 }
 
-/// The entry of a folder with this name in either case.
+/// The entry of a folder with this name, case-insensitive.
 fn named(folder: &Path, name: &str) -> Option<PathBuf> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);

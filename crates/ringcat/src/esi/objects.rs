@@ -1,5 +1,5 @@
 //! The object dictionary of a simulated device from a description. PDO mappings, PDO assignments and the identity
-//! follow from the rest of the device, as the simulator makes them.
+//! follow from the rest of the device; the simulator creates them.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use ringcat_sim::description::{PdoDescription, data_type};
 use ringcat_wire::mailbox::coe::AccessRights;
 use ringcat_wire::sii::PdoDirection;
 
-/// Objects that the simulator makes: identity, SyncManager types, PDO assignments, synchronisation, mappings.
+/// Objects that the simulator creates: identity, SyncManager types, PDO assignments, synchronisation, mappings.
 fn is_derived(index: u16) -> bool {
     matches!(index, 0x1018 | 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C00..=0x1C5F)
 }
@@ -104,7 +104,7 @@ fn entry(part: &Part, is_single: bool) -> Entry {
     }
 }
 
-/// Types of unsigned numbers, whose limits compare as they are.
+/// Types of unsigned numbers: their limits can be compared directly.
 fn is_unsigned(code: u8) -> bool {
     matches!(code, data_type::U8 | data_type::U16 | data_type::U32)
 }
@@ -116,7 +116,7 @@ fn number(bytes: &[u8]) -> i64 {
     i64::from_le_bytes(value)
 }
 
-/// Mapped entries that the dictionary of the file does not have, in objects that it has.
+/// Mapped entries that the file's dictionary lacks, in objects that it contains.
 fn add_mapped(pdos: &[PdoDescription], objects: &mut BTreeMap<u16, Object>) {
     for pdo in pdos {
         let (access, right) = match pdo.direction {

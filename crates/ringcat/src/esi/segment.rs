@@ -12,7 +12,7 @@ use ringcat_sim::segment::{DescribedDevice, DescribedDevices, DescriptionFault, 
 use super::device::describe;
 use super::file::load;
 
-/// Types that a message names.
+/// Maximum number of types that a message lists.
 const NAMED: usize = 20;
 
 /// Reads description files for segment files, each once.
@@ -21,7 +21,7 @@ pub struct EsiDevices {
     files: RefCell<HashMap<PathBuf, Rc<Esi>>>,
 }
 
-/// Reads a segment file whose devices may be those of description files.
+/// Reads a segment file; its devices may come from description files.
 ///
 /// # Errors
 /// [`SegmentError`] with file, line and device.
@@ -52,7 +52,7 @@ impl DescribedDevices for EsiDevices {
     }
 }
 
-/// The device of a type, of the wanted or the highest revision.
+/// The device of a type, with the wanted revision or the highest one.
 fn chosen<'a>(esi: &'a Esi, wanted: &DescribedDevice) -> Result<&'a Device, DescriptionFault> {
     let fault = |key, message| Err(DescriptionFault { key, message });
     let devices = || esi.devices.iter().filter(|device| !device.is_invisible);

@@ -115,7 +115,7 @@ fn whole(data: &[u8], options: &SiiOptions) -> Option<SiiImage> {
     Some(SiiImage { used: bytes.len(), bytes, notices: Vec::new() })
 }
 
-/// Categories of the description; those that are made too are replaced if the length is right (protocol ES-100).
+/// Categories given by the description. They replace generated categories if their length is right (protocol ES-100).
 fn own_categories(eeprom: &Eeprom, categories: &mut Vec<(u16, Vec<u8>)>, notices: &mut Vec<String>) {
     for own in &eeprom.categories {
         let data = own.content.bytes();

@@ -103,7 +103,7 @@ fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
     begin.and_then(|begin| begin.checked_rem(cycle)).map_or(0, |ns| ns as i64)
 }
 
-/// What follows from clocks that are not locked in time. A SubDevice whose delay is unknown never goes on: its time may
+/// What follows from clocks that are not locked in time. A SubDevice with an unknown delay never goes on: its time may
 /// be wrong by any amount.
 fn or_go_on(bus: &Bus, segment: &SharedSegment, member: usize, result: Result<(), NotLocked>) -> Result<(), NotLocked> {
     let choice = segment.view().clocks().config.when_unlocked;

@@ -47,7 +47,7 @@ const FINE: Duration = Duration::from_micros(500);
 /// Maximum bytes for 1,000 terminals, as a multiple of the floor.
 const BYTES_BAR: f64 = 1.5;
 
-/// A name, the segment with so many SubDevices, and how many are tried.
+/// A name, a function that creates a segment with a number of SubDevices, and the numbers to measure.
 type Kind<'a> = (&'static str, &'a dyn Fn(usize) -> Network, &'a [usize]);
 
 /// Cost of a start.
