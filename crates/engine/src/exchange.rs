@@ -23,6 +23,7 @@ pub mod foreign;
 mod image;
 mod leaving;
 mod missed;
+mod outcome;
 mod place;
 mod presence;
 mod proved;
@@ -204,7 +205,7 @@ impl Exchange {
         }
         if !self.again.is_empty() {
             if frame.way.is_later(now) {
-                frame.way.learn(tries::sent_at(frame, domain.timeout_ns()), now, false);
+                frame.way.learn(outcome::sent_at(frame, domain.timeout_ns()), now, false);
             }
             if self.is_alone {
                 self.decide_at = Instant::NEVER;
@@ -235,21 +236,20 @@ impl Exchange {
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
             return self.receive_again(copy, arrived_on, bytes);
         };
-        let sends_again = !self.again.is_empty();
-        let timeout_ns = self.domains.get(frame.domain()).filter(|_| sends_again).map(Domain::timeout_ns);
+        let timeout_ns = self.domains.get(frame.domain()).map(Domain::timeout_ns);
         let domain = self.domains.get_mut(frame.domain());
         let image = domain.map_or_else(|| self.service.image_mut(), Domain::inputs_mut);
         self.taken = index;
         let was_complete = frame.is_complete();
         let step = frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally);
-        let is_ours = matches!(step, Step::Waiting | Step::Finished);
-        if let Some(timeout_ns) = timeout_ns
-            && is_ours
+        let is_followed = !self.again.is_empty() && matches!(step, Step::Waiting | Step::Finished);
+        if is_followed
+            && let Some(timeout_ns) = timeout_ns
             && frame.is_complete()
             && !was_complete
             && frame.way.is_later(now)
         {
-            frame.way.learn(tries::sent_at(frame, timeout_ns), now, self.is_closed);
+            frame.way.learn(outcome::sent_at(frame, timeout_ns), now, self.is_closed);
         }
         let received = match step {
             Step::Waiting => {
@@ -273,7 +273,7 @@ impl Exchange {
                 Received::Corrupt
             }
         };
-        if is_ours && sends_again {
+        if is_followed {
             self.follow_tries(usize::from(index));
         }
         received
@@ -305,7 +305,7 @@ impl Exchange {
             let (mut wkc, mut waiting, mut complete, mut left) = (0, false, true, self.cycle + 1);
             let (mut saved, mut was_sent) = (false, false);
             for (index, frame) in set.clone().zip(frames) {
-                let outcome = tries::outcome(frame, self.again.get(index));
+                let outcome = outcome::outcome(frame, self.again.get(index));
                 waiting |= outcome.waiting;
                 complete &= outcome.complete;
                 saved |= outcome.saved;
@@ -327,11 +327,11 @@ impl Exchange {
             }
             domain.count_tries(was_sent, complete);
             if !domain.judge(wkc, complete, left) {
-                let returned = tries::has_returned(set.clone(), &self.frames, &self.again);
+                let returned = outcome::has_returned(set.clone(), &self.frames, &self.again);
                 let judgement = (wkc, complete, returned);
                 note_change(id, domain, judgement, &self.board, self.tally.disturbed(), &mut self.events);
                 if !complete {
-                    tries::count_errors(set, &self.frames, &self.again, &self.board);
+                    outcome::count_errors(set, &self.frames, &self.again, &self.board);
                 }
             }
         }

@@ -71,8 +71,8 @@ pub struct Mirror {
     areas: Vec<Area>,
     flights: Vec<Option<Flight>>,
     compared: u64,
-    /// Frames of the cycle that is judged next were sent again: fresh inputs do not show that outputs were taken, because
-    /// outputs of some devices are never repeated.
+    /// Frames of the cycle that is judged next were sent again: fresh inputs do not show that outputs were taken,
+    /// because outputs of some devices are never repeated.
     pub was_sent_again: bool,
     /// Whether a difference to latched outputs is a failure.
     pub judges_latched: bool,

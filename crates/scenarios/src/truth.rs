@@ -94,13 +94,7 @@ impl Truth {
                     if self.compares_outputs {
                         let taken = controller.logical_accesses();
                         let taken = taken.filter(|it| it.written && is_of_cycle(it) && is_moved(area, it, true));
-                        let mut values = taken.filter_map(|access| bytes_of(area, access));
-                        let first = values.next();
-                        let (device, number) = (area.device.0, domain.0);
-                        assert!(
-                            values.all(|value| Some(value) == first),
-                            "device {device} took different outputs in one cycle of domain {number}",
-                        );
+                        assert_alike(area, domain, taken.filter_map(|access| bytes_of(area, access)));
                     }
                     if status.state != DomainState::Complete || status.wkc != status.expected {
                         continue;
@@ -149,4 +143,14 @@ fn is_moved(area: &Area, access: &LogicalAccess, write: bool) -> bool {
 fn bytes_of<'a>(area: &Area, access: &'a LogicalAccess) -> Option<&'a [u8]> {
     let at = usize::try_from(area.logical.checked_sub(access.address)?).ok()?;
     access.data.get(at..at + area.in_image.len())
+}
+
+/// All tries of a cycle carry the same outputs.
+fn assert_alike<'a>(area: &Area, domain: DomainId, mut values: impl Iterator<Item = &'a [u8]>) {
+    let first = values.next();
+    let (device, number) = (area.device.0, domain.0);
+    assert!(
+        values.all(|value| Some(value) == first),
+        "device {device} took different outputs in one cycle of domain {number}",
+    );
 }

@@ -1,8 +1,8 @@
 //! A frame that may be sent again within its cycle, and what its tries have proved (decision 0045).
 //!
 //! Each try is evaluated by itself: working counters of different tries are never added. A try proves, for each
-//! SubDevice of a datagram, that it took the outputs or delivered the inputs. A cycle is complete if one try is complete,
-//! or if the tries together have proved each SubDevice. The bytes of outputs are those of the first try.
+//! SubDevice of a datagram, that it took the outputs or delivered the inputs. A cycle is complete if one try is
+//! complete, or if the tries together have proved each SubDevice. The bytes of outputs are those of the first try.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -211,7 +211,7 @@ pub(super) fn is_mixed(frame: &CyclicFrame) -> bool {
 mod tests {
     use super::*;
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn a_grid_separates_the_times_before_and_after_its_signals() {
         let grid = SyncGrid { cycle_ns: 1_000_000, shift_ns: -200_000 };

@@ -189,7 +189,8 @@ impl Domain {
         }
     }
 
-    /// Whether it is worth it to send frames again: not if that did not help for many cycles, until a cycle is complete.
+    /// Whether it is worth it to send frames again: not if that did not help for many cycles, until a cycle is
+    /// complete.
     pub(crate) fn may_send_again(&mut self) -> bool {
         if self.status.state == DomainState::Complete {
             self.fruitless = 0;

@@ -1,20 +1,20 @@
 //! Sends lost frames again within their cycle (decision 0045).
 //!
-//! Input: the times at which frames are lost ([`super::way`]), and the copies that came back. A frame of which the copies
-//! are not back by then, or whose copies show that the ring changed while they were on the wire, is sent again on all
-//! links, as long as it can come back before the next cycle. This is bounded: one check of all frames per call, and at
-//! least one round trip between two tries. It is away from the usual cycle, which only notes the time of the next check.
+//! Input: the times at which frames are lost ([`super::way`]), and the copies that came back. A frame of which the
+//! copies are not back by then, or whose copies show that the ring changed while they were on the wire, is sent again
+//! on all links, as long as it can come back before the next cycle. This is bounded: one check of all frames per
+//! call, and at least one round trip between two tries. It is away from the usual cycle, which only notes the time of
+//! the next check.
 
 use alloc::vec::Vec;
-use core::ops::Range;
 
 use super::again::{Again, SyncGrid, Tries, is_mixed};
 use super::domain::Domain;
 use super::flight::{CyclicFrame, Step};
 use super::image::InputNumber;
 use super::missed::give_up;
+use super::outcome::sent_at;
 use super::{Exchange, Received};
-use crate::board::Board;
 use crate::domain::DomainId;
 use crate::layout::{Layout, RepeatRule};
 use crate::link::{Link, LinkSet};
@@ -23,8 +23,8 @@ use crate::time::Instant;
 
 impl Exchange {
     /// From now on lost frames are sent again within their cycle, in domains with one cycle on the wire: `rules` has
-    /// what each SubDevice may receive twice, `layout` is that of this exchange, `is_wanted` selects domains. Not for the
-    /// cyclic path: this allocates.
+    /// what each SubDevice may receive twice, `layout` is that of this exchange, `is_wanted` selects domains. Not for
+    /// the cyclic path: this allocates.
     pub fn send_lost_frames_again(
         &mut self,
         layout: &Layout,
@@ -127,7 +127,7 @@ impl Exchange {
         let end = end_of_cycle(domain, first, self.cycle, self.base_ns, self.next_at);
         let back = Instant(now.0.saturating_add(first.way.longest_ns()));
         let is_late =
-            back > end || self.evidence.clocks.passes(again.grids(), self::sent_at(first, domain.timeout_ns()), back);
+            back > end || self.evidence.clocks.passes(again.grids(), sent_at(first, domain.timeout_ns()), back);
         if is_late {
             let was_sent = again.was_sent(left);
             again.set_tries(first, Tries::Over);
@@ -285,59 +285,6 @@ enum Next {
     Now,
     At(Instant),
     Never,
-}
-
-/// Result of the tries of a frame.
-#[derive(Default)]
-pub(super) struct Outcome {
-    pub waiting: bool,
-    pub complete: bool,
-    pub wkc: u32,
-    /// It is complete because it was sent again.
-    pub saved: bool,
-    /// It was sent again.
-    pub was_sent: bool,
-}
-
-/// Result of the tries of a frame.
-pub(super) fn outcome(first: &CyclicFrame, again: Option<&Option<Again>>) -> Outcome {
-    let (waiting, complete, wkc) = (first.is_waiting(), first.is_complete(), first.wkc());
-    let left = first.left();
-    let Some(Some(again)) = again.filter(|again| again.as_ref().is_some_and(|again| again.was_sent(left))) else {
-        return Outcome { waiting, complete, wkc, ..Outcome::default() };
-    };
-    if complete {
-        return Outcome { waiting, complete, wkc, was_sent: true, ..Outcome::default() };
-    }
-    let saved = again.tries(left) == Tries::Complete;
-    Outcome { waiting: waiting && !saved, complete: saved, wkc: again.wkc(), saved, was_sent: true }
-}
-
-/// Counts the wrong working counters of a judged cycle.
-#[cold]
-pub(super) fn count_errors(set: Range<usize>, frames: &[CyclicFrame], again: &[Option<Again>], board: &Board) {
-    for index in set {
-        let first = &frames[index];
-        match again.get(index) {
-            Some(Some(again)) if again.was_sent(first.left()) => again.count_errors(first, board),
-            _ => first.count_errors(board),
-        }
-    }
-}
-
-/// Whether a copy of any try came back.
-#[cold]
-pub(super) fn has_returned(mut set: Range<usize>, frames: &[CyclicFrame], again: &[Option<Again>]) -> bool {
-    set.any(|index| {
-        let again = again.get(index).and_then(Option::as_ref);
-        let again = again.filter(|again| again.was_sent(frames[index].left())).map(|again| &again.frame);
-        frames[index].arrivals().arrived != 0 || again.is_some_and(|frame| frame.arrivals().arrived != 0)
-    })
-}
-
-/// When a frame left that is overdue after this time.
-pub(super) fn sent_at(frame: &CyclicFrame, timeout_ns: u64) -> Instant {
-    Instant(frame.deadline().0.saturating_sub(timeout_ns))
 }
 
 /// When a cycle of a domain is judged: frames must be back before.

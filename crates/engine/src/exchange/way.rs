@@ -1,8 +1,8 @@
 //! How long a frame takes to come back, learned from its flights, and how long it is waited for.
 //!
-//! Input: times of departure and return as the host sees them. Output: the time after departure at which a frame that is
-//! not back is lost. This time is never shorter than the way of an open ring, which is up to twice the closed one, plus
-//! a margin. Nothing is known before the first flights.
+//! Input: times of departure and return as the host sees them. Output: the time after departure at which a frame that
+//! is not back is lost. This time is never shorter than the way of an open ring, which is up to twice the closed one,
+//! plus a margin. Nothing is known before the first flights.
 
 use crate::time::Instant;
 
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn nothing_is_known_before_the_first_refresh() {
         let mut way = Way::default();
@@ -130,7 +130,7 @@ mod tests {
         assert_eq!(way.wait_ns(), 40_000 + 5_000 + 10_000, "twice the closed way, and the margin");
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn equal_flights_never_reach_the_time_at_which_they_are_lost() {
         let mut way = Way::default();
@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn one_late_return_doubles_the_way_at_most_and_is_forgotten() {
         let mut way = Way::default();
@@ -159,7 +159,7 @@ mod tests {
         assert!(way.wait_ns() <= 135_000, "{}", way.wait_ns());
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn a_ring_that_opens_takes_up_to_twice_the_closed_way() {
         let mut way = Way::default();

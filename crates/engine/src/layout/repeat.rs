@@ -2,8 +2,8 @@
 //!
 //! Input: a planned frame, and for each SubDevice what it may receive twice in a cycle. Output: a frame with the
 //! datagrams that may be repeated. A datagram is cut around the areas of SubDevices that must not see it twice. The
-//! presence datagram is repeated, because it reads the AL status only. Clock and supervision datagrams never are: first tries
-//! alone show the ring and the clocks.
+//! presence datagram is repeated, because it reads the AL status only. Clock and supervision datagrams never are:
+//! first tries alone show the ring and the clocks.
 
 use alloc::vec::Vec;
 
@@ -169,7 +169,7 @@ mod tests {
         domain.repeat(&domain.frames[0], None, rule)
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn datagrams_are_cut_around_outputs_that_must_not_come_twice() {
         let layout = layout(LinkSet::Ring, 4, 2);
@@ -183,7 +183,7 @@ mod tests {
         assert!(!cut.frame.supervision && !cut.frame.clocks);
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn an_lrw_becomes_a_read_where_no_output_may_be_repeated() {
         let layout = layout(LinkSet::Single, 2, 3);
@@ -195,7 +195,7 @@ mod tests {
         assert!(domain.repeat(&domain.frames[0], None, |_| RepeatRule::NEVER).is_none());
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn pieces_that_do_not_fit_a_frame_are_left_out() {
         let layout = layout(LinkSet::Ring, 100, 6);

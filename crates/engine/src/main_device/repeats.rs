@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::config::SyncSignals;
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn a_subdevice_that_was_not_scanned_receives_only_what_its_declaration_allows_twice() {
         let areas = Areas::Planned(None);
@@ -92,7 +92,7 @@ mod tests {
         assert_eq!(of(&reads), RepeatRule { outputs: OutputsAgain::Never, inputs: true });
     }
 
-    // covers: lossless
+    // covers: lost-frames
     #[test]
     fn free_run_follows_from_a_start_up_command() {
         let config = SubDeviceConfig::default();

@@ -91,7 +91,7 @@ fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], p
     row
 }
 
-// covers: lossless
+// covers: lost-frames
 #[test]
 fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
     println!("{:>4} {:>9} {:>7} {:>7} {:>9} {:>9} {:>6}", "ring", "d", "T", "edges", "lost cut", "repair", "bound");
@@ -111,7 +111,7 @@ fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
     }
 }
 
-// covers: lossless
+// covers: lost-frames
 #[test]
 fn single_lost_frames_cost_no_cycle() {
     let rates = [1, 5, 10];
@@ -138,7 +138,7 @@ fn single_lost_frames_cost_no_cycle() {
     }
 }
 
-// covers: lossless
+// covers: lost-frames
 #[test]
 fn nothing_is_sent_again_in_undisturbed_cycles() {
     let cycles = if is_full() { 1_000_000 } else { 20_000 };
@@ -156,7 +156,7 @@ fn latched(world: &World) -> Vec<u64> {
     world.network().devices().map(Device::outputs_latched).collect()
 }
 
-// covers: lossless
+// covers: lost-frames
 #[test]
 fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
     // Servos have CoE, and no command selects free run: they are taken for SM-synchronous.
@@ -188,7 +188,7 @@ fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
     }
 }
 
-// covers: lossless
+// covers: lost-frames
 #[test]
 fn outputs_of_subdevices_with_sync_signals_are_not_repeated_across_sync0() {
     let (mut saved, mut refused) = (0, 0);

@@ -2,14 +2,14 @@
 //!
 //! An EEPROM takes half a millisecond for each 8 bytes, so the reading of one SII determines how long a scan takes.
 //! Two SubDevices read the categories from the beginning, the others help from the end. A word is used for another
-//! SubDevice only if two SubDevices have returned the same value, as in the cache. Where two values differ, nothing is
-//! shared any more; differing names only end the sharing of names, because names have no effect.
+//! SubDevice only if two SubDevices have returned the same value, as in the cache, and all three have equal headers up
+//! to the category of the word. Where two values differ, nothing is shared any more; differing names only end the
+//! sharing of names, because names have no effect.
 
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use core::ops::Range;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::sii::{CategoryHeader, CategoryKind};
@@ -25,14 +25,20 @@ pub(super) struct SharedWords(Rc<RefCell<Shared>>);
 
 #[derive(Debug, Default)]
 struct Shared {
+    places: Vec<Place>,
+    trust: Trust,
+    /// The complete chains of those that have read them.
+    chains: Vec<Vec<CategoryHeader>>,
+}
+
+/// The data of a category in SubDevices whose chains are equal up to its header. With longer names, all data behind
+/// them has another place.
+#[derive(Debug)]
+struct Place {
+    chain: Vec<CategoryHeader>,
     words: BTreeMap<u32, Word>,
     /// SubDevices that read a block, by its first word.
     readers: BTreeMap<u32, Vec<StationAddress>>,
-    trust: Trust,
-    /// Words with names.
-    names: Range<u32>,
-    /// The chain of categories in the EEPROMs of the SubDevices that share words.
-    chain: Vec<CategoryHeader>,
 }
 
 /// A returned word.
@@ -52,16 +58,47 @@ pub(super) enum Trust {
     None,
 }
 
-impl SharedWords {
-    /// A word for which two SubDevices have returned this value.
-    pub fn confirmed(&self, word: u32) -> Option<u16> {
-        let shared = self.0.borrow();
-        let is_trusted = match shared.trust {
+impl Trust {
+    fn covers(self, kind: CategoryKind) -> bool {
+        match self {
             Trust::All => true,
-            Trust::AllButNames => !shared.names.contains(&word),
+            Trust::AllButNames => kind != CategoryKind::Strings,
             Trust::None => false,
-        };
-        shared.words.get(&word).filter(|found| is_trusted && found.is_confirmed).map(|found| found.value)
+        }
+    }
+}
+
+impl Shared {
+    fn place(&self, chain: &[CategoryHeader]) -> Option<&Place> {
+        self.places.iter().find(|place| place.chain == chain)
+    }
+
+    fn place_mut(&mut self, chain: &[CategoryHeader]) -> &mut Place {
+        let at = self.places.iter().position(|place| place.chain == chain).unwrap_or_else(|| {
+            self.places.push(Place { chain: chain.to_vec(), words: BTreeMap::new(), readers: BTreeMap::new() });
+            self.places.len() - 1
+        });
+        &mut self.places[at]
+    }
+
+    fn add_chain(&mut self, chain: &[CategoryHeader]) {
+        if !self.chains.iter().any(|known| known == chain) {
+            self.chains.push(chain.to_vec());
+        }
+    }
+}
+
+/// Type of the last category.
+fn last_kind(chain: &[CategoryHeader]) -> CategoryKind {
+    chain.last().map_or(CategoryKind::Nop, |category| category.kind)
+}
+
+impl SharedWords {
+    /// A word of the last of these categories for which two SubDevices with these headers have returned this value.
+    pub fn confirmed(&self, chain: &[CategoryHeader], word: u32) -> Option<u16> {
+        let shared = self.0.borrow();
+        let found = shared.place(chain)?.words.get(&word)?;
+        (shared.trust.covers(last_kind(chain)) && found.is_confirmed).then_some(found.value)
     }
 
     /// Which words may be used now. If that has changed, words that were used before may have to be read.
@@ -69,42 +106,45 @@ impl SharedWords {
         self.0.borrow().trust
     }
 
-    /// A SubDevice has returned data of a category: each word that it has read itself.
-    pub fn report(&self, by: StationAddress, kind: CategoryKind, words: impl Iterator<Item = (u32, u16)>) {
+    /// Whether words may have been used for a SubDevice with this complete chain. Words of a category are shared before
+    /// the headers behind it are known; another chain that begins like this one may have had a part in them.
+    pub fn suit(&self, chain: &[CategoryHeader]) -> bool {
         let shared = &mut *self.0.borrow_mut();
+        shared.add_chain(chain);
+        shared.chains.iter().all(|other| other == chain || other.first() != chain.first())
+    }
+
+    /// A SubDevice has returned data of the last of these categories: each word that it has read itself.
+    pub fn report(&self, by: StationAddress, chain: &[CategoryHeader], words: impl Iterator<Item = (u32, u16)>) {
+        let shared = &mut *self.0.borrow_mut();
+        let place = shared.place_mut(chain);
+        let mut differ = false;
         for (word, value) in words {
-            let found = shared.words.entry(word).or_insert(Word { value, by, is_confirmed: false });
-            if found.value != value {
-                let trust = if kind == CategoryKind::Strings { Trust::AllButNames } else { Trust::None };
-                shared.trust = if shared.trust == Trust::None { Trust::None } else { trust };
-            } else if found.by != by {
-                found.is_confirmed = true;
-            }
+            let found = place.words.entry(word).or_insert(Word { value, by, is_confirmed: false });
+            differ |= found.value != value;
+            found.is_confirmed |= found.value == value && found.by != by;
+        }
+        if differ && shared.trust != Trust::None {
+            let is_name = last_kind(chain) == CategoryKind::Strings;
+            shared.trust = if is_name { Trust::AllButNames } else { Trust::None };
         }
     }
 
     /// The last block that too few other SubDevices read; this one reads it.
     pub fn claim(&self, by: StationAddress, blocks: &Blocks) -> Option<Block> {
         let shared = &mut *self.0.borrow_mut();
-        if shared.chain.is_empty() {
-            shared.chain.clone_from(&blocks.chain);
-            shared.names = blocks.names.clone();
-        } else if shared.chain != blocks.chain {
-            // With longer names, all data behind them has another place.
-            return None;
-        }
-        let may_be_used = |kind| match shared.trust {
-            Trust::All => true,
-            Trust::AllButNames => kind != CategoryKind::Strings,
-            Trust::None => false,
-        };
+        shared.add_chain(&blocks.chain);
         let is_free = |block: &&Block| {
-            let is_confirmed = shared.words.get(&block.first).is_some_and(|word| word.is_confirmed);
-            let readers = shared.readers.get(&block.first).map_or(&[][..], Vec::as_slice);
-            may_be_used(block.kind) && !is_confirmed && readers.len() < READERS && !readers.contains(&by)
+            let chain = blocks.before(block);
+            let is_open = shared.place(chain).is_none_or(|place| {
+                let readers = place.readers.get(&block.first).map_or(&[][..], Vec::as_slice);
+                let is_confirmed = place.words.get(&block.first).is_some_and(|word| word.is_confirmed);
+                !is_confirmed && readers.len() < READERS && !readers.contains(&by)
+            });
+            is_open && shared.trust.covers(last_kind(chain))
         };
         let block = blocks.blocks.iter().rev().find(is_free).copied()?;
-        shared.readers.entry(block.first).or_default().push(by);
+        shared.place_mut(blocks.before(&block)).readers.entry(block.first).or_default().push(by);
         Some(block)
     }
 }
@@ -114,7 +154,8 @@ impl SharedWords {
 pub(super) struct Block {
     pub first: u32,
     pub count: u32,
-    pub kind: CategoryKind,
+    /// Number of its category in the chain.
+    category: usize,
 }
 
 /// The data of the categories that are read, behind the words that come with their headers.
@@ -122,27 +163,28 @@ pub(super) struct Block {
 pub(super) struct Blocks {
     chain: Vec<CategoryHeader>,
     blocks: Vec<Block>,
-    names: Range<u32>,
 }
 
 impl Blocks {
     /// The blocks of a chain of categories, each with `width` words.
     pub fn new(chain: &[CategoryHeader], width: u32) -> Blocks {
-        let (mut blocks, mut names) = (Vec::new(), 0..0);
+        let mut blocks = Vec::new();
         let mut header = HEADER_WORDS;
-        for category in chain {
+        for (number, category) in chain.iter().enumerate() {
             let end = header + 2 + u32::from(category.words);
             if is_needed(category.kind) {
                 let firsts = (header + width..end).step_by(width as usize);
-                let block = |first| Block { first, count: width.min(end - first), kind: category.kind };
+                let block = |first| Block { first, count: width.min(end - first), category: number };
                 blocks.extend(firsts.map(block));
-            }
-            if category.kind == CategoryKind::Strings {
-                names = header + 2..end;
             }
             header = end;
         }
-        Blocks { chain: chain.to_vec(), blocks, names }
+        Blocks { chain: chain.to_vec(), blocks }
+    }
+
+    /// The headers up to the one of a block's category.
+    pub fn before(&self, block: &Block) -> &[CategoryHeader] {
+        &self.chain[..=block.category]
     }
 }
 
@@ -157,20 +199,42 @@ mod tests {
     const NAMES: u32 = HEADER_WORDS + 2;
     const GENERAL: u32 = HEADER_WORDS + 10;
 
-    fn report(shared: &SharedWords, by: u16, kind: CategoryKind, word: u32, value: u16) {
-        shared.report(StationAddress(by), kind, [(word, value)].into_iter());
+    fn report(shared: &SharedWords, by: u16, chain: &[CategoryHeader], word: u32, value: u16) {
+        shared.report(StationAddress(by), chain, [(word, value)].into_iter());
     }
 
     #[test]
     fn a_word_counts_when_two_subdevices_returned_it() {
         let shared = SharedWords::default();
-        report(&shared, 1, CategoryKind::General, GENERAL, 7);
-        report(&shared, 1, CategoryKind::General, GENERAL, 7);
-        assert_eq!(shared.confirmed(GENERAL), None, "a SubDevice does not confirm itself");
-        report(&shared, 2, CategoryKind::General, GENERAL, 7);
-        assert_eq!(shared.confirmed(GENERAL), Some(7));
-        report(&shared, 3, CategoryKind::General, GENERAL, 8);
-        assert_eq!((shared.confirmed(GENERAL), shared.trust()), (None, Trust::None));
+        report(&shared, 1, &CHAIN, GENERAL, 7);
+        report(&shared, 1, &CHAIN, GENERAL, 7);
+        assert_eq!(shared.confirmed(&CHAIN, GENERAL), None, "a SubDevice does not confirm itself");
+        report(&shared, 2, &CHAIN, GENERAL, 7);
+        assert_eq!(shared.confirmed(&CHAIN, GENERAL), Some(7));
+        report(&shared, 3, &CHAIN, GENERAL, 8);
+        assert_eq!((shared.confirmed(&CHAIN, GENERAL), shared.trust()), (None, Trust::None));
+    }
+
+    #[test]
+    fn words_at_one_address_behind_other_headers_are_others() {
+        let longer = [CategoryHeader { kind: CategoryKind::Strings, words: 7 }, CHAIN[1]];
+        let shared = SharedWords::default();
+        report(&shared, 1, &CHAIN, GENERAL, 7);
+        report(&shared, 2, &longer, GENERAL, 7);
+        assert_eq!((shared.confirmed(&CHAIN, GENERAL), shared.confirmed(&longer, GENERAL)), (None, None));
+        report(&shared, 3, &longer, GENERAL, 7);
+        assert_eq!((shared.confirmed(&CHAIN, GENERAL), shared.confirmed(&longer, GENERAL)), (None, Some(7)));
+        report(&shared, 4, &CHAIN, GENERAL, 8);
+        assert_eq!(shared.trust(), Trust::None);
+    }
+
+    #[test]
+    fn words_suit_a_chain_if_no_other_one_begins_like_it() {
+        let shared = SharedWords::default();
+        let end = CategoryHeader { kind: CategoryKind::End, words: 0 };
+        let longer = [CategoryHeader { kind: CategoryKind::Strings, words: 7 }, end];
+        assert!(shared.suit(&CHAIN) && shared.suit(&longer) && shared.suit(&CHAIN));
+        assert!(!shared.suit(&[CHAIN[0], end]) && !shared.suit(&CHAIN) && shared.suit(&longer));
     }
 
     #[test]
@@ -179,14 +243,14 @@ mod tests {
         let blocks = Blocks::new(&CHAIN, 4);
         assert!(shared.claim(StationAddress(1), &blocks).is_some());
         for by in [1, 2] {
-            report(&shared, by, CategoryKind::General, GENERAL, 7);
-            report(&shared, by, CategoryKind::Strings, NAMES, 1);
-            report(&shared, by, CategoryKind::Strings, NAMES + 1, by);
+            report(&shared, by, &CHAIN, GENERAL, 7);
+            report(&shared, by, &CHAIN[..1], NAMES, 1);
+            report(&shared, by, &CHAIN[..1], NAMES + 1, by);
         }
-        assert_eq!((shared.confirmed(NAMES), shared.confirmed(GENERAL)), (None, Some(7)));
+        assert_eq!((shared.confirmed(&CHAIN[..1], NAMES), shared.confirmed(&CHAIN, GENERAL)), (None, Some(7)));
         assert_eq!(shared.trust(), Trust::AllButNames);
         let claimed = core::iter::from_fn(|| shared.claim(StationAddress(2), &blocks));
-        assert!(claimed.into_iter().all(|block| block.kind == CategoryKind::General));
+        assert!(claimed.into_iter().all(|block| block.category == 1));
     }
 
     #[test]
