@@ -213,10 +213,13 @@ impl Eeprom {
                 if poll.control.command_error || poll.control.write_enable_error {
                     return Ok(Err(Failure::Command(poll.control)));
                 }
-                if poll.address == given.word || Some(poll.address) == next {
-                    self.keep(poll.address, poll.data);
+                // Repeated after a loss, the next command may be before the poll in one frame: the address is then new,
+                // the data old.
+                if poll.address != given.word {
+                    return Ok(Err(Failure::NotTaken));
                 }
-                return Ok(if poll.address == given.word { Ok(()) } else { Err(Failure::NotTaken) });
+                self.keep(poll.address, poll.data);
+                return Ok(Ok(()));
             }
             if poll.taken {
                 // The EEPROM finished between the poll and the command behind it.
