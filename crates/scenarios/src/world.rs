@@ -16,9 +16,8 @@ use ringcat::{
 };
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{Directory, Pending};
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
-use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
@@ -27,7 +26,6 @@ use ringcat_wire::register::map;
 use self::journal::Journal;
 pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
-use crate::loss::Loss;
 use crate::tap::{Fingerprint, Tap};
 use crate::truth::{Departure, Truth};
 

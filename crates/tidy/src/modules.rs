@@ -51,9 +51,9 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
         "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
     // both together
-    ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info", "topology",
-        "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail", "request",
-        "junction", "procedures"]),
+    ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
+        "topology", "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail",
+        "request", "junction", "procedures"]),
 ];
 
 /// The engine's sources.

@@ -112,7 +112,7 @@ impl Exchange {
         let (domain, first) = (&self.domains[number], &self.frames[index]);
         let Some(Some(again)) = self.again.get_mut(index) else { return Next::Never };
         let left = first.left();
-        let sent_at = match again.tries(left) {
+        let last_at = match again.tries(left) {
             Tries::Over | Tries::Complete => return Next::Never,
             _ if first.is_complete() || first.is_vacant() || !first.way.is_known() => return Next::Never,
             Tries::First if !first.is_waiting() => return Next::Never,
@@ -120,7 +120,7 @@ impl Exchange {
             Tries::First => sent_at(first, domain.timeout_ns()),
             Tries::Again => again.sent_at,
         };
-        let lost_at = Instant(sent_at.0.saturating_add(first.way.wait_ns()));
+        let lost_at = Instant(last_at.0.saturating_add(first.way.wait_ns()));
         if lost_at > received_at && again.tries(left) != Tries::Due {
             return Next::At(lost_at);
         }

@@ -1,6 +1,12 @@
 //! Faults of the segment and the host in a scenario.
 
+use std::time::Duration;
+
+use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
+
 use super::World;
+use crate::loss::Loss;
 
 impl World {
     /// Loses frames.
