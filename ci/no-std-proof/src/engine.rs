@@ -12,7 +12,7 @@ use ringcat_engine::board::Board;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::domain::{DomainId, DomainState};
 use ringcat_engine::exchange::Exchange;
-use ringcat_engine::layout::{AreaSpec, DomainSpec, Layout};
+use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout};
 use ringcat_engine::link::{Link, LinkSet};
 use ringcat_engine::queue::queue;
 use ringcat_engine::ring::Identity;
@@ -57,7 +57,8 @@ fn procedure_works(identity: Identity) -> Option<()> {
 fn cycle_works(identity: Identity) -> Option<()> {
     let area = |sync_manager, flow| AreaSpec { subdevice: 0, sync_manager, direction: flow, length: 2 };
     let areas = vec![area(2, Direction::Outputs), area(3, Direction::Inputs)];
-    let spec = DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: false, areas };
+    let spec =
+        DomainSpec { period: Duration::from_millis(1), under_way: 1, lrw: false, areas, image: ImageOrder::Packed };
     let layout = Layout::new(&[spec], LinkSet::Single, true).ok()?;
     let (_, inputs) = layout.area(0, 3)?;
     let board = Arc::new(Board::new(1));
