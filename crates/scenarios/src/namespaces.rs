@@ -65,7 +65,7 @@ impl Namespaces {
     /// As [`Namespaces::serve`], and returns as soon as it is ready.
     ///
     /// # Errors
-    /// It ends, or is not ready after [`READY`].
+    /// It ends, or is not ready after `READY`.
     pub fn serve_until(
         &self,
         program: impl AsRef<OsStr>,

@@ -81,7 +81,8 @@ fn independent_clients_read_dictionaries_and_files_through_the_gateway() {
             ("0x9001", "'StationAddress': 4098, 'VendorId': 3143, 'ProductCode': 2577"),
             ("0xa001", "'ALStatus': 8, 'ALControl': 8, 'ALStatusCode': 0, 'LinkConnStatus': 17"),
             ("0xa001", "'FixedAddressConnPort': [4097, 0, 0, 0], 'FrameErrorCounterPort': [0, 0, 0, 0]"),
-            ("0xa001", "'LastProtocolError': 0, 'NewDiagMessageAvailable': False"),
+            // Its reply to the unknown mailbox type above: 2 is an unsupported protocol.
+            ("0xa001", "'LastProtocolError': 2, 'NewDiagMessageAvailable': False"),
             ("0xf020", "'ConfiguredAddress': [4097, 4098, 0,"),
             ("0xf120", "'MasterState': 8"),
         ] {
