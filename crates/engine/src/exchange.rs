@@ -65,8 +65,6 @@ use leaving::Leaving;
 use missed::{Missed, give_up_overdue};
 use service::Service;
 
-/// Cycles between two applications of the learned ways of frames.
-const REFRESH: u64 = 64;
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
 
@@ -175,17 +173,17 @@ impl Exchange {
 
     /// Takes a received frame. Any bytes are allowed.
     #[inline(always)]
-    pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
-        if self.receive_usual(arrived_on, bytes, now) {
+    pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
+        if self.receive_usual(arrived_on, bytes) {
             return Received::Taken;
         }
-        self.receive_any(arrived_on, bytes, now)
+        self.receive_any(arrived_on, bytes)
     }
 
     /// Takes a frame that came back on the only link with the same results as the previous one, which is the usual
     /// case. In all other cases the result is false, and nothing has changed.
     #[inline(always)]
-    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> bool {
+    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8]) -> bool {
         let Some(sequence) = self.identity.main_cyclic(bytes) else { return false };
         let index = self.by_id[usize::from(sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else { return false };
@@ -203,22 +201,12 @@ impl Exchange {
         if let Some(supervision) = frame.supervision() {
             self.board.post_supervision(supervision);
         }
-        if !self.again.is_empty() {
-            if frame.way.is_later(now) {
-                frame.way.learn(outcome::sent_at(frame, domain.timeout_ns()), now, false);
-            }
-            if self.is_alone {
-                self.decide_at = Instant::NEVER;
-            } else if index == self.newest {
-                self.rest();
-            }
-        }
         true
     }
 
     /// As [`Exchange::receive`], for any frame.
     #[inline(never)]
-    fn receive_any(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
+    fn receive_any(&mut self, arrived_on: Link, bytes: &[u8]) -> Received {
         let copy = match self.identity.classify(bytes) {
             Classified::Ours(copy) if copy.class == Class::Cyclic => copy,
             Classified::Ours(_) => return Received::Acyclic,
@@ -236,22 +224,10 @@ impl Exchange {
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
             return self.receive_again(copy, arrived_on, bytes);
         };
-        let timeout_ns = self.domains.get(frame.domain()).map(Domain::timeout_ns);
         let domain = self.domains.get_mut(frame.domain());
         let image = domain.map_or_else(|| self.service.image_mut(), Domain::inputs_mut);
         self.taken = index;
-        let was_complete = frame.is_complete();
-        let step = frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally);
-        let is_followed = !self.again.is_empty() && matches!(step, Step::Waiting | Step::Finished);
-        if is_followed
-            && let Some(timeout_ns) = timeout_ns
-            && frame.is_complete()
-            && !was_complete
-            && frame.way.is_later(now)
-        {
-            frame.way.learn(outcome::sent_at(frame, timeout_ns), now, self.is_closed);
-        }
-        let received = match step {
+        match frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally) {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
                 self.evidence.hear_early(frame, &self.board);
@@ -272,11 +248,7 @@ impl Exchange {
                 self.missed.damaged(copy.sequence);
                 Received::Corrupt
             }
-        };
-        if is_followed {
-            self.follow_tries(usize::from(index));
         }
-        received
     }
 
     /// Evaluates a domain: gives up its overdue frames and sums its working counters. With several cycles on the wire
@@ -425,18 +397,11 @@ impl Exchange {
                     transmit(Link::Main, bytes);
                     bytes.len()
                 };
-                if !self.again.is_empty() {
-                    self.decide_at = self.decide_at.min(frame.way.depart(now));
-                    self.newest = index as u16;
-                }
                 self.tally.counters.sent += 1;
                 self.tally.counters.bytes += bytes as u64;
             }
         }
         self.cycle += 1;
-        if !self.again.is_empty() && self.cycle.is_multiple_of(REFRESH) {
-            self.refresh_ways();
-        }
         self.board.post_cycle(self.cycle, self.tally.counters.sent);
     }
 

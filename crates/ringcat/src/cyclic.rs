@@ -109,7 +109,12 @@ impl Cyclic {
     /// Takes a frame of the cyclic class or of an unknown sender. Returns its departure if it is an expected copy.
     #[inline(always)]
     pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) -> Option<Instant> {
-        let taken = self.exchange.receive(link, frame, now) == Received::Taken;
+        let taken = if self.exchange.sends_again() {
+            self.exchange.receive_and_follow(link, frame, now)
+        } else {
+            self.exchange.receive(link, frame, now)
+        };
+        let taken = taken == Received::Taken;
         taken.then(|| self.exchange.taken_left_at())
     }
 
@@ -286,13 +291,16 @@ impl Cyclic {
     #[inline(always)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
         let Cyclic { exchange, window, .. } = self;
-        exchange.expect_next(self.next_cycle);
         exchange.send(now, &mut |link, frame| {
             if link == Link::Main {
                 window.occupy(Half::Cyclic, now, frame.len());
             }
             links.send(link, frame);
         });
+        if exchange.sends_again() {
+            exchange.expect_next(self.next_cycle);
+            exchange.follow_departures(now);
+        }
         self.cycle += 1;
         self.window.expect_cycle(next);
     }

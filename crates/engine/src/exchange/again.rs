@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 use super::flight::CyclicFrame;
 use super::image::InputNumber;
 use super::proved::Proved;
+use super::way::Way;
 use crate::board::Board;
 use crate::layout::{OutputsAgain, Piece, PlannedFrame, PlannedRepeat, RepeatRule};
 use crate::link::Link;
@@ -65,6 +66,8 @@ pub(super) enum Tries {
 pub(super) struct Again {
     /// The frame of the further tries.
     pub frame: CyclicFrame,
+    /// The way of the first try.
+    pub way: Way,
     pieces: Box<[Piece]>,
     proofs: Box<[Proof]>,
     grids: Box<[SyncGrid]>,
@@ -109,6 +112,7 @@ impl Again {
         }
         Again {
             frame: again,
+            way: Way::default(),
             pieces: repeat.pieces.clone().into_boxed_slice(),
             proofs: proofs.into_boxed_slice(),
             grids: grids.into_boxed_slice(),

@@ -21,7 +21,6 @@ use super::place::Place;
 use super::presence::Presence;
 use super::template::Template;
 use super::usual::Usual;
-use super::way::Way;
 use super::words::{Header, header_at, supervision_at, u16_at};
 use crate::board::{Board, Supervision};
 use crate::layout::PlannedFrame;
@@ -68,7 +67,6 @@ pub(crate) struct CyclicFrame {
     deadline: Instant,
     /// Cycle, plus one, in which it left.
     left: u64,
-    pub(crate) way: Way,
     /// Number of changes on the board that are applied.
     followed: u32,
     /// Sum of the working counters of process data over the copies received so far.
@@ -134,7 +132,6 @@ impl CyclicFrame {
             arrivals: Arrivals::default(),
             deadline: Instant::NEVER,
             left: 0,
-            way: Way::default(),
             followed: 0,
             wkc: 0,
             complete: false,
@@ -345,6 +342,7 @@ impl CyclicFrame {
     }
 
     /// Takes a copy. Delivers into the image as soon as the flight is complete.
+    #[inline(always)]
     pub(crate) fn receive(
         &mut self,
         copy: FrameCopy,
@@ -382,7 +380,9 @@ impl CyclicFrame {
             let moment = Moment { left: self.left, came: cycle + 1 };
             if moment.left >= image.newest && (first || !self.views.are_doubled) {
                 image.newest = moment.left;
-                self.places.iter_mut().for_each(|place| place.deliver(link, bytes, image, moment));
+                for place in &mut self.places {
+                    place.deliver(link, bytes, image, moment);
+                }
             } else {
                 self.deliver_singly(link, bytes, image, moment, tally);
             }

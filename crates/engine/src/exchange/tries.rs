@@ -21,6 +21,9 @@ use crate::link::{Link, LinkSet};
 use crate::ring::{FrameCopy, Identity, RingState};
 use crate::time::Instant;
 
+/// Cycles between two applications of the learned ways of frames.
+const REFRESH: u64 = 64;
+
 impl Exchange {
     /// From now on lost frames are sent again within their cycle, in domains with one cycle on the wire: `rules` has
     /// what each SubDevice may receive twice, `layout` is that of this exchange, `is_wanted` selects domains. Not for
@@ -73,8 +76,7 @@ impl Exchange {
     /// How long frames are waited for before they are sent again: the longest such time. `None` before enough frames
     /// came back, and where nothing is sent again.
     pub fn waits_for_ns(&self) -> Option<u64> {
-        let can_repeat = |index: &usize| matches!(self.again.get(*index), Some(Some(_)));
-        let known = (0..self.frames.len()).filter(can_repeat).map(|index| &self.frames[index].way);
+        let known = self.again.iter().flatten().map(|again| &again.way);
         known.filter(|way| way.is_known()).map(|way| way.wait_ns()).max()
     }
 
@@ -114,18 +116,18 @@ impl Exchange {
         let left = first.left();
         let last_at = match again.tries(left) {
             Tries::Over | Tries::Complete => return Next::Never,
-            _ if first.is_complete() || first.is_vacant() || !first.way.is_known() => return Next::Never,
+            _ if first.is_complete() || first.is_vacant() || !again.way.is_known() => return Next::Never,
             Tries::First if !first.is_waiting() => return Next::Never,
             Tries::Due => Instant(0),
             Tries::First => sent_at(first, domain.timeout_ns()),
             Tries::Again => again.sent_at,
         };
-        let lost_at = Instant(last_at.0.saturating_add(first.way.wait_ns()));
+        let lost_at = Instant(last_at.0.saturating_add(again.way.wait_ns()));
         if lost_at > received_at && again.tries(left) != Tries::Due {
             return Next::At(lost_at);
         }
         let end = end_of_cycle(domain, first, self.cycle, self.base_ns, self.next_at);
-        let back = Instant(now.0.saturating_add(first.way.longest_ns()));
+        let back = Instant(now.0.saturating_add(again.way.longest_ns()));
         let is_late =
             back > end || self.evidence.clocks.passes(again.grids(), sent_at(first, domain.timeout_ns()), back);
         if is_late {
@@ -164,7 +166,7 @@ impl Exchange {
         counters.sent += 1;
         counters.sent_again += 1;
         counters.bytes += length;
-        Instant(now.0.saturating_add(self.frames[index].way.wait_ns()))
+        Instant(now.0.saturating_add(again.way.wait_ns()))
     }
 
     /// Takes a copy of a further try.
@@ -205,16 +207,86 @@ impl Exchange {
             }
         }
         again.gather_own();
-        self.follow_tries(index);
+        self.taken = (count + index) as u16;
         Received::Taken
     }
 
+    /// Whether lost frames are sent again. Then frames are taken by [`Exchange::receive_and_follow`], and
+    /// [`Exchange::follow_departures`] is called after [`Exchange::send`]: the usual cycle pays nothing for it.
+    #[inline(always)]
+    pub fn sends_again(&self) -> bool {
+        !self.again.is_empty()
+    }
+
+    /// As [`Exchange::receive`], where lost frames are sent again.
+    #[inline(never)]
+    pub fn receive_and_follow(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
+        if self.receive_usual(arrived_on, bytes) {
+            self.follow_usual(now);
+            return Received::Taken;
+        }
+        let received = self.receive_any(arrived_on, bytes);
+        if received == Received::Taken {
+            self.follow_copy(now);
+        }
+        received
+    }
+
+    /// A first try is back on the only link as usual.
+    fn follow_usual(&mut self, now: Instant) {
+        self.learn_way(usize::from(self.taken), now, false);
+        if self.is_alone {
+            self.decide_at = Instant::NEVER;
+        } else if self.taken == self.newest {
+            self.rest();
+        }
+    }
+
+    /// A copy of any try was received.
+    fn follow_copy(&mut self, now: Instant) {
+        let index = usize::from(self.taken);
+        if let Some(again) = index.checked_sub(self.frames.len()) {
+            // Its departure is that of the first try.
+            self.taken = again as u16;
+            self.follow_tries(again);
+        } else {
+            self.learn_way(index, now, self.is_closed);
+            self.follow_tries(index);
+        }
+    }
+
+    /// After [`Exchange::send`], where lost frames are sent again: notes when the frames that left are lost.
+    #[inline(never)]
+    pub fn follow_departures(&mut self, now: Instant) {
+        let left = self.cycle;
+        for (index, (frame, again)) in self.frames.iter().zip(&mut self.again).enumerate() {
+            if frame.is_waiting() && frame.left() == left {
+                let lost_at = again.as_mut().map_or(Instant::NEVER, |again| again.way.depart(now));
+                self.decide_at = self.decide_at.min(lost_at);
+                self.newest = index as u16;
+            }
+        }
+        if left.is_multiple_of(REFRESH) {
+            self.refresh_ways();
+        }
+    }
+
+    /// Learns from the copy with which a frame became complete.
+    fn learn_way(&mut self, index: usize, now: Instant, is_closed: bool) {
+        let (Some(frame), Some(Some(again))) = (self.frames.get(index), self.again.get_mut(index)) else { return };
+        let Some(domain) = self.domains.get(frame.domain()).filter(|_| frame.is_complete()) else { return };
+        if again.way.is_later(now) {
+            again.way.learn(sent_at(frame, domain.timeout_ns()), now, is_closed);
+        }
+        again.way.arrive();
+    }
+
     /// A copy of any try was received: settles the cycle of the frame, or has it sent again at once.
-    pub(super) fn follow_tries(&mut self, index: usize) {
+    fn follow_tries(&mut self, index: usize) {
         let is_closed = self.links == LinkSet::Ring && self.evidence.monitor.state() == RingState::Closed;
         if is_closed != self.is_closed {
             self.is_closed = is_closed;
-            self.frames.iter_mut().for_each(|frame| frame.way.change(is_closed));
+            self.again.iter_mut().flatten().for_each(|again| again.way.change(is_closed));
         }
         let first = &self.frames[index];
         let left = first.left();
@@ -272,11 +344,7 @@ impl Exchange {
     /// Applies what was learned about the ways of frames that can be sent again.
     #[cold]
     pub(super) fn refresh_ways(&mut self) {
-        for (frame, again) in self.frames.iter_mut().zip(&self.again) {
-            if again.is_some() {
-                frame.way.refresh(self.is_closed);
-            }
-        }
+        self.again.iter_mut().flatten().for_each(|again| again.way.refresh(self.is_closed));
     }
 }
 

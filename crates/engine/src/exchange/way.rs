@@ -41,6 +41,12 @@ impl Way {
         Instant(now.0.wrapping_add(self.wait_ns))
     }
 
+    /// The frame is complete: a further copy does not make the way longer.
+    #[inline(always)]
+    pub fn arrive(&mut self) {
+        self.soon = Instant::NEVER;
+    }
+
     /// Whether a return now is later than the returns before.
     #[inline(always)]
     pub fn is_later(&self, now: Instant) -> bool {
