@@ -61,7 +61,7 @@ use evidence::Evidence;
 use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
-use leaving::Leaving;
+use leaving::{Leaving, send_twice};
 use missed::{Missed, give_up_overdue};
 use service::Service;
 
@@ -389,9 +389,11 @@ impl Exchange {
                 let Some(frame) = self.frames.get_mut(index) else { continue };
                 self.sequence = self.sequence.next();
                 self.by_id[usize::from(self.sequence.frame_id())] = index as u16;
-                let bytes = if frame.clocks().is_some() || self.links == LinkSet::Ring {
+                let bytes = if frame.clocks().is_some() {
                     let leaving = Leaving { identity: &self.identity, links: self.links, board: &self.board, now };
                     leaving.send(frame, self.sequence, deadline, &mut self.evidence, transmit)
+                } else if self.links == LinkSet::Ring {
+                    send_twice(&self.identity, frame, self.sequence, deadline, transmit)
                 } else {
                     let bytes = frame.depart(&self.identity, self.sequence, deadline);
                     transmit(Link::Main, bytes);

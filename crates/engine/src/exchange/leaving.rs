@@ -47,3 +47,20 @@ impl Leaving<'_> {
         bytes.len()
     }
 }
+
+/// Sends a frame without clocks on both links; returns its length.
+#[inline(never)]
+pub(super) fn send_twice(
+    identity: &Identity,
+    frame: &mut CyclicFrame,
+    sequence: Sequence,
+    deadline: Instant,
+    transmit: &mut impl FnMut(Link, &[u8]),
+) -> usize {
+    let bytes = frame.depart(identity, sequence, deadline);
+    transmit(Link::Main, bytes);
+    Identity::mark_redundant(bytes, true);
+    transmit(Link::Redundant, bytes);
+    Identity::mark_redundant(bytes, false);
+    bytes.len()
+}
