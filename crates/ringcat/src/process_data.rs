@@ -50,6 +50,7 @@ impl Rate {
         matches!(self.due, Due::Always) || self.is_due_now(cycle)
     }
 
+    #[inline(never)]
     fn is_due_now(&self, cycle: u64) -> bool {
         match self.due {
             Due::Always => true,
