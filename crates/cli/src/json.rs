@@ -12,6 +12,7 @@ pub mod eni;
 #[cfg(test)]
 mod keys;
 pub mod line;
+pub mod network;
 pub mod ring;
 pub mod run;
 pub mod scan;

@@ -2,19 +2,23 @@
 
 mod access;
 mod bench;
+mod bus;
 mod capture;
 mod clock_options;
 mod clocks;
+mod compare;
 mod demo;
 mod ending;
 mod eni_summary;
 mod failure;
+mod init;
 mod interfaces;
 mod json;
 mod numbers;
 mod others;
 mod output;
 mod recording;
+mod resend;
 mod ring;
 mod run;
 mod run_log;
@@ -95,6 +99,14 @@ enum Command {
     ///
     /// All SubDevices are in INIT afterwards.
     Scan(scan::ScanArguments),
+    /// Writes a network file from a scan
+    ///
+    /// The file declares the network as it was found; `ringcat run --network` brings exactly this network to OP.
+    Init(init::InitArguments),
+    /// Compares a network with a network file or an ENI
+    ///
+    /// Names every SubDevice that is missing, additional or different.
+    Compare(compare::CompareArguments),
     /// Exchanges process data with outputs zero
     ///
     /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
@@ -141,6 +153,8 @@ fn main() -> ExitCode {
     conclude(match command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Ring(arguments) => ring::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
@@ -158,6 +172,8 @@ impl Command {
         match self {
             Command::Demo(_) => "demo",
             Command::Scan(_) => "scan",
+            Command::Init(_) => "init",
+            Command::Compare(_) => "compare",
             Command::Run(_) => "run",
             Command::Ring(_) => "ring",
             Command::Clocks(_) => "clocks",

@@ -1,11 +1,11 @@
-//! `ringcat run`: all SubDevices to OP as their SII or an ENI says, process data in a fixed cycle, and an orderly stop.
+//! `ringcat run`: all SubDevices to OP as their SII or a file says, process data in a fixed cycle, and an orderly stop.
 //!
 //! Cycles have a thread of their own, and so has the acyclic half; the main thread only prints. Outputs stay zero or,
-//! with an ENI, have the values of `--set`. The summary tells apart why cycles are late: late wake-ups and left out
+//! with a file, have the values of `--set`. The summary tells apart why cycles are late: late wake-ups and left out
 //! cycles are due to this machine, lost frames to the wire.
 
 mod beside;
-mod eni;
+mod configured;
 mod exchange;
 mod junction;
 mod live;
@@ -23,8 +23,8 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    Application, CyclicThread, Declaration, Event, Instant, LastOutputs, Links, Options, ReadPdos, Scan, SubDeviceInfo,
-    SupervisorThread, SyncSignals, automatic,
+    Application, CyclicThread, Declaration, Event, Instant, JunctionConnection, JunctionMode, LastOutputs, Links,
+    Options, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread, SyncSignals, automatic,
 };
 
 use crate::access::AccessArguments;
@@ -32,12 +32,13 @@ use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::{LinkNames, now};
 use crate::json::data::Data;
+use crate::json::run::SentOnce;
 use crate::output::{counted, say, warn, write_event};
 use crate::run_log::{RunLog, name_of};
 use crate::surroundings::Surroundings;
 use crate::times::in_words;
 use crate::verdict::{Report, Verdict};
-use eni::{EniNetwork, Watched};
+use configured::{ConfiguredNetwork, Watched};
 use exchange::Run;
 use live::Live;
 pub use options::RunArguments;
@@ -50,12 +51,14 @@ const STOP_LIMIT: Duration = Duration::from_secs(5);
 
 /// The application of this command, with a possible recording of all frames.
 type Recorded = Application<Tee<PacketLinks>, SupervisorThread>;
+/// The cycles, the variables of the ENI that are printed, the SubDevices of [`sent_once`].
+type Started = (CyclicThread<Tee<PacketLinks>>, Watched, Vec<SentOnce>);
 
 /// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
 pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let AccessArguments { interfaces, thread, .. } = &arguments.access;
     interfaces.links.check()?;
-    let network = arguments.eni.load()?;
+    let network = arguments.configured.load(interfaces.links.redundant.is_some())?;
     let thread = *thread;
     let end = EndRequest::watch(thread.priority)?;
     let halves = interfaces.open_halves(thread)?;
@@ -81,7 +84,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
     let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
-    let (cycles, watched) = start_cycles(arguments, network.as_ref(), application, &end)?;
+    let (cycles, watched, sent_once) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
     let log = RunLog::new(begin, EventLog::new(begin, names).one_by_one(arguments.tell_all), surroundings);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
@@ -94,7 +97,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     end.no_limit();
     let status = if clocks { run.cycles.supervisor().clocks()? } else { Vec::new() };
     let exchanged = Exchanged::of(&run, &before, ring, &status);
-    let mut at_end = End { cycle: period, reached_op: reached.is_ok(), signals, exchanged };
+    let mut at_end = End { cycle: period, reached_op: reached.is_ok(), signals, sent_once, exchanged };
     let mut reasons = match reached {
         Ok(()) => {
             let reasons = at_end.exchanged.reasons(run.log.events().names());
@@ -113,14 +116,23 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     Ok(Report { verdict, data })
 }
 
-fn options(arguments: &RunArguments, network: Option<&EniNetwork>) -> Options {
+fn options(arguments: &RunArguments, network: Option<&ConfiguredNetwork>) -> Options {
     // A file that declares all SyncManagers says what PDOs there are.
-    let pdos = if network.is_some_and(EniNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
+    let pdos = if network.is_some_and(ConfiguredNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
     let options = arguments.access.interfaces.options();
+    let junctions = junctions(arguments, network);
     options
-        .with_junctions(arguments.junction.mode)
+        .with_junctions(junctions.map_or(arguments.junction.mode, |(mode, _)| mode))
         .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
         .with_pdos(pdos)
+}
+
+/// How rings behind junctions are handled where the file says it and the command line does not.
+fn junctions(
+    arguments: &RunArguments,
+    network: Option<&ConfiguredNetwork>,
+) -> Option<(JunctionMode, Vec<JunctionConnection>)> {
+    network.filter(|_| arguments.junction.mode == JunctionMode::Disabled).and_then(ConfiguredNetwork::junctions)
 }
 
 /// Scans, and meanwhile reports oddities of the cabling and other MainDevices.
@@ -141,7 +153,7 @@ fn scan(
 /// Activates what is declared, with the connections of junctions and what makes cycles begin.
 fn activate(
     arguments: &RunArguments,
-    network: Option<&EniNetwork>,
+    network: Option<&ConfiguredNetwork>,
     supervisor: SupervisorThread,
     declaration: Declaration,
     cyclic: Tee<PacketLinks>,
@@ -151,6 +163,9 @@ fn activate(
     let at_station = |station| network.and_then(|network| network.at_station(station));
     for connection in &arguments.junction.connections {
         let connection = connection.resolve(at_station).map_err(Failure::new)?;
+        supervisor.add_junction_connection(connection)?;
+    }
+    for connection in junctions(arguments, network).into_iter().flat_map(|(_, connections)| connections) {
         supervisor.add_junction_connection(connection)?;
     }
     let mut application = supervisor.apply(cyclic).map_err(|error| match network {
@@ -163,13 +178,30 @@ fn activate(
     Ok(application)
 }
 
-/// Gives the cycles a thread, with the work of an ENI; also the variables of the ENI that are printed.
+/// The SubDevices of which not all process data is sent again with a lost frame, if lost frames are sent again at all;
+/// prints them.
+fn sent_once(application: &Recorded, names: &Names) -> Vec<SentOnce> {
+    if !application.exchange().sends_again() {
+        return Vec::new();
+    }
+    let of = |(subdevice, reason): (SubDeviceId, ringcat::SentOnce)| {
+        let name = names.0.get(subdevice.0).cloned().unwrap_or_default();
+        say!("lost frames: SubDevice {subdevice} \"{name}\": {reason}");
+        SentOnce { subdevice: subdevice.0, name, reason: reason.to_string() }
+    };
+    application.directory().sent_once().map(of).collect()
+}
+
+/// Gives the cycles a thread, with the work of a file; also the variables of the file that are printed, and the
+/// SubDevices of [`sent_once`].
 fn start_cycles(
     arguments: &RunArguments,
-    network: Option<&EniNetwork>,
+    network: Option<&ConfiguredNetwork>,
     mut application: Recorded,
+    names: &Names,
     end: &EndRequest,
-) -> Result<(CyclicThread<Tee<PacketLinks>>, Watched), Failure> {
+) -> Result<Started, Failure> {
+    let sent_once = sent_once(&application, names);
     let (mut work, watched) = match network {
         Some(network) => {
             let (work, watched) = network.work(application.directory())?;
@@ -189,7 +221,7 @@ fn start_cycles(
             if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     )?;
-    Ok((cycles, watched))
+    Ok((cycles, watched, sent_once))
 }
 
 /// Ends the cycles, prints the summary, and stops all SubDevices. What of that fails is a reason.
@@ -222,10 +254,10 @@ fn finish(run: Run, end: &mut End, links: &LinkNames, reasons: &mut Vec<String>)
     Data::Run(Box::new(json))
 }
 
-/// The declaration: the network of the ENI, or the SubDevices found as their SIIs say.
+/// The declaration: the network of the file, or the SubDevices found as their SIIs say.
 fn declare(
     arguments: &RunArguments,
-    network: Option<&EniNetwork>,
+    network: Option<&ConfiguredNetwork>,
     found: &[SubDeviceInfo],
 ) -> Result<Declaration, Failure> {
     let options = &arguments.clock_options;
@@ -244,7 +276,7 @@ fn declare(
             declaration
         }
     };
-    Ok(declaration.with_under_way(arguments.under_way.under_way))
+    Ok(arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way)))
 }
 
 /// Reports other MainDevices and oddities of the cabling among the events of a scan.

@@ -3,14 +3,16 @@
 //! The exchange posts the result of its supervision datagram and the state of the ring; the supervisor posts which
 //! SubDevices take part in process data. Readers use the latest value, so a slow reader blocks and loses nothing.
 
+pub mod clock_times;
 pub mod clocks;
+pub mod live;
 mod rest;
 pub mod traffic;
 
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use ringcat_wire::address::Wkc;
+use ringcat_wire::address::{StationAddress, Wkc};
 
 use crate::link::Link;
 use crate::ring::RingState;
@@ -136,6 +138,8 @@ pub struct Board {
     /// One bit per SubDevice: takes part in process data.
     taking_part: Vec<AtomicU64>,
     taking_part_changes: AtomicU32,
+    /// By SubDevice, the cycles after which its process data has left for the first time since it last took part.
+    left_after: Vec<AtomicU64>,
     /// SubDevices that may be missing without a domain being incomplete.
     optional: Vec<bool>,
     /// One bit per SubDevice: its absence is intended.
@@ -146,6 +150,8 @@ pub struct Board {
     pub clocks: clocks::ClockWords,
     /// Frames of the cyclic half on the wire.
     pub traffic: traffic::Traffic,
+    /// State of SubDevices and links, for any thread.
+    pub live: live::LiveWords,
 }
 
 impl Board {
@@ -162,10 +168,19 @@ impl Board {
             excused: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             unproven: (0..subdevices.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
             taking_part_changes: AtomicU32::new(0),
+            left_after: (0..subdevices).map(|_| AtomicU64::new(0)).collect(),
             optional: Vec::new(),
             clocks: clocks::ClockWords::default(),
             traffic: traffic::Traffic::default(),
+            live: live::LiveWords::new(subdevices),
         }
+    }
+
+    /// Sets the station addresses of the SubDevices.
+    #[must_use]
+    pub fn with_stations(mut self, stations: Vec<StationAddress>) -> Board {
+        self.live.set_stations(stations);
+        self
     }
 
     /// Sets which SubDevices may be missing without a domain being incomplete.
@@ -211,6 +226,37 @@ impl Board {
         (count != 0).then(|| (count as u32, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
     }
 
+    /// That result, packed, and whether there was any.
+    #[inline]
+    pub(crate) fn supervision_word(&self) -> (u64, bool) {
+        let is_any = self.supervision_count.load(Ordering::Acquire) != 0;
+        (self.supervision.load(Ordering::Relaxed), is_any)
+    }
+
+    /// The latest supervision result; none while supervision frames do not come back, and after the application has
+    /// ended.
+    pub fn responding(&self) -> Supervision {
+        let seen = self.supervision().filter(|_| !self.is_silent());
+        seen.map(|(_, supervision)| supervision).unwrap_or_default()
+    }
+
+    /// Whether supervision frames do not come back, or the application has ended: then no SubDevice is known to be
+    /// present.
+    pub fn is_silent(&self) -> bool {
+        self.live.is_silent(self.supervision_count.load(Ordering::Acquire))
+    }
+
+    /// A supervision frame did not come back.
+    #[cold]
+    pub(crate) fn post_silence(&self) {
+        self.live.post_silence(self.supervision_count.load(Ordering::Relaxed));
+    }
+
+    /// The application has ended: no SubDevice is known to be present.
+    pub(crate) fn post_end(&self) {
+        self.live.post_end(self.supervision_count.load(Ordering::Relaxed));
+    }
+
     /// Posts the state of the ring and counts its changes.
     pub(crate) fn post_ring(&self, word: RingWord) {
         let before = RingWord::unpack(self.ring.load(Ordering::Relaxed));
@@ -221,6 +267,12 @@ impl Board {
     /// State of the ring as the exchange sees it.
     pub fn ring(&self) -> RingWord {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
+    }
+
+    /// That state, packed.
+    #[inline]
+    pub(crate) fn ring_word(&self) -> u64 {
+        self.ring.load(Ordering::Acquire)
     }
 
     /// Posts the number of cycles and frames sent.
@@ -261,6 +313,9 @@ impl Board {
 
     /// Sets whether a SubDevice takes part in process data. Indices beyond the board are ignored.
     pub fn set_taking_part(&self, subdevice: usize, takes_part: bool) {
+        if let Some(after) = self.left_after.get(subdevice).filter(|_| takes_part != self.takes_part(subdevice)) {
+            after.store(0, Ordering::Relaxed);
+        }
         self.set(&self.taking_part, subdevice, takes_part);
     }
 
@@ -277,6 +332,20 @@ impl Board {
     /// Whether a SubDevice takes part in process data.
     pub fn takes_part(&self, subdevice: usize) -> bool {
         bit(&self.taking_part, subdevice)
+    }
+
+    /// Posts that frames with process data of a SubDevice leave with the cycle that has this number. With process data
+    /// in several domains the first of them counts.
+    pub(crate) fn post_leaving(&self, subdevice: usize, cycle: u64) {
+        if let Some(after) = self.left_after.get(subdevice).filter(|_| self.takes_part(subdevice)) {
+            let _ = after.compare_exchange(0, cycle + 1, Ordering::Release, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether a cycle with process data of a SubDevice has been sent since it began to take part.
+    pub fn has_left(&self, subdevice: usize) -> bool {
+        let after = self.left_after.get(subdevice).map_or(0, |after| after.load(Ordering::Acquire));
+        after > 0 && self.cycles() >= after
     }
 
     /// Number of changes to the bits `taking_part`, `excused` and `unproven` since activation.
@@ -316,6 +385,25 @@ mod tests {
         board.post_ring(RingWord { changes: 0, ..closed });
         board.post_ring(RingWord { changes: 0, ..closed });
         assert_eq!(board.ring(), closed, "a change is counted once");
+    }
+
+    #[test]
+    fn process_data_has_left_with_the_cycle_that_first_carries_it() {
+        let board = Board::new(2);
+        board.post_leaving(1, 0);
+        board.post_cycle(1, 1);
+        assert!(!board.has_left(1), "it takes no part");
+        board.set_taking_part(1, true);
+        board.post_leaving(1, 1);
+        assert!(!board.has_left(1), "queued, not sent");
+        board.post_cycle(2, 2);
+        board.post_leaving(1, 7);
+        assert!(board.has_left(1) && !board.has_left(0) && !board.has_left(2));
+        board.set_taking_part(1, true);
+        assert!(board.has_left(1), "no change");
+        board.set_taking_part(1, false);
+        board.set_taking_part(1, true);
+        assert!(!board.has_left(1), "it takes part anew");
     }
 
     #[test]

@@ -85,6 +85,31 @@ pub enum Event {
         /// The problem and its place.
         reason: String,
     },
+    /// Without an application: SubDevices were connected or removed, and the segment was scanned again.
+    SegmentChanged {
+        /// SubDevices now.
+        subdevices: usize,
+        /// SubDevices that were not there before.
+        added: usize,
+        /// SubDevices that are no longer there.
+        removed: usize,
+    },
+    /// A SubDevice without a declaration did not reach its requested state.
+    UndeclaredFailed {
+        /// Position.
+        position: Position,
+        /// The reason.
+        reason: String,
+    },
+    /// A SubDevice without a declaration has left its requested state without a request; it is brought back.
+    UndeclaredState {
+        /// Position.
+        position: Position,
+        /// Its AL status.
+        status: AlStatus,
+        /// Its AL status code.
+        code: AlStatusCode,
+    },
     /// A fault in a SubDevice's SII that was worked around.
     SiiOddity {
         /// Position.
@@ -401,6 +426,14 @@ pub enum Event {
         subdevice: SubDeviceId,
         /// The clock that is not locked, and its difference.
         reason: String,
+    },
+    /// The clocks follow another time of the application: one that it has set for the first time, or after a jump. Both
+    /// values are signed.
+    ApplicationTime {
+        /// Nanoseconds by which the system time of all clocks has jumped; 0 while SYNC signals run.
+        jump_ns: i64,
+        /// Application time minus system time from now on, in nanoseconds.
+        shift_ns: i64,
     },
     /// The differences of the clocks entered or left the sync window.
     SyncWindow {

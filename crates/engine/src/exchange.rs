@@ -23,12 +23,14 @@ pub mod foreign;
 mod image;
 mod leaving;
 mod missed;
+mod only_frame;
 mod outcome;
 mod place;
 mod presence;
 mod proved;
 mod send_service;
 mod service;
+mod shares;
 mod template;
 mod tries;
 mod usual;
@@ -62,8 +64,9 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use leaving::{Leaving, send_twice};
-use missed::{Missed, give_up_overdue};
+use missed::{Missed, give_up_overdue, note_missing};
 use service::Service;
+use shares::Shares;
 
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
@@ -104,6 +107,7 @@ pub struct Exchange {
     missed: Missed,
     copies: Copies,
     service: Service,
+    shares: Shares,
     /// The frame of the last copy taken.
     taken: u16,
     cycle: u64,
@@ -113,6 +117,8 @@ pub struct Exchange {
     decide_at: Instant,
     /// There is one frame.
     is_alone: bool,
+    /// The short way of one frame exists ([`Exchange::load_only_frame`]).
+    has_only_frame: bool,
     /// The frame that was sent last.
     newest: u16,
     /// When the next cycle is expected to begin.
@@ -143,12 +149,14 @@ impl Exchange {
             domains.push(Domain::new(planned, first, &frames));
         }
         let service = Service::new(&identity, links.mask(), layout, &mut frames);
-        Exchange {
+        let shares = Shares::new(layout, &board);
+        let mut exchange = Exchange {
             identity,
             links,
             board,
             events,
             service,
+            shares,
             sequence: Sequence::default(),
             by_id: [NO_FRAME; 256],
             frames,
@@ -164,17 +172,20 @@ impl Exchange {
             again: Vec::new(),
             decide_at: Instant::NEVER,
             is_alone: false,
+            has_only_frame: false,
             newest: NO_FRAME,
             next_at: Instant::NEVER,
             base_ns: 0,
             is_closed: false,
-        }
+        };
+        exchange.find_only_frame();
+        exchange
     }
 
     /// Takes a received frame. Any bytes are allowed.
     #[inline(always)]
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], _now: Instant) -> Received {
-        if self.receive_usual(arrived_on, bytes) {
+        if self.receive_usual(bytes) {
             return Received::Taken;
         }
         self.receive_any(arrived_on, bytes)
@@ -183,22 +194,22 @@ impl Exchange {
     /// Takes a frame that came back on the only link with the same results as the previous one, which is the usual
     /// case. In all other cases the result is false, and nothing has changed.
     #[inline(always)]
-    fn receive_usual(&mut self, arrived_on: Link, bytes: &[u8]) -> bool {
+    fn receive_usual(&mut self, bytes: &[u8]) -> bool {
+        if self.links != LinkSet::Single {
+            return false;
+        }
         let Some(sequence) = self.identity.main_cyclic(bytes) else { return false };
         let index = self.by_id[usize::from(sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else { return false };
         let Some(domain) = self.domains.get_mut(frame.domain()) else { return false };
-        if arrived_on != Link::Main
-            || !frame.is_back_as_usual(sequence, bytes, domain.inputs_mut())
-            || !self.evidence.ends_as_usual(frame)
-        {
+        if !frame.is_back_as_usual(sequence, bytes, domain.inputs_mut()) || !self.evidence.ends_as_usual(frame) {
             return false;
         }
         self.taken = index;
-        frame.take_usual(bytes, domain.inputs_mut(), self.cycle);
+        let supervision = frame.take_usual(bytes, domain.inputs_mut(), self.cycle);
         self.board.traffic.post_home(sequence);
         self.tally.counters.received += 1;
-        if let Some(supervision) = frame.supervision() {
+        if let Some(supervision) = supervision {
             self.board.post_supervision(supervision);
         }
         true
@@ -230,7 +241,7 @@ impl Exchange {
         match frame.receive(copy, arrived_on, bytes, image, self.cycle, &mut self.tally) {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, frame.sequence());
-                self.evidence.hear_early(frame, &self.board);
+                self.evidence.receive_first(frame, &self.board);
                 Received::Taken
             }
             Step::Finished => {
@@ -255,8 +266,12 @@ impl Exchange {
     /// it evaluates each that has come back, in the order of departure; the state of the newest one stays.
     #[inline(always)]
     pub fn process(&mut self, id: DomainId, now: Instant) -> DomainStatus {
+        if id.0 == 0 && self.process_unchanged() {
+            return self.domains.first().map_or_else(DomainStatus::default, |domain| domain.status(false));
+        }
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
-        // The usual case: one frame per cycle, one cycle on the wire, the same results as in the previous cycle.
+        // The usual case of a ring and of several domains: one frame per cycle, one cycle on the wire, the same results
+        // as in the previous cycle.
         if let Some(frame) = domain.only().and_then(|at| self.frames.get(at))
             && frame.is_complete()
             && !frame.is_waiting()
@@ -302,6 +317,9 @@ impl Exchange {
                 let returned = outcome::has_returned(set.clone(), &self.frames, &self.again);
                 let judgement = (wkc, complete, returned);
                 note_change(id, domain, judgement, &self.board, self.tally.disturbed(), &mut self.events);
+                for (index, frame) in set.clone().zip(&self.frames[set.clone()]) {
+                    self.shares.post(frame, self.again.get(index).and_then(Option::as_ref), &self.board);
+                }
                 if !complete {
                     outcome::count_errors(set, &self.frames, &self.again, &self.board);
                 }
@@ -365,6 +383,7 @@ impl Exchange {
             if frame.is_delivered() {
                 self.tally.disturbed().copies_lost += 1;
             }
+            note_missing(frame, &self.board);
             self.evidence.close(frame, &self.board, &mut self.events);
         }
         let changes = self.board.taking_part_changes();
@@ -378,6 +397,16 @@ impl Exchange {
     /// call, also where no domain is queued, unless a frame with them is still on the wire.
     #[inline(always)]
     pub fn send(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        if self.leave_alone() {
+            self.send_only_frame(now, &mut |bytes| transmit(Link::Main, bytes));
+        } else {
+            self.send_any(now, transmit);
+        }
+    }
+
+    /// As [`Exchange::send`], for any frames.
+    #[inline(always)]
+    fn send_any(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
         self.board.traffic.post_departure(self.cycle);
         if !self.service.leaves_at_home(&self.domains) {
             self.send_service(now, transmit);
@@ -418,6 +447,9 @@ impl Exchange {
                 core::mem::swap(frame, other);
             }
             frame.follow(changes, board);
+            if !frame.is_vacant() {
+                frame.post_leaving(board, self.cycle);
+            }
         }
     }
 }

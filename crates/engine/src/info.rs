@@ -6,6 +6,8 @@
 //! process data.
 
 mod collect;
+mod extend;
+mod extent;
 mod identity_field;
 mod subdevice;
 mod warning;
@@ -15,6 +17,7 @@ use alloc::vec::Vec;
 use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
+pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
 pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};

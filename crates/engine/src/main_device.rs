@@ -8,12 +8,15 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod clocks;
 mod datagrams;
 mod declaration;
 mod declare;
 mod ethernet;
 mod found;
 mod gateway;
+mod idle;
+mod live_status;
 mod loaded;
 mod lrw;
 mod mail;
@@ -25,6 +28,7 @@ mod registered;
 mod registered_area;
 mod registration;
 mod repeats;
+mod sent_once;
 mod services;
 pub mod snapshot;
 mod states;
@@ -47,11 +51,15 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;
 pub use registered_area::RegisteredArea;
-pub use states::{GroupState, SubDeviceState};
+pub use sent_once::SentOnce;
+pub use states::{GroupState, MainDevicePhase, SubDeviceState};
+
+pub use crate::procedures::undeclared::Retries;
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
@@ -59,9 +67,9 @@ pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
+use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
-use crate::mail::{EmergencyRings, Mailbox};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
@@ -69,6 +77,7 @@ use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
+use crate::procedures::undeclared::Undeclared;
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
@@ -101,11 +110,11 @@ pub struct MainDevice {
     cyclic_events: Option<Consumer>,
     /// Cyclic events that were lost before they were numbered.
     cyclic_events_lost: u64,
-    /// Mailboxes by position, before activation.
-    visited: Vec<Mailbox>,
     requests: Requests,
     /// Emergencies of all SubDevices.
-    emergencies: EmergencyRings,
+    emergencies: Rc<RefCell<EmergencyRings>>,
+    /// The procedures of idle operation run.
+    is_idle: bool,
     /// Error counters, once active.
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
@@ -127,8 +136,11 @@ impl MainDevice {
         let mut supervisor = supervisor(identity, &options, now);
         supervisor.set_events(EventLog::new(now.0));
         let cache = SiiCache::new(options.sii_cache);
-        let segment = SharedSegment::idle(&supervisor.bus(), Segment::new(choices(&options)), cache.clone());
-        MainDevice {
+        let emergencies: Rc<RefCell<EmergencyRings>> = Rc::default();
+        let undeclared = Undeclared::new(&supervisor.bus(), emergencies.clone(), options.retries);
+        let segment = Segment::new(choices(&options));
+        let segment = SharedSegment::idle(&supervisor.bus(), segment, cache.clone(), undeclared);
+        let mut main_device = MainDevice {
             supervisor,
             activations: 0,
             counted: AcyclicCounters::default(),
@@ -139,9 +151,9 @@ impl MainDevice {
             segment,
             cyclic_events: None,
             cyclic_events_lost: 0,
-            visited: Vec::new(),
             requests: Requests::default(),
-            emergencies: EmergencyRings::default(),
+            emergencies,
+            is_idle: false,
             statistics: None,
             statistics_period: None,
             loaded: None,
@@ -150,7 +162,9 @@ impl MainDevice {
             own_objects: OwnObjects::default(),
             disconnected: None,
             options,
-        }
+        };
+        main_device.begin_idle();
+        main_device
     }
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
@@ -163,23 +177,29 @@ impl MainDevice {
         }
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
-        self.visited.drain(..).for_each(|mailbox| mailbox.close());
-        self.emergencies.forget_positions();
+        self.segment.undeclared.clear();
+        self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = ScanOptions {
-            settle: self.options.settle,
-            patience: self.options.patience,
-            cache: self.cache.clone(),
-            junctions: self.options.junctions,
-            pdos: self.options.pdos,
-            enhanced_line_crossed: self.options.enhanced_line_crossed,
-        };
+        let options = self.scan_options();
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
             segment.observe(Observation::ScanEnded(ended));
         });
+        self.begin_idle();
         Ok(())
+    }
+
+    fn scan_options(&self) -> ScanOptions {
+        ScanOptions {
+            settle: self.options.settle,
+            patience: self.options.patience,
+            extent: self.options.sii_extent,
+            cache: self.cache.clone(),
+            junctions: self.options.junctions,
+            pdos: self.options.pdos,
+            enhanced_line_crossed: self.options.enhanced_line_crossed,
+        }
     }
 
     /// The shared model, while an application is active.
@@ -204,6 +224,16 @@ impl MainDevice {
     /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
         let to_stop = all_known(&self.segment.view());
+        self.end_application(now);
+        let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
+        self.supervisor.spawn(async move {
+            let result = stop(&bus, to_stop, state, limit).await;
+            *slot.borrow_mut() = Some(result);
+        });
+    }
+
+    /// Ends all procedures; what the last scan found stays.
+    fn end_application(&mut self, now: Instant) {
         self.counted = self.counters();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
@@ -214,8 +244,8 @@ impl MainDevice {
         self.segment = self.segment.without_application(&self.supervisor.bus());
         self.segment.observe(Observation::Deactivated);
         self.requests.end();
-        self.emergencies = EmergencyRings::default();
-        self.visited.clear();
+        *self.emergencies.borrow_mut() = EmergencyRings::default();
+        self.is_idle = false;
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
@@ -223,11 +253,6 @@ impl MainDevice {
         self.cyclic_events = None;
         self.cyclic_events_lost = 0;
         *self.stopped.borrow_mut() = None;
-        let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
-        self.supervisor.spawn(async move {
-            let result = stop(&bus, to_stop, state, limit).await;
-            *slot.borrow_mut() = Some(result);
-        });
     }
 
     /// The result of [`MainDevice::start_stop`], once it has ended.
@@ -262,7 +287,7 @@ impl MainDevice {
 
     /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
-        self.segment.view().members().iter().map(|member| member.phase.into()).collect()
+        self.segment.view().members().map(|member| member.phase.into()).collect()
     }
 
     /// Status of each clock of the segment, by position; empty without distributed clocks.
@@ -277,7 +302,7 @@ impl MainDevice {
 
     /// Station addresses of the declared SubDevices.
     pub fn stations(&self) -> Vec<StationAddress> {
-        self.segment.view().members().iter().map(|member| member.station).collect()
+        self.segment.view().members().map(|member| member.station).collect()
     }
 
     /// Whether every declared SubDevice is in its target state.
@@ -286,7 +311,6 @@ impl MainDevice {
         access.is_active()
             && access
                 .members()
-                .iter()
                 .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
     }
 
@@ -294,12 +318,12 @@ impl MainDevice {
     pub fn mandatory_settled(&self) -> bool {
         let access = self.segment.view();
         access.is_active()
-            && access.members().iter().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
+            && access.members().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
     /// The present state of each hot connect group, by its number.
     pub fn groups(&self) -> Vec<GroupState> {
-        let counts = counts(self.segment.view().members());
+        let counts = counts(self.segment.view().subdevices());
         counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
     }
 
@@ -327,6 +351,11 @@ impl MainDevice {
     /// The latest time of the next call of [`MainDevice::poll`].
     pub fn next_deadline(&self) -> Option<Instant> {
         self.supervisor.next_deadline()
+    }
+
+    /// When the acyclic half has work; see [`Supervisor::due_at`].
+    pub fn due_at(&self) -> Instant {
+        self.supervisor.due_at()
     }
 
     /// Command to the link layer; see [`Supervisor::take_link_order`].

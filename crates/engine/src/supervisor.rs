@@ -76,7 +76,9 @@ impl Supervisor {
 
     /// Attaches the board of the exchange; from now on [`Bus::ring`] returns the ring state that the exchange posts.
     pub fn attach(&mut self, board: Arc<Board>) {
-        self.shared.borrow_mut().board = Some(board);
+        let shared = &mut *self.shared.borrow_mut();
+        board.live.post_carriers(shared.carriers);
+        shared.board = Some(board);
     }
 
     /// Attaches the request counter of cyclic threads: procedures wake when it changes.
@@ -91,7 +93,11 @@ impl Supervisor {
 
     /// Sets the carrier states that the links report.
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
-        self.shared.borrow_mut().carriers = carriers;
+        let shared = &mut *self.shared.borrow_mut();
+        shared.carriers = carriers;
+        if let Some(board) = &shared.board {
+            board.live.post_carriers(carriers);
+        }
     }
 
     /// Takes a frame received on a link. Any bytes are allowed.
@@ -133,7 +139,15 @@ impl Supervisor {
 
     /// Latest time at which [`Supervisor::poll`] has work to do, received frames aside.
     pub fn next_deadline(&self) -> Option<Instant> {
-        self.shared.borrow().next_deadline()
+        Some(self.shared.borrow().next_deadline()).filter(|at| *at != Instant::NEVER)
+    }
+
+    /// When there is work: for [`Supervisor::poll`], a datagram to send, or a request to the link layer. In the distant
+    /// past for work that does not wait for a time, never without work.
+    pub fn due_at(&self) -> Instant {
+        let shared = self.shared.borrow();
+        let is_waiting = matches!(shared.link_order, LinkOrder::Given { .. }) || shared.wants_to_send();
+        if is_waiting { Instant::default() } else { shared.next_deadline() }
     }
 
     /// Request of a procedure to the link layer: a link, and whether to disconnect it. Answer it with

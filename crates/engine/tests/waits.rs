@@ -29,7 +29,7 @@ enum Reason {
 use Reason::{Cyclic, Pace, Register, Retry, Settle, Turn};
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 29] = [
+const WAITS: [(&str, &[Reason]); 34] = [
     ("mail/reader.rs", &[Register]),
     ("mail/writer.rs", &[Register]),
     ("procedures/al_state.rs", &[Register, Register, Register]),
@@ -37,16 +37,19 @@ const WAITS: [(&str, &[Reason]); 29] = [
     ("procedures/clocks/drift.rs", &[Retry, Pace]),
     ("procedures/clocks/measure.rs", &[Register]),
     ("procedures/clocks/watch.rs", &[Register]),
+    ("procedures/complete_siis.rs", &[Retry]),
     ("procedures/configure.rs", &[Settle, Turn]),
     ("procedures/configure/registers.rs", &[Register, Register, Register]),
+    ("procedures/deactivate.rs", &[Retry]),
     ("procedures/error_watch.rs", &[Settle, Cyclic]),
+    ("procedures/idle.rs", &[Cyclic]),
     ("procedures/inspect.rs", &[Pace]),
     ("procedures/junction/isolate.rs", &[Settle]),
     ("procedures/junction/learn.rs", &[Settle]),
     ("procedures/junction/refute.rs", &[Retry]),
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
-    ("procedures/recover.rs", &[Retry, Retry, Retry]),
+    ("procedures/recover.rs", &[Retry, Retry]),
     ("procedures/scan.rs", &[Register]),
     ("procedures/scan/count.rs", &[Register, Register]),
     ("procedures/services/ports.rs", &[Register]),
@@ -57,6 +60,8 @@ const WAITS: [(&str, &[Reason]); 29] = [
     ("procedures/unassigned.rs", &[Retry]),
     ("procedures/unassigned/quiet.rs", &[Register]),
     ("procedures/unassigned/rescan.rs", &[Retry, Retry]),
+    ("procedures/undeclared/bring.rs", &[Cyclic, Cyclic]),
+    ("procedures/undeclared/mail.rs", &[Cyclic]),
     ("procedures/verify.rs", &[Cyclic]),
     ("supervisor", &[Turn, Turn, Settle, Pace]),
 ];

@@ -21,6 +21,7 @@ use std::net::SocketAddr;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, PoisonError};
+use std::task;
 use std::thread::JoinHandle;
 
 use mio::Waker;
@@ -31,7 +32,7 @@ use ringcat_engine::main_device::MainDevice as Engine;
 pub use options::GatewayOptions;
 use server::Server;
 pub use shared::GatewayCounters;
-use shared::{FromClient, Shared};
+use shared::{FromClient, Shared, ToEngine};
 
 /// Queued messages to the engine's thread.
 const MESSAGES: usize = 256;
@@ -74,16 +75,18 @@ impl Drop for Gateway {
 }
 
 impl Gateway {
-    /// Opens the gateway: its sockets are served from now on. The passage is for the thread of the acyclic half.
+    /// Opens the gateway: its sockets are served from now on. The passage is for the thread of the acyclic half, which
+    /// `engine` wakes when there is a message for it.
     ///
     /// # Errors
     /// The address cannot be listened on, or the system has no more threads.
-    pub fn open(options: GatewayOptions) -> io::Result<(Gateway, Passage)> {
-        let (to_engine, incoming) = sync_channel(MESSAGES);
+    pub fn open(options: GatewayOptions, engine: task::Waker) -> io::Result<(Gateway, Passage)> {
+        let (queue, incoming) = sync_channel(MESSAGES);
+        let to_engine = ToEngine { queue, waker: engine.clone() };
         let (outgoing, answers) = sync_channel(ANSWERS);
         let shared = Arc::new(Shared::default());
         let (server, waker, address) = Server::open(options, to_engine, answers, shared.clone())?;
-        let passage = Passage { incoming, outgoing, waker: waker.clone(), shared: shared.clone() };
+        let passage = Passage { incoming, outgoing, engine, waker: waker.clone(), shared: shared.clone() };
         let thread = std::thread::Builder::new().name("gateway".into()).spawn(move || server.run())?;
         Ok((Gateway { shared, waker, address, thread: Some(thread) }, passage))
     }
@@ -94,16 +97,23 @@ impl Gateway {
 pub struct Passage {
     incoming: Receiver<FromClient>,
     outgoing: SyncSender<Relayed>,
+    /// Wakes the thread in which this is.
+    engine: task::Waker,
     waker: Arc<Waker>,
     shared: Arc<Shared>,
 }
 
 impl Passage {
-    /// Passes messages to the engine and its answers back, a bounded number per call; to be called regularly. True when
-    /// the gateway no longer exists.
+    /// Passes messages to the engine and its answers back, a bounded number per call; to be called when the engine has
+    /// worked and after each wake-up. True when the gateway no longer exists.
     pub fn work(&mut self, engine: &mut Engine) -> bool {
         let mut any = false;
-        for _ in 0..TURN {
+        for number in 0..=TURN {
+            if number == TURN {
+                // The rest waits for the next call.
+                self.engine.wake_by_ref();
+                break;
+            }
             match self.incoming.try_recv() {
                 Ok(FromClient::Message(client, bytes)) => engine.relay(client, &bytes),
                 Ok(FromClient::Gone(client)) => engine.forget_client(client),
@@ -151,7 +161,7 @@ mod tests {
 
     fn open() -> (Gateway, Passage) {
         let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        Gateway::open(GatewayOptions::at(any)).expect("a free port")
+        Gateway::open(GatewayOptions::at(any), task::Waker::noop().clone()).expect("a free port")
     }
 
     fn next(passage: &Passage) -> FromClient {

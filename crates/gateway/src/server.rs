@@ -5,7 +5,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
+use std::sync::mpsc::{Receiver, TrySendError};
 use std::time::{Duration, Instant};
 
 use mio::net::{TcpListener, UdpSocket};
@@ -15,7 +15,7 @@ use ringcat_wire::mailbox::gateway::{HEADER_LEN, MAX_LENGTH};
 
 use crate::connection::{Connection, Going};
 use crate::options::GatewayOptions;
-use crate::shared::{FromClient, Shared};
+use crate::shared::{FromClient, Shared, ToEngine};
 
 const LISTENER: Token = Token(0);
 const DATAGRAMS: Token = Token(1);
@@ -51,7 +51,7 @@ pub(super) struct Server {
     connections: BTreeMap<u64, Connection>,
     peers: Vec<Peer>,
     next_client: u64,
-    to_engine: SyncSender<FromClient>,
+    to_engine: ToEngine,
     answers: Receiver<Relayed>,
     /// Ended clients that are not reported to the engine yet.
     gone: Vec<u64>,
@@ -64,7 +64,7 @@ impl Server {
     /// Opens the sockets; also returns the waker and the address.
     pub(super) fn open(
         options: GatewayOptions,
-        to_engine: SyncSender<FromClient>,
+        to_engine: ToEngine,
         answers: Receiver<Relayed>,
         shared: Arc<Shared>,
     ) -> io::Result<(Server, Arc<Waker>, SocketAddr)> {

@@ -1,7 +1,9 @@
 //! Data shared by the thread of the sockets and the engine's thread.
 
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Mutex, PoisonError};
+use std::task::Waker;
 
 use ringcat_engine::mail::relay::RelayCounters;
 
@@ -39,4 +41,21 @@ pub(crate) enum FromClient {
     Message(u64, Vec<u8>),
     /// The connection of the client has ended.
     Gone(u64),
+}
+
+/// The queue to the engine's thread.
+#[derive(Debug)]
+pub(crate) struct ToEngine {
+    pub queue: SyncSender<FromClient>,
+    /// Wakes that thread.
+    pub waker: Waker,
+}
+
+impl ToEngine {
+    /// Hands a message over and wakes the thread.
+    pub fn try_send(&self, message: FromClient) -> Result<(), TrySendError<FromClient>> {
+        self.queue.try_send(message)?;
+        self.waker.wake_by_ref();
+        Ok(())
+    }
 }

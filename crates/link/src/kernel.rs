@@ -250,6 +250,31 @@ pub fn clear_counter(fd: RawFd) {
     unsafe { libc::read(fd, count.as_mut_ptr().cast(), count.len()) };
 }
 
+/// A set of descriptors that is readable while one of them has an event (`epoll`).
+pub fn descriptor_set() -> Result<OwnedFd, i32> {
+    // SAFETY: no pointers are passed.
+    let fd = unsafe { libc::epoll_create1(libc::EPOLL_CLOEXEC) };
+    if fd < 0 {
+        return Err(errno());
+    }
+    // SAFETY: the descriptor was just made and has no other owner.
+    Ok(unsafe { OwnedFd::from_raw_fd(fd) })
+}
+
+/// Adds a descriptor to such a set. New data is an event; data that stays is none.
+pub fn add_descriptor(set: RawFd, fd: RawFd) -> Result<(), i32> {
+    let mut event = libc::epoll_event { events: (libc::EPOLLIN | libc::EPOLLET) as u32, u64: 0 };
+    // SAFETY: the pointer refers to a live event, which the kernel only reads.
+    if unsafe { libc::epoll_ctl(set, libc::EPOLL_CTL_ADD, fd, &mut event) } < 0 { Err(errno()) } else { Ok(()) }
+}
+
+/// Takes all events of such a set.
+pub fn take_events(set: RawFd) {
+    let mut events = [libc::epoll_event { events: 0, u64: 0 }; 16];
+    // SAFETY: the pointer refers to this many live events.
+    while unsafe { libc::epoll_wait(set, events.as_mut_ptr(), events.len() as libc::c_int, 0) } > 0 {}
+}
+
 /// Clears the pending error of a socket.
 pub fn clear_error(fd: &impl AsRawFd) {
     option::<libc::c_int>(fd.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ERROR, 0);

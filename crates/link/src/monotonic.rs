@@ -30,6 +30,7 @@ fn read(clock: libc::clockid_t) -> u64 {
 }
 
 /// Sleeps until the clock shows `ns`; returns at once if that time has passed. Signals do not end the sleep early.
+#[inline(always)]
 pub fn sleep_until_ns(ns: u64) {
     let until = timespec(ns);
     while kernel::sleep_until(&until) == Err(libc::EINTR) {}

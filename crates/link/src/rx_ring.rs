@@ -58,7 +58,10 @@ pub struct Seen<'a> {
 pub struct RxRing {
     base: NonNull<u8>,
     slots: usize,
-    head: usize,
+    /// The slot that is read next.
+    head: NonNull<u8>,
+    /// Behind the last slot.
+    end: NonNull<u8>,
     /// When the kernel received the frame that was handed out last: seconds and nanoseconds.
     stamp: [u32; 2],
 }
@@ -92,7 +95,10 @@ impl RxRing {
         if base == libc::MAP_FAILED {
             return Err(io::Error::last_os_error().raw_os_error().unwrap_or(0));
         }
-        NonNull::new(base.cast()).map(|base| RxRing { base, slots, head: 0, stamp: [0; 2] }).ok_or(libc::ENOMEM)
+        let base = NonNull::new(base.cast::<u8>()).ok_or(libc::ENOMEM)?;
+        // SAFETY: the mapping has this length.
+        let end = unsafe { base.add(slots * SLOT) };
+        Ok(RxRing { base, slots, head: base, end, stamp: [0; 2] })
     }
 
     /// Whether a frame waits.
@@ -133,24 +139,20 @@ impl RxRing {
         }
         // SAFETY: this process owns the slot until it returns it, which needs `&mut self` again; the
         // slot lies within the mapping, and bytes have no invalid values.
-        let slot = unsafe { std::slice::from_raw_parts_mut(self.slot().as_ptr(), SLOT) };
+        let slot = unsafe { std::slice::from_raw_parts_mut(self.head.as_ptr(), SLOT) };
         let taken = hand_out(status, slot);
         self.status().store(TP_STATUS_KERNEL, Ordering::Release);
-        self.head = if self.head + 1 == self.slots { 0 } else { self.head + 1 };
+        // SAFETY: the head is a slot that is mapped, so the result is the next one or the end.
+        let next = unsafe { self.head.add(SLOT) };
+        self.head = if next == self.end { self.base } else { next };
         taken
-    }
-
-    #[inline(always)]
-    fn slot(&self) -> NonNull<u8> {
-        // SAFETY: the head is below the number of slots that are mapped.
-        unsafe { self.base.add(self.head * SLOT) }
     }
 
     #[inline(always)]
     fn status(&self) -> &AtomicU32 {
         // SAFETY: the status is the first word of the aligned slot and lives as long as the mapping. The slice over the
         // slot in `take` is no longer used when this is called.
-        unsafe { AtomicU32::from_ptr(self.slot().as_ptr().cast()) }
+        unsafe { AtomicU32::from_ptr(self.head.as_ptr().cast()) }
     }
 }
 
@@ -178,8 +180,10 @@ fn u32_at(slot: &[u8], at: usize) -> u32 {
 fn place(slot: &[u8]) -> Option<Place> {
     let start = usize::from(u16::from_ne_bytes([slot[12], slot[13]]));
     let (length, captured) = (u32_at(slot, 4) as usize, u32_at(slot, 8) as usize);
-    let whole = captured >= 14 && start >= HEAD + TAG && start + captured <= slot.len();
-    whole.then_some(Place { length, start, captured })
+    if captured < 14 || start < HEAD + TAG || start + captured > slot.len() {
+        return None;
+    }
+    Some(Place { length, start, captured })
 }
 
 /// Puts back a VLAN tag that the kernel removed. Returns the new start of the frame and the additional bytes.
@@ -224,12 +228,14 @@ fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken 
     if slot[PACKET_TYPE] == PACKET_OUTGOING {
         return Taken::Outgoing;
     }
-    let Some(Place { length, start, captured }) = place(slot).filter(|place| place.captured == place.length) else {
+    let Some(Place { length, start, captured }) = place(slot) else { return Taken::Truncated };
+    if captured != length {
         return Taken::Truncated;
-    };
+    }
     let has_tag = status & TP_STATUS_VLAN_VALID != 0;
     let (start, tag) = if has_tag { put_tag_back(status, slot, start) } else { (start, 0) };
-    take(&slot[start..start + length.min(captured) + tag]);
+    let Some(frame) = slot.get(start..start + length + tag) else { return Taken::Truncated };
+    take(frame);
     Taken::Frame
 }
 

@@ -11,7 +11,7 @@ use std::ffi::CStr;
 use std::fmt;
 use std::io;
 use std::mem::size_of;
-use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
 
 use crate::kernel::{self, errno};
 use crate::permission;
@@ -98,6 +98,13 @@ impl Error for TapError {}
 pub struct TapInterface {
     fd: OwnedFd,
     name: String,
+}
+
+impl AsFd for TapInterface {
+    /// Readable while frames of the host wait.
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
 }
 
 impl TapInterface {

@@ -1,10 +1,12 @@
-//! Ends the wait of another thread.
+//! Ends the wait of a thread: by another thread, or by data at a descriptor.
 //!
 //! Output: a [`Waker`], for any thread; its use costs one system call. The waiting thread sees it in the same `ppoll`
-//! as its sockets ([`crate::waiting::wait_or_wake`]). A wake-up that comes before the wait ends it at once.
+//! as its sockets ([`crate::waiting::wait_or_wake`]). A wake-up that comes before the wait ends it at once. New data at
+//! a watched descriptor ends one wait; what was not read then ends no further wait.
 
-use std::os::fd::{AsRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Wake, Waker};
 
 use crate::error::LinkError;
@@ -15,7 +17,14 @@ use crate::kernel;
 pub struct WakeUp(Arc<Counter>);
 
 #[derive(Debug)]
-struct Counter(OwnedFd);
+struct Counter {
+    /// Written by other threads.
+    counter: OwnedFd,
+    /// The counter and the watched descriptors.
+    set: OwnedFd,
+    /// A wait was ended since the last [`WakeUp::take_call`].
+    is_called: AtomicBool,
+}
 
 impl WakeUp {
     /// A wake-up that nothing has used yet.
@@ -23,9 +32,11 @@ impl WakeUp {
     /// # Errors
     /// The process has no more descriptors.
     pub fn new() -> Result<WakeUp, LinkError> {
-        let counter = kernel::event_counter();
-        let counter = counter.map_err(|errno| LinkError::from_errno("", "making a wake-up for a thread", errno))?;
-        Ok(WakeUp(Arc::new(Counter(counter))))
+        let failed = |errno| LinkError::from_errno("", "making a wake-up for a thread", errno);
+        let counter = kernel::event_counter().map_err(failed)?;
+        let set = kernel::descriptor_set().map_err(failed)?;
+        kernel::add_descriptor(set.as_raw_fd(), counter.as_raw_fd()).map_err(failed)?;
+        Ok(WakeUp(Arc::new(Counter { counter, set, is_called: AtomicBool::new(false) })))
     }
 
     /// The handle for other threads.
@@ -33,14 +44,26 @@ impl WakeUp {
         Waker::from(self.0.clone())
     }
 
-    /// The descriptor, readable after a wake-up.
-    pub(crate) fn fd(&self) -> RawFd {
-        self.0.0.as_raw_fd()
+    /// New data at this descriptor ends a wait, until it is closed. False if the kernel refuses that.
+    pub fn watch(&self, descriptor: impl AsFd) -> bool {
+        kernel::add_descriptor(self.0.set.as_raw_fd(), descriptor.as_fd().as_raw_fd()).is_ok()
     }
 
-    /// Forgets the wake-ups so far.
+    /// Whether a wait was ended by this since the last call.
+    pub fn take_call(&self) -> bool {
+        self.0.is_called.swap(false, Ordering::Relaxed)
+    }
+
+    /// The descriptor, readable after a wake-up.
+    pub(crate) fn fd(&self) -> RawFd {
+        self.0.set.as_raw_fd()
+    }
+
+    /// Notes the wake-ups so far as a call.
     pub(crate) fn clear(&self) {
-        kernel::clear_counter(self.fd());
+        kernel::take_events(self.fd());
+        kernel::clear_counter(self.0.counter.as_raw_fd());
+        self.0.is_called.store(true, Ordering::Relaxed);
     }
 }
 
@@ -50,12 +73,15 @@ impl Wake for Counter {
     }
 
     fn wake_by_ref(self: &Arc<Self>) {
-        kernel::count(self.0.as_raw_fd());
+        kernel::count(self.counter.as_raw_fd());
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::os::unix::net::UnixStream;
+
     use super::*;
     use crate::monotonic::now_ns;
     use crate::waiting::wait_or_wake;
@@ -76,5 +102,29 @@ mod tests {
         let until = now_ns() + 3_000_000;
         assert!(!wait_or_wake(&[], &wake_up, now_ns(), until));
         assert!(now_ns() >= until, "no wake-up is left");
+        assert!(wake_up.take_call());
+        assert!(!wake_up.take_call(), "no wait ended since");
+    }
+
+    // covers: links
+    #[test]
+    fn new_data_at_a_descriptor_ends_a_wait_and_data_that_stays_does_not() {
+        let wake_up = WakeUp::new().expect("there are descriptors");
+        let (mut near, far) = UnixStream::pair().expect("there are sockets");
+        assert!(wake_up.watch(&far));
+        for _ in 0..3 {
+            near.write_all(&[1]).expect("there is room");
+            let begin = now_ns();
+            assert!(!wait_or_wake(&[], &wake_up, begin, begin + 10_000_000_000));
+            assert!(now_ns() < begin + 5_000_000_000);
+            assert!(wake_up.take_call());
+            let until = now_ns() + 3_000_000;
+            assert!(!wait_or_wake(&[], &wake_up, now_ns(), until));
+            assert!(now_ns() >= until && !wake_up.take_call(), "the data was there before");
+        }
+        drop(far);
+        let until = now_ns() + 3_000_000;
+        assert!(!wait_or_wake(&[], &wake_up, now_ns(), until));
+        assert!(now_ns() >= until, "a closed descriptor is not watched");
     }
 }

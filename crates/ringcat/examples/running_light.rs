@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("{:>9.3} ms  {}", event.at.0 as f64 / 1e6, describe(&event, &Names::default()));
         }
     }
-    let status = application.exchange().status(DomainId(0));
+    let status = application.exchange().status(DomainId(0)).ok_or("no such domain")?;
     println!("working counter {} of {} after 500 cycles", status.wkc, status.expected);
     application.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())

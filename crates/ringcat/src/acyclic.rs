@@ -25,8 +25,12 @@ pub trait AcyclicHalf {
     /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
 
-    /// When it has work again.
+    /// When it has work again, received frames aside.
     fn wake(&self) -> Instant;
+
+    /// When it has work for [`AcyclicHalf::work`], received frames included; in the distant past for work that does not
+    /// wait for a time. Cheap, for each pass of a wait on shared links.
+    fn due_at(&mut self, links: &impl Links) -> Instant;
 
     /// The present state of each declared SubDevice. Not for the cyclic path.
     fn states(&self) -> Vec<SubDeviceState>;
@@ -86,6 +90,11 @@ impl AcyclicHalf for Inline {
 
     fn wake(&self) -> Instant {
         self.engine.next_deadline().unwrap_or(Instant::NEVER)
+    }
+
+    fn due_at(&mut self, links: &impl Links) -> Instant {
+        self.engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
+        self.engine.due_at()
     }
 
     fn states(&self) -> Vec<SubDeviceState> {

@@ -17,8 +17,10 @@ use std::time::Duration;
 use ringcat_engine::clocks::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
-use ringcat_engine::main_device::{Active, Directory, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState};
+use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange, Received};
+use ringcat_engine::main_device::{
+    Active, Directory, LiveStatus, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
+};
 use ringcat_engine::ring::RingState;
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
@@ -55,12 +57,14 @@ pub struct Application<L, H = Inline> {
     pub(crate) cyclic: Cyclic,
     pub(crate) acyclic: H,
     pub(crate) window: Arc<Window>,
+    pub(crate) live_status: LiveStatus,
 }
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
     pub(crate) fn new(links: L, acyclic: H, active: Active, window: Arc<Window>) -> Application<L, H> {
+        let live_status = active.live_status.clone();
         let cyclic = Cyclic::new(active, window.clone(), links.now());
-        Application { links, cyclic, acyclic, window }
+        Application { links, cyclic, acyclic, window, live_status }
     }
 
     /// Waits for the next cycle, evaluates the domains that are due, runs `work`, sends.
@@ -72,26 +76,89 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         result
     }
 
-    /// Receives frames, and runs the acyclic half if it shares the links, until the cycle begins. Returns the time, and
-    /// the time at which the last check for frames began.
+    /// Waits until the cycle begins. Returns the time, and the time at which the last check for frames began.
     #[inline(always)]
     fn wait_for_cycle(&mut self) -> (Instant, Instant) {
+        let left_at = self.wait_for_only_frame();
+        let now = self.links.now();
+        if let Some(left_at) = left_at {
+            self.note_round_trip(left_at, now);
+        }
+        let is_idle = !self.links.has_frame() && (!H::SHARES_LINKS || self.acyclic.due_at(&self.links) > now);
+        if is_idle && self.cyclic.begins(now) {
+            return (now, now);
+        }
+        self.wait_for_frames()
+    }
+
+    /// The short way of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. Returns
+    /// the departure of the frame if it came back. Ends early if the acyclic half shares the links and has work.
+    #[inline(always)]
+    fn wait_for_only_frame(&mut self) -> Option<Instant> {
+        let Application { links, cyclic, acyclic, .. } = self;
+        if !cyclic.exchange.awaits_only_frame() || !links.knows_arrivals() {
+            return None;
+        }
+        let left_at = cyclic.left_at()?;
+        let mut now = links.now();
+        let until = cyclic.begins_at();
+        let wake = if H::SHARES_LINKS { until.min(acyclic.due_at(links)) } else { until };
+        if now >= wake {
+            return None;
+        }
+        links.wait_from(now, wake);
+        if H::SHARES_LINKS {
+            now = links.now();
+        }
+        let mut is_back = false;
+        links.receive(&mut |link, frame| {
+            if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
+                acyclic.receive(link, frame, now);
+            } else {
+                is_back = cyclic.exchange.receive(link, frame, now) == Received::Taken;
+            }
+        });
+        if !is_back {
+            return None;
+        }
+        if cyclic.may_begin_early() {
+            return Some(left_at);
+        }
+        if H::SHARES_LINKS {
+            let wake = until.min(acyclic.due_at(links));
+            if now < wake {
+                links.wait_from(now, wake);
+            }
+        } else {
+            links.sleep(until);
+        }
+        Some(left_at)
+    }
+
+    /// Receives frames, and runs the acyclic half if it shares the links, until the cycle begins. Returns the time, and
+    /// the time at which the last check for frames began.
+    #[inline(never)]
+    fn wait_for_frames(&mut self) -> (Instant, Instant) {
         loop {
             // Read once per wait.
             let looked_at = self.links.now();
             self.take_in(looked_at);
-            if looked_at >= self.cyclic.exchange.decide_at() {
-                self.cyclic.decide(looked_at, &mut self.links);
-            }
+            // Before the acyclic half, for which the wire is not kept free any longer if nothing is sent again.
+            let decide_at = match self.cyclic.exchange.sends_again() {
+                true => self.cyclic.decide_if_due(looked_at, &mut self.links),
+                false => Instant::NEVER,
+            };
             let mut now = looked_at;
-            if H::SHARES_LINKS {
+            let mut due_at = self.acyclic.due_at(&self.links);
+            if due_at <= now {
                 self.acyclic.work(&mut self.links, &self.window);
+                due_at = self.acyclic.wake();
                 now = self.links.now();
             }
             if self.cyclic.begins(now) {
                 return (now, looked_at);
             }
-            let wake = self.cyclic.wake(now).min(self.acyclic.wake()).min(self.cyclic.exchange.decide_at());
+            let wake = self.cyclic.wake(now).min(due_at).min(decide_at);
             if H::SHARES_LINKS || self.cyclic.exchange.awaits_copies() {
                 self.links.wait_from(now, wake.max(now));
             } else {
@@ -107,17 +174,22 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     pub fn receive(&mut self) {
         let now = self.links.now();
         self.take_in(now);
-        if now >= self.cyclic.exchange.decide_at() {
-            self.cyclic.decide(now, &mut self.links);
+        self.cyclic.decide_if_due(now, &mut self.links);
+        self.work_if_due(now);
+    }
+
+    /// Runs the acyclic half if it shares the links and has work.
+    fn work_if_due(&mut self, now: Instant) {
+        if self.acyclic.due_at(&self.links) <= now {
+            self.acyclic.work(&mut self.links, &self.window);
         }
-        self.acyclic.work(&mut self.links, &self.window);
     }
 
     /// Takes all frames that have arrived.
     #[inline(always)]
     fn take_in(&mut self, now: Instant) {
-        let Application { links, acyclic, cyclic, .. } = self;
         loop {
+            let Application { links, acyclic, cyclic, .. } = self;
             let mut left_at = None;
             let any = links.receive(&mut |link, frame| {
                 if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
@@ -130,9 +202,16 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
                 break;
             }
             if let Some(left_at) = left_at {
-                cyclic.note_round_trip(left_at, links.received_at(left_at, now).unwrap_or(now));
+                self.note_round_trip(left_at, now);
             }
         }
+    }
+
+    /// Records the round trip of the frame that was taken last.
+    #[inline(always)]
+    fn note_round_trip(&mut self, left_at: Instant, now: Instant) {
+        let received_at = self.links.received_at(left_at, now).unwrap_or(now);
+        self.cyclic.note_round_trip(left_at, received_at);
     }
 
     /// When [`Application::receive`] is to be called again so that a frame that is lost by then is sent again; in the
@@ -158,7 +237,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     pub fn send(&mut self) {
         let now = self.links.now();
         self.cyclic.send_by_hand(now, &mut self.links);
-        self.acyclic.work(&mut self.links, &self.window);
+        self.work_if_due(now);
     }
 
     /// Process data of all domains, to be used between [`Application::process`] and [`Application::queue`].

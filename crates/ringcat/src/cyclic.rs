@@ -36,6 +36,8 @@ pub(crate) struct Cyclic {
     period_ns: u64,
     /// A cycle is late when its delay reaches this time.
     late_ns: u64,
+    /// A longer delay is late, or longer than all before.
+    usual_delay: u64,
     trigger: Trigger,
     /// Shifts the grid to follow the reference clock, with [`Trigger::ReferenceClock`].
     follower: Option<Follower>,
@@ -43,6 +45,8 @@ pub(crate) struct Cyclic {
     followed: Instant,
     /// When the last cycle began.
     begun_at: Instant,
+    /// When the only frame left, if it left in the last cycle; otherwise never.
+    left_at: Instant,
     /// The next cycle begins now at the latest.
     next_cycle: Instant,
     /// With [`Trigger::FramesReturned`] it may begin from now on.
@@ -55,6 +59,8 @@ pub(crate) struct Cyclic {
     window: Arc<Window>,
     /// Number of disturbances that the news include.
     published: u64,
+    /// The news include the states of all domains; there is one, and none of its frames is expected.
+    is_settled: bool,
 }
 
 impl Cyclic {
@@ -74,10 +80,13 @@ impl Cyclic {
             rates: periods.iter().map(rate).collect(),
             period_ns,
             late_ns: period_ns / LATE_FRACTION,
+            usual_delay: 0,
             trigger: Trigger::default(),
             follower: None,
             followed: Instant::NEVER,
             begun_at: now,
+            left_at: Instant::NEVER,
+            is_settled: false,
             next_cycle,
             earliest: next_cycle,
             cycle: 0,
@@ -110,7 +119,9 @@ impl Cyclic {
     #[inline(always)]
     pub fn receive(&mut self, link: Link, frame: &[u8], now: Instant) -> Option<Instant> {
         let taken = if self.exchange.sends_again() {
-            self.exchange.receive_and_follow(link, frame, now)
+            let taken = self.exchange.receive_and_follow(link, frame, now);
+            self.window.expect_try(self.exchange.decide_at().max(now));
+            taken
         } else {
             self.exchange.receive(link, frame, now)
         };
@@ -153,8 +164,21 @@ impl Cyclic {
         if self.may_begin_early() { self.earliest.min(self.next_cycle) } else { self.next_cycle }
     }
 
+    /// When the only frame left, if it left in the last cycle.
     #[inline(always)]
-    fn may_begin_early(&self) -> bool {
+    pub fn left_at(&self) -> Option<Instant> {
+        (self.left_at != Instant::NEVER).then_some(self.left_at)
+    }
+
+    /// When the next cycle begins at the latest.
+    #[inline(always)]
+    pub const fn begins_at(&self) -> Instant {
+        self.next_cycle
+    }
+
+    /// Whether the next cycle may begin before its time: it begins with returned frames, and not all are on the wire.
+    #[inline(always)]
+    pub fn may_begin_early(&self) -> bool {
         matches!(self.trigger, Trigger::FramesReturned { .. }) && !self.exchange.is_full()
     }
 
@@ -164,46 +188,75 @@ impl Cyclic {
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
         self.keep_pace(now);
+        if !(self.is_settled && self.exchange.process_unchanged()) {
+            self.process_due(looked_at);
+        }
+    }
+
+    /// Evaluates the due domains.
+    #[inline(never)]
+    fn process_due(&mut self, looked_at: Instant) {
         for (number, rate) in self.rates.iter_mut().enumerate() {
             if rate.is_due(self.cycle) {
                 rate.status = self.exchange.process(DomainId(number), looked_at);
             }
         }
+        self.note_states();
     }
 
-    /// Records the delay of the cycle, and sets the time of the next one; leaves out cycles with a time that has
-    /// passed.
+    /// Publishes the states of the domains after any was evaluated.
+    fn note_states(&mut self) {
+        self.news.publish_rates(&self.rates);
+        self.news.publish_ring(self.exchange.ring());
+        self.is_settled = matches!(&self.rates[..], [alone] if !alone.status.pending);
+    }
+
+    /// Records the delay of the cycle, and sets the time of the next one.
     #[inline(always)]
     fn keep_pace(&mut self, now: Instant) {
-        let is_held = core::mem::take(&mut self.held);
         let delay = now.0.saturating_sub(self.next_cycle.0);
         self.pace.cycles += 1;
-        if is_held {
-            self.pace.paused += 1;
-            self.pace.disturbances += 1;
+        if self.held {
+            self.note_pause();
             self.pass_over(now, delay);
             return;
         }
         self.pace.last_delay = delay;
-        if delay > self.pace.longest_delay || delay > self.late_ns {
+        if delay > self.usual_delay {
             self.note_late(delay);
         }
         self.news.wake_ups().record_ns(delay);
-        self.pace.skipped += self.pass_over(now, delay);
+        if delay < self.period_ns && matches!(self.trigger, Trigger::Time) {
+            self.next_cycle = Instant(self.next_cycle.0.saturating_add(self.period_ns));
+        } else {
+            self.pace.skipped += self.pass_over(now, delay);
+        }
+    }
+
+    /// Records that the cycle had to wait for a pause.
+    #[cold]
+    fn note_pause(&mut self) {
+        self.held = false;
+        self.pace.paused += 1;
+        self.pace.disturbances += 1;
     }
 
     /// Records that the cycle is late, or later than all before.
     #[cold]
     fn note_late(&mut self, delay: u64) {
-        self.pace.disturbances += 1;
-        self.pace.longest_delay = self.pace.longest_delay.max(delay);
-        self.pace.late += u64::from(delay > self.late_ns);
+        let is_late = delay > self.late_ns;
+        if is_late || delay > self.pace.longest_delay {
+            self.pace.disturbances += 1;
+            self.pace.longest_delay = self.pace.longest_delay.max(delay);
+            self.pace.late += u64::from(is_late);
+        }
+        self.usual_delay = self.pace.longest_delay.min(self.late_ns);
     }
 
     /// Sets the time of the next cycle; returns the number of cycles left out because their time has passed.
-    #[inline(always)]
+    #[inline(never)]
     fn pass_over(&mut self, now: Instant, delay: u64) -> u64 {
-        let passed_over = if delay < self.period_ns { 0 } else { delay / self.period_ns };
+        let passed_over = delay / self.period_ns;
         match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => {
                 let periods = self.period_ns.saturating_mul(passed_over + 1);
@@ -257,10 +310,9 @@ impl Cyclic {
     /// Ends the cycle: sends the due domains.
     #[inline(always)]
     pub fn end(&mut self, now: Instant, links: &mut impl Links) {
-        for (number, rate) in self.rates.iter().enumerate() {
-            if rate.is_due(self.cycle) {
-                self.exchange.queue(DomainId(number), now);
-            }
+        let is_alone = self.exchange.load_only_frame();
+        if !is_alone {
+            self.queue_due(now);
         }
         // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not
         // from the beginning of the work.
@@ -270,26 +322,53 @@ impl Cyclic {
             Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,
             Trigger::FramesReturned { .. } => Instant::NEVER,
         };
-        self.send(now, next, links);
+        if is_alone {
+            self.left_at = now;
+            let Cyclic { exchange, window, .. } = self;
+            exchange.send_only_frame(now, &mut |frame| {
+                window.occupy(Half::Cyclic, now, frame.len());
+                links.send(Link::Main, frame);
+            });
+            self.cycle += 1;
+            self.window.expect_cycle(next);
+        } else {
+            self.send(now, next, links);
+        }
         self.publish();
     }
 
-    /// Sends frames again that are lost; all frames were taken in that had arrived at `looked_at`.
-    #[cold]
-    pub fn decide(&mut self, looked_at: Instant, links: &mut impl Links) {
-        let now = links.now();
-        let Cyclic { exchange, window, .. } = self;
-        exchange.decide(looked_at, now, &mut |link, frame| {
-            if link == Link::Main {
-                window.occupy(Half::Cyclic, now, frame.len());
+    /// Copies the outputs of the due domains into their frames.
+    #[inline(never)]
+    fn queue_due(&mut self, now: Instant) {
+        for (number, rate) in self.rates.iter().enumerate() {
+            if rate.is_due(self.cycle) {
+                self.exchange.queue(DomainId(number), now);
             }
-            links.send(link, frame);
-        });
+        }
+    }
+
+    /// Sends frames again that are lost, if it is time to decide that. All frames that had arrived at `looked_at` were
+    /// taken. Returns the time of the next decision.
+    #[cold]
+    pub fn decide_if_due(&mut self, looked_at: Instant, links: &mut impl Links) -> Instant {
+        let Cyclic { exchange, window, .. } = self;
+        if looked_at >= exchange.decide_at() {
+            let now = links.now();
+            exchange.decide(looked_at, now, &mut |link, frame| {
+                if link == Link::Main {
+                    window.occupy(Half::Cyclic, now, frame.len());
+                }
+                links.send(link, frame);
+            });
+            window.expect_try(exchange.decide_at());
+        }
+        exchange.decide_at()
     }
 
     /// Sends the queued frames; the next cycle's frames leave at `next`.
-    #[inline(always)]
+    #[inline(never)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
+        self.left_at = Instant::NEVER;
         let Cyclic { exchange, window, .. } = self;
         exchange.send(now, &mut |link, frame| {
             if link == Link::Main {
@@ -300,9 +379,12 @@ impl Cyclic {
         if exchange.sends_again() {
             exchange.expect_next(self.next_cycle);
             exchange.follow_departures(now);
+            window.expect_try(exchange.decide_at());
         }
         self.cycle += 1;
         self.window.expect_cycle(next);
+        self.news.publish_spread(self.exchange.clock_spread_ns());
+        self.news.publish_ring(self.exchange.ring());
     }
 
     /// Evaluates a domain, for an application with its own loop.
@@ -311,6 +393,7 @@ impl Cyclic {
         if let Some(rate) = self.rates.get_mut(domain.0) {
             rate.status = status;
         }
+        self.note_states();
         status
     }
 
@@ -325,9 +408,7 @@ impl Cyclic {
 
     #[inline(always)]
     fn publish(&mut self) {
-        self.news.publish_spread(self.exchange.clock_spread_ns());
-        self.news.publish_cycle(&self.pace, self.exchange.counters(), self.exchange.ring());
-        self.news.publish_rates(&self.rates);
+        self.news.publish_cycle(&self.pace, self.exchange.counters());
         let disturbances = self.exchange.disturbances() + self.pace.disturbances;
         if disturbances != self.published || self.news.is_restart_wanted() {
             self.published = disturbances;

@@ -10,6 +10,7 @@
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Waker;
 use std::time::Duration;
 
 use ringcat_engine::mail::eoe::{EthernetStatus, MAX_FRAME, QUEUE};
@@ -159,10 +160,12 @@ pub struct EthernetInterface {
     pub refused: u64,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Shared {
     ended: AtomicBool,
     told: Mutex<Told>,
+    /// Wakes the supervisor's thread.
+    waker: Waker,
 }
 
 #[derive(Debug, Default)]
@@ -196,6 +199,7 @@ impl Ethernet {
 impl Drop for Ethernet {
     fn drop(&mut self) {
         self.0.ended.store(true, Ordering::Relaxed);
+        self.0.waker.wake_by_ref();
     }
 }
 
@@ -206,29 +210,33 @@ impl SupervisorThread {
     /// # Errors
     /// The thread has ended.
     pub fn start_ethernet(&self, options: EthernetOptions) -> Result<Ethernet, Error> {
-        let make = |name: &str, mac| {
+        let wake_up = self.wake_up();
+        let is_called = wake_up.is_some();
+        let make = move |name: &str, mac| {
             let tap = TapInterface::create(name, mac)?;
+            // Without it frames of the host wait for the next turn of the thread.
+            if let Some(wake_up) = &wake_up {
+                wake_up.watch(&tap);
+            }
             Ok(Box::new(tap) as Box<dyn HostInterface>)
         };
-        self.start_ethernet_on(options, Box::new(make))
+        let (ethernet, mut switch) = Switch::new(options, Box::new(make), self.waker());
+        if is_called {
+            self.attend(move |engine, now| switch.work(engine, now))?;
+        } else {
+            self.attend_often(move |engine, now| switch.work(engine, now))?;
+        }
+        Ok(ethernet)
     }
 
-    /// As [`SupervisorThread::start_ethernet`], with interfaces of another kind.
+    /// As [`SupervisorThread::start_ethernet`], with interfaces of another kind, which are read every half millisecond.
     ///
     /// # Errors
     /// The thread has ended.
     pub fn start_ethernet_on(&self, options: EthernetOptions, make: MakeInterface) -> Result<Ethernet, Error> {
-        let shared = Arc::new(Shared::default());
-        let mut switch = Switch {
-            options,
-            make,
-            shared: shared.clone(),
-            ends: Vec::new(),
-            refused: Vec::new(),
-            look_at: Instant(0),
-        };
-        self.attend(move |engine, now| switch.work(engine, now))?;
-        Ok(Ethernet(shared))
+        let (ethernet, mut switch) = Switch::new(options, make, self.waker());
+        self.attend_often(move |engine, now| switch.work(engine, now))?;
+        Ok(ethernet)
     }
 }
 
@@ -253,6 +261,12 @@ struct Switch {
 }
 
 impl Switch {
+    fn new(options: EthernetOptions, make: MakeInterface, waker: Waker) -> (Ethernet, Switch) {
+        let shared = Arc::new(Shared { ended: AtomicBool::new(false), told: Mutex::default(), waker });
+        let (ends, refused, look_at) = (Vec::new(), Vec::new(), Instant(0));
+        (Ethernet(shared.clone()), Switch { options, make, shared, ends, refused, look_at })
+    }
+
     /// Moves frames between interfaces and mailboxes; true when the interfaces are dropped.
     fn work(&mut self, engine: &mut Engine, now: Instant) -> bool {
         if self.shared.ended.load(Ordering::Relaxed) {

@@ -12,7 +12,7 @@ impl SupervisorThread {
     /// The address cannot be bound, the system cannot start a thread, or the thread of the acyclic half has ended.
     pub fn start_gateway(&self, options: GatewayOptions) -> Result<Gateway, Error> {
         let failed = |cause| Error::Gateway { address: options.address, cause };
-        let (gateway, mut passage) = Gateway::open(options).map_err(failed)?;
+        let (gateway, mut passage) = Gateway::open(options, self.waker()).map_err(failed)?;
         self.attend(move |engine, _| passage.work(engine))?;
         Ok(gateway)
     }

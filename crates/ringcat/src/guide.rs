@@ -31,3 +31,6 @@ pub mod testing {}
 
 #[doc = include_str!("../guide/known-places.md")]
 pub mod known_places {}
+
+#[doc = include_str!("../guide/without-an-application.md")]
+pub mod without_an_application {}

@@ -30,6 +30,7 @@
 //! | objects, files, registers, states of one SubDevice | [`SubDevice`] |
 //! | cycles in a thread of their own | [`SupervisorThread`], [`CyclicThread`] |
 //! | distributed clocks | [`ClockConfig`], [`SyncSignals`], [`Trigger`] |
+//! | state of SubDevices and links in real-time threads | [`LiveStatus`], [`LiveSubDevice`] |
 //! | what happened | [`Event`], [`event_log`] |
 //!
 //! The module `guide` leads from here to a drive with clocks.
@@ -43,6 +44,7 @@
 //! | `packet` (default) | network interfaces ([`packet::PacketLinks`]), captures ([`tee::Tee`]), `realtime` |
 //! | `sim` | links into a simulated segment, in virtual or in real time; the simulator itself as `sim` |
 //! | `eni` | networks from an ENI, its variables by name; the parsed file as `config` |
+//! | `network` | networks from a network file of RingCAT (TOML); includes `eni` |
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
@@ -71,9 +73,12 @@ pub mod histogram;
 mod job;
 mod limits;
 pub mod links;
+mod live;
 pub mod main_device;
 mod mapped;
 pub mod memory;
+#[cfg(feature = "network")]
+pub mod network;
 pub mod news;
 mod no_domain;
 mod not_ready;
@@ -107,6 +112,7 @@ pub use error::Error;
 pub use job::Job;
 pub use limits::TransferLimits;
 pub use links::Links;
+pub use live::LiveSubDevice;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, ObjectOf, Output, OutputBits, Wanted, WriteError};
 pub use no_domain::NoDomain;
@@ -114,6 +120,7 @@ pub use not_ready::{NotReady, Reason};
 pub use pace::{Pace, Trigger};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
+pub use stop::Deactivated;
 pub use subdevice::{SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
 pub use value::{Number, ObjectValue};
@@ -129,7 +136,7 @@ pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness}
 pub use ringcat_engine::event::{Event, EventsSince, Occupant, TimedEvent};
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
-pub use ringcat_engine::info::{Direction, SubDeviceInfo};
+pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
 pub use ringcat_engine::junction::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
@@ -148,8 +155,9 @@ pub use ringcat_engine::main_device::snapshot::{
 };
 pub use ringcat_engine::main_device::{
     ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
-    GroupState, HiddenDelay, MAX_DATAGRAMS, MAX_UNDER_WAY, Pending, RawDatagram, RegisterError, RegisteredArea,
-    Required, SubDeviceId, SubDeviceState,
+    GroupState, HiddenDelay, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY, MainDevicePhase, Pending,
+    RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus, SentOnce, SubDeviceId,
+    SubDeviceState, SubDeviceStatus, WkcShare,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;

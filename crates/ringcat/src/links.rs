@@ -4,6 +4,8 @@ use std::task::Waker;
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
+#[cfg(feature = "eoe")]
+use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
 /// One or two network interfaces with a clock.
@@ -23,6 +25,16 @@ pub trait Links {
     /// Passes the oldest frame that has arrived to `take`; false if there is none.
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
 
+    /// Whether a frame may have arrived that was not passed to `take`. Cheap.
+    fn has_frame(&self) -> bool {
+        true
+    }
+
+    /// Whether [`Links::received_at`] returns times, also if it is called later, before the next frame is taken.
+    fn knows_arrivals(&self) -> bool {
+        false
+    }
+
     /// Arrival time at the interface of the frame that was last passed to `take`; `None` if these links know only the
     /// time at which it was taken. The frame left at `sent_at`, and was taken at about `now`: a time that is not
     /// between them is determined again. Without a system call.
@@ -40,6 +52,17 @@ pub trait Links {
     /// millisecond.
     fn waker(&self) -> Option<Waker> {
         None
+    }
+
+    /// The same with descriptors that end a wait; `None` if these links have none.
+    #[cfg(feature = "eoe")]
+    fn wake_up(&self) -> Option<WakeUp> {
+        None
+    }
+
+    /// Whether a wait was ended by a wake-up since the last call.
+    fn take_call(&mut self) -> bool {
+        false
     }
 
     /// Waits until a frame has arrived or the time has come.

@@ -6,14 +6,18 @@ use std::time::Duration;
 
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::event::TimedEvent;
-use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
+use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
-use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending};
+use ringcat_engine::main_device::{
+    ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
+};
 use ringcat_engine::procedures::dictionary::ReadPdos;
 use ringcat_engine::procedures::inspect_ring::{RingInspection, inspect_ring};
 use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::supervisor::AcyclicCounters;
+use ringcat_engine::time::Instant;
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
@@ -37,6 +41,9 @@ use crate::window::{DEFAULT_BUDGET, Window};
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
+    /// How much of each SII a scan reads. With less than the default, SubDevices are sooner in OP; the rest is read in
+    /// the background afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
+    pub sii_extent: SiiExtent,
     /// SubDevices with dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
@@ -57,6 +64,12 @@ pub struct Options {
     /// Whether the redundant link may be taken down for a moment, when ports have changed, to locate a crossed line
     /// ([`Links::force_disconnect`]). Otherwise a closed ring shows only that a line is crossed.
     pub enhanced_line_crossed: bool,
+    /// Whether the MainDevice works on its segment without an application, too, and on SubDevices without a
+    /// declaration: it scans by itself, follows changes, and keeps all of them in PREOP with their mailboxes. Services
+    /// take positions at any time then. In one thread it works while one of its methods runs ([`MainDevice::attend`]).
+    pub idle_operation: bool,
+    /// What follows a failed configuration of a SubDevice.
+    pub retries: Retries,
     /// Maximum number of datagrams in a frame, cyclic and acyclic; `None`: as many as fit. Some gateways and simulators
     /// accept fewer (often 15): the scan then fails with [`ScanError::FrameLimit`](crate::ScanError). Values below 3
     /// are raised to 3.
@@ -70,6 +83,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             sii_cache: true,
+            sii_extent: SiiExtent::default(),
             pdos: ReadPdos::default(),
             supervision: true,
             source_address: MacCodec::FlagsFirst,
@@ -78,6 +92,8 @@ impl Default for Options {
             junctions: JunctionMode::Disabled,
             follow_groups: true,
             enhanced_line_crossed: false,
+            idle_operation: false,
+            retries: Retries::Always,
             max_datagrams_per_frame: None,
             acyclic_bytes: DEFAULT_BUDGET,
         }
@@ -89,6 +105,13 @@ impl Options {
     #[must_use]
     pub fn with_sii_cache(mut self, sii_cache: bool) -> Options {
         self.sii_cache = sii_cache;
+        self
+    }
+
+    /// Sets [`Options::sii_extent`].
+    #[must_use]
+    pub fn with_sii_extent(mut self, sii_extent: SiiExtent) -> Options {
+        self.sii_extent = sii_extent;
         self
     }
 
@@ -148,6 +171,20 @@ impl Options {
         self
     }
 
+    /// Sets [`Options::idle_operation`].
+    #[must_use]
+    pub fn with_idle_operation(mut self, idle_operation: bool) -> Options {
+        self.idle_operation = idle_operation;
+        self
+    }
+
+    /// Sets [`Options::retries`].
+    #[must_use]
+    pub fn with_retries(mut self, retries: Retries) -> Options {
+        self.retries = retries;
+        self
+    }
+
     /// Sets [`Options::acyclic_bytes`].
     #[must_use]
     pub fn with_acyclic_bytes(mut self, acyclic_bytes: usize) -> Options {
@@ -167,6 +204,7 @@ impl Options {
         let (main, redundant) = links.addresses();
         let mut options = Engineering::new(main, redundant);
         options.sii_cache = self.sii_cache;
+        options.sii_extent = self.sii_extent;
         options.pdos = self.pdos;
         options.supervision = self.supervision;
         options.codec = self.source_address;
@@ -175,6 +213,8 @@ impl Options {
         options.junctions = self.junctions;
         options.follow_groups = self.follow_groups;
         options.enhanced_line_crossed = self.enhanced_line_crossed;
+        options.idle_operation = self.idle_operation;
+        options.retries = self.retries;
         options.max_datagrams_per_frame = self.max_datagrams_per_frame;
         Engine::new(options, links.now())
     }
@@ -235,12 +275,43 @@ impl<L: Links> MainDevice<L> {
     fn work(&mut self) {
         let MainDevice { links, engine, .. } = self;
         let now = links.now();
+        engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
         while links.receive(&mut |link, frame| {
             engine.receive(link, frame, now);
         }) {}
         engine.poll(now);
         carry_out_link_order(engine, links);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
+    }
+
+    /// Works for a time without an application: with [`Options::idle_operation`] it watches the segment meanwhile.
+    pub fn attend(&mut self, time: Duration) {
+        let end = self.links.now() + time;
+        while self.links.now() < end {
+            self.work();
+            let wake = self.engine.next_deadline().unwrap_or(end);
+            self.links.wait(wake.min(end));
+        }
+    }
+
+    /// Takes the oldest event.
+    pub fn pop_event(&mut self) -> Option<TimedEvent> {
+        self.engine.pop_event(self.links.now())
+    }
+
+    /// The SubDevices that the last scan found, as idle operation has followed them; empty before a scan.
+    pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
+        self.engine.subdevices()
+    }
+
+    /// Host time.
+    pub fn now(&self) -> Instant {
+        self.links.now()
+    }
+
+    /// The engine, for functions without a method here.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
     }
 
     /// Waits for a frame or a deadline.
@@ -347,13 +418,13 @@ impl<L: Links> MainDevice<L> {
     }
 }
 
-/// A refused activation, with the MainDevice. `?` converts it into an [`Error`] or a `Box<dyn std::error::Error>`, and
-/// drops the MainDevice.
+/// A refused activation or a deactivation that was not complete, with the MainDevice. `?` converts it into an [`Error`]
+/// or a `Box<dyn std::error::Error>`, and drops the MainDevice.
 #[non_exhaustive]
 pub struct Refused<M> {
     /// The cause.
     pub error: Error,
-    /// The MainDevice, unchanged.
+    /// The MainDevice.
     pub main_device: M,
 }
 

@@ -188,15 +188,18 @@ impl News {
         self.spread.store(spread_ns.map_or(0, |ns| u64::from(ns) + 1), Ordering::Relaxed);
     }
 
-    /// Publishes the figures that change in each cycle.
-    #[inline(always)]
-    pub(crate) fn publish_cycle(&self, pace: &PaceNs, counters: &CyclicCounters, ring: RingState) {
+    pub(crate) fn publish_ring(&self, ring: RingState) {
         let ring = match ring {
             RingState::Unknown => 0,
             RingState::Closed => 1,
             RingState::Open => 2,
         };
         set(&self.ring, ring);
+    }
+
+    /// Publishes the figures that change in each cycle.
+    #[inline(always)]
+    pub(crate) fn publish_cycle(&self, pace: &PaceNs, counters: &CyclicCounters) {
         let [cycles, .., last_delay, _] = &self.pace;
         set(cycles, pace.cycles);
         set(last_delay, pace.last_delay);

@@ -156,18 +156,22 @@ impl Links for PacketLinks {
 
     #[inline(always)]
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        // Only one call of `take`, so that the compiler inlines it. The loop skips frames that the socket rejects.
-        loop {
-            let (link, socket) = match &mut self.redundant {
-                _ if self.main.has_frame() => (Link::Main, &mut self.main),
-                Some(redundant) if redundant.has_frame() => (Link::Redundant, redundant),
-                _ => return false,
-            };
-            self.taken_from = link;
-            if socket.receive(&mut |frame| take(link, frame)) {
-                return true;
-            }
+        self.taken_from = Link::Main;
+        if self.main.receive(&mut |frame| take(Link::Main, frame)) {
+            return true;
         }
+        let Some(redundant) = &mut self.redundant else { return false };
+        self.taken_from = Link::Redundant;
+        redundant.receive(&mut |frame| take(Link::Redundant, frame))
+    }
+
+    #[inline(always)]
+    fn has_frame(&self) -> bool {
+        self.main.has_frame() || self.redundant.as_ref().is_some_and(PacketSocket::has_frame)
+    }
+
+    fn knows_arrivals(&self) -> bool {
+        true
     }
 
     /// The kernel's receive time.
@@ -187,6 +191,15 @@ impl Links for PacketLinks {
 
     fn waker(&self) -> Option<Waker> {
         self.wake_up.as_ref().map(WakeUp::waker)
+    }
+
+    #[cfg(feature = "eoe")]
+    fn wake_up(&self) -> Option<WakeUp> {
+        self.wake_up.clone()
+    }
+
+    fn take_call(&mut self) -> bool {
+        self.wake_up.as_ref().is_some_and(WakeUp::take_call)
     }
 
     fn wait(&mut self, until: Instant) {

@@ -161,10 +161,12 @@ impl ProcessData<'_> {
         }
     }
 
+    #[cold]
     fn not_an_output(&self, domain: DomainId, start: u64) -> WriteError {
         WriteError::NotAnOutput { domain, start, object: self.directory.object_at(domain, start).map(ObjectOf::new) }
     }
 
+    #[cold]
     fn object_at(&self, entry: &Entry) -> Option<ObjectOf> {
         self.directory.object_at(entry.domain, entry.bit_offset.into()).map(ObjectOf::new)
     }
@@ -249,6 +251,7 @@ impl ProcessData<'_> {
     ///
     /// # Errors
     /// The bytes are not all outputs, or not in the image.
+    #[inline]
     pub fn outputs_mut(&mut self, domain: DomainId, bytes: Range<usize>) -> Result<&mut [u8], WriteError> {
         let [start, end] = [bytes.start, bytes.end].map(|at| (at as u64).saturating_mul(8));
         let image_bits = self.exchange.image(domain).len() as u64 * 8;

@@ -13,8 +13,11 @@
 use std::time::Duration;
 
 use ringcat_engine::event::EventsSince;
+use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
-use ringcat_engine::main_device::{MainDevice as Engine, Pending, RawDatagram, SubDeviceId};
+use ringcat_engine::main_device::{
+    Address, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, RawDatagram, SubDeviceId,
+};
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::unassigned::rescan::Rescan;
@@ -69,6 +72,12 @@ pub trait Services: Sized {
         self.call(move |engine| engine.start_datagrams(datagrams))
     }
 
+    /// State of the segment, of the links and of each declared SubDevice, for real-time threads: a handle that can be
+    /// copied to any thread. Before activation it contains no SubDevice.
+    fn live_status(self) -> Self::Immediate<LiveStatus> {
+        self.immediately(|engine| engine.live_status())
+    }
+
     /// Opens all ports that [`SubDevice::block`](crate::SubDevice::block) has closed; the result is their number. A
     /// port of a neighbour that does not answer is kept for the next try.
     fn open_blocked(self) -> Self::Outcome<usize, ServiceError> {
@@ -84,6 +93,13 @@ pub trait Services: Sized {
     /// the ring of two links is open or a mandatory SubDevice is absent.
     fn rescan(self, limit: Duration) -> Self::Outcome<Rescan, ServiceError> {
         self.call(move |engine| engine.start_rescan(limit))
+    }
+
+    /// Reads what the scan left out of the SIIs ([`Options::sii_extent`](crate::Options::sii_extent)): names and
+    /// operation modes. Returns the SubDevices of the scan with all data, at once where nothing is missing. Without
+    /// this call the rest is read in the background, after activation.
+    fn complete_siis(self) -> Self::Outcome<Vec<SubDeviceInfo>, ServiceError> {
+        self.call(|engine| engine.start_sii_completion())
     }
 
     /// Checks all SubDevices and searches for new ones now, as after a change of the segment. Returns false before
@@ -109,6 +125,23 @@ pub trait Services: Sized {
     /// number to continue with. Another epoch means that the MainDevice began anew.
     fn events_since(self, number: u64) -> Self::Immediate<EventsSince> {
         self.immediately(move |engine| engine.events_since(number))
+    }
+
+    /// Repeats the failed configuration of a SubDevice now, or of all, without a further pause. The result is false if
+    /// there is no such SubDevice.
+    fn retry(self, subdevice: Option<Address>) -> Self::Immediate<bool> {
+        self.immediately(move |engine| {
+            let number = subdevice.map(|subdevice| engine.number(subdevice));
+            if number != Some(None) {
+                engine.retry(number.flatten());
+            }
+            number != Some(None)
+        })
+    }
+
+    /// What the MainDevice does as a whole.
+    fn phase(self) -> Self::Immediate<MainDevicePhase> {
+        self.immediately(|engine| engine.phase())
     }
 
     /// The whole state of the MainDevice at one moment: SubDevices, ring, clocks, groups, counters, and the number of

@@ -1,6 +1,8 @@
 //! States of mandatory SubDevices, of hot connect groups and of clocks.
 
+use ringcat_engine::config::ReferenceClock;
 use ringcat_engine::main_device::{ClockStatus, GroupState};
+use ringcat_wire::address::Position;
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -23,6 +25,12 @@ impl<L: Links> Application<L, Inline> {
     /// Not for the cyclic path.
     pub fn clocks(&self) -> Vec<ClockStatus> {
         self.engine().clocks()
+    }
+
+    /// Chooses the reference clock, also while the clocks run. Returns the position of the reference from now on: the
+    /// first clock that answers if the chosen one does not; `None` without clocks. Not for the cyclic path.
+    pub fn choose_reference_clock(&mut self, reference: ReferenceClock) -> Option<Position> {
+        self.engine_mut().choose_reference_clock(reference)
     }
 }
 
@@ -49,5 +57,14 @@ impl SupervisorThread {
     /// The thread has ended.
     pub fn clocks(&self) -> Result<Vec<ClockStatus>, Error> {
         self.with(|engine| engine.clocks())
+    }
+
+    /// Chooses the reference clock, also while the clocks run. Returns the position of the reference from now on: the
+    /// first clock that answers if the chosen one does not; `None` without clocks.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn choose_reference_clock(&self, reference: ReferenceClock) -> Result<Option<Position>, Error> {
+        self.with(move |engine| engine.choose_reference_clock(reference))
     }
 }

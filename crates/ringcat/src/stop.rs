@@ -1,4 +1,4 @@
-//! An orderly stop of an application, in one thread and in two.
+//! An orderly stop of an application, and the way back to operation without one, in one thread and in two.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use crate::acyclic::Inline;
 use crate::application::{Application, LastOutputs};
 use crate::error::Error;
 use crate::links::Links;
-use crate::main_device::MainDevice;
+use crate::main_device::{MainDevice, Refused};
 use crate::supervisor_thread::SupervisorThread;
 
 impl<L: Links> Application<L, Inline> {
@@ -23,6 +23,27 @@ impl<L: Links> Application<L, Inline> {
         let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
         main_device.finish_stop()?;
         Ok(main_device)
+    }
+
+    /// Ends the application: runs a few more cycles, with all outputs zero if `outputs` requests it, then brings every
+    /// SubDevice to PREOP, those without a declaration too. The returned MainDevice keeps the scan, and may activate
+    /// another declaration at once.
+    ///
+    /// # Errors
+    /// SubDevices do not reach PREOP in time, or the bus fails. The error contains the MainDevice, which may activate
+    /// another declaration nevertheless.
+    pub fn deactivate(
+        mut self,
+        outputs: LastOutputs,
+        limit: Duration,
+    ) -> Result<MainDevice<L>, Box<Refused<MainDevice<L>>>> {
+        self.last_cycles(outputs);
+        let begun = self.acyclic.engine.start_deactivate(limit, self.links.now()).map_err(Error::from);
+        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
+        match begun.and_then(|()| main_device.finish_stop()) {
+            Ok(()) => Ok(main_device),
+            Err(error) => Err(Box::new(Refused { error, main_device })),
+        }
     }
 }
 
@@ -42,4 +63,22 @@ impl<L: Links> Application<L, SupervisorThread> {
         self.acyclic.stop(state, limit)?;
         Ok((self.acyclic, self.links))
     }
+
+    /// Ends the application, as in one thread. The returned thread keeps the scan, and may activate another declaration
+    /// at once, on the same links.
+    ///
+    /// # Errors
+    /// SubDevices do not reach PREOP in time, or the bus fails. The error contains the handle and the links.
+    pub fn deactivate(mut self, outputs: LastOutputs, limit: Duration) -> Deactivated<L> {
+        self.last_cycles(outputs);
+        let ended = self.acyclic.deactivate(limit);
+        let main_device = (self.acyclic, self.links);
+        match ended {
+            Ok(()) => Ok(main_device),
+            Err(error) => Err(Box::new(Refused { error, main_device })),
+        }
+    }
 }
+
+/// The handle and the links of a deactivated application; the same if it was not complete.
+pub type Deactivated<L> = Result<(SupervisorThread, L), Box<Refused<(SupervisorThread, L)>>>;

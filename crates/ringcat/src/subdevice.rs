@@ -88,6 +88,11 @@ impl<S: Services> SubDevice<S> {
         self.address
     }
 
+    /// The address and the services.
+    pub(crate) fn into_parts(self) -> (Address, S) {
+        (self.address, self.services)
+    }
+
     /// Starts a service in the engine; `number` is the SubDevice's number there.
     fn ask<T, E, W>(self, work: impl FnOnce(&mut Engine, usize) -> W + Send + 'static) -> S::Outcome<T, SubDeviceError>
     where

@@ -26,6 +26,8 @@ use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+#[cfg(feature = "eoe")]
+use ringcat_link::WakeUp;
 use ringcat_wire::al::AlState;
 
 use crate::acyclic::AcyclicHalf;
@@ -56,6 +58,8 @@ struct Handle {
     window: Arc<Window>,
     /// Ends a sleep of the thread.
     waker: Option<Waker>,
+    #[cfg(feature = "eoe")]
+    wake_up: Option<WakeUp>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -75,6 +79,8 @@ impl SupervisorThread {
         let window = Arc::new(Window::new(options.acyclic_bytes));
         let options = options.clone();
         let waker = links.waker();
+        #[cfg(feature = "eoe")]
+        let wake_up = links.wake_up();
         let (shared, windows) = (published.clone(), window.clone());
         let body = move || {
             prepare();
@@ -84,7 +90,16 @@ impl SupervisorThread {
         };
         let thread = std::thread::Builder::new().name("supervisor".into()).spawn(body).map_err(Error::Thread)?;
         let (requests, events) = (Some(requests), Mutex::new(events));
-        Ok(SupervisorThread(Arc::new(Handle { requests, events, published, window, waker, thread: Some(thread) })))
+        Ok(SupervisorThread(Arc::new(Handle {
+            requests,
+            events,
+            published,
+            window,
+            waker,
+            #[cfg(feature = "eoe")]
+            wake_up,
+            thread: Some(thread),
+        })))
     }
 
     /// Starts a task in the thread.
@@ -121,10 +136,32 @@ impl SupervisorThread {
         job
     }
 
-    /// Calls a closure with the engine in each turn of the thread, until it returns true.
+    /// Calls a closure with the engine in each turn of the thread, until it returns true: when the engine has worked,
+    /// after a call of [`SupervisorThread::waker`], and every 10 ms.
     #[cfg(any(feature = "eoe", feature = "gateway"))]
     pub(crate) fn attend(&self, work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static) -> Result<(), Error> {
+        self.request(Attention::Engine, move |_, _| Box::new(work))
+    }
+
+    /// The same, and every half millisecond.
+    #[cfg(feature = "eoe")]
+    pub(crate) fn attend_often(
+        &self,
+        work: impl FnMut(&mut Engine, Instant) -> bool + Send + 'static,
+    ) -> Result<(), Error> {
         self.request(Attention::Often, move |_, _| Box::new(work))
+    }
+
+    /// Ends a sleep of the thread; does nothing where links have no waker, because the thread wakes often then.
+    #[cfg(any(feature = "eoe", feature = "gateway"))]
+    pub(crate) fn waker(&self) -> Waker {
+        self.0.waker.clone().unwrap_or_else(|| Waker::noop().clone())
+    }
+
+    /// With descriptors that end a sleep of the thread.
+    #[cfg(feature = "eoe")]
+    pub(crate) fn wake_up(&self) -> Option<WakeUp> {
+        self.0.wake_up.clone()
     }
 
     /// Runs `act` with the engine in the thread, and waits for its result.
@@ -224,7 +261,13 @@ impl SupervisorThread {
     /// Nothing is loaded, or the declaration does not fit the scan.
     pub fn apply<C: Links>(self, links: C) -> Activated<C> {
         // From then on the windows of the cyclic half apply, so its first cycle must begin soon.
-        let apply = || self.with(move |engine| engine.apply())?.map_err(Error::from);
+        let published = self.0.published.clone();
+        let apply = move |engine: &mut Engine| {
+            let applied = engine.apply();
+            published.states_of(engine);
+            applied
+        };
+        let apply = || self.with(apply)?.map_err(Error::from);
         match self.check_connections().and_then(|()| apply()) {
             Ok(active) => {
                 let window = self.0.window.clone();
@@ -248,6 +291,24 @@ impl SupervisorThread {
             reply.answer(|engine| engine.stop_result())
         })?;
         Ok(begun.wait()??)
+    }
+
+    /// Brings all SubDevices to PREOP, without an application.
+    pub(crate) fn deactivate(&self, limit: Duration) -> Result<(), Error> {
+        let (ended, reply) = job(self.clone());
+        let published = self.0.published.clone();
+        self.begin(move |engine, now| {
+            let mut begun = Some(engine.start_deactivate(limit, now).map_err(Error::from));
+            reply.answer(move |engine| match begun.take() {
+                Some(Err(error)) => Some(Err(error)),
+                Some(Ok(())) | None => {
+                    let result = engine.stop_result()?;
+                    published.states_of(engine);
+                    Some(result.map_err(Error::from))
+                }
+            })
+        })?;
+        ended.wait()?
     }
 
     fn rest(&self) -> Rest {
@@ -322,6 +383,10 @@ impl AcyclicHalf for SupervisorThread {
     fn work(&mut self, _links: &mut impl Links, _window: &Window) {}
 
     fn wake(&self) -> Instant {
+        Instant::NEVER
+    }
+
+    fn due_at(&mut self, _links: &impl Links) -> Instant {
         Instant::NEVER
     }
 

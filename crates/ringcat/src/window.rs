@@ -4,6 +4,9 @@
 //! Each word has one writer, so the halves may run in different threads. Both links carry the same frames, so one
 //! account is enough. The acyclic half also has a budget per cycle, so that a long cycle does not fill the queues of
 //! the interface at once.
+//!
+//! While a frame of a cycle is out that would be sent again, acyclic frames have left the interface by the time at
+//! which it would be: a second try never waits for them (decision 0054).
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -19,6 +22,8 @@ pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wi
 const SILENCE_NS: u64 = 20_000_000;
 /// Interval of the check for room while a cycle is due, because it may begin at any moment.
 const LOOK_AGAIN: Duration = Duration::from_micros(50);
+/// A second try that is due for this time was not decided in time, and keeps no more time free.
+const TRY_OVERDUE: Duration = LOOK_AGAIN;
 /// Shortest time between two readings of what the cyclic half posts.
 const SHORTEST_READING: Duration = Duration::from_micros(500);
 
@@ -43,6 +48,8 @@ pub struct Window {
     spent: [AtomicU64; 2],
     /// When frames of the cyclic half leave next; never without a cyclic half.
     next_cycle: AtomicU64,
+    /// When a frame of this cycle is sent again if it is not back by then; never if all are back, or if none would be.
+    next_try: AtomicU64,
     /// When the sent frames of each half will have left.
     free: [AtomicU64; 2],
 }
@@ -61,6 +68,7 @@ impl Window {
             budget: budget.max(MAX_FRAME),
             spent: [zero(), zero()],
             next_cycle: AtomicU64::new(Instant::NEVER.0),
+            next_try: AtomicU64::new(Instant::NEVER.0),
             free: [zero(), zero()],
         }
     }
@@ -74,6 +82,12 @@ impl Window {
     #[inline(always)]
     pub fn expect_cycle(&self, at: Instant) {
         self.next_cycle.store(at.0, Ordering::Relaxed);
+    }
+
+    /// Posts when a frame of this cycle is sent again if it is not back by then.
+    #[inline(always)]
+    pub fn expect_try(&self, at: Instant) {
+        self.next_try.store(at.0, Ordering::Relaxed);
     }
 
     /// Notes a frame of `length` bytes without FCS that leaves now, or as soon as the interface is free.
@@ -107,12 +121,19 @@ impl Window {
         if next == Instant::NEVER.0 || now.0.saturating_sub(next) > SILENCE_NS {
             return usize::MAX;
         }
-        let bytes = Instant(next).since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
+        let end = Instant(next).min(self.reserved_from(now));
+        let bytes = end.since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
         let room = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD);
         let spent = usize::try_from(self.spent_before(next)).unwrap_or(usize::MAX);
         let left = room.min(self.budget.saturating_sub(spent));
         // No frame is shorter on the wire.
         if left < MIN_FRAME { 0 } else { left }
+    }
+
+    /// When the wire is kept free for a second try; never if none is expected.
+    fn reserved_from(&self, now: Instant) -> Instant {
+        let next_try = Instant(self.next_try.load(Ordering::Relaxed));
+        if now.since(next_try) > TRY_OVERDUE { Instant::NEVER } else { next_try }
     }
 
     /// Whether the cyclic half runs: it has announced a cycle, or has sent a moment ago.
@@ -136,6 +157,10 @@ impl Window {
 
     /// When to check again for room on the wire.
     pub fn look_again(&self, now: Instant) -> Instant {
+        if self.reserved_from(now) != Instant::NEVER {
+            // Mostly the frame comes back long before.
+            return now + LOOK_AGAIN;
+        }
         let next = Instant(self.next_cycle.load(Ordering::Relaxed));
         next.max(now) + LOOK_AGAIN
     }
@@ -198,6 +223,25 @@ mod tests {
         assert_eq!(window.next_reading(Instant(50 * MS)), Instant::NEVER);
         window.occupy(Half::Cyclic, Instant(50 * MS), 60);
         assert_eq!(window.next_reading(Instant(50 * MS)), Instant(50 * MS) + SHORTEST_READING, "cycles back to back");
+    }
+
+    // covers: threads, lost-frames
+    #[test]
+    fn acyclic_frames_end_before_a_second_try_unless_it_is_overdue() {
+        let window = Window::default();
+        window.expect_cycle(Instant(MS));
+        let whole = window.bytes(Instant(0));
+        window.expect_try(Instant(MS / 4));
+        let before = window.bytes(Instant(0));
+        assert!(wire_time_ns(before) <= MS / 4 && before > 1_514, "{before}");
+        assert_eq!(window.bytes(Instant(MS / 4 - 10_000)), 0, "the second try leaves soon");
+        assert_eq!(window.look_again(Instant(MS / 4)), Instant(MS / 4) + LOOK_AGAIN);
+        assert_eq!(window.bytes(Instant(MS / 4) + TRY_OVERDUE), 0, "it leaves late");
+        let late = Instant(MS / 4 + 1) + TRY_OVERDUE;
+        assert!(window.bytes(late) > 1_514, "nothing decides on it");
+        assert!(window.look_again(late) > Instant(MS));
+        window.expect_try(Instant::NEVER);
+        assert_eq!(window.bytes(Instant(0)), whole, "all frames are back");
     }
 
     // covers: threads

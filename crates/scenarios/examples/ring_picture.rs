@@ -67,7 +67,7 @@ fn watch() -> Result<(Vec<Seen>, Told), ringcat::Error> {
         disturb(&mut application, stretch);
         for _ in 0..count {
             application.cycle(|_| ());
-            let status = application.exchange_mut().status(DomainId(0));
+            let status = application.exchange_mut().status(DomainId(0)).expect("it is declared");
             let ring = application.ring_status();
             let answering = [Link::Main, Link::Redundant].map(|link| ring.link(link).answering);
             cycles.push(Seen { wkc: status.wkc, expected: status.expected, answering });

@@ -15,6 +15,8 @@ pub struct Area {
     pub device: DeviceIndex,
     /// The domain.
     pub domain: DomainId,
+    /// Its SyncManager.
+    pub sync_manager: u8,
     /// Outputs or inputs.
     pub direction: Direction,
     /// Bytes of the domain's image.
@@ -41,6 +43,7 @@ pub fn areas_of(directory: &Directory, subdevice: usize, device: DeviceIndex) ->
             subdevice,
             device,
             domain: entries.domain,
+            sync_manager: entries.placed.area.sync_manager,
             direction: entries.direction,
             in_image: start..start + length,
             in_device,

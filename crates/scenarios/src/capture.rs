@@ -22,12 +22,15 @@
 //! 8. **Flights** (CR-04, CR-07, SM-03): each copy comes back at most once, and not after the 8 bits of its id in the
 //!    source address were used by another frame of its class: no id is in flight twice. Only sent frames come back.
 //! 9. **Windows**: see [`windows`].
+//! 10. **Tries**: a frame that is sent again within its cycle has process data of that cycle alone, with the same
+//!     outputs; it begins no cycle. See [`tries`].
 //!
 //! Copies that do not come back are counted but are not findings: cables are cut in tests.
 
 pub mod ethercat;
 pub mod flights;
 pub mod pcapng;
+pub mod tries;
 mod verdict;
 pub mod windows;
 
@@ -63,6 +66,7 @@ pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdic
     let mut verdict = Verdict::default();
     let mut flights = Flights::new(links);
     let mut traffic = Vec::new();
+    let mut cycles: Vec<tries::Cycle> = (0..links).map(|_| tries::Cycle::default()).collect();
     // Send time of the copy on the main link, by number.
     let mut first_copies: HashMap<(bool, u16), u64> = HashMap::new();
     for (number, packet) in packets {
@@ -82,7 +86,13 @@ pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdic
                 let first =
                     if link == 0 { first_copies.insert(key, packet.time_ns) } else { first_copies.remove(&key) };
                 let behind_ns = first.filter(|_| link > 0).map_or(0, |first| packet.time_ns.saturating_sub(first));
+                let again = if frame.is_acyclic() { None } else { cycles[link].take(&frame) };
+                verdict.again += u64::from(again.is_some() && link == 0);
+                if again == Some(false) {
+                    verdict.find(number, "is sent again with other outputs");
+                }
                 traffic.push(windows::Sent {
+                    again: again.is_some(),
                     behind_ns,
                     time_ns: packet.time_ns,
                     link,

@@ -3,6 +3,19 @@
 
 use std::ops::Range;
 
+use crate::dice::Dice;
+
+/// Whether lost frames are sent again within their cycle in the scenario of a seed: one in three. A world that fails
+/// prints it.
+pub const fn sends_again(seed: u64) -> bool {
+    Dice::new(seed ^ 0x00A1_0000).one_in(3)
+}
+
+/// Number of these seeds.
+pub fn sending_again(seeds: &Range<u64>) -> usize {
+    seeds.clone().filter(|seed| sends_again(*seed)).count()
+}
+
 /// What the environment variable SEED names.
 ///
 /// # Panics

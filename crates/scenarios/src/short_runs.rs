@@ -4,13 +4,14 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use ringcat::{Event, Redundancy, RingState};
+use ringcat::{Event, Options, Redundancy, RingState, Scan, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
 
 use crate::check::{Delivery, ring_events};
 use crate::dice::Dice;
+use crate::seeds;
 use crate::segments::{descriptions, ring};
 use crate::world::{CYCLE, World};
 
@@ -36,7 +37,11 @@ pub fn run(seed: u64) {
     let kinds: Vec<&str> = (0..count).map(|_| *dice.pick(&KINDS)).collect();
     let detection = Duration::from_micros(*dice.pick(&[10, 200, 1_500]));
     let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
-    let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
+    let declare =
+        |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed));
+    let mut world = World::with(seed, ring(descriptions(&kinds), options), &Options::default(), declare)
+        .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+    world.settle();
     // Late and duplicated frames change the devices.
     world.judge_latched(false);
     let mut cut: Option<CableId> = None;

@@ -5,7 +5,8 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::{Instant, Link, Links};
 use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_sim::network::Network;
-use ringcat_wire::frame::MacAddress;
+use ringcat_wire::command::Command;
+use ringcat_wire::frame::{Frame, MacAddress};
 
 use crate::loss::Loss;
 
@@ -44,6 +45,8 @@ const REDUNDANT_BIT: u8 = 0x08;
 struct Out {
     frame: (u8, u8),
     back: u8,
+    /// A further try of its cycle has left.
+    is_superseded: bool,
 }
 
 /// Links into a simulated segment, tapped.
@@ -56,18 +59,22 @@ pub struct Tap {
     idle: u64,
     /// Last time at which the exchange began to send.
     cyclic_sent: Instant,
-    /// Last sent cyclic frames.
+    /// Cyclic frames of the last cycle, with all tries.
     out: Vec<Out>,
     /// Marks of sent cyclic frames with their times, until they are taken.
     departed: Vec<(Instant, (u8, u8))>,
-    /// Copies that came back after newer frames had been sent, or twice.
+    /// Copies that came back after frames of a newer cycle had been sent, or twice.
     outdated: u64,
+    /// Other copies that came back after a further try of their cycle had been sent.
+    superseded: u64,
     /// Whether links can be taken down.
     can_disconnect: bool,
     /// Injected losses.
     losses: Vec<Loss>,
     /// Random losses, per thousand frames.
     lost_per_mille: u64,
+    /// Random losses, one in so many frames; none if 0.
+    lost_one_in: u64,
     /// Maximum random delay of the end of a wait.
     oversleep_ns: u64,
     /// Maximum random sending delay of a frame.
@@ -90,9 +97,11 @@ impl Tap {
             out: Vec::new(),
             departed: Vec::new(),
             outdated: 0,
+            superseded: 0,
             can_disconnect: true,
             losses: Vec::new(),
             lost_per_mille: 0,
+            lost_one_in: 0,
             oversleep_ns: 0,
             late_sending_ns: 0,
             random: FNV_OFFSET,
@@ -136,7 +145,16 @@ impl Tap {
         self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
     }
 
+    /// As [`Tap::lose_per_mille`], one in so many frames: for rare losses.
+    pub fn lose_one_in(&mut self, frames: u64, seed: u64) {
+        self.lost_one_in = frames;
+        self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
+    }
+
     fn is_lost(&mut self, outward: bool, bytes: &[u8]) -> bool {
+        if self.lost_one_in > 0 && self.random(self.lost_one_in - 1) == 0 {
+            return true;
+        }
         if self.lost_per_mille > 0 && self.random(999) < self.lost_per_mille {
             return true;
         }
@@ -177,10 +195,16 @@ impl Tap {
         self.random % (most + 1)
     }
 
-    /// Copies of cyclic frames that came back after newer frames had been sent, or twice: they must not be treated as
-    /// new.
+    /// Copies of cyclic frames that came back after frames of a newer cycle had been sent, or twice: they must not be
+    /// treated as new.
     pub fn outdated(&self) -> u64 {
         self.outdated
+    }
+
+    /// Other copies that came back after a further try of their cycle had been sent: they are late if the cycle was
+    /// complete by then.
+    pub fn superseded(&self) -> u64 {
+        self.superseded
     }
 
     /// Cyclic frames sent since the last call: time, byte 1 of the source address, and Idx.
@@ -209,23 +233,35 @@ impl Tap {
         }
         let frame = (bytes[FRAME_ID_AT], bytes[INDEX_AT]);
         if outward {
-            if now > self.cyclic_sent {
+            if now > self.cyclic_sent && !is_further_try(bytes) {
                 self.out.clear();
+                self.cyclic_sent = now;
             }
-            self.cyclic_sent = now;
             if link == Link::Main {
-                self.out.push(Out { frame, back: 0 });
+                if now > self.cyclic_sent {
+                    self.out.iter_mut().for_each(|out| out.is_superseded = true);
+                }
+                self.out.push(Out { frame, back: 0, is_superseded: false });
                 self.departed.push((now, frame));
             }
         } else {
             self.flight_ns = self.flight_ns.max(now.since(self.cyclic_sent).as_nanos() as u64);
             let copy = if bytes[6] & REDUNDANT_BIT == 0 { 1 } else { 2 };
             match self.out.iter_mut().find(|out| out.frame == frame) {
-                Some(out) if out.back & copy == 0 => out.back |= copy,
+                Some(out) if out.back & copy == 0 => {
+                    out.back |= copy;
+                    self.superseded += u64::from(out.is_superseded);
+                }
                 Some(_) | None => self.outdated += 1,
             }
         }
     }
+}
+
+/// Whether a cyclic frame is a further try of its cycle: it has process data only, neither supervision nor clocks.
+fn is_further_try(bytes: &[u8]) -> bool {
+    let logical = |command| matches!(command, Command::Lrd | Command::Lwr | Command::Lrw);
+    Frame::parse(bytes).is_ok_and(|frame| frame.datagrams().all(|datagram| logical(datagram.header.command)))
 }
 
 impl Links for Tap {

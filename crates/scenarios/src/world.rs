@@ -26,6 +26,7 @@ use ringcat_wire::register::map;
 use self::journal::Journal;
 pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
+use crate::once::Declared;
 use crate::tap::{Fingerprint, Tap};
 use crate::truth::{Departure, Truth};
 
@@ -120,6 +121,7 @@ impl World {
         main_device.links_mut().set_limit(Instant::NEVER);
         let declaration = declare(&scan);
         let under_way = declaration.domains.iter().map(|domain| domain.under_way).max().unwrap_or(1);
+        let once = declaration.subdevices.iter().map(Declared::of).collect();
         let (domains, declared) = (declaration.domains.len(), declaration.subdevices.len());
         main_device.load(declaration)?;
         connections.iter().try_for_each(|connection| main_device.add_junction_connection(*connection))?;
@@ -127,7 +129,7 @@ impl World {
         let network = application.links().network();
         let devices: Vec<Option<DeviceIndex>> = Vec::new();
         let mirror = Mirror::new(application.directory(), &devices, domains);
-        let truth = Truth::new(application.directory(), &devices, domains, under_way.into());
+        let truth = Truth::new(once, domains, under_way.into());
         journal.status = network.devices().map(|device| device.al_status()).collect();
         let outputs = output_ranges(application.directory(), domains, declared);
         let last_cycle = application.pace().cycles;
@@ -209,7 +211,7 @@ impl World {
                 let stale = self.mirror.stale(domain, exchange);
                 self.journal.judge(Judged { domain, at, status, delivery, stale });
             }
-            if exchange.status(domain).skipped == status.skipped {
+            if exchange.status(domain).is_some_and(|now| now.skipped == status.skipped) {
                 self.mirror.depart(domain, exchange, network);
                 self.truth.depart(domain, &departed);
             }
@@ -320,7 +322,8 @@ impl World {
         self.mirror.judges_latched = judged;
     }
 
-    /// From now on outputs of all tries of a cycle must be alike: for worlds in which no frame is damaged.
+    /// From now on outputs of all tries of a cycle must be alike, and follow in the order of cycles: for worlds with
+    /// one cycle under way in which no frame is damaged or delayed.
     pub fn compare_tries(&mut self) {
         self.truth.compares_outputs = true;
     }
@@ -333,6 +336,12 @@ impl World {
     /// Areas of fresh inputs and of outputs of complete cycles that were found in a device's log.
     pub fn proven(&self) -> u64 {
         self.truth.proven()
+    }
+
+    /// Areas of cycles with second tries that were not transferred by these, because their SubDevice must not receive
+    /// them twice.
+    pub fn spared(&self) -> u64 {
+        self.truth.spared()
     }
 
     /// Time of the simulation.
@@ -421,7 +430,9 @@ impl World {
 impl Drop for World {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            println!("seed {}, at {}; what happened:\n{}\n{}", self.seed, self.now(), self.log(), self.condition());
+            let again = if self.application.exchange().sends_again() { ", lost frames are sent again" } else { "" };
+            let (seed, now, log, condition) = (self.seed, self.now(), self.log(), self.condition());
+            println!("seed {seed}{again}, at {now}; what happened:\n{log}\n{condition}");
         }
     }
 }

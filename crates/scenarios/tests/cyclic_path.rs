@@ -10,7 +10,7 @@ use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
 use ringcat_engine::exchange::{CopyRule, CyclicCounters, Entry, Received};
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{MainDevice, Options};
+use ringcat_engine::main_device::{MainDevice, Options, SubDeviceId};
 use ringcat_engine::request::{RequestRefused, RequestState};
 use ringcat_engine::time::Instant;
 use ringcat_link::Recorder;
@@ -20,6 +20,8 @@ use ringcat_wire::mailbox::soe::Idn;
 use scenarios::answering_double::Cabling;
 use scenarios::counting_allocator::{CountingAllocator, Counts, counts};
 use scenarios::cyclic_load::{CyclicLoad, LoadSpec, PERIOD};
+use scenarios::segments::ring_of_16;
+use scenarios::world::World;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -319,4 +321,21 @@ fn typed_process_data_does_not_allocate_in_a_cycle() {
             assert_eq!(memory, (0, 0));
         });
     }
+}
+
+// covers: threads, no-allocation
+#[test]
+fn the_live_status_is_read_and_posted_without_memory() {
+    let world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
+    let live = world.application().live_status();
+    let mut operational = 0;
+    let used = counted(|| {
+        for _ in 0..CYCLES {
+            let copy = live.clone();
+            let all = (0..copy.subdevice_count()).filter_map(|number| copy.subdevice(SubDeviceId(number)));
+            operational += all.filter(|status| status.operational && status.wkc.is_complete()).count();
+            operational += usize::from(copy.segment().responding == 16 && copy.link(Link::Main).answering == 16);
+        }
+    });
+    assert_eq!((used, operational), ((0, 0), CYCLES as usize * 17));
 }

@@ -36,7 +36,7 @@ const ROOMS: &[Room] = &[
     Room {
         directory: "config",
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
-        external: External::Only(&["encoding_rs", "roxmltree"]),
+        external: External::Only(&["encoding_rs", "roxmltree", "serde", "sha2", "toml"]),
     },
     Room {
         directory: "sim",

@@ -10,8 +10,8 @@ use clap::Args;
 use ringcat::AlState;
 use ringcat::packet::PacketLinks;
 use ringcat::{
-    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MainDevice, Scan, SupervisorThread, Trigger,
-    automatic,
+    AcyclicHalf, Application, Declaration, DomainId, LastOutputs, MainDevice, Scan, SiiExtent, SupervisorThread,
+    Trigger, automatic,
 };
 use ringcat_link::monotonic;
 
@@ -24,6 +24,7 @@ use crate::json::data::Data;
 use crate::json::values::Times;
 use crate::numbers::number;
 use crate::output::say;
+use crate::resend::ResendArgument;
 use crate::thread::ThreadArguments;
 use crate::under_way::UnderWayArgument;
 use crate::verdict::{Report, Verdict};
@@ -57,6 +58,8 @@ pub struct CyclesArguments {
     count: u32,
     #[command(flatten)]
     under_way: UnderWayArgument,
+    #[command(flatten)]
+    resend: ResendArgument,
     /// Leave the supervision datagram out
     ///
     /// For a comparison with MainDevices that send process data alone.
@@ -71,7 +74,8 @@ pub struct CyclesArguments {
 pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
     let thread = arguments.thread;
     let end = EndRequest::watch(thread.priority)?;
-    let options = arguments.interfaces.options().with_supervision(!arguments.unsupervised);
+    let options = arguments.interfaces.options().with_sii_extent(SiiExtent::Operation);
+    let options = options.with_supervision(!arguments.unsupervised);
     if arguments.one_thread {
         let links = arguments.interfaces.open(thread)?;
         let _awake = thread.apply();
@@ -79,7 +83,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
         let mut main_device = MainDevice::request(links, &options);
         let scan = main_device.scan()?;
         let (declaration, start_up) = declare(&scan, begin);
-        let declaration = declaration.with_under_way(arguments.under_way.under_way);
+        let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
         let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
         let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
         let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
@@ -91,7 +95,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
         let _awake = thread.apply();
         let scan = supervisor.scan()?;
         let (declaration, start_up) = declare(&scan, begin);
-        let declaration = declaration.with_under_way(arguments.under_way.under_way);
+        let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
         let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
         let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
         let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
@@ -146,8 +150,14 @@ fn exchange<H: AcyclicHalf>(
     begin: u64,
     end: &EndRequest,
 ) -> (Vec<String>, bench::Cycles) {
-    let mut data =
-        bench::Cycles { start_up, cycle_times: None, rate_hz: None, cpu_ns_per_cycle: None, incomplete_cycles: None };
+    let mut data = bench::Cycles {
+        start_up,
+        cycle_times: None,
+        rate_hz: None,
+        cpu_ns_per_cycle: None,
+        incomplete_cycles: None,
+        resent_frames: None,
+    };
     match reach_op(application, begin, end) {
         Ok(after_ns) => data.start_up.op_after_ns = Some(after_ns),
         Err(reason) => return (vec![reason], data),
@@ -178,12 +188,14 @@ fn exchange<H: AcyclicHalf>(
     data.rate_hz = (cycles > 0).then_some(rate_hz);
     data.cpu_ns_per_cycle = cpu.checked_div(cycles as u64);
     data.incomplete_cycles = (cycles > 0).then_some(incomplete);
+    data.resent_frames = (cycles > 0).then_some(after.sent_again - before.sent_again);
     say!("cycles per second: {rate_hz:.0}");
     say!("cycle median: {:.2} us", quantile_us(&times_ns, 50));
     say!("cycle minimum: {:.2} us", quantile_us(&times_ns, 0));
     let share = 100.0 * cpu as f64 / (last - first).max(1) as f64;
     say!("CPU per cycle: {:.2} us, {share:.0} % of a processor", cpu as f64 / 1e3 / cycles.max(1) as f64);
     say!("incomplete: {incomplete} of {cycles}");
+    say!("sent again: {} frames", after.sent_again - before.sent_again);
     let mut reasons = Vec::new();
     if incomplete > 0 {
         reasons.push(format!("{incomplete} of {cycles} cycles incomplete"));

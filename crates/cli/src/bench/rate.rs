@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::packet::PacketLinks;
-use ringcat::{AlState, Application, Instant, LastOutputs, Links, SupervisorThread};
+use ringcat::{AlState, Application, Instant, LastOutputs, Links, SiiExtent, SupervisorThread};
 use ringcat_link::monotonic;
 
 use super::cycles::{DOMAIN, STOP_LIMIT, declare, reach_op};
@@ -57,7 +57,7 @@ pub fn run(arguments: &RateArguments) -> Result<Report, Failure> {
     let end = EndRequest::watch(thread.priority)?;
     let (cyclic, acyclic) = arguments.interfaces.open_halves(thread)?;
     let begin = monotonic::now_ns();
-    let options = arguments.interfaces.options();
+    let options = arguments.interfaces.options().with_sii_extent(SiiExtent::Operation);
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let _awake = thread.apply();
     let (declaration, mut start_up) = declare(&supervisor.scan()?, begin);

@@ -64,6 +64,8 @@ pub struct Cycles {
     pub cpu_ns_per_cycle: Option<u64>,
     /// Incomplete cycles among the measured ones; null where none was measured
     pub incomplete_cycles: Option<u64>,
+    /// Frames that were sent again within their cycle (--resend always); null where none was measured
+    pub resent_frames: Option<u64>,
 }
 
 /// The largest rate that is kept.

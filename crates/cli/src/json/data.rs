@@ -7,6 +7,7 @@ use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
 use super::eni::EniFile;
+use super::network::{Compare, Init};
 use super::ring::Ring;
 use super::run::Run;
 use super::scan::Scan;
@@ -19,6 +20,8 @@ use super::sim::Sim;
 #[allow(missing_docs)]
 pub enum Data {
     Scan(Scan),
+    Init(Init),
+    Compare(Compare),
     Run(Box<Run>),
     Ring(Ring),
     Clocks(Clocks),

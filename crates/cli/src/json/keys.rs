@@ -10,7 +10,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::Value;
 
-use super::{bench, capture, clocks, demo, eni, line, ring, run, scan, sii, sim};
+use super::{bench, capture, clocks, demo, eni, line, network, ring, run, scan, sii, sim};
 
 /// Lines around the tables.
 const BEGIN: &str =
@@ -87,6 +87,8 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("Event", keys::<line::EventLine>()),
         ("Answer", keys::<line::AnswerLine>()),
         ("`scan`", keys::<scan::Scan>()),
+        ("`init`", keys::<network::Init>()),
+        ("`compare`", keys::<network::Compare>()),
         ("`run`", keys::<run::Run>()),
         ("`ring`", keys::<ring::Ring>()),
         ("`clocks`", keys::<clocks::Clocks>()),

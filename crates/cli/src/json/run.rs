@@ -21,6 +21,8 @@ pub struct Run {
     pub cycles: Cycles,
     /// Frames with process data
     pub process_data: ProcessData,
+    /// SubDevices of which not all process data is sent again with a lost frame (--resend always)
+    pub sent_once: Vec<SentOnce>,
     /// Frames with everything else
     pub acyclic: Acyclic,
     /// From sending a frame to the arrival of a copy; null where none arrived since OP was reached
@@ -81,6 +83,22 @@ pub struct ProcessData {
     pub damaged_copies: u64,
     /// Frames of other MainDevices
     pub foreign_frames: u64,
+    /// Frames that were sent again within their cycle, once for each further try; `sent_frames` includes them
+    pub resent_frames: u64,
+    /// Cycles that are complete because a frame was sent again
+    pub saved_cycles: u64,
+}
+
+/// A SubDevice of which not all process data is sent again with a lost frame.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct SentOnce {
+    /// Index in the declaration, from 0
+    pub subdevice: usize,
+    /// Its name
+    pub name: String,
+    /// What is sent once, and why
+    pub reason: String,
 }
 
 /// Frames with everything else.

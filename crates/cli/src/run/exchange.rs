@@ -8,7 +8,7 @@ use ringcat::tee::Tee;
 use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
 
 use super::beside::Beside;
-use super::eni::Watched;
+use super::configured::Watched;
 use super::live::{self, Live};
 use super::pace::Seen;
 use crate::ending::EndRequest;

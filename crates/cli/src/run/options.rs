@@ -5,18 +5,19 @@ use std::time::Duration;
 use clap::Args;
 
 use super::beside::BesideArguments;
-use super::eni::EniArguments;
+use super::configured::ConfiguredArguments;
 use super::junction::{self, Junctions, junctions};
 use crate::access::AccessArguments;
 use crate::clock_options::ClockOptions;
+use crate::resend::ResendArgument;
 use crate::times::{cycle, time};
 use crate::under_way::UnderWayArgument;
 
 /// How to read what it prints.
 const SUMMARY_HELP: &str = "\
 All outputs stay zero. Watchdogs, process data and mailboxes are set up as the
-EEPROM (SII) of each SubDevice says; with --eni as the file says, and outputs
-as --set does.
+EEPROM (SII) of each SubDevice says; with --eni or --network as the file says,
+and outputs as --set does.
 
 Ctrl-C ends it in order: outputs zero, all SubDevices to INIT; so do SIGTERM and
 SIGHUP. Exit status 0: all reached OP and stayed there, every cycle was
@@ -50,6 +51,8 @@ pub struct RunArguments {
     pub cycle: Duration,
     #[command(flatten)]
     pub under_way: UnderWayArgument,
+    #[command(flatten)]
+    pub resend: ResendArgument,
     /// How long to exchange process data in OP, such as 10s; until Ctrl-C by default
     #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Cycle")]
     pub lasts: Option<Duration>,
@@ -59,7 +62,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time, help_heading = "Cycle")]
     pub within: Duration,
     #[command(flatten)]
-    pub eni: EniArguments,
+    pub configured: ConfiguredArguments,
     #[arg(
         long,
         value_name = "MODE",

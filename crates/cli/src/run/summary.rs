@@ -28,6 +28,8 @@ pub struct End {
     pub reached_op: bool,
     /// SYNC signals by SubDevice.
     pub signals: Vec<Option<SyncSignals>>,
+    /// SubDevices of which not all process data is sent again.
+    pub sent_once: Vec<run::SentOnce>,
     /// States, ring and clocks.
     pub exchanged: Exchanged,
 }
@@ -65,7 +67,10 @@ pub fn json(
             late_copies: cyclic.late,
             damaged_copies: cyclic.corrupt,
             foreign_frames: cyclic.foreign,
+            resent_frames: cyclic.sent_again,
+            saved_cycles: cyclic.saved,
         },
+        sent_once: end.sent_once.clone(),
         acyclic: application.acyclic_counters().into(),
         round_trips: Times::of(application.round_trips()),
         wake_ups: Times::of(news.wake_ups()),
@@ -123,6 +128,9 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
         cyclic.late,
         cyclic.corrupt
     );
+    if application.exchange().sends_again() {
+        say!("  lost frames: {} sent again, {} cycles complete because of that", cyclic.sent_again, cyclic.saved);
+    }
     if cyclic.foreign + acyclic.foreign > 0 {
         let (frames, senders) = (cyclic.foreign + acyclic.foreign, surroundings.senders());
         say!("  other MainDevices: {frames} frames, {senders}");

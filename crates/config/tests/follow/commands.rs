@@ -26,7 +26,7 @@ fn registers(config: &SubDeviceConfig) -> Vec<(Transition, RegisterCommand)> {
     config.startup.iter().filter_map(|command| Some((command.transition, register(&command.action)?))).collect()
 }
 
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn standard_commands_become_part_of_the_declaration() {
     let configuration = configured(SMALL);
@@ -40,7 +40,7 @@ fn standard_commands_become_part_of_the_declaration() {
     assert_eq!(configuration.declaration.subdevices[0].declared, Some(Vec::new()));
 }
 
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn only_what_the_commands_compare_is_expected() {
     let configuration = configured(SMALL);
@@ -50,7 +50,7 @@ fn only_what_the_commands_compare_is_expected() {
     assert_eq!(terminal, ringcat_engine::config::Expected::default(), "nothing is compared, nothing is expected");
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn a_single_word_of_the_revision_is_compared_as_in_the_file() {
     let lookup = ("<Data>000108000000</Data>", "<Data>00010c000000</Data>");
@@ -69,7 +69,7 @@ fn a_single_word_of_the_revision_is_compared_as_in_the_file() {
     assert!(registers(&whole.declaration.subdevices[0]).is_empty());
 }
 
-// covers: 3.11, eni-commands
+// covers: 3.11, eni-image
 #[test]
 fn sync_managers_result_from_all_writes_whatever_their_sizes() {
     let drive = drive(&configured(SMALL));
@@ -96,7 +96,7 @@ fn sync_managers_result_from_all_writes_whatever_their_sizes() {
     assert_eq!((back.register.start, back.register.length, back.register.control.bits()), (4352, 256, 0x22));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn a_sync_manager_activated_at_so_is_active_in_op_only() {
     let op_only = |configuration: &ringcat_config::Configuration, subdevice: usize| {
@@ -113,7 +113,7 @@ fn a_sync_manager_activated_at_so_is_active_in_op_only() {
     assert!(has_notice(&changed, &["SyncManager 0 at SO", "set before SAFEOP"]));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn long_entries_are_split_and_pdos_that_do_not_fit_have_no_positions() {
     let entry = "<Entry><Index>#x6064</Index><SubIndex>0</SubIndex><BitLen>32</BitLen></Entry>";
@@ -133,7 +133,7 @@ fn long_entries_are_split_and_pdos_that_do_not_fit_have_no_positions() {
     assert!(has_notice(&too_long, &["PDOs of SyncManager 3", "816 bits, more than its 48"]));
 }
 
-// covers: 7.3, eni-commands
+// covers: 7.3, eni-image
 #[test]
 fn sync_signals_result_from_the_registers_and_the_shift_from_the_element() {
     let configuration = configured(SMALL);
@@ -148,7 +148,7 @@ fn sync_signals_result_from_the_registers_and_the_shift_from_the_element() {
     assert!(drive(&changed(&[("<Data>0007</Data>", "<Data>0000</Data>")])).sync.is_none());
 }
 
-// covers: 8.1, eni-commands
+// covers: 8.1, eni-image
 #[test]
 fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     let drive = drive(&configured(SMALL));
@@ -175,7 +175,7 @@ fn commands_through_the_mailbox_become_start_up_commands_in_document_order() {
     assert_eq!(mail[1].comment.as_deref(), Some("assign"));
 }
 
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn a_file_with_only_ccs_2_means_downloads() {
     let upload = "<Comment>look</Comment><Ccs>2</Ccs><Index>#x1018</Index><SubIndex>1</SubIndex><Data>9A000000</Data>";
@@ -187,7 +187,7 @@ fn a_file_with_only_ccs_2_means_downloads() {
     assert!(has_notice(&configuration, &["CoE/InitCmd/Ccs", "taken as downloads"]));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn other_registers_are_written_and_compared_as_in_the_file() {
     let configuration = configured(SMALL);
@@ -203,7 +203,7 @@ fn other_registers_are_written_and_compared_as_in_the_file() {
     assert!(has_notice(&configuration, &["own register", "not sent at OI"]));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn a_command_for_another_subdevice_is_not_sent_and_noted() {
     let position = changed(&[("<Adp>1004</Adp><Ado>3840</Ado>", "<Adp>1003</Adp><Ado>3840</Ado>")]);
@@ -214,7 +214,7 @@ fn a_command_for_another_subdevice_is_not_sent_and_noted() {
     assert!(has_notice(&mixed_up, &["own register", "APWR counts positions", "Cmd 4 and 5 address by PhysAddr"]));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn notices_list_commands_not_followed_but_not_those_of_the_engine() {
     let configuration = configured(SMALL);
@@ -243,7 +243,7 @@ fn a_sync_manager_activated_at_so_is_op_only_and_one_changed_there_is_noted() {
     assert!(has_notice(&twice, &["SyncManager 0 at SO", "set before SAFEOP"]));
 }
 
-// covers: 6.5, eni-commands
+// covers: 6.5, eni-image
 #[test]
 fn addresses_are_hexadecimal_dotted_decimal_or_a_whole_message() {
     let elements = "<Type>2</Type><MAC>020000000004</MAC><IP>c0a80104</IP><Subnet>ffffff00</Subnet>";
@@ -272,7 +272,7 @@ fn addresses_are_hexadecimal_dotted_decimal_or_a_whole_message() {
 }
 
 /// Protocol 8.2: PO is among the transitions; OP is reached through SAFEOP.
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn a_path_over_two_transitions_is_sent_at_the_listed_one_or_noted() {
     let own = "<Transition>PS</Transition><Transition>OP</Transition>";
@@ -289,7 +289,7 @@ fn a_path_over_two_transitions_is_sent_at_the_listed_one_or_noted() {
     assert!(has_notice(&alone, &["own register", "not sent at PO, OI:"]));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn a_disabled_command_of_any_kind_is_not_sent() {
     let own = "<Comment>own register</Comment>";
@@ -301,7 +301,7 @@ fn a_disabled_command_of_any_kind_is_not_sent() {
 }
 
 /// Protocol 6.6: the data of a write with several elements contains more than the value.
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn an_idn_is_written_if_the_command_has_only_its_value() {
     let value = "<Elements>64</Elements>";
@@ -315,7 +315,7 @@ fn an_idn_is_written_if_the_command_has_only_its_value() {
 }
 
 /// Protocol 8.2: document order within a transition, mailbox commands and registers alike.
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn registers_and_mailbox_commands_of_a_transition_are_in_document_order() {
     let at_ps = |configuration: &ringcat_config::Configuration| -> Vec<Option<String>> {

@@ -8,7 +8,7 @@ fn has(text: &str, parts: &[&str]) {
     }
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn the_written_station_address_must_be_phys_addr() {
     let text = refused(&[("<Data>e903</Data>", "<Data>ea03</Data>")]);
@@ -29,7 +29,7 @@ fn a_sync_manager_must_have_the_direction_of_its_type() {
     has(&text, &["Slave 2 \"Left\"", "direction of SyncManager 0", "Write", "Read"]);
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn mailbox_and_sync_manager_must_be_the_same_memory() {
     let text = refused(&[(
@@ -39,7 +39,7 @@ fn mailbox_and_sync_manager_must_be_the_same_memory() {
     has(&text, &["Slave 4 \"Drive\"", "Mailbox/Send", "64 bytes at 0x1000", "128 bytes at 0x1000"]);
 }
 
-// covers: 3.10, eni-commands
+// covers: 3.10, eni-image
 #[test]
 fn an_fmmu_must_not_extend_beyond_its_sync_manager() {
     let text =
@@ -47,7 +47,7 @@ fn an_fmmu_must_not_extend_beyond_its_sync_manager() {
     has(&text, &["FMMU 0", "SyncManager 2 (6 bytes)", "64 bits"]);
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn send_must_have_as_many_bits_as_the_fmmus_map() {
     let text = refused(&[(
@@ -57,7 +57,7 @@ fn send_must_have_as_many_bits_as_the_fmmus_map() {
     has(&text, &["ProcessData/Send", "expected 48 bits", "got 40 bits"]);
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn two_subdevices_cannot_have_the_same_bits_address_or_position() {
     let bits = ("<BitStart>20</BitStart>", "<BitStart>18</BitStart>");

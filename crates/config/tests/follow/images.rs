@@ -143,7 +143,7 @@ fn sync_managers_of_different_tasks_are_members_of_both() {
     assert!(configuration.declaration.explicit_lrw.is_empty());
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn process_data_without_a_command_is_not_exchanged_and_noted() {
     let nothing = changed(&[("<Addr>16777216</Addr>", "<Addr>33554432</Addr>")]);

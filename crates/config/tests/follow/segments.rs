@@ -99,7 +99,7 @@ fn the_reference_clock_is_the_subdevice_addressed_by_the_cyclic_time_command() {
     assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(0)), true));
 }
 
-// covers: eni-commands
+// covers: eni-image
 #[test]
 fn a_file_without_commands_uses_the_sii_and_expects_the_identity_of_info() {
     let text = "<EtherCATConfig><Config><Slave><Info><Name>A</Name><PhysAddr>1001</PhysAddr><VendorId>2</VendorId>\
@@ -118,7 +118,7 @@ fn a_file_without_commands_uses_the_sii_and_expects_the_identity_of_info() {
 }
 
 /// A file with start-up lists only, as users write it (a common problem: a mapping that differs from the SII).
-// covers: 6.3, eni-commands
+// covers: 6.3, eni-image
 #[test]
 fn a_file_with_only_coe_commands_defines_the_length_of_process_data() {
     let command = |object: &str, sub_index: u8, complete: u8, data: &str| {

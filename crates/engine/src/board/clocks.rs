@@ -7,6 +7,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use ringcat_wire::address::StationAddress;
 
+use super::clock_times::TimeWords;
 use crate::link::Link;
 
 /// Reference clocks that the copies of cyclic frames distribute.
@@ -48,8 +49,6 @@ pub struct ClockWords {
     /// Stations in the lower half, the leader in bit 32, number of posts in the upper 31 bits.
     references: AtomicU64,
     spread: AtomicU32,
-    /// The first time that the application has set; 0 before.
-    first_application_time: AtomicU64,
     is_window_watched: AtomicBool,
     is_reference_led: AtomicBool,
     are_some_in_front: AtomicBool,
@@ -59,6 +58,8 @@ pub struct ClockWords {
     /// answered.
     holds: AtomicU32,
     answered: AtomicU32,
+    /// The application's time, and that of the clocks.
+    pub(crate) times: TimeWords,
 }
 
 const LEADER: u64 = 1 << 32;
@@ -141,18 +142,6 @@ impl ClockWords {
     /// Whether some difference shows the jitter of the host, so that the OR of all differences carries no information.
     pub(crate) fn is_host_told(&self) -> bool {
         self.is_reference_led() || self.are_some_in_front.load(Ordering::Relaxed)
-    }
-
-    /// Posts a time of the application; only the first counts, and 0 is none.
-    pub(crate) fn post_application_time(&self, time: u64) {
-        if self.first_application_time.load(Ordering::Relaxed) == 0 {
-            self.first_application_time.store(time, Ordering::Relaxed);
-        }
-    }
-
-    /// The first time that the application has set.
-    pub(crate) fn first_application_time(&self) -> Option<u64> {
-        Some(self.first_application_time.load(Ordering::Relaxed)).filter(|time| *time != 0)
     }
 
     pub(crate) fn post_spread(&self, spread_ns: u32) {

@@ -276,6 +276,12 @@ impl SyncSignals {
         self
     }
 
+    /// The register value of SYNC1, if it is activated.
+    pub(crate) const fn active_sync1_ns(&self) -> u32 {
+        const SYNC1: u16 = 0x0400;
+        if self.assign_activate & SYNC1 != 0 { self.sync1_register_ns() } else { 0 }
+    }
+
     /// Value of DC_SYNC1_CYCLE: time from SYNC0 to SYNC1; a whole cycle or more divides the rate of SYNC1.
     pub const fn sync1_register_ns(&self) -> u32 {
         let longer = self.sync1_cycle_ns.saturating_sub(self.sync0_cycle_ns);

@@ -27,11 +27,11 @@ impl Exchange {
         self.domains.get_mut(id.0).map_or(&mut [], Domain::image_mut)
     }
 
-    /// The last state of a domain.
-    pub fn status(&self, id: DomainId) -> DomainStatus {
-        let Some(domain) = self.domains.get(id.0) else { return DomainStatus::default() };
+    /// The last state of a domain; `None` if it is not declared.
+    pub fn status(&self, id: DomainId) -> Option<DomainStatus> {
+        let domain = self.domains.get(id.0)?;
         let pending = domain.oldest().is_some_and(|set| self.frames[set].iter().any(CyclicFrame::is_waiting));
-        domain.status(pending)
+        Some(domain.status(pending))
     }
 
     /// Age of a SubDevice's inputs in a domain.
@@ -63,6 +63,7 @@ impl Exchange {
     /// stays unchanged then.
     pub fn set_copies(&mut self, rules: &[CopyRule]) -> Result<(), CopyError> {
         self.copies = Copies::new(rules, &self.domains, &self.frames)?;
+        self.find_only_frame();
         Ok(())
     }
 
@@ -133,7 +134,7 @@ impl Exchange {
     /// Without it, host time plus the epoch of the configuration is used. The first time may also be the grid of SYNC
     /// pulses (`PulseGrid`); 0 counts as not set.
     pub fn set_application_time(&mut self, time: u64, now: Instant) {
-        self.board.clocks.post_application_time(time);
+        self.board.clocks.times.post_application_time(time, now.0);
         self.evidence.clocks.set_application_time(time, now);
     }
 
@@ -149,13 +150,13 @@ impl Exchange {
 
     /// Chooses when the datagrams of distributed clocks take effect; in each cycle unless chosen otherwise.
     pub fn set_clock_datagrams(&mut self, policy: ClockDatagrams) {
+        self.board.clocks.times.post_called(policy == ClockDatagrams::Called);
         self.evidence.clocks.set_datagrams(policy);
     }
 
-    /// The next frame sets the reference clock towards the application's time, once.
+    /// The next frame sets the reference clock towards the application's time when it leaves, once.
     pub fn sync_reference(&mut self, now: Instant) {
-        let time = self.evidence.clocks.application_time(now);
-        self.evidence.clocks.want_reference_at(time);
+        self.evidence.clocks.want_reference_now(now);
     }
 
     /// The next frame distributes the time of the reference clock, with [`ClockDatagrams::Called`]. No time is

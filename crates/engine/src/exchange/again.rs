@@ -189,6 +189,12 @@ impl Again {
         self.proofs.iter().all(is_met)
     }
 
+    /// The increment of a SubDevice in a datagram, by their indices in the first try, if the tries have proved it.
+    pub fn proved(&self, datagram: usize, contribution: usize) -> Option<u16> {
+        let mut own = self.proofs.iter().filter(|it| it.datagram == datagram && it.contribution == contribution);
+        own.find(|proof| proof.found.holds(proof.needed)).map(|proof| proof.wkc)
+    }
+
     /// Sum of the increments that are proved.
     pub fn wkc(&self) -> u32 {
         let found = self.proofs.iter().filter(|proof| proof.found.holds(proof.needed));

@@ -13,6 +13,7 @@ use ringcat_wire::register::{EcatEvent, map};
 
 mod calls;
 mod lead;
+mod slide;
 
 use crate::board::Board;
 use crate::board::clocks::References;
@@ -25,9 +26,13 @@ use crate::time::Instant;
 use calls::Calls;
 pub use calls::ClockDatagrams;
 use lead::Lead;
+use slide::Slide;
 
 /// Data of each datagram: the low half of a time.
 pub(crate) const CLOCK_DATA: usize = 4;
+/// Beyond this difference the reference is not steered: its control loop would take more than a tenth of a second, and
+/// the clocks that follow it could not. The supervisor sets all clocks, or continues with another shift.
+const FAR_NS: i64 = 100_000;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;
 
@@ -139,6 +144,20 @@ fn data_at(bytes: &[u8], at: usize) -> (u32, u16) {
     }
 }
 
+/// Whether a difference of the reference is more than its control loop takes out.
+const fn is_far(difference: i64) -> bool {
+    difference.unsigned_abs() > FAR_NS.unsigned_abs()
+}
+
+/// A time towards which the application has the reference steered once.
+#[derive(Clone, Copy, Debug)]
+enum WantedTime {
+    /// This time.
+    Given(u64),
+    /// The application's time, which goes on until the frame leaves.
+    Application(ReferenceTime),
+}
+
 /// State of the clocks as the exchange sees it.
 #[derive(Debug, Default)]
 pub(crate) struct Clocks {
@@ -158,8 +177,14 @@ pub(crate) struct Clocks {
     led: Option<ReferenceTime>,
     /// The application's time, and when it was set.
     application: Option<ReferenceTime>,
-    /// Time that the reference is to have when the next frame passes it.
-    wanted: Option<u64>,
+    /// Application time that the reference is to have when the next frame passes it.
+    wanted: Option<WantedTime>,
+    /// The last such time, at host time zero.
+    wanted_epoch: Option<u64>,
+    /// From application time to system time.
+    slide: Slide,
+    /// The wanted time is far from that of the reference.
+    is_far: bool,
     spread_ns: Option<u32>,
     window: SyncWindow,
     calls: Calls,
@@ -180,7 +205,12 @@ impl Clocks {
     }
 
     pub(crate) fn want_reference_at(&mut self, time: u64) {
-        self.wanted = Some(time);
+        self.wanted = Some(WantedTime::Given(time));
+    }
+
+    pub(crate) fn want_reference_now(&mut self, now: Instant) {
+        let time = ReferenceTime { time: self.application_time(now), sent_at: now };
+        self.wanted = Some(WantedTime::Application(time));
     }
 
     /// When the datagrams take effect.
@@ -199,8 +229,13 @@ impl Clocks {
         self.spread_ns = None;
     }
 
-    /// The last reading of the segment's reference.
+    /// The last reading of the segment's reference, as application time.
     pub(crate) fn reference_time(&self) -> Option<ReferenceTime> {
+        let ReferenceTime { time, sent_at } = self.system_time()?;
+        Some(ReferenceTime { time: time.wrapping_add(self.slide.shift()), sent_at })
+    }
+
+    fn system_time(&self) -> Option<ReferenceTime> {
         self.times[self.references.leader().0?.index()]
     }
 
@@ -212,21 +247,23 @@ impl Clocks {
     fn predicted(&self, link: Link, now: Instant) -> u64 {
         let [main, redundant] = self.times;
         let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
-        own.or(other).or(self.last).map_or_else(|| self.application_time(now), |time| time.at(now))
+        let unread = || self.application_time(now).wrapping_sub(self.slide.in_effect());
+        own.or(other).or(self.last).map_or_else(unread, |time| time.at(now))
     }
 
     /// Content of the copies of a frame that leaves now.
     pub(crate) fn depart(&mut self, board: &Board, now: Instant) -> [Payload; 2] {
         let (references, changes) = board.clocks.references();
         if changes != self.changes {
-            self.follow(references, changes, now);
+            self.follow(references, changes, board, now);
         }
         let (distributes, monitors) = self.calls.take();
+        let wanted = self.wanted.take();
         let mut payloads = [Payload { monitors, ..Payload::default() }; 2];
         if board.clocks.is_held() {
             return payloads;
         }
-        let steer = self.steering(distributes, board, now);
+        let steer = self.steering(distributes, wanted, board, now);
         for link in Link::ALL {
             let sync = self.references.on(link).map(|station| (station, self.predicted(link, now) as u32));
             payloads[link.index()].sync = sync.filter(|_| distributes);
@@ -237,8 +274,14 @@ impl Clocks {
 
     /// Takes over newly posted references.
     #[cold]
-    fn follow(&mut self, references: References, changes: u32, now: Instant) {
-        self.last = self.reference_time().or(self.last);
+    fn follow(&mut self, references: References, changes: u32, board: &Board, now: Instant) {
+        let jump = self.slide.follow(board.clocks.times.timeline(), self.wanted_epoch, now);
+        if jump != 0 {
+            let times = self.times.iter_mut().chain([&mut self.last]).flatten();
+            times.for_each(|time| time.time = time.time.wrapping_add(jump));
+            self.behind = None;
+        }
+        self.last = self.system_time().or(self.last);
         for link in Link::ALL {
             if references.on(link) != self.references.on(link) {
                 // The clock of another reference shows the same time, as far as is known.
@@ -252,14 +295,21 @@ impl Clocks {
             self.behind = None;
         }
         (self.references, self.changes) = (references, changes);
+        board.clocks.times.take(changes);
     }
 
     /// The references that receive another time than their own, and that time, by the link of the copy. In an open ring
     /// each copy passes another reference: the first may follow the host, the second follows the first.
-    fn steering(&mut self, distributes: bool, board: &Board, now: Instant) -> [Option<(StationAddress, u32)>; 2] {
+    fn steering(
+        &mut self,
+        distributes: bool,
+        wanted: Option<WantedTime>,
+        board: &Board,
+        now: Instant,
+    ) -> [Option<(StationAddress, u32)>; 2] {
         let (leader, steered) = self.references.leader();
         let steered = steered.filter(|_| distributes);
-        let to_host = self.leading(leader, board, now);
+        let to_host = self.leading(leader, wanted, board, now);
         match (leader, steered) {
             (Some(Link::Main), Some(_)) => [to_host, self.following(Link::Redundant, now)],
             (Some(Link::Redundant), Some(_)) => [self.following(Link::Main, now), to_host],
@@ -271,15 +321,22 @@ impl Clocks {
 
     /// Time written to the segment's reference: that of the host or of the application. Once the difference to that
     /// time is known: the reading of the reference, corrected by a part of the difference.
-    fn leading(&mut self, leader: Option<Link>, board: &Board, now: Instant) -> Option<(StationAddress, u32)> {
+    fn leading(
+        &mut self,
+        leader: Option<Link>,
+        wanted: Option<WantedTime>,
+        board: &Board,
+        now: Instant,
+    ) -> Option<(StationAddress, u32)> {
         let leader = leader?;
         let station = self.references.on(leader)?;
-        let time = match self.wanted.take() {
-            Some(time) => time,
+        let time = match wanted {
+            Some(WantedTime::Given(time)) => time,
+            Some(WantedTime::Application(time)) => time.at(now),
             None if self.setup.bus_shift && self.calls.is_automatic() => self.application_time(now),
             None => return None,
         };
-        board.clocks.lead_reference();
+        let time = self.written_time(time, leader, board, now)?;
         self.led = Some(ReferenceTime { time, sent_at: now });
         let behind = self.behind.filter(|behind| behind.is_fresh(now));
         let told = match (self.times[leader.index()], behind.and_then(|behind| behind.steering_ns())) {
@@ -287,6 +344,23 @@ impl Clocks {
             _ => time,
         };
         Some((station, told as u32))
+    }
+
+    /// The system time for an application time; `None` if it is far from that of the reference.
+    fn written_time(&mut self, application: u64, leader: Link, board: &Board, now: Instant) -> Option<u64> {
+        board.clocks.lead_reference();
+        let epoch = application.wrapping_sub(now.0);
+        let shift = self.slide.step(now);
+        self.wanted_epoch = Some(epoch);
+        board.clocks.times.post_wanted(epoch, shift);
+        let time = application.wrapping_sub(shift);
+        let own = self.times[leader.index()];
+        let is_far = own.is_some_and(|own| is_far(own.at(now).wrapping_sub(time) as i64));
+        if is_far && !self.is_far {
+            board.clocks.times.tell();
+        }
+        self.is_far = is_far;
+        (!is_far).then_some(time)
     }
 
     /// Time written to a second reference, so that it follows the first one.
@@ -360,10 +434,13 @@ impl Clocks {
     fn observe_led(&mut self, time: u64, sent_at: Instant) {
         let wanted = match self.led {
             Some(led) if led.sent_at == sent_at => led.time,
-            _ if self.setup.bus_shift => self.application_time(sent_at),
+            _ if self.setup.bus_shift => self.application_time(sent_at).wrapping_sub(self.slide.in_effect()),
             _ => return,
         };
         let difference = time.wrapping_sub(wanted) as i64;
+        if is_far(difference) {
+            return;
+        }
         let behind = self.behind.filter(|behind| behind.is_fresh(sent_at));
         self.behind = Some(behind.map_or(Lead::behind_host(sent_at), |behind| behind.go_on(difference, sent_at)));
     }

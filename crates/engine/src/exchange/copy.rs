@@ -207,7 +207,7 @@ impl Copies {
     pub(super) fn run(&mut self, target: usize, domains: &mut [Domain], cycle: u64) -> u64 {
         let Some(range) = self.by_domain.get(target).cloned().filter(|range| !range.is_empty()) else { return 0 };
         for source in &mut self.sources {
-            source.look(domains, cycle);
+            source.check(domains, cycle);
         }
         let mut refused = 0;
         for piece in &mut self.pieces[range] {
@@ -226,7 +226,7 @@ impl Copies {
 }
 
 impl Source {
-    fn look(&mut self, domains: &[Domain], cycle: u64) {
+    fn check(&mut self, domains: &[Domain], cycle: u64) {
         let domain = &domains[self.domain];
         // Cycles are counted from 1; 0 is none.
         let oldest = self.inputs.iter().map(|input| domain.came(*input)).min().unwrap_or(0);

@@ -133,11 +133,23 @@ impl Domain {
     /// if the previous one was incomplete or no SubDevice answered.
     #[inline]
     pub(crate) fn judge_again(&mut self, wkc: u32, left: u64) -> bool {
-        let is_again = wkc > 0 && self.status.state == DomainState::Complete;
+        let is_again = left >= self.image.usual_from;
         if is_again {
             self.judge(wkc, true, left);
         }
         is_again
+    }
+
+    /// Evaluates the only cycle on the wire, of a domain with one set, if it is complete with the working counter of
+    /// the one before, so that its status stays the same. False, and nothing is evaluated, otherwise.
+    #[inline(always)]
+    pub(crate) fn judge_unchanged(&mut self, wkc: u32, left: u64) -> bool {
+        let is_same = self.out == 1 && left >= self.image.usual_from && self.status.wkc == wkc;
+        if is_same {
+            self.out = 0;
+            self.judged = left;
+        }
+        is_same
     }
 
     /// Indices of the frames to queue next.
@@ -237,6 +249,12 @@ impl Domain {
         self.unsent = true;
     }
 
+    /// Notes that the only set was loaded and leaves at once.
+    #[inline(always)]
+    pub(crate) fn note_loaded_alone(&mut self) {
+        self.out = 1;
+    }
+
     /// Whether frames are queued and have not left.
     #[inline(always)]
     pub(crate) fn is_queued(&self) -> bool {
@@ -268,14 +286,14 @@ impl Domain {
     }
 
     /// Evaluates the oldest cycle on the wire, which left in cycle `left` minus one: the sum of its working counters,
-    /// and whether each datagram has exactly the expected one. True where it was complete like the one before;
-    /// otherwise [`Domain::change_state`] follows.
+    /// and whether each datagram has exactly the expected one. True where it was complete with the results of the one
+    /// before; otherwise [`Domain::change_state`] follows.
     pub(crate) fn judge(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
         self.status.wkc = wkc;
         self.oldest = self.after(self.oldest);
         self.out -= 1;
         self.judged = left;
-        complete && wkc > 0 && self.status.state == DomainState::Complete
+        complete && left >= self.image.usual_from
     }
 
     /// Updates the state after an evaluated cycle of which any copy returned or none. True where the state is to be
@@ -288,6 +306,8 @@ impl Domain {
             (_, false) => DomainState::Incomplete,
         };
         let is_another = core::mem::replace(&mut self.status.state, state) != state;
+        // A domain without process data has no working counter that shows a return.
+        self.image.set_complete(state == DomainState::Complete && wkc > 0);
         match &mut self.told {
             Told::Something => is_another,
             Told::Nothing { silent } => {

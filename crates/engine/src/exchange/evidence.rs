@@ -20,7 +20,7 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// One copy is received, and the other copy may never come: an open ring is reported at once.
-    pub fn hear_early(&mut self, frame: &CyclicFrame, board: &Board) {
+    pub fn receive_first(&mut self, frame: &CyclicFrame, board: &Board) {
         if frame.arrivals().returned != 0 && self.monitor.state() != RingState::Open && frame.left() >= self.newest {
             self.newest = frame.left();
             self.observe(frame, board);

@@ -6,12 +6,13 @@
 //! Each copy is evaluated by itself, and its inputs are delivered when it arrives ([`super::place`]). While no
 //! SubDevice can answer its process data, a frame leaves without it: see [`CyclicFrame::vacant`].
 
+mod increments;
+mod only_copy;
+mod places;
 mod tries;
 mod variants;
 
 use alloc::boxed::Box;
-use core::ops::Range;
-
 use ringcat_wire::address::Wkc;
 
 use super::clocks::{Places, Seen};
@@ -63,18 +64,13 @@ pub(crate) struct CyclicFrame {
     sequence: Sequence,
     /// Idx of all datagrams.
     index: u8,
-    arrivals: Arrivals,
     deadline: Instant,
     /// Cycle, plus one, in which it left.
     left: u64,
     /// Number of changes on the board that are applied.
     followed: u32,
-    /// Sum of the working counters of process data over the copies received so far.
-    wkc: u32,
-    /// Every process data datagram has exactly the expected working counter.
-    complete: bool,
-    /// Result of the supervision datagram in the copies received so far, packed.
-    seen: u64,
+    /// Results of the copies received so far.
+    shown: Shown,
     /// Offset of the supervision datagram's header.
     supervision_at: Option<usize>,
     /// Datagrams of distributed clocks.
@@ -91,9 +87,21 @@ pub(crate) struct CyclicFrame {
     first: InputNumber,
     /// Results for the copies, as of the last evaluation.
     views: Views,
+    tx: Box<[u8]>,
+}
+
+/// Results of the copies of a flight that were received so far: two words, so that they are cleared at once.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown {
+    /// Result of the supervision datagram, packed.
+    supervision: u64,
+    /// Sum of the working counters of process data.
+    wkc: u32,
+    arrivals: Arrivals,
+    /// Every process data datagram has exactly the expected working counter.
+    complete: bool,
     /// Newer inputs were in the image when this flight came back.
     is_overtaken: bool,
-    tx: Box<[u8]>,
 }
 
 /// Results for the copies, by the link on which they were sent. They stay valid for the next flight while copies come
@@ -129,13 +137,10 @@ impl CyclicFrame {
             stage: Stage::Idle,
             sequence: Sequence::default(),
             index: 0,
-            arrivals: Arrivals::default(),
+            shown: Shown::default(),
             deadline: Instant::NEVER,
             left: 0,
             followed: 0,
-            wkc: 0,
-            complete: false,
-            seen: 0,
             supervision_at,
             clocks,
             clocks_seen: Seen::default(),
@@ -145,7 +150,6 @@ impl CyclicFrame {
             presence,
             first,
             views: Views::default(),
-            is_overtaken: false,
             tx: bytes.into_boxed_slice(),
         }
     }
@@ -168,6 +172,11 @@ impl CyclicFrame {
         self.stage == Stage::Delivered
     }
 
+    /// Complete, and no copy is expected any more.
+    pub(crate) fn is_home(&self) -> bool {
+        self.shown.complete && self.stage == Stage::Idle
+    }
+
     pub(crate) fn is_open(&self) -> bool {
         self.stage != Stage::Idle
     }
@@ -186,7 +195,7 @@ impl CyclicFrame {
         self.deadline
     }
 
-    /// Whether it may be loaded: it is not on the wire, and this number of changes on the board is applied.
+    /// Whether it may be loaded: not on the wire, and with this number of changes on the board applied.
     pub(crate) fn is_ready(&self, changes: u32) -> bool {
         self.stage == Stage::Idle && self.followed == changes
     }
@@ -197,11 +206,11 @@ impl CyclicFrame {
     }
 
     pub(crate) fn arrivals(&self) -> Arrivals {
-        self.arrivals
+        self.shown.arrivals
     }
 
     pub(crate) fn close(&mut self) {
-        if self.arrivals.arrived & self.all_links != self.all_links {
+        if self.shown.arrivals.arrived & self.all_links != self.all_links {
             self.forget_missing();
         }
         self.stage = Stage::Idle;
@@ -210,7 +219,7 @@ impl CyclicFrame {
     /// Results of copies that did not come back this time are dropped.
     #[cold]
     fn forget_missing(&mut self) {
-        for link in Link::ALL.into_iter().filter(|link| self.arrivals.arrived & link.bit() == 0) {
+        for link in Link::ALL.into_iter().filter(|link| self.shown.arrivals.arrived & link.bit() == 0) {
             if core::mem::take(&mut self.views.looked[link.index()])
                 && let Some(presence) = &mut self.presence
             {
@@ -222,26 +231,26 @@ impl CyclicFrame {
 
     /// Sum of the working counters of process data.
     pub(crate) fn wkc(&self) -> u32 {
-        self.wkc
+        self.shown.wkc
     }
 
     /// Whether every process data datagram of the flight has exactly the expected working counter. A sum over datagrams
     /// could hide a shortfall of one behind an excess of another.
     pub(crate) fn is_complete(&self) -> bool {
-        self.complete
+        self.shown.complete
     }
 
     /// Counts the wrong working counters of this flight.
     pub(crate) fn count_errors(&self, board: &Board) {
-        let links = Link::ALL.map(|link| self.arrivals.arrived & link.bit() != 0);
+        let links = Link::ALL.map(|link| self.shown.arrivals.arrived & link.bit() != 0);
         self.places.iter().for_each(|place| place.count_errors(board, links));
     }
 
     /// Result of this flight's supervision datagram, if it has one and any copy came back.
     #[inline(always)]
     pub(crate) fn supervision(&self) -> Option<u64> {
-        let returned = if self.arrivals.returned != 0 { Supervision::RETURNED } else { 0 };
-        (self.supervision_at.is_some() && self.arrivals.arrived != 0).then_some(self.seen | returned)
+        let returned = if self.shown.arrivals.returned != 0 { Supervision::RETURNED } else { 0 };
+        (self.supervision_at.is_some() && self.shown.arrivals.arrived != 0).then_some(self.shown.supervision | returned)
     }
 
     /// Copies the outputs in, to leave in this cycle, and clears the previous flight.
@@ -260,11 +269,7 @@ impl CyclicFrame {
     #[inline(always)]
     fn clear(&mut self, left: u64) {
         self.left = left;
-        self.wkc = 0;
-        self.is_overtaken = false;
-        self.complete = self.places.is_empty();
-        self.arrivals = Arrivals::default();
-        self.seen = 0;
+        self.shown = Shown { complete: self.places.is_empty(), ..Shown::default() };
         if self.clocks.is_some() {
             self.clocks_seen = Seen::default();
         }
@@ -312,35 +317,6 @@ impl CyclicFrame {
         self.usual.iter_mut().for_each(Usual::forget);
     }
 
-    /// Whether bytes are those of the only copy of the current flight, with the same results as the one before, none
-    /// of which was incomplete or came from an older cycle than others in the image.
-    #[inline(always)]
-    pub(crate) fn is_back_as_usual(&self, sequence: Sequence, bytes: &[u8], image: &Image) -> bool {
-        let main = Link::Main.index();
-        self.stage == Stage::Waiting
-            && self.sequence == sequence
-            && self.all_links == Link::Main.bit()
-            && self.views.is_enough[main]
-            && self.left >= image.newest
-            && self.is_usual(main, bytes)
-    }
-
-    /// Takes such a copy: delivers it, and ends the flight.
-    #[inline(always)]
-    pub(crate) fn take_usual(&mut self, bytes: &[u8], image: &mut Image, cycle: u64) {
-        let main = Link::Main.index();
-        self.arrivals = Arrivals { arrived: Link::Main.bit(), returned: Link::Main.bit() };
-        self.wkc = self.usual[main].wkc;
-        self.seen = self.usual[main].supervision;
-        self.complete = true;
-        image.newest = self.left;
-        let moment = Moment { left: self.left, came: cycle + 1 };
-        for place in &mut self.places {
-            place.deliver(main, bytes, image, moment);
-        }
-        self.stage = Stage::Idle;
-    }
-
     /// Takes a copy. Delivers into the image as soon as the flight is complete.
     #[inline(always)]
     pub(crate) fn receive(
@@ -360,22 +336,22 @@ impl CyclicFrame {
         if !is_usual && !self.is_what_was_sent(bytes) {
             return Step::Corrupt;
         }
-        if !self.arrivals.note(copy.sent_on, arrived_on) {
+        if !self.shown.arrivals.note(copy.sent_on, arrived_on) {
             return Step::Late;
         }
-        let first = self.arrivals.arrived == copy.sent_on.bit();
-        let finished = self.arrivals.arrived & self.all_links == self.all_links;
+        let first = self.shown.arrivals.arrived == copy.sent_on.bit();
+        let finished = self.shown.arrivals.arrived & self.all_links == self.all_links;
         if is_usual {
-            self.wkc += self.usual[link].wkc;
-            self.seen |= self.usual[link].supervision;
+            self.shown.wkc += self.usual[link].wkc;
+            self.shown.supervision |= self.usual[link].supervision;
         } else {
-            self.count(copy.sent_on, bytes);
+            self.count(copy.sent_on, bytes, image);
         }
         if let Some(clocks) = self.clocks {
             clocks.read(&mut self.clocks_seen, copy.sent_on, bytes);
         }
         let complete = if first { self.views.is_enough[link] } else { self.views.are_enough };
-        self.complete = complete;
+        self.shown.complete = complete;
         if self.stage == Stage::Waiting {
             let moment = Moment { left: self.left, came: cycle + 1 };
             if moment.left >= image.newest && (first || !self.views.are_doubled) {
@@ -400,7 +376,7 @@ impl CyclicFrame {
         for place in &self.places {
             newest &= place.deliver_singly(link, bytes, image, moment);
         }
-        if !newest && !core::mem::replace(&mut self.is_overtaken, true) {
+        if !newest && !core::mem::replace(&mut self.shown.is_overtaken, true) {
             tally.disturbed().overtaken += 1;
         }
     }
@@ -419,7 +395,7 @@ impl CyclicFrame {
 
     /// Adds the working counters of a copy, and evaluates it where they are others than those of the copy before.
     #[cold]
-    fn count(&mut self, sent_on: Link, bytes: &[u8]) {
+    fn count(&mut self, sent_on: Link, bytes: &[u8], image: &mut Image) {
         let link = sent_on.index();
         let mut as_seen =
             self.views.looked[link] && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
@@ -431,10 +407,11 @@ impl CyclicFrame {
         }
         if !as_seen {
             self.look(link, bytes);
+            image.note_change(self.left);
         }
         let supervision = self.supervision_at.map_or(0, |at| supervision_at(bytes, at, sent_on));
-        self.wkc += sum;
-        self.seen |= supervision;
+        self.shown.wkc += sum;
+        self.shown.supervision |= supervision;
         self.usual[link].note(bytes, sum, supervision);
     }
 
@@ -456,7 +433,7 @@ impl CyclicFrame {
     /// The deadline has passed. True where no copy came back.
     pub(crate) fn give_up(&mut self) -> bool {
         self.stage = Stage::GivenUp;
-        self.arrivals.arrived == 0
+        self.shown.arrivals.arrived == 0
     }
 
     /// Applies changes of participation, and of the SubDevices that may be missing. What was on the wire has come back
@@ -466,6 +443,11 @@ impl CyclicFrame {
         self.views = Views::default();
         self.usual.iter_mut().for_each(Usual::forget);
         self.places.iter_mut().for_each(|place| place.follow(board));
+    }
+
+    /// Posts that process data of its SubDevices leaves with this cycle.
+    pub(crate) fn post_leaving(&self, board: &Board, cycle: u64) {
+        self.places.iter().for_each(|place| place.post_leaving(board, cycle));
     }
 
     /// Inputs of a SubDevice, by their numbers in the image.
@@ -486,15 +468,5 @@ impl CyclicFrame {
     /// Number of process data datagrams.
     pub(crate) fn datagrams(&self) -> usize {
         self.places.len()
-    }
-
-    /// The SubDevice whose inputs contain all the given bytes of the image.
-    pub(crate) fn whose_inputs(&self, bytes: Range<usize>) -> Option<usize> {
-        self.places.iter().find_map(|place| place.whose_inputs(&bytes))
-    }
-
-    /// Whether outputs contain all the given bytes of the image.
-    pub(crate) fn has_outputs(&self, bytes: Range<usize>) -> bool {
-        self.places.iter().any(|place| place.has_outputs(&bytes))
     }
 }

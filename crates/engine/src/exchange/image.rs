@@ -35,6 +35,11 @@ pub(crate) struct Image {
     shares: Box<[[Share; 2]]>,
     /// Shares found so far.
     found: u32,
+    /// Departure of the newest flight with other results than the one before, as a cycle plus one.
+    changed: u64,
+    /// Flights that left from this cycle on, as a cycle plus one, have the results of the one before, and the domain is
+    /// complete with them; the distant future while it is not.
+    pub usual_from: u64,
     /// Departure of the newest flight of which any copy returned, as a cycle plus one; one more if its frame was sent
     /// again.
     pub newest: u64,
@@ -69,8 +74,24 @@ impl Image {
             parts: vec![Moment::default(); first].into_boxed_slice(),
             shares: shares.into_boxed_slice(),
             found: 0,
+            changed: 0,
+            usual_from: u64::MAX,
             newest: 0,
         }
+    }
+
+    /// A flight that left then, as a cycle plus one, has other results than the one before.
+    #[cold]
+    pub fn note_change(&mut self, left: u64) {
+        self.changed = self.changed.max(left);
+        if self.usual_from != u64::MAX {
+            self.usual_from = self.changed + 1;
+        }
+    }
+
+    /// The domain is complete or not, and the results of its evaluated flights are posted.
+    pub fn set_complete(&mut self, complete: bool) {
+        self.usual_from = if complete { self.changed + 1 } else { u64::MAX };
     }
 
     /// The frame of this cycle was sent again: its inputs are delivered one by one from now on, and inputs of the cycle

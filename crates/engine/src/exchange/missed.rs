@@ -9,6 +9,7 @@ use core::ops::Range;
 use super::counters::CyclicCounters;
 use super::domain::Domain;
 use super::flight::CyclicFrame;
+use crate::board::Board;
 use crate::ring::Sequence;
 use crate::time::Instant;
 
@@ -66,6 +67,15 @@ impl Missed {
             *place = (sequence, Fate::None);
             counters.lost_late += 1;
         }
+    }
+}
+
+/// Posts which copies of a flight that is closed did not come back.
+#[cold]
+pub(crate) fn note_missing(frame: &CyclicFrame, board: &Board) {
+    frame.missing().for_each(|(link, bytes)| board.live.count_lost(link, bytes));
+    if frame.has_lost_supervision() {
+        board.post_silence();
     }
 }
 

@@ -5,6 +5,7 @@
 //! copy shows which of them processed it; the working counter must equal the sum of their increments. Each copy is
 //! evaluated by itself: in a ring that closes or breaks the same SubDevice may have processed both.
 
+mod increments;
 mod tries;
 
 use alloc::boxed::Box;
@@ -25,12 +26,12 @@ const OUTSIDE: usize = 2 * MAX_FRAME;
 /// Increment of an LRW for inputs alone, where a SubDevice has both directions.
 const INPUTS_OF_LRW: Wkc = Wkc(1);
 
-/// Bytes copied between frame and image.
+/// Bytes copied between frame and image. In these types no sum overflows, which is not checked then.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Span {
-    pub frame_at: usize,
-    pub image_at: usize,
-    pub length: usize,
+    pub frame_at: u16,
+    pub image_at: u32,
+    pub length: u16,
 }
 
 /// Inputs of one SubDevice within a datagram.
@@ -115,9 +116,9 @@ impl Place {
     pub fn new(datagram: &PlannedDatagram, data_at: usize, number: InputNumber) -> Place {
         let (outputs, inputs) = (usize::from(datagram.outputs), usize::from(datagram.inputs));
         let span = |placed: &PlacedArea| Span {
-            frame_at: data_at + placed.logical.0.saturating_sub(datagram.logical.0) as usize,
-            image_at: placed.image_offset as usize,
-            length: usize::from(placed.area.length),
+            frame_at: data_at as u16 + placed.logical.0.saturating_sub(datagram.logical.0) as u16,
+            image_at: placed.image_offset,
+            length: placed.area.length,
         };
         let mut out = joined(datagram.output_areas.iter().map(span)).into_iter();
         let contribution = |subdevice: usize| datagram.contributions.iter().position(|(other, _)| *other == subdevice);
@@ -148,7 +149,7 @@ impl Place {
 
     /// The same place in a frame without this datagram: no bytes are copied from or to it, its working counter is zero.
     pub fn outside(&self) -> Place {
-        let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE, ..span };
+        let span = |span: Span| Span { frame_at: span.frame_at + OUTSIDE as u16, ..span };
         let segment = |segment: &Segment| Segment { span: span(segment.span), ..*segment };
         let view = || View { runs: Vec::with_capacity(self.segments.len()), ..View::default() };
         Place {
@@ -183,6 +184,11 @@ impl Place {
     /// Whether a SubDevice with process data in it takes part.
     pub fn concerns(&self, takes_part: impl Fn(usize) -> bool) -> bool {
         self.contributions.iter().any(|it| takes_part(it.subdevice))
+    }
+
+    /// Posts that process data of its SubDevices leaves with this cycle.
+    pub fn post_leaving(&self, board: &Board, cycle: u64) {
+        self.contributions.iter().for_each(|it| board.post_leaving(it.subdevice, cycle));
     }
 
     /// Whether a copy has the same working counter as the last one evaluated.
@@ -450,30 +456,33 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
 impl Span {
     /// Whether it contains all the given bytes of the image.
     pub fn holds(&self, image: &Range<usize>) -> bool {
-        self.image_at <= image.start && image.end <= self.image_at + self.length
+        let start = self.image_at as usize;
+        start <= image.start && image.end <= start + usize::from(self.length)
     }
 
     /// Whether `next` follows directly.
     fn reaches(&self, next: &Span) -> bool {
-        self.frame_at + self.length == next.frame_at && self.image_at + self.length == next.image_at
+        self.frame_at + self.length == next.frame_at && self.image_at + u32::from(self.length) == next.image_at
     }
 
     /// Copies from the image into the frame.
     pub fn load(&self, image: &[u8], frame: &mut [u8]) {
-        copy(image, self.image_at, frame, self.frame_at, self.length);
+        copy(image, self.image_at as usize, frame, self.frame_at.into(), self.length);
     }
 
     /// Copies from a frame into another one with the same process data.
     pub fn take_over(&self, from: &[u8], to: &mut [u8]) {
-        copy(from, self.frame_at, to, self.frame_at, self.length);
+        copy(from, self.frame_at.into(), to, self.frame_at.into(), self.length);
     }
 
     fn deliver(&self, frame: &[u8], image: &mut [u8]) {
-        copy(frame, self.frame_at, image, self.image_at, self.length);
+        copy(frame, self.frame_at.into(), image, self.image_at as usize, self.length);
     }
 }
 
-fn copy(from: &[u8], from_at: usize, to: &mut [u8], to_at: usize, length: usize) {
+#[inline(always)]
+fn copy(from: &[u8], from_at: usize, to: &mut [u8], to_at: usize, length: u16) {
+    let length = usize::from(length);
     if length > 0
         && let Some(to) = to.get_mut(to_at..to_at + length)
         && let Some(from) = from.get(from_at..from_at + length)

@@ -1,7 +1,7 @@
 //! Departure of supervision and clocks in cycles in which the home domain does not leave.
 
 use super::leaving::Leaving;
-use super::missed::give_up;
+use super::missed::{give_up, note_missing};
 use super::service::Carrier;
 use super::{Domain, Exchange};
 use crate::link::Link;
@@ -25,6 +25,7 @@ impl Exchange {
             if frame.is_delivered() {
                 self.tally.disturbed().copies_lost += 1;
             }
+            note_missing(frame, &self.board);
             self.evidence.close(frame, &self.board, &mut self.events);
         }
         frame.load(&[], self.cycle);

@@ -65,6 +65,11 @@ impl Service {
         self.is_home && domains.get(self.home).is_some_and(Domain::is_queued)
     }
 
+    /// Whether no domain but this one ever has the datagrams.
+    pub fn stays_at(&self, domain: usize) -> bool {
+        self.home == domain && self.spares.iter().all(Option::is_none)
+    }
+
     /// Gives the datagrams to one of the domains that leave.
     #[cold]
     pub fn place(&mut self, domains: &[Domain], frames: &mut [CyclicFrame], board: &Board, now: Instant) -> Carrier {

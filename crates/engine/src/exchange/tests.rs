@@ -186,7 +186,10 @@ fn a_missing_subdevice_keeps_its_last_inputs_and_the_others_are_new_at_once() {
         ring.receive(Link::Main, &redundant);
         ring.judge();
     }
-    assert_eq!((ring.inputs(), ring.exchange.status(DOMAIN).state), (&[0x20, 0x11, 0x22][..], DomainState::Incomplete));
+    assert_eq!(
+        (ring.inputs(), ring.exchange.status(DOMAIN).unwrap().state),
+        (&[0x20, 0x11, 0x22][..], DomainState::Incomplete)
+    );
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Stale { cycles: 1 }, Freshness::Fresh]);
     assert_eq!([0, 1, 2].map(|subdevice| ring.exchange.al_status(subdevice)), [Some(8), Some(0), Some(8)]);
 }
@@ -431,7 +434,7 @@ impl Starting {
     }
 
     fn states(&self) -> [DomainState; 2] {
-        [0, 1].map(|domain| self.exchange.status(DomainId(domain)).state)
+        [0, 1].map(|domain| self.exchange.status(DomainId(domain)).unwrap().state)
     }
 }
 

@@ -58,6 +58,7 @@ impl Exchange {
         self.is_alone = again.len() == 1;
         self.base_ns = layout.domains.iter().map(|domain| domain.period.as_nanos() as u64).min().unwrap_or(0);
         self.again = again;
+        self.find_only_frame();
     }
 
     /// When [`Exchange::decide`] is to be called, after all frames that have arrived were received.
@@ -221,7 +222,7 @@ impl Exchange {
     /// As [`Exchange::receive`], where lost frames are sent again.
     #[inline(never)]
     pub fn receive_and_follow(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
-        if self.receive_usual(arrived_on, bytes) {
+        if self.receive_usual(bytes) {
             self.follow_usual(now);
             return Received::Taken;
         }

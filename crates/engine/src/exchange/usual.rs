@@ -16,7 +16,8 @@ use crate::layout::SUPERVISION_LEN;
 /// Eight bytes of a frame, of which some count.
 #[derive(Clone, Copy, Debug)]
 struct Check {
-    at: usize,
+    /// Offset. In this type its end cannot overflow, which is not checked then.
+    at: u16,
     mask: u64,
     word: u64,
 }
@@ -59,14 +60,14 @@ impl Usual {
     /// Whether a copy shows the same as the last noted copy.
     #[inline(always)]
     pub fn is_shown_by(&self, bytes: &[u8]) -> bool {
-        self.is_known && self.checks.iter().all(|check| word_at(bytes, check.at) & check.mask == check.word)
+        self.is_known && self.checks.iter().all(|check| word_at(bytes, check.at.into()) & check.mask == check.word)
     }
 
     /// Notes the result of an evaluated copy.
     #[cold]
     pub fn note(&mut self, bytes: &[u8], wkc: u32, supervision: u64) {
         for check in &mut self.checks {
-            check.word = word_at(bytes, check.at) & check.mask;
+            check.word = word_at(bytes, check.at.into()) & check.mask;
         }
         (self.is_known, self.wkc, self.supervision) = (true, wkc, supervision);
     }
@@ -86,7 +87,7 @@ fn words(bits: &[u8]) -> Box<[Check]> {
         // The last word of a frame begins earlier; its first bytes are those of the word before.
         let at = start.min(bits.len().saturating_sub(size_of::<u64>()));
         let skipped = 8 * (start - at);
-        checks.push(Check { at, mask: word_at(bits, at) >> skipped << skipped, word: 0 });
+        checks.push(Check { at: at as u16, mask: word_at(bits, at) >> skipped << skipped, word: 0 });
         next = at + size_of::<u64>();
     }
     checks.into_boxed_slice()

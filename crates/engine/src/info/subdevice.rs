@@ -1,5 +1,6 @@
 //! Result of a scan for a SubDevice: registers of its controller, and content of its SII (protocol 3.1, 4).
 
+use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -10,6 +11,7 @@ use ringcat_wire::sii::{
     SyncManagerKind,
 };
 
+use super::extent::SiiExtent;
 use super::warning::{InfoWarning, SiiProblem};
 use crate::direction::Direction;
 
@@ -115,6 +117,8 @@ pub struct SubDeviceInfo {
     pub position: Position,
     /// Station address that the scan gave.
     pub station: StationAddress,
+    /// How much of its SII is known: names are empty and there are no operation modes until they are.
+    pub extent: SiiExtent,
     /// Alias; 0 is none.
     pub alias: u16,
     /// Vendor, product, revision, serial number.
@@ -195,6 +199,16 @@ impl SubDeviceInfo {
             self.pdos.clone_from(&known.pdos);
             self.read_online.clone_from(&known.read_online);
         }
+    }
+
+    /// The same SubDevice with other ports, at another position; shared if nothing differs.
+    pub(crate) fn seen_at(self: &Rc<SubDeviceInfo>, readout: &Readout) -> Rc<SubDeviceInfo> {
+        let Readout { position, dl_status, receive_times, alias, .. } = *readout;
+        let is_same = (position, dl_status, alias) == (self.position, self.dl_status, self.alias);
+        if is_same {
+            return self.clone();
+        }
+        Rc::new(SubDeviceInfo { position, dl_status, receive_times, alias, ..(**self).clone() })
     }
 
     /// The PDO with this index.

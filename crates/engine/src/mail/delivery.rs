@@ -101,7 +101,7 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
             };
             let emergency = Emergency::decode(bytes);
             state.emergencies.push(shared.bus.now(), &emergency);
-            shared.bus.report(Event::Emergency { subdevice: shared.subdevice, emergency });
+            shared.bus.report(Event::Emergency { subdevice: shared.subdevice.get(), emergency });
             false
         }
         // An abort has the service of a request in both directions.

@@ -124,6 +124,11 @@ impl EmergencyRings {
         ring
     }
 
+    /// The ring of a SubDevice that has another name now.
+    pub(crate) fn keep(&mut self, subdevice: Address, ring: EmergencyRing) {
+        self.rings.insert(subdevice, ring);
+    }
+
     /// A new scan: positions of the scan before are no longer valid.
     pub(crate) fn forget_positions(&mut self) {
         self.rings.retain(|subdevice, _| matches!(subdevice, Address::Declared(_)));

@@ -31,6 +31,11 @@ impl Mailbox {
         Mailbox { shared: SharedMailbox::new(bus, subdevice.into()) }
     }
 
+    /// Another name of the SubDevice in events: it is at another position now.
+    pub(crate) fn rename(&self, subdevice: Address) {
+        self.shared.subdevice.set(subdevice);
+    }
+
     /// The SubDevice has entered PREOP or BOOT with this mailbox: counters restart. `send_manager` is the SyncManager
     /// of the mailbox that the MainDevice reads.
     pub(crate) fn open(&self, station: StationAddress, layout: MailboxLayout, send_manager: u8) {

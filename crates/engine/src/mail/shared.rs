@@ -3,7 +3,7 @@
 mod work;
 
 use alloc::rc::Rc;
-use core::cell::{Ref, RefCell, RefMut};
+use core::cell::{Cell, Ref, RefCell, RefMut};
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::{SyncManager, map};
@@ -81,7 +81,7 @@ pub(super) struct MailboxState {
 pub(super) struct SharedMailbox {
     pub bus: Bus,
     /// Index in the declaration, before activation the position; for events.
-    pub subdevice: Address,
+    pub subdevice: Cell<Address>,
     state: RefCell<MailboxState>,
     /// Notifies conversations and receivers.
     pub changed: Signal,
@@ -117,6 +117,7 @@ impl SharedMailbox {
             last_error: 0,
         };
         let (changed, work) = (bus.signal(), bus.signal());
+        let subdevice = Cell::new(subdevice);
         Rc::new(SharedMailbox { bus: bus.clone(), subdevice, state: RefCell::new(state), changed, work })
     }
 

@@ -24,6 +24,7 @@ use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
 use crate::procedures::clocks;
+use crate::procedures::complete_siis::complete_in_background;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::error_watch::watch_errors;
 use crate::procedures::mail_watch::watch_mail;
@@ -36,8 +37,7 @@ use crate::procedures::verify::verify;
 use crate::queue::queue;
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
-use crate::segment::member::Member;
-use crate::segment::{Cabling, Declared, Found, Observation, stations_by_position};
+use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position};
 use crate::time::Instant;
 use crate::topology::Topology;
 
@@ -57,16 +57,20 @@ impl MainDevice {
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
         let (specs, layout) = self.lay_out(&declaration, &plans, &found)?;
-        let repeats = repeats::rules(&declaration.subdevices, &plans, &found);
+        let repeats = repeats::of_all(&declaration.subdevices, &plans, &found);
         let sends_again: Vec<bool> = declaration.domains.iter().map(|domain| domain.sends_again).collect();
         let members = members(declaration, found, &plans, &layout)?;
-        let clocks = clocks_of(clock_config.clone(), &scan, &topology, &members);
-        let directory = Directory::new(&plans, &layout);
-        report_oddities(&bus, &members, &layout);
-        let optional = members.iter().map(|member| member.config.optional).collect();
-        let board = Arc::new(Board::new(members.len()).with_optional(optional));
+        let subdevices = SubDevices::new(members, unassigned);
+        let clocks = clocks_of(clock_config.clone(), &scan, &topology, &subdevices);
+        let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
+        report_oddities(&bus, &subdevices, &layout);
+        let count = subdevices.member_count();
+        let optional = subdevices.members().map(|member| member.config.optional).collect();
+        let addresses = subdevices.members().map(|member| member.station).collect();
+        let board = Arc::new(Board::new(count).with_optional(optional).with_stations(addresses));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        let repeats = repeats::rules(&repeats);
         exchange.send_lost_frames_again(&layout, &repeats, |domain| sends_again.get(domain.0) == Some(&true));
         if let Some(config) = &clock_config {
             exchange.set_up_clocks(ClockSetup {
@@ -75,16 +79,15 @@ impl MainDevice {
                 sync_window_ns: config.sync_window_ns,
             });
         }
-        let stations = stations_by_position(&members, scan.subdevices.iter().map(|info| info.station));
-        let closings = loaded.closings(&topology, &members, &stations);
+        let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
+        let closings = loaded.closings(&topology, &subdevices, &stations);
         let cables = cables(&topology, self.options.links());
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
-        let mailboxes = (0..members.len()).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
-        let statistics = ErrorStatistics::new(&bus, members.len(), self.statistics_period);
+        let mailboxes = (0..count).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
+        let statistics = ErrorStatistics::new(&bus, count, self.statistics_period);
         let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
         let declared = Box::new(Declared {
-            members,
-            unassigned,
+            subdevices,
             layout,
             cabling: Cabling { topology, stations, cables, closings, version: 0 },
             clocks,
@@ -100,7 +103,7 @@ impl MainDevice {
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
-        Ok(Active { exchange, directory, periods, under_way })
+        Ok(Active { exchange, directory, periods, under_way, live_status: self.live_status() })
     }
 
     /// The domains, and the places of their process data.
@@ -129,7 +132,7 @@ impl MainDevice {
     fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
         self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
-        self.visited.drain(..).for_each(|mailbox| mailbox.close());
+        self.begin_keeping_undeclared(&segment);
         if with_clocks {
             // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
             // afterwards.
@@ -153,6 +156,7 @@ impl MainDevice {
                 supervise(own_bus, own).await;
             });
         }
+        self.supervisor.spawn(complete_in_background(bus.clone(), segment.clone()));
         self.supervisor.spawn(watch_mail(bus.clone(), segment.clone()));
         self.supervisor.spawn(serve_requests(bus.clone(), segment.clone(), self.requests.clone()));
         self.supervisor.spawn(collect(bus, segment.clone()));
@@ -171,10 +175,10 @@ impl MainDevice {
 }
 
 /// Clocks of all SubDevices of the scan.
-fn clocks_of(config: Option<ClockConfig>, scan: &Found, topology: &Topology, members: &[Member]) -> Clocks {
+fn clocks_of(config: Option<ClockConfig>, scan: &Found, topology: &Topology, subdevices: &SubDevices) -> Clocks {
     let member = |info: &SubDeviceInfo| {
-        let index = members.iter().position(|member| member.station == info.station)?;
-        Some((index, &*members[index].config))
+        let index = subdevices.member_of(info.station)?;
+        Some((index, &*subdevices.member(index)?.member.config))
     };
     Clocks::new(config, &scan.subdevices, topology, member)
 }

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::areas::Directory;
+use super::live_status::LiveStatus;
 use crate::exchange::Exchange;
 
 /// Result of the activation.
@@ -15,6 +16,8 @@ pub struct Active {
     pub directory: Directory,
     /// Periods of the domains. There is at least one domain, possibly only for supervision.
     pub periods: Vec<Duration>,
+    /// State of SubDevices and links, for any thread.
+    pub live_status: LiveStatus,
     /// Maximum number of cycles of a domain under way at once.
     pub under_way: u8,
 }

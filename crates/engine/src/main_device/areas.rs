@@ -5,6 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::sent_once::SentOnce;
 use super::working_counters::expected_as_igh;
 use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
 use crate::declared::SubDeviceId;
@@ -23,6 +24,8 @@ pub struct Directory {
     contributions: Vec<u32>,
     /// Bits of outputs by domain, in order and without gaps inside a range.
     outputs: Vec<(DomainId, Range<u64>)>,
+    /// By SubDevice, why not all of its process data is sent again.
+    sent_once: Vec<Option<SentOnce>>,
 }
 
 /// An area with its entries.
@@ -49,9 +52,21 @@ impl Directory {
                 *sum += u32::from(wkc.0);
             }
         }
-        let mut directory = Directory { subdevices, contributions, outputs: Vec::new() };
+        let mut directory = Directory { subdevices, contributions, ..Directory::default() };
         directory.outputs = directory.output_ranges();
         directory
+    }
+
+    /// `repeats`: by SubDevice, what may be sent again, or why not everything may.
+    pub(super) fn with_sent_once<T>(self, repeats: &[Result<T, SentOnce>]) -> Directory {
+        let sent_once = repeats.iter().map(|repeat| repeat.as_ref().err().copied()).collect();
+        Directory { sent_once, ..self }
+    }
+
+    /// The SubDevices of which not all process data is sent again when a frame is lost, in domains that do that
+    /// ([`DomainConfig::sends_again`](super::DomainConfig::sends_again)), and why.
+    pub fn sent_once(&self) -> impl Iterator<Item = (SubDeviceId, SentOnce)> {
+        self.sent_once.iter().enumerate().filter_map(|(subdevice, reason)| Some((SubDeviceId(subdevice), (*reason)?)))
     }
 
     fn output_ranges(&self) -> Vec<(DomainId, Range<u64>)> {

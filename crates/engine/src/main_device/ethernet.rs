@@ -34,10 +34,10 @@ impl MainDevice {
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
         let Some(segment) = self.active() else { return Vec::new() };
         let access = segment.view();
-        let members = access.members().iter().enumerate();
+        let members = access.members().enumerate();
         members
             .filter_map(|(subdevice, member)| {
-                let info = member.info.as_ref()?;
+                let info = member.info?;
                 let speaks = info.protocols.0 & MailboxProtocols::EOE != 0 && info.mailbox.is_some();
                 let (position, alias) = (info.position, info.alias);
                 speaks.then_some(EthernetSubDevice { subdevice: SubDeviceId(subdevice), position, alias })

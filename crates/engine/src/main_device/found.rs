@@ -22,7 +22,7 @@ impl MainDevice {
     /// optional ones.
     pub fn unsettled(&self) -> alloc::vec::Vec<(usize, SubDeviceState)> {
         let access = self.segment.view();
-        let members = access.members().iter().enumerate();
+        let members = access.members().enumerate();
         let states = members.map(|(index, member)| (index, member.phase.into(), member.config.optional));
         let unsettled = states.filter(|(_, state, optional)| match state {
             SubDeviceState::Settled(_) => false,

@@ -57,8 +57,8 @@ impl MainDevice {
 fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipient, u16> {
     let Some(segment) = segment else { return Err(ErrorReply::INVALID_HEADER) };
     let access = segment.view();
-    let member = access.members().iter().find(|member| member.station.0 == message.header.address);
-    let Some((member, info)) = member.and_then(|member| Some((member, member.info.as_ref()?))) else {
+    let member = access.members().find(|member| member.station.0 == message.header.address);
+    let Some((member, info)) = member.and_then(|member| Some((member, member.info?))) else {
         return Err(ErrorReply::INVALID_HEADER);
     };
     let announced = match message.header.protocol {
@@ -75,7 +75,7 @@ fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipi
     if info.protocols.0 & announced == 0 {
         return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
     }
-    let index = access.member_of(member.station);
+    let index = access.subdevices().member_of(member.station);
     let mailbox = index.and_then(|index| segment.mailbox(index));
     mailbox.map(Recipient::SubDevice).ok_or(ErrorReply::INVALID_HEADER)
 }

@@ -14,7 +14,7 @@ use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
 use crate::procedures::scan::{Scan, node_status, report_cabling};
 use crate::segment::Found;
-use crate::segment::member::Member;
+use crate::segment::SubDevices;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -64,7 +64,7 @@ impl Loaded {
     pub(super) fn closings(
         &self,
         topology: &Topology,
-        members: &[Member],
+        subdevices: &SubDevices,
         stations: &[StationAddress],
     ) -> Vec<[(StationAddress, u8); 2]> {
         if self.connections.is_empty() {
@@ -72,7 +72,7 @@ impl Loaded {
             let rings = topology.local_rings.iter().map(|ring| ring.closing);
             return rings.filter_map(|closing| Some([end(closing.head)?, end(closing.tail)?])).collect();
         }
-        let end = |subdevice: SubDeviceId, port: u8| Some((members.get(subdevice.0)?.station, port));
+        let end = |subdevice: SubDeviceId, port: u8| Some((subdevices.member(subdevice.0)?.station, port));
         let ends = |it: &JunctionConnection| Some([end(it.head, it.head_port)?, end(it.tail, it.tail_port)?]);
         self.connections.iter().filter_map(ends).collect()
     }

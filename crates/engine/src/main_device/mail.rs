@@ -3,49 +3,47 @@
 use alloc::vec::Vec;
 use core::future::Future;
 
-use ringcat_wire::address::Position;
 use ringcat_wire::al::AlState;
 
 use super::MainDevice;
+use super::idle::Place;
 use super::pending::Pending;
 use crate::declared::Address;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{EmergencyRing, Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
-use crate::procedures::visit::visit;
+use crate::procedures::undeclared::request;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 use crate::segment::Observation;
 
 impl MainDevice {
-    /// Mailbox of a SubDevice: by its index in the declaration; before activation by its position in the last scan, to
-    /// be used after [`MainDevice::start_visit`] has brought it to PREOP. `None` if there is no such SubDevice.
+    /// Mailbox of a SubDevice, by its number ([`MainDevice::number`]). That of a SubDevice without a declaration is in
+    /// use after [`MainDevice::start_visit`] or idle operation has brought it to PREOP. `None` if there is no such
+    /// SubDevice.
     pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
-        match self.active() {
-            Some(segment) => segment.mailbox(subdevice),
-            None => self.visited.get(subdevice).cloned(),
+        match self.place(subdevice) {
+            Place::Member(index) => self.segment.mailbox(index),
+            Place::Undeclared(position) => self.segment.undeclared.mailbox(position),
         }
     }
 
-    /// Before activation: starts to bring a scanned SubDevice to PREOP or BOOT, where its mailbox can be used, or back
-    /// to INIT.
-    pub fn start_visit(&mut self, position: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
-        let found = self.segment.view().found().filter(|_| self.active().is_none()).cloned();
-        let info = found.and_then(|found| found.subdevices.get(position).cloned());
+    /// Starts to bring a SubDevice without a declaration to a state, by its number ([`MainDevice::number`]), through
+    /// INIT: PREOP or BOOT, where its mailbox can be used, INIT, or SAFEOP or OP with the defaults of its SII and
+    /// without process data. With idle operation it is kept there.
+    pub fn start_visit(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
         let bus = self.supervisor.bus();
-        if info.is_some() {
-            self.segment.observe(Observation::Visited);
-            // A scan counts SubDevices in 16 bits (protocol 2.2).
-            for new in self.visited.len()..=position {
-                let mailbox = self.new_mailbox(Position(new as u16));
-                self.visited.push(mailbox);
-            }
-        }
-        let mailbox = self.visited.get(position).cloned();
+        let work = match self.place(subdevice) {
+            Place::Undeclared(position) => self.info_of(position).map(|info| {
+                self.segment.observe(Observation::Visited);
+                request(&bus, &self.segment, (position, &info), state)
+            }),
+            Place::Member(_) => None,
+        };
         self.start(async move {
-            match (info, mailbox) {
-                (Some(info), Some(mailbox)) => visit(&bus, &info, &mailbox, state).await,
-                _ => Err(ConfigureError::NoSetup),
+            match work {
+                Some(work) => work.await,
+                None => Err(ConfigureError::NoSetup),
             }
         })
     }
@@ -98,21 +96,21 @@ impl MainDevice {
     }
 
     /// The emergencies of a SubDevice, for any thread: by its index in the declaration, before or after activation, or
-    /// before activation by its position in the last scan. While a declaration is active, the MainDevice opens no
-    /// mailbox of a SubDevice without a declaration: such a SubDevice keeps its emergencies.
+    /// by its position without a declaration. While a declaration is active, such a SubDevice has an open mailbox with
+    /// idle operation only.
     ///
     /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
     pub fn emergencies(&mut self, subdevice: Address) -> EmergencyRing {
-        self.emergencies.of(subdevice)
+        self.emergencies.borrow_mut().of(subdevice)
     }
 
     /// Keeps further emergencies of a SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]. With
     /// a size of 0 they are only counted, and reported as events.
     pub fn create_emergency_ring(&mut self, subdevice: Address, size: usize) -> EmergencyRing {
-        let ring = self.emergencies.create(subdevice, size);
+        let ring = self.emergencies.borrow_mut().create(subdevice, size);
         let mailbox = match subdevice {
             Address::Declared(subdevice) => self.segment.mailbox(subdevice.0),
-            Address::Scanned(position) => self.visited.get(usize::from(position.0)).cloned(),
+            Address::Scanned(position) => self.segment.undeclared.mailbox(position),
         };
         if let Some(mailbox) = mailbox {
             mailbox.keep_emergencies_in(ring.clone());
@@ -124,7 +122,7 @@ impl MainDevice {
     pub(super) fn new_mailbox(&mut self, subdevice: impl Into<Address>) -> Mailbox {
         let subdevice = subdevice.into();
         let mailbox = Mailbox::new(&self.supervisor.bus(), subdevice);
-        mailbox.keep_emergencies_in(self.emergencies.of(subdevice));
+        mailbox.keep_emergencies_in(self.emergencies.borrow_mut().of(subdevice));
         mailbox
     }
 

@@ -5,9 +5,11 @@ use core::time::Duration;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
+use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::procedures::dictionary::ReadPdos;
+use crate::procedures::undeclared::Retries;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 
 /// Configuration of a MainDevice that is needed before the first frame.
@@ -22,6 +24,8 @@ pub struct Options {
     pub codec: MacCodec,
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
+    /// How much of each SII a scan reads; the rest follows in the background once all are in their target states.
+    pub sii_extent: SiiExtent,
     /// Dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
@@ -39,6 +43,12 @@ pub struct Options {
     pub follow_groups: bool,
     /// Whether the redundant link may be taken down for a moment to locate a crossed line.
     pub enhanced_line_crossed: bool,
+    /// Whether the MainDevice also works on its segment without an application: it scans by itself, follows changes,
+    /// and keeps all SubDevices in PREOP with their mailboxes; while an application is active those that its
+    /// declaration does not name.
+    pub idle_operation: bool,
+    /// What follows a failed configuration of a SubDevice, declared or not.
+    pub retries: Retries,
     /// Maximum number of datagrams in a frame, cyclic and acyclic; `None`: as many as fit. For segments behind
     /// gateways, and simulators, with a limit (often 15). Values below [`MIN_DATAGRAMS_PER_FRAME`] are raised to it.
     pub max_datagrams_per_frame: Option<u16>,
@@ -52,6 +62,7 @@ impl Options {
             redundant,
             codec: MacCodec::FlagsFirst,
             sii_cache: true,
+            sii_extent: SiiExtent::default(),
             pdos: ReadPdos::default(),
             supervision: true,
             settle: Duration::from_millis(5),
@@ -59,6 +70,8 @@ impl Options {
             junctions: JunctionMode::Disabled,
             follow_groups: true,
             enhanced_line_crossed: false,
+            idle_operation: false,
+            retries: Retries::Always,
             max_datagrams_per_frame: None,
         }
     }

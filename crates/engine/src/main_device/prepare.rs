@@ -27,17 +27,16 @@ use crate::link::LinkSet;
 use crate::plan::{PlanFault, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
-use crate::segment::member::Member;
+use crate::segment::member::MemberView;
 use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
-use crate::segment::unassigned::UnassignedSubDevice;
-use crate::segment::{Found, Owners};
+use crate::segment::{Found, Owners, SubDevice, SubDevices};
 use crate::supervisor::Bus;
 
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 
 /// By declaration the SubDevice found, and the undeclared SubDevices.
-type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<UnassignedSubDevice>);
+type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<SubDevice>);
 
 /// Matches SubDevices with the declaration.
 pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
@@ -66,7 +65,7 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Fou
     let unassigned = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
         bus.report(Event::Unexpected { position: info.position, identity: info.identity });
-        UnassignedSubDevice::new(info, &owners, scan.main_count, true)
+        SubDevice::undeclared(info, &owners, scan.main_count)
     });
     Ok((found, unassigned.collect()))
 }
@@ -256,13 +255,13 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 }
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
-pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
-    for (subdevice, member) in members.iter().enumerate() {
+pub(super) fn report_oddities(bus: &Bus, subdevices: &SubDevices, layout: &Layout) {
+    for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
             bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: warning.to_string() });
         }
-        if let Some((period, watchdog)) = beyond_watchdog(subdevice, member, layout) {
+        if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
             let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
             let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
             bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what });
@@ -275,7 +274,7 @@ pub(super) fn report_oddities(bus: &Bus, members: &[Member], layout: &Layout) {
 }
 
 /// Period of a SubDevice's outputs and time of its watchdog, if the watchdog is shorter.
-fn beyond_watchdog(subdevice: usize, member: &Member, layout: &Layout) -> Option<(Duration, Duration)> {
+fn beyond_watchdog(subdevice: usize, member: &MemberView<'_>, layout: &Layout) -> Option<(Duration, Duration)> {
     let plan = &member.setup.as_ref()?.plan;
     let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
     let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
@@ -293,7 +292,7 @@ pub(super) fn members(
     found: Vec<Option<Rc<SubDeviceInfo>>>,
     plans: &[Areas],
     layout: &Layout,
-) -> Result<Vec<Member>, ActivateError> {
+) -> Result<Vec<SubDevice>, ActivateError> {
     let count = found.len();
     let mut members = Vec::with_capacity(count);
     for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
@@ -308,9 +307,7 @@ pub(super) fn members(
         // An absent SubDevice gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        let mut member = Member::new(config, info, station, setup);
-        member.unfit = unfit;
-        members.push(member);
+        members.push(SubDevice::declared(config, info, station, setup.ok_or(unfit)));
     }
     Ok(members)
 }

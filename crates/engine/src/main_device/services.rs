@@ -1,17 +1,21 @@
 //! Services of the MainDevice besides the mailbox protocols. Each starts a procedure; its result is fetched later.
 //!
-//! SubDevices are named by their index in the declaration, before activation by their position in the last scan.
+//! SubDevices are named by their number ([`MainDevice::number`]): their index in the declaration, before activation
+//! their position.
 
 use alloc::vec::Vec;
 use core::future::Future;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
+use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
+use super::idle::Place;
 use super::pending::Pending;
 use crate::declared::{Address, SubDeviceId};
+use crate::info::SubDeviceInfo;
+use crate::procedures::complete_siis::complete;
 use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
@@ -23,11 +27,10 @@ use crate::supervisor::Bus;
 impl MainDevice {
     /// Station address of a SubDevice.
     pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
-        let view = self.segment.view();
-        if view.is_active() {
-            return view.members().get(subdevice).map(|member| member.station);
+        match self.place(subdevice) {
+            Place::Member(index) => self.segment.view().member(index).map(|member| member.station),
+            Place::Undeclared(position) => self.info_of(position).map(|info| info.station),
         }
-        view.found()?.subdevices.get(subdevice).map(|info| info.station)
     }
 
     /// Starts a procedure on one SubDevice.
@@ -42,9 +45,9 @@ impl MainDevice {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let work = self.station(subdevice).map(|station| work(self.bus(), station));
-        let address = match self.active() {
-            Some(_) => Address::Declared(SubDeviceId(subdevice)),
-            None => Address::Scanned(Position(u16::try_from(subdevice).unwrap_or(u16::MAX))),
+        let address = match self.place(subdevice) {
+            Place::Member(index) => Address::Declared(SubDeviceId(index)),
+            Place::Undeclared(position) => Address::Scanned(position),
         };
         self.start(async move {
             match work {
@@ -127,7 +130,7 @@ impl MainDevice {
     /// activation, when a normal scan does the same.
     pub fn force_topology_change(&mut self) -> bool {
         if let Some(segment) = self.active() {
-            segment.observe(Observation::ScanAgain);
+            segment.observe(Observation::RoundWanted);
         }
         self.active().is_some()
     }
@@ -144,9 +147,20 @@ impl MainDevice {
         self.start(async move { rescan(&bus, &segment.ok_or(ServiceError::NotActive)?, limit).await })
     }
 
+    /// Starts a read of what the scan left out of the SIIs ([`Options::sii_extent`](super::Options)); the result is the
+    /// SubDevices of the scan with all of it. Only the reading of SIIs that are not complete yet takes time.
+    pub fn start_sii_completion(&mut self) -> Pending<Result<Vec<SubDeviceInfo>, ServiceError>> {
+        let (bus, segment) = (self.bus(), self.segment.clone());
+        self.start(async move { complete(&bus, &segment).await })
+    }
+
     /// Starts a read of a whole EEPROM; the SII contains its size.
     pub fn start_sii_read(&mut self, subdevice: usize) -> Pending<Result<Vec<u8>, ServiceError>> {
-        self.start_on(subdevice, move |bus, station| async move { program::read_all(&bus, station).await })
+        let eeproms = self.segment.eeproms.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let _turn = eeproms.take(station).await;
+            program::read_all(&bus, station).await
+        })
     }
 
     /// Starts a write of an EEPROM: each word that differs is written and read back. Without `force` only an SII image
@@ -157,8 +171,9 @@ impl MainDevice {
         image: Vec<u8>,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let cache = self.cache.clone();
+        let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
         self.start_on(subdevice, move |bus, station| async move {
+            let _turn = eeproms.take(station).await;
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
             written
@@ -173,8 +188,9 @@ impl MainDevice {
         alias: u16,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let cache = self.cache.clone();
+        let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
         self.start_on(subdevice, move |bus, station| async move {
+            let _turn = eeproms.take(station).await;
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
             written
@@ -183,7 +199,11 @@ impl MainDevice {
 
     /// Starts a reload of a controller's configuration from the EEPROM.
     pub fn start_sii_reload(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
-        self.start_on(subdevice, move |bus, station| async move { program::reload(&bus, station).await })
+        let eeproms = self.segment.eeproms.clone();
+        self.start_on(subdevice, move |bus, station| async move {
+            let _turn = eeproms.take(station).await;
+            program::reload(&bus, station).await
+        })
     }
 
     /// Sets the interval at which the error counters of all declared SubDevices are read in the background; `None` (the

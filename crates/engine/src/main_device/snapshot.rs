@@ -15,7 +15,7 @@ use crate::link::Link;
 use crate::mail::MailCounters;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, Redundancy};
-use crate::segment::member::Member;
+use crate::segment::member::MemberView;
 use crate::supervisor::AcyclicCounters;
 
 macro_rules! plain {
@@ -271,7 +271,7 @@ impl MainDevice {
         let scanned = self.subdevices();
         let mut subdevices: Vec<SubDeviceSnapshot> = match self.active() {
             None => Vec::new(),
-            Some(segment) => segment.view().members().iter().enumerate().map(of_member).collect(),
+            Some(segment) => segment.view().members().enumerate().map(of_member).collect(),
         };
         for subdevice in &mut subdevices {
             let found = scanned.iter().find(|info| info.station.0 == subdevice.station);
@@ -318,7 +318,7 @@ impl MainDevice {
     }
 }
 
-fn of_member((index, member): (usize, &Member)) -> SubDeviceSnapshot {
+fn of_member((index, member): (usize, MemberView<'_>)) -> SubDeviceSnapshot {
     SubDeviceSnapshot {
         declared: Some(index),
         station: member.station.0,
@@ -328,7 +328,7 @@ fn of_member((index, member): (usize, &Member)) -> SubDeviceSnapshot {
             SubDeviceState::Settled(_) => Progress::Settled,
         },
         target_state: Some(member.target.code()),
-        ..member.info.as_deref().map(of_info).unwrap_or_default()
+        ..member.info.map(|info| of_info(info)).unwrap_or_default()
     }
 }
 

@@ -71,11 +71,13 @@ impl From<BusError> for StateError {
 /// AL status and AL status code, in one datagram.
 pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus, AlStatusCode), BusError> {
     let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
-    Ok(split_status(&bytes))
+    let (status, code) = split_status(&bytes);
+    bus.post_al_status(station, status, code);
+    Ok((status, code))
 }
 
 /// AL status (0x0130) and AL status code (0x0134) from the six bytes that contain both.
-pub(super) fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
+fn split_status(bytes: &[u8; 6]) -> (AlStatus, AlStatusCode) {
     let [a, b, _, _, c, d] = *bytes;
     (AlStatus::decode(&[a, b]), AlStatusCode::decode(&[c, d]))
 }

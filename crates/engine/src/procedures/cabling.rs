@@ -25,8 +25,7 @@ use crate::event::Event;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::segment::disturbance::Disturbance;
-use crate::segment::unassigned::UnassignedSubDevice;
-use crate::segment::{Crossing, LineCheck, Observation, PORT_BITS, is_swapped, retrace};
+use crate::segment::{Crossing, LineCheck, Observation, PORT_BITS, SubDevice, is_swapped, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, Finding, NodeStatus, rings_shown, with_longer_rings};
 
@@ -215,7 +214,7 @@ async fn scan_once(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, B
 
 impl Known for SharedSegment {
     fn note_port_scan(&self) {
-        self.observe(Observation::ScanAgain);
+        self.observe(Observation::RoundWanted);
     }
 
     fn are_measuring(&self) -> bool {
@@ -229,8 +228,8 @@ impl Known for SharedSegment {
 
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
         let view = self.view();
-        let member = view.members().iter().find(|member| member.station == station);
-        member.and_then(|member| member.info.as_ref()).map(|info| info.controller.ports).unwrap_or_default()
+        let member = view.members().find(|member| member.station == station);
+        member.and_then(|member| member.info).map(|info| info.controller.ports).unwrap_or_default()
     }
 
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
@@ -239,7 +238,7 @@ impl Known for SharedSegment {
 
     fn are_known(&self, stations: &[StationAddress]) -> bool {
         let view = self.view();
-        let is_settled = |station| view.unassigned(station).is_some_and(UnassignedSubDevice::is_settled);
-        stations.iter().all(|station| view.member_of(*station).is_some() || is_settled(*station))
+        let is_settled = |it: &SubDevice| it.as_unassigned().is_none_or(|it| it.is_settled());
+        stations.iter().all(|station| view.subdevices().at(*station).is_some_and(is_settled))
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! * `measure`: the present connections of the SubDevices, and the times of frames from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;
+//! * `offsets`: another time of the application;
 //! * `signals`: SYNC signals of one SubDevice;
 //! * `drift`: the static drift compensation;
 //! * `watch`: the set-up, the differences, the links of the references.
@@ -13,6 +14,7 @@ mod changes;
 mod drift;
 mod measure;
 mod not_locked;
+mod offsets;
 mod set_up;
 mod signals;
 mod watch;

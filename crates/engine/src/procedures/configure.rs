@@ -32,8 +32,8 @@ pub use crate::segment::setup::SetupError;
 pub use error::{ConfigureError, StartupError};
 pub use register_error::{RegisterError, RegisterFailure, WrongValue};
 
-/// Cycles of the exchange between the configuration and the request of OP, so that valid outputs are present (protocol
-/// 5.2). The first of them may have been queued without process data.
+/// Cycles of the exchange before the request of OP, so that valid outputs are present (protocol 5.2). The first of them
+/// may have been queued without process data; one is enough if it is known to have had it.
 const CYCLES_BEFORE_OP: u64 = 2;
 /// Interval of the check of the cycle counter.
 const CYCLE_PAUSE: Duration = Duration::from_micros(200);
@@ -238,8 +238,9 @@ impl BringUp<'_> {
             self.map().await?;
             self.join();
         }
-        let cycles = self.segment.board.cycles() + CYCLES_BEFORE_OP;
-        while self.segment.board.cycles() < cycles {
+        let (board, begin) = (&self.segment.board, self.segment.board.cycles());
+        let is_sent = || board.cycles() > begin && board.has_left(self.index);
+        while board.cycles() < begin + CYCLES_BEFORE_OP && !is_sent() {
             self.bus.sleep(CYCLE_PAUSE).await;
         }
         self.request(AlState::SafeOp, AlState::Op).await

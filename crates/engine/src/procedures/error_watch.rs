@@ -30,7 +30,7 @@ const FULL: u8 = 128;
 
 /// Runs until the MainDevice stops.
 pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
-    let count = segment.view().members().len();
+    let count = segment.view().subdevices().member_count();
     let mut last = vec![None; count];
     let mut versions = segment.view().versions();
     let mut watched = watch_all(&segment);
@@ -47,7 +47,7 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
             }
             let before = last[index].replace(counters);
             segment.statistics.note_reading(index, &counters);
-            let Some(node) = segment.view().members().get(index).and_then(|member| member.node) else { continue };
+            let Some(node) = segment.view().member(index).and_then(|member| member.node) else { continue };
             for at in at_node.get(node).into_iter().flatten() {
                 watched[*at].take(node, before.as_ref(), &counters);
             }
@@ -88,7 +88,7 @@ fn by_node(watched: &[Watched]) -> Vec<Vec<usize>> {
 /// Members that answer, by index.
 fn present(segment: &SharedSegment) -> Vec<(usize, StationAddress)> {
     let access = segment.view();
-    let members = access.members().iter().enumerate().filter(|(_, member)| member.phase != Phase::Absent);
+    let members = access.members().enumerate().filter(|(_, member)| member.phase != Phase::Absent);
     members.map(|(index, member)| (index, member.station)).collect()
 }
 
@@ -102,7 +102,7 @@ fn is_full(counters: &ErrorCounters) -> bool {
 }
 
 async fn clear(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), BusError> {
-    let Some(station) = segment.view().members().get(index).map(|member| member.station) else { return Ok(()) };
+    let Some(station) = segment.view().member(index).map(|member| member.station) else { return Ok(()) };
     bus.fpwr(station, map::RX_ERROR_COUNTER, &[0]).await?;
     bus.fpwr(station, map::LOST_LINK_COUNTER, &[0]).await?;
     segment.statistics.cleared(index);

@@ -1,4 +1,4 @@
-//! Scans all declared SubDevices: which answer, in which state, with which ports.
+//! Reads all declared SubDevices: which answer, in which state, with which ports.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -9,15 +9,15 @@ use core::time::Duration;
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::register::{DlStatus, map};
 
-use super::al_state::split_status;
+use super::al_state::read_status;
 use super::shared_segment::SharedSegment;
-use crate::segment::Reading;
+use crate::segment::{Reading, SubDeviceKey};
 use crate::supervisor::{Bus, BusError, TURN, TURN_PAUSE};
 
-/// Interval of intermediate results of a scan: most answers arrive within the first.
+/// Interval of intermediate results of a round: most answers arrive within the first.
 const STEP: Duration = Duration::from_micros(300);
 
-/// Scans all members: a few at a time while `is_calm`, all at once otherwise. Intermediate results are passed to
+/// Reads all members: a few at a time while `is_calm`, all at once otherwise. Intermediate results are passed to
 /// `so_far`, because reads of absent SubDevices take longer.
 pub(super) async fn read_members(
     bus: &Bus,
@@ -25,7 +25,7 @@ pub(super) async fn read_members(
     is_calm: impl Fn() -> bool,
     mut so_far: impl FnMut(&[Reading]),
 ) -> Vec<Reading> {
-    let stations: Vec<StationAddress> = segment.view().members().iter().map(|member| member.station).collect();
+    let stations: Vec<StationAddress> = segment.view().members().map(|member| member.station).collect();
     let readings = Rc::new(RefCell::new(vec![Reading::Unknown; stations.len()]));
     let mut next = 0;
     while next < stations.len() {
@@ -34,7 +34,7 @@ pub(super) async fn read_members(
         for (index, station) in stations.iter().copied().enumerate().take(end).skip(next) {
             let (bus, readings) = (bus.clone(), readings.clone());
             group.spawn(async move {
-                let reading = read_member(&bus, station).await;
+                let reading = read_subdevice(&bus, station).await;
                 readings.borrow_mut()[index] = reading;
             });
         }
@@ -49,13 +49,14 @@ pub(super) async fn read_members(
     readings.take()
 }
 
-/// Scans all SubDevices without a declaration, by their addresses.
-pub(super) async fn read_all_unassigned(bus: &Bus, segment: &SharedSegment) -> Vec<(StationAddress, Reading)> {
-    let stations: Vec<StationAddress> = segment.view().all_unassigned().iter().map(|it| it.station).collect();
-    bus.gather(stations, |bus, station| async move { (station, read_member(&bus, station).await) }).await
+/// Reads all SubDevices without a declaration, by their station addresses.
+pub(super) async fn read_all_unassigned(bus: &Bus, segment: &SharedSegment) -> Vec<(SubDeviceKey, Reading)> {
+    let keys: Vec<SubDeviceKey> = segment.view().subdevices().unassigned().map(|it| it.key).collect();
+    bus.gather(keys, |bus, key| async move { (key, read_subdevice(&bus, key.station).await) }).await
 }
 
-async fn read_member(bus: &Bus, station: StationAddress) -> Reading {
+/// Scans one SubDevice.
+pub(super) async fn read_subdevice(bus: &Bus, station: StationAddress) -> Reading {
     match read_both(bus, station).await {
         Ok(reading) => reading,
         Err(BusError::Wkc { got: Wkc(0), .. }) => Reading::Silent,
@@ -71,8 +72,7 @@ async fn read_member(bus: &Bus, station: StationAddress) -> Reading {
 }
 
 async fn read_both(bus: &Bus, station: StationAddress) -> Result<Reading, BusError> {
-    let bytes: [u8; 6] = bus.fprd_array(station, map::AL_STATUS).await?;
-    let (status, code) = split_status(&bytes);
+    let (status, code) = read_status(bus, station).await?;
     let dl_status = DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?);
     Ok(Reading::Answer { status, code, dl_status })
 }

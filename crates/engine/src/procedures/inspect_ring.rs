@@ -49,7 +49,7 @@ pub async fn inspect_ring(bus: Bus) -> Result<RingInspection, ScanError> {
     };
     let counts = LinkCounts { main: counted.main.0, redundant: counted.redundant.0 };
     let positions = (0..counted.wkc().0).map(Position);
-    let readings = bus.gather_in_turns(positions.collect(), look_at).await;
+    let readings = bus.gather_in_turns(positions.collect(), read_seen).await;
     let mut statuses = Vec::with_capacity(readings.len());
     let (mut stations, mut states, mut counters) = (Vec::new(), Vec::new(), Vec::new());
     for reading in readings {
@@ -80,7 +80,7 @@ pub async fn inspect_ring(bus: Bus) -> Result<RingInspection, ScanError> {
 
 type Seen = (StationAddress, NodeStatus, AlStatus, ErrorCounters);
 
-async fn look_at(bus: Bus, position: Position) -> Result<Seen, BusError> {
+async fn read_seen(bus: Bus, position: Position) -> Result<Seen, BusError> {
     let (station, (ports, (state, (dl_status, counters)))) = bus
         .both(
             bus.aprd(position, map::STATION_ADDRESS, 2),

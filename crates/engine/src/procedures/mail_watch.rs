@@ -30,7 +30,6 @@ struct Open {
     /// Register with the mailbox-full bit.
     status: RegisterAddress,
     mailbox: Mailbox,
-    mapped: bool,
 }
 
 /// Runs until the MainDevice stops.
@@ -38,8 +37,7 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     let mut alone = 0;
     loop {
         bus.sleep(PAUSE.max(TIME_EACH.saturating_mul(alone))).await;
-        let (mapped, mut others): (Vec<Open>, Vec<Open>) =
-            open_mailboxes(&segment).into_iter().partition(|open| open.mapped);
+        let (mapped, mut others) = open_mailboxes(&segment);
         for open in &mapped {
             if bus.has_stray_mail(open.station) {
                 open.mailbox.mail_available();
@@ -54,16 +52,17 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     }
 }
 
-fn open_mailboxes(segment: &SharedSegment) -> Vec<Open> {
+/// Those with a mapped status bit, and the others.
+fn open_mailboxes(segment: &SharedSegment) -> (Vec<Open>, Vec<Open>) {
     let view = segment.view();
-    let members = view.members().iter().zip(segment.mailboxes()).enumerate();
-    members
-        .filter_map(|(index, (member, mailbox))| {
-            let mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
-            let (station, status) = mailbox.send_status()?;
-            Some(Open { index, station, status, mailbox: mailbox.clone(), mapped })
-        })
-        .collect()
+    let (mut mapped, mut others) = (Vec::with_capacity(segment.mailboxes().len()), Vec::new());
+    for (index, (member, mailbox)) in view.members().zip(segment.mailboxes()).enumerate() {
+        let Some((station, status)) = mailbox.send_status() else { continue };
+        let is_mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
+        let list = if is_mapped { &mut mapped } else { &mut others };
+        list.push(Open { index, station, status, mailbox: mailbox.clone() });
+    }
+    (mapped, others)
 }
 
 /// One read for all; false if not all answered.

@@ -192,7 +192,7 @@ impl OwnObjects {
         let Some(segment) = &seen.segment else { return };
         segment.observe(Observation::IncidentsForgotten);
         segment.mailboxes().iter().for_each(|mailbox| mailbox.forget_protocol_error(0));
-        let stations: Vec<_> = segment.view().members().iter().map(|member| member.station).enumerate().collect();
+        let stations: Vec<_> = segment.view().members().map(|member| member.station).enumerate().collect();
         let wrong = stations.iter().map(|(subdevice, _)| segment.board.wkc_errors(*subdevice));
         *self.shared.forgotten_wkc.borrow_mut() = wrong.collect();
         let statistics = segment.statistics.clone();

@@ -22,13 +22,15 @@ const LATE: Duration = Duration::from_secs(1);
 
 /// Reads with separate datagrams until a SubDevice has delivered all its inputs, or is lost.
 pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize, mapping: u32) {
-    let known = segment.view().members().get(index).and_then(|member| Some((member.station, member.setup.clone()?)));
+    let known = segment.view().member(index).and_then(|member| Some((member.station, member.setup.clone()?)));
     let Some((station, setup)) = known else { return };
     let is_input = |area: &&AreaPlan| area.direction == Direction::Inputs;
     let mut missing: Vec<&AreaPlan> = setup.plan.mapped_areas().map(|(_, area)| area).filter(is_input).collect();
     let (mut pause, late) = (PAUSE, bus.now() + LATE);
     let mut is_reported = false;
-    while segment.board.is_unproven(index) && segment.view().members()[index].is_mapped_as(mapping) {
+    let is_mapped =
+        |segment: &SharedSegment| segment.view().member(index).is_some_and(|member| member.is_mapped_as(mapping));
+    while segment.board.is_unproven(index) && is_mapped(&segment) {
         let mut left = Vec::new();
         for area in missing {
             let read = bus.fprd(station, RegisterAddress(area.physical), usize::from(area.length)).await;

@@ -6,7 +6,7 @@ use super::junction::isolate_rings;
 use super::presence::prove_inputs;
 use super::recover::bring_up_member;
 use super::shared_segment::SharedSegment;
-use super::supervise::scan_round;
+use super::supervise::run_round;
 use super::unassigned::read_unassigned;
 use super::unassigned::rescan::follow_groups;
 use crate::segment::effect::Task;
@@ -17,12 +17,12 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment) {
     loop {
         let (own_bus, own) = (bus.clone(), segment.clone());
         match segment.next_task().await {
-            Task::Scan { routine } => bus.spawn(scan_round(own_bus, own, routine)),
+            Task::Round { routine } => bus.spawn(run_round(own_bus, own, routine)),
             Task::BringUp { index, attempt, from, reported, check } => {
                 bus.spawn(bring_up_member(own_bus, own, (index, attempt), from, reported, check));
             }
             Task::ProveInputs { index, mapping } => bus.spawn(prove_inputs(own_bus, own, index, mapping)),
-            Task::ReadUnassigned { station, since } => bus.spawn(read_unassigned(own_bus, own, (station, since))),
+            Task::ReadUnassigned { key } => bus.spawn(read_unassigned(own_bus, own, key)),
             Task::ExamineCabling { in_control } => bus.spawn(examine(own_bus, own, in_control)),
             Task::IsolateRings => bus.spawn(isolate_rings(own_bus, own)),
             Task::CompensateDrift => bus.spawn(compensate_drift(own_bus, own)),

@@ -17,6 +17,7 @@ use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
+use super::undeclared::Retries;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::mail::MailboxError;
@@ -70,12 +71,24 @@ pub(super) async fn keep_up(
                 frame_limit::explain(bus, segment).await;
                 bus.report(failure(index, &error));
             }
-            // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back.
-            Err(error @ ConfigureError::Unfit(_)) => return bus.report(failure(index, &error)),
-            Err(error) => bus.report(failure(index, &error)),
+            // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back, or on
+            // request.
+            Err(error @ ConfigureError::Unfit(_)) => {
+                bus.report(failure(index, &error));
+                segment.until_retried(index).await;
+                read_again(bus, segment, (index, attempt)).await;
+                continue;
+            }
+            Err(error) => {
+                bus.report(failure(index, &error));
+                if segment.undeclared.retries() == Retries::OnRequest {
+                    segment.until_retried(index).await;
+                    continue;
+                }
+            }
         }
-        bus.sleep(pause).await;
-        pause = (pause * 2).min(LONGEST_PAUSE);
+        let is_requested = bus.within(pause, segment.until_retried(index)).await.is_ok();
+        pause = if is_requested { FIRST_PAUSE } else { (pause * 2).min(LONGEST_PAUSE) };
     }
 }
 
@@ -108,7 +121,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 
 /// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.
 async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
-    let Some(station) = segment.view().members().get(index).map(|member| member.station) else { return false };
+    let Some(station) = segment.view().member(index).map(|member| member.station) else { return false };
     for _ in 0..SCANS {
         match al_state::read_status(bus, station).await {
             Err(BusError::Wkc { .. }) => bus.sleep(READ_PAUSE).await,
@@ -137,14 +150,14 @@ pub(super) fn bring_up<'a>(
     (index, attempt): (usize, u32),
 ) -> Result<BringUp<'a>, ConfigureError> {
     let access = segment.view();
-    let member = access.members().get(index).ok_or(ConfigureError::NoSetup)?;
+    let member = access.member(index).ok_or(ConfigureError::NoSetup)?;
     Ok(BringUp {
         bus,
         segment,
         index,
         attempt,
         station: member.station,
-        setup: member.setup.clone().ok_or_else(|| no_setup(member))?,
+        setup: member.setup.clone().ok_or_else(|| no_setup(&member))?,
         config: member.config.clone(),
         target: member.target,
         mailbox: segment.mailbox(index).ok_or(ConfigureError::NoSetup)?,
@@ -184,7 +197,7 @@ async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<b
     let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
-        if segment.view().members()[*index].exchanges(*target) {
+        if segment.view().member(*index).is_some_and(|member| member.exchanges(*target)) {
             bring_up.join();
         } else {
             bring_up.process_data(ProcessDataStep::Off);
@@ -194,7 +207,7 @@ async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<b
     }
     if status.al_state() != Some(AlState::SafeOp)
         || *target != AlState::Op
-        || !segment.view().members()[*index].configured
+        || !segment.view().member(*index).is_some_and(|member| member.configured)
     {
         return Ok(false);
     }
@@ -228,7 +241,7 @@ pub(super) async fn bring_up_member(
         if !is_the_member(&bus, &segment, (index, attempt), check).await {
             return;
         }
-        if segment.view().members()[index].unfit.is_some() {
+        if segment.view().member(index).is_some_and(|member| member.unfit.is_some()) {
             read_again(&bus, &segment, (index, attempt)).await;
         }
         keep_up(&bus, &segment, (index, attempt), from, reported).await;
@@ -238,7 +251,7 @@ pub(super) async fn bring_up_member(
 
 /// Whether the SubDevice with the station address of a member is that member.
 async fn is_the_member(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), check: Check) -> bool {
-    let station = segment.view().members()[index].station;
+    let Some(station) = segment.view().member(index).map(|member| member.station) else { return false };
     let is = match check {
         Check::None => Ok(true),
         Check::Identity => Ok(has_identity(bus, segment, index, station).await),
@@ -288,7 +301,7 @@ pub(super) async fn while_current(
 ) {
     let mut procedure = pin!(procedure);
     poll_fn(|context| {
-        if segment.view().members().get(index).is_none_or(|member| member.attempt != attempt) {
+        if segment.view().member(index).is_none_or(|member| member.attempt != attempt) {
             return Poll::Ready(());
         }
         procedure.as_mut().poll(context)

@@ -42,7 +42,7 @@ pub(crate) fn request_state(
     async move {
         segment
             .until(|model| {
-                let is_over = model.members().get(index).is_none_or(|member| member.attempt != attempt);
+                let is_over = model.member(index).is_none_or(|member| member.attempt != attempt);
                 result.borrow_mut().take().or_else(|| is_over.then_some(Err(ConfigureError::Interrupted)))
             })
             .await
@@ -50,16 +50,16 @@ pub(crate) fn request_state(
 }
 
 fn attempt_of(segment: &SharedSegment, index: usize) -> u32 {
-    segment.view().members().get(index).map_or(0, |member| member.attempt)
+    segment.view().member(index).map_or(0, |member| member.attempt)
 }
 
 /// Errors that are detected before anything is changed.
 fn check(segment: &SharedSegment, index: usize, state: AlState) -> Result<(), ConfigureError> {
     let view = segment.view();
-    let member = view.members().get(index).ok_or(ConfigureError::NoSetup)?;
+    let member = view.member(index).ok_or(ConfigureError::NoSetup)?;
     match &member.setup {
         Some(setup) if state == AlState::Boot && setup.plan.bootstrap.is_empty() => Err(ConfigureError::NoBoot),
-        None if member.unfit.is_some() => Err(no_setup(member)),
+        None if member.unfit.is_some() => Err(no_setup(&member)),
         Some(_) | None => Ok(()),
     }
 }
@@ -69,7 +69,8 @@ type Slot = Rc<RefCell<Option<Result<(), ConfigureError>>>>;
 fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, result: &Slot) {
     let (phase, before) = {
         let view = segment.view();
-        (view.members()[index].phase, view.members()[index].target)
+        let Some(member) = view.member(index) else { return };
+        (member.phase, member.target)
     };
     segment.observe(Observation::Requested { index, state });
     match phase {

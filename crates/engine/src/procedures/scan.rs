@@ -36,10 +36,12 @@ use super::al_state;
 use super::dictionary::complete;
 use super::frame_limit::probe;
 use super::junction::learn;
+use super::services::ServiceError;
+use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::Event;
-use crate::info::{InfoWarning, Readout, SiiProblem, SubDeviceInfo};
+use crate::info::{InfoWarning, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
 pub use crate::segment::Scan;
@@ -161,7 +163,7 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
 async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count) -> Result<Vec<Said>, Failure> {
     let settling = async { count::settle(bus, expected, options.settle).await.map_err(Failure::Unsettled) };
     let mut settling = pin!(settling);
-    let mut reading = pin!(identify(bus, expected.total() as u16, &options.cache));
+    let mut reading = pin!(identify(bus, expected.total() as u16, options));
     let (mut settled, mut read) = (false, None);
     poll_fn(|context| {
         if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
@@ -184,8 +186,8 @@ async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count)
 }
 
 /// How the SubDevices are connected.
-struct Learned {
-    topology: Topology,
+pub(super) struct Learned {
+    pub topology: Topology,
     /// Closing cables of the rings behind junctions that were learned.
     closings: Vec<Closing>,
     /// Detected rings behind junctions that could not be learned.
@@ -193,7 +195,7 @@ struct Learned {
 }
 
 /// Determines the connections. The main copy passed the first `main_count` SubDevices.
-async fn connect(
+pub(super) async fn connect(
     bus: &Bus,
     junctions: JunctionMode,
     subdevices: &[SubDeviceInfo],
@@ -217,17 +219,17 @@ async fn connect(
 }
 
 /// Data of one SubDevice: its SII and its identification.
-type Said = (SiiContents, Option<u16>);
+pub(super) type Said = (SiiContents, Option<u16>);
 
 /// Sets the common initial state and station addresses, and reads each SubDevice.
-async fn identify(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
+async fn identify(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Said>, ScanError> {
     level(bus).await?;
     let are_clean = to_init(bus, count).await?;
     assign_addresses(bus, count).await?;
     if !are_clean {
         clear_errors(bus, count).await?;
     }
-    read_all(bus, count, cache).await
+    read_all(bus, count, options).await
 }
 
 pub(crate) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
@@ -303,14 +305,14 @@ async fn assign_addresses(bus: &Bus, count: u16) -> Result<(), BusError> {
     written.await.into_iter().collect()
 }
 
-async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, ScanError> {
+async fn read_all(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Said>, ScanError> {
     let total = usize::from(count);
     let step = total.div_ceil(PROGRESS_STEPS).max(1);
     let done = Rc::new(Cell::new(0_usize));
     let read = bus.gather((0..count).map(Position), |bus, position| {
-        let (done, cache) = (done.clone(), cache.clone());
+        let (done, cache, extent) = (done.clone(), options.cache.clone(), options.extent);
         async move {
-            let result = ask(&bus, position, station_at(position), &cache).await;
+            let result = ask(&bus, position, station_at(position), &cache, extent).await;
             done.set(done.get() + 1);
             if done.get().is_multiple_of(step) || done.get() == total {
                 bus.report(Event::ScanProgress { done: done.get(), total });
@@ -321,8 +323,14 @@ async fn read_all(bus: &Bus, count: u16, cache: &SiiCache) -> Result<Vec<Said>, 
     read.await.into_iter().collect()
 }
 
-async fn ask(bus: &Bus, position: Position, station: StationAddress, cache: &SiiCache) -> Result<Said, ScanError> {
-    let contents = match sii::read(bus, station, cache).await {
+pub(super) async fn ask(
+    bus: &Bus,
+    position: Position,
+    station: StationAddress,
+    cache: &SiiCache,
+    extent: SiiExtent,
+) -> Result<Said, ScanError> {
+    let contents = match sii::read(bus, station, cache, extent).await {
         Ok(contents) => contents,
         Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
         // A broken EEPROM fails only its own SubDevice.
@@ -342,12 +350,27 @@ pub(super) async fn read_one(
     station: StationAddress,
     cache: &SiiCache,
 ) -> Result<SubDeviceInfo, ScanError> {
-    let contents = ask(bus, position, station, cache).await?;
+    let contents = ask(bus, position, station, cache, SiiExtent::Complete).await?;
     Ok(describe(read_registers(bus, position, station).await?, &contents))
 }
 
+/// Reads the SII of a SubDevice that a scan has described, in any state; its identification, which follows a request,
+/// is not read again.
+pub(super) async fn read_whole(
+    bus: &Bus,
+    (position, station): (Position, StationAddress),
+    cache: &SiiCache,
+) -> Result<SubDeviceInfo, ServiceError> {
+    let contents = sii::read(bus, station, cache, SiiExtent::Complete).await.map_err(SiiProgramError::Read)?;
+    Ok(describe(read_registers(bus, position, station).await?, &(contents, None)))
+}
+
 /// Reads controller, ports, alias and receive times.
-async fn read_registers(bus: &Bus, position: Position, station: StationAddress) -> Result<Readout, BusError> {
+pub(super) async fn read_registers(
+    bus: &Bus,
+    position: Position,
+    station: StationAddress,
+) -> Result<Readout, BusError> {
     let registers = [
         (map::TYPE, Information::LEN),
         (map::DL_STATUS, DlStatus::LEN),
@@ -382,9 +405,10 @@ fn answered<const N: usize, const M: usize>(
     data.ok_or(BusError::Wkc { target, expected, got })
 }
 
-fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInfo {
+pub(super) fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInfo {
     let mut info = SubDeviceInfo::from_parts(readout, &contents.header, contents.categories());
     info.identification = *identification;
+    info.limit_to(contents.extent);
     let (category, offset, problem) = match contents.end {
         ChainEnd::Unreadable => {
             info.warnings.clear();
@@ -392,7 +416,7 @@ fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInf
         }
         // A blank EEPROM has no categories.
         _ if info.is_blank() => return info,
-        ChainEnd::Sound { .. } if contents.categories.is_empty() => {
+        ChainEnd::Sound { .. } if contents.categories.is_empty() && !contents.has_more => {
             (None, Some(SiiHeader::LEN), SiiProblem::NoCategories)
         }
         ChainEnd::Sound { .. } => return info,

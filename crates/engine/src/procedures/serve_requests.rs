@@ -65,7 +65,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
             cancelled.notify();
         }
         for (served, order) in requests.ordered() {
-            let station = segment.view().members().get(order.subdevice).map(|member| member.station);
+            let station = segment.view().member(order.subdevice).map(|member| member.station);
             let member = station.zip(segment.mailbox(order.subdevice));
             match member {
                 Some(target) => {

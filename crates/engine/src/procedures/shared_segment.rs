@@ -9,7 +9,8 @@ use core::cell::{Cell, Ref, RefCell};
 use core::time::Duration;
 
 use super::error_statistics::ErrorStatistics;
-use super::sii::SiiCache;
+use super::sii::{EepromTurns, SiiCache};
+use super::undeclared::Undeclared;
 use crate::board::Board;
 use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
@@ -35,8 +36,14 @@ pub struct SharedSegment {
     pub board: Arc<Board>,
     /// SII contents read before.
     pub cache: SiiCache,
+    /// Turns at EEPROMs.
+    pub eeproms: EepromTurns,
     /// Error counters.
     pub statistics: ErrorStatistics,
+    /// SubDevices without a declaration.
+    pub undeclared: Undeclared,
+    /// Requests for another attempt to configure a member: of all, and by member.
+    retried: Rc<(Cell<u32>, RefCell<Vec<u32>>)>,
 }
 
 /// Data beside the model.
@@ -58,22 +65,30 @@ impl Beside {
 
 impl SharedSegment {
     /// Shares a model without an application.
-    pub fn idle(bus: &Bus, segment: Segment, cache: SiiCache) -> SharedSegment {
-        SharedSegment::of(bus, Rc::new(RefCell::new(segment)), Arc::new(Board::new(0)), Beside::nothing(bus, cache))
+    pub fn idle(bus: &Bus, segment: Segment, cache: SiiCache, undeclared: Undeclared) -> SharedSegment {
+        let (segment, board) = (Rc::new(RefCell::new(segment)), Arc::new(Board::new(0)));
+        SharedSegment::of(bus, segment, board, Beside::nothing(bus, cache), undeclared)
     }
 
     /// The same model, with an application that is activated next.
     pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
-        SharedSegment::of(bus, self.segment.clone(), board, beside)
+        SharedSegment::of(bus, self.segment.clone(), board, beside, self.undeclared.clone())
     }
 
     /// The same model, without an application.
     pub fn without_application(&self, bus: &Bus) -> SharedSegment {
         let beside = Beside::nothing(bus, self.cache.clone());
-        SharedSegment::of(bus, self.segment.clone(), Arc::new(Board::new(0)), beside)
+        let undeclared = self.undeclared.renewed(bus);
+        SharedSegment::of(bus, self.segment.clone(), Arc::new(Board::new(0)), beside, undeclared)
     }
 
-    fn of(bus: &Bus, segment: Rc<RefCell<Segment>>, board: Arc<Board>, beside: Beside) -> SharedSegment {
+    fn of(
+        bus: &Bus,
+        segment: Rc<RefCell<Segment>>,
+        board: Arc<Board>,
+        beside: Beside,
+        undeclared: Undeclared,
+    ) -> SharedSegment {
         let Beside { mailboxes, cache, statistics } = beside;
         SharedSegment {
             segment,
@@ -84,8 +99,36 @@ impl SharedSegment {
             bus: bus.clone(),
             board,
             cache,
+            eeproms: EepromTurns::new(bus),
             statistics,
+            undeclared,
+            retried: Rc::default(),
         }
+    }
+
+    /// Requests another attempt to configure a member, or all, without a further pause.
+    pub(crate) fn retry(&self, index: Option<usize>) {
+        let (all, single) = &*self.retried;
+        match index {
+            None => all.set(all.get().wrapping_add(1)),
+            Some(index) => {
+                let mut single = single.borrow_mut();
+                let count = single.len().max(index + 1).min(self.mailboxes.len());
+                single.resize(count, 0);
+                single.get_mut(index).into_iter().for_each(|requests| *requests = requests.wrapping_add(1));
+            }
+        }
+        self.changed.notify();
+    }
+
+    /// Waits until another attempt is requested.
+    pub(super) async fn until_retried(&self, index: usize) {
+        let requests = || {
+            let (all, single) = &*self.retried;
+            (all.get(), single.borrow().get(index).copied().unwrap_or_default())
+        };
+        let before = requests();
+        self.changed.until(|| (requests() != before).then_some(())).await;
     }
 
     /// Borrows the model, between two points at which a procedure waits.

@@ -1,15 +1,17 @@
 //! Reads the SII of a SubDevice through its controller (protocol 3.8, 4).
 //!
-//! Only the words of the fixed area and the categories that the engine uses are read. If another SubDevice with the
-//! same fixed area was read before, only the category headers are read. If others are being read, they share the rest.
+//! Only the words of the fixed area and the categories of an extent are read. If another SubDevice with the same fixed
+//! area was read before, only the category headers are read. If others are being read, they share the rest.
 
 mod cache;
 mod contents;
 mod eeprom;
 mod error;
+mod extents;
 mod pace;
 pub mod program;
 mod shared_words;
+mod turns;
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -22,13 +24,15 @@ use ringcat_wire::sii::{CategoryHeader, CategoryKind, Identity, SiiHeader};
 
 pub use cache::SiiCache;
 use cache::{FixedArea, Found};
+use contents::HEADER_WORDS;
 pub use contents::{ChainEnd, SiiContents};
-use contents::{HEADER_WORDS, is_needed};
 use eeprom::Eeprom;
 pub use error::SiiReadError;
 use pace::Pace;
 use shared_words::{Blocks, SharedWords};
+pub use turns::EepromTurns;
 
+use crate::info::SiiExtent;
 use crate::supervisor::{Bus, BusError};
 
 /// Categories of one SubDevice; real ones have about ten.
@@ -39,38 +43,32 @@ const MAX_WORDS: u32 = 0x8000;
 const IDENTITY_WORD: u32 = 0x08;
 /// Value of an EEPROM that was never written, or behind its end.
 const ERASED: u8 = 0xFF;
-/// Words of the fixed area that are read: all but reserved words (protocol 4.1). Words 0x20 to 0x23 are reserved too,
-/// but in many real images with otherwise equal fixed areas and different categories only these words differ, so they
-/// are read.
-const FIXED_AREA: [(u32, u32); 2] = [(0x00, 0x24), (0x3E, 2)];
 /// Interval of the check whether another procedure has read the same SII.
 const CACHE_PAUSE: Duration = Duration::from_micros(500);
 
-/// Reads the SII of one SubDevice, which must be assigned to EtherCAT: the fixed area and the categories that the
-/// engine uses.
-pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -> Result<SiiContents, SiiReadError> {
+/// Reads the SII of one SubDevice, which must be assigned to EtherCAT: the fixed area and the categories of an extent.
+pub(super) async fn read(
+    bus: &Bus,
+    station: StationAddress,
+    cache: &SiiCache,
+    extent: SiiExtent,
+) -> Result<SiiContents, SiiReadError> {
     let mut eeprom = Eeprom::open(bus, station, Pace::guess(cache.pace())).await?;
-    let mut area: FixedArea = [0; SiiHeader::LEN];
-    for (number, (first, count)) in FIXED_AREA.into_iter().enumerate() {
-        let then = FIXED_AREA.get(number + 1).map_or(HEADER_WORDS, |(first, _)| *first);
-        let bytes = eeprom.bytes(first, count, Some(then)).await?;
-        let at = 2 * first as usize;
-        area[at..at + bytes.len()].copy_from_slice(&bytes);
-    }
+    let area = fixed_area(&mut eeprom, extent).await?;
     cache.teach(eeprom.pace.learnt());
     if !cache.enabled {
-        return categories(&mut eeprom, &area, Extent::Own).await.map(|(_, contents)| contents);
+        return categories(&mut eeprom, &area, extent, Data::Own).await.map(|(_, contents)| contents);
     }
     let mut own_chain = None;
     loop {
-        match cache.find(&area, station) {
+        match cache.find(&area, extent, station) {
             Found::Nothing(claim) => {
                 let words = claim.words();
                 let (chain, contents) = loop {
                     let trust = words.trust();
-                    let read = categories(&mut eeprom, &area, Extent::Shared(&words)).await?;
+                    let read = categories(&mut eeprom, &area, extent, Data::Shared(&words)).await?;
                     if !words.suit(&read.0) {
-                        break categories(&mut eeprom, &area, Extent::Own).await?;
+                        break categories(&mut eeprom, &area, extent, Data::Own).await?;
                     }
                     // Trust only decreases, so this ends.
                     if words.trust() == trust {
@@ -81,42 +79,58 @@ pub(super) async fn read(bus: &Bus, station: StationAddress, cache: &SiiCache) -
                 return Ok(contents);
             }
             Found::BeingRead(words) => match &own_chain {
-                None => own_chain = Some(own_headers(&mut eeprom, &area).await?),
+                None => own_chain = Some(own_headers(&mut eeprom, &area, extent).await?),
                 Some(_) if bus.now() >= eeprom.until() => return Err(SiiReadError::TooSlow { word: HEADER_WORDS }),
                 Some(own) => {
-                    help(&mut eeprom, own, &words).await;
+                    help(&mut eeprom, own, extent, &words).await;
                     bus.sleep(CACHE_PAUSE).await;
                 }
             },
             Found::Contents(..) if own_chain.is_none() => {
-                own_chain = Some(own_headers(&mut eeprom, &area).await?);
+                own_chain = Some(own_headers(&mut eeprom, &area, extent).await?);
             }
             Found::Contents(chain, contents) if own_chain.as_ref().is_some_and(|own| own.0 == chain) => {
                 return Ok(contents);
             }
             // The SubDevice has another identity than its fixed area.
             Found::Contents(..) | Found::Disputed => {
-                return categories(&mut eeprom, &area, Extent::Own).await.map(|(_, contents)| contents);
+                return categories(&mut eeprom, &area, extent, Data::Own).await.map(|(_, contents)| contents);
             }
         }
     }
 }
 
+/// Reads the fixed area.
+async fn fixed_area(eeprom: &mut Eeprom, extent: SiiExtent) -> Result<FixedArea, SiiReadError> {
+    let ranges = extents::fixed_area(extent);
+    let mut area: FixedArea = [0; SiiHeader::LEN];
+    for (number, (first, count)) in ranges.iter().copied().enumerate() {
+        let then = ranges.get(number + 1).map_or(HEADER_WORDS, |(first, _)| *first);
+        let bytes = eeprom.bytes(first, count, Some(then)).await?;
+        let at = bytes_before(first);
+        if number == 0 {
+            area[..bytes_before(extents::LAST_FIXED)].fill(bytes[0]);
+        }
+        area[at..at + bytes.len()].copy_from_slice(&bytes);
+    }
+    Ok(area)
+}
+
 /// The chain of categories, and its end.
 type Headers = (Vec<CategoryHeader>, ChainEnd);
 
-async fn own_headers(eeprom: &mut Eeprom, area: &FixedArea) -> Result<Headers, SiiReadError> {
-    let (chain, contents) = categories(eeprom, area, Extent::Headers).await?;
+async fn own_headers(eeprom: &mut Eeprom, area: &FixedArea, extent: SiiExtent) -> Result<Headers, SiiReadError> {
+    let (chain, contents) = categories(eeprom, area, extent, Data::Headers).await?;
     Ok((chain, contents.end))
 }
 
 /// Reads words of others with the same fixed area, as long as there are any that too few SubDevices read. An EEPROM
 /// that fails does not help; its own data is not needed yet.
-async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, words: &SharedWords) {
+async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, extent: SiiExtent, words: &SharedWords) {
     if !matches!(end, ChainEnd::Sound { .. }) {
         return;
     }
-    let blocks = Blocks::new(chain, eeprom.width());
+    let blocks = Blocks::new(chain, extent, eeprom.width());
     let mut next = words.claim(eeprom.station(), &blocks);
     while let Some(block) = next {
         next = words.claim(eeprom.station(), &blocks);
@@ -128,15 +142,36 @@ async fn help(eeprom: &mut Eeprom, (chain, end): &Headers, words: &SharedWords) 
     }
 }
 
-/// How much of the categories is read.
+/// Which data of the categories is read.
 #[derive(Clone, Copy)]
-enum Extent<'a> {
+enum Data<'a> {
     /// The headers alone.
     Headers,
-    /// Headers and data of needed categories, all from this EEPROM.
+    /// Headers, and data of the categories of the extent, all from this EEPROM.
     Own,
     /// The same, but data that two others have returned is not read again.
     Shared(&'a SharedWords),
+}
+
+impl Data<'_> {
+    /// Words of the last category of a chain: the first one, and their number. `then` is read ahead.
+    async fn read(
+        self,
+        eeprom: &mut Eeprom,
+        chain: &[CategoryHeader],
+        (first, count): (u32, u32),
+        then: Option<u32>,
+    ) -> Result<Option<Vec<u8>>, SiiReadError> {
+        match self {
+            Data::Headers => Ok(None),
+            Data::Own => eeprom.bytes(first, count, then).await.map(Some),
+            Data::Shared(shared) => {
+                let data = eeprom.bytes_with(first, count, then, |word| shared.confirmed(chain, word)).await?;
+                shared.report(eeprom.station(), chain, eeprom.own_words(first, count));
+                Ok(Some(data))
+            }
+        }
+    }
 }
 
 /// Reads vendor, product, revision and serial number.
@@ -147,15 +182,16 @@ pub(super) async fn identity(bus: &Bus, station: StationAddress, cache: &SiiCach
     Ok(Identity { vendor_id: field(0), product_code: field(4), revision: field(8), serial: field(12) })
 }
 
-/// Follows the chain of categories, and reads the data of needed ones.
+/// Follows the chain of categories, and reads the data of those of the extent.
 async fn categories(
     eeprom: &mut Eeprom,
     area: &FixedArea,
-    extent: Extent<'_>,
+    extent: SiiExtent,
+    data: Data<'_>,
 ) -> Result<(Vec<CategoryHeader>, SiiContents), SiiReadError> {
     let header = SiiHeader::decode(area);
-    let mut contents =
-        SiiContents { header, categories: Vec::new(), end: ChainEnd::Open { at: bytes_before(HEADER_WORDS) } };
+    let open = ChainEnd::Open { at: bytes_before(HEADER_WORDS) };
+    let mut contents = SiiContents { header, extent, categories: Vec::new(), has_more: false, end: open };
     let mut chain = Vec::new();
     // An EEPROM without a size is followed up to the largest size.
     let size = (contents.header.size_bytes() / 2) as u32;
@@ -181,19 +217,16 @@ async fn categories(
             contents.end = ChainEnd::Beyond { kind: category.kind, at, announced, left };
             return Ok((chain, contents));
         }
-        if is_needed(category.kind) {
+        contents.has_more |= SiiExtent::Complete.contains(category.kind) && !extent.contains(category.kind);
+        if extent.contains(category.kind) {
+            let used = extents::words_of(extent, category.kind).min(words);
             let next = word + words;
             let then = (next + 2 <= end && chain.len() < MAX_CATEGORIES).then_some(next);
-            let data = match extent {
-                Extent::Headers => None,
-                Extent::Own => Some(eeprom.bytes(word, words, then).await?),
-                Extent::Shared(shared) => {
-                    let data = eeprom.bytes_with(word, words, then, |word| shared.confirmed(&chain, word)).await?;
-                    shared.report(eeprom.station(), &chain, eeprom.own_words(word, words));
-                    Some(data)
-                }
-            };
-            contents.categories.extend(data.map(|data| (category.kind, at, data)));
+            let data = data.read(eeprom, &chain, (word, used), then).await?;
+            contents.categories.extend(data.map(|mut data| {
+                data.resize(bytes_before(words), 0);
+                (category.kind, at, data)
+            }));
         }
         word += words;
     }

@@ -91,8 +91,8 @@ pub(crate) type ToStop = (Option<usize>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
 pub(crate) fn all_known(segment: &Segment) -> Vec<ToStop> {
-    let members = segment.members().iter().enumerate().map(|(index, member)| (Some(index), member.station));
-    members.chain(segment.all_unassigned().iter().map(|it| (None, it.station))).collect()
+    let all = segment.subdevices().all().iter().enumerate();
+    all.map(|(number, it)| (it.as_member().map(|_| number), it.key.station)).collect()
 }
 
 /// Brings SubDevices to a state below their present one. SubDevices in a lower state stay there, and so do those in
@@ -139,7 +139,14 @@ async fn bring_down(bus: &Bus, station: StationAddress, state: AlState, until: I
     let (mut silent, mut next, mut reason) = (0, None, AlStatusCode(0));
     loop {
         match read_status(bus, station).await {
-            Ok((status, _)) if is_down(status, state) => return End::There,
+            Ok((status, code)) if is_down(status, state) => match withdraw(bus, station, status, state).await {
+                Ok(Requested::NoHigher) => return End::There,
+                Ok(Requested::Higher) | Err(BusError::Wkc { .. }) if bus.now() >= until => {
+                    return End::Late(status, code);
+                }
+                Ok(Requested::Higher) | Err(BusError::Wkc { .. }) => {}
+                Err(error) => return End::Failed(error),
+            },
             Ok((status, code)) => {
                 silent = 0;
                 if status.error {
@@ -169,15 +176,41 @@ async fn bring_down(bus: &Bus, station: StationAddress, state: AlState, until: I
     }
 }
 
-/// Whether a SubDevice needs no further request.
-fn is_down(status: AlStatus, state: AlState) -> bool {
-    let rank = |state: AlState| match state {
+/// What AL control of a SubDevice held.
+enum Requested {
+    /// The present state, or a lower one than that of the stop.
+    NoHigher,
+    /// A higher state. It was replaced by the present one.
+    Higher,
+}
+
+/// Withdraws the request of a procedure that has ended: a SubDevice may be on its way to a higher state, while its AL
+/// status is still the one before.
+async fn withdraw(bus: &Bus, station: StationAddress, status: AlStatus, state: AlState) -> Result<Requested, BusError> {
+    let control = AlStatus::decode(&bus.fprd_array(station, map::AL_CONTROL).await?);
+    let Some(present) = status.al_state().filter(|present| *present != AlState::Boot) else {
+        return Ok(Requested::NoHigher);
+    };
+    if control.al_state().is_none_or(|requested| requested == present || rank(requested) <= rank(state)) {
+        return Ok(Requested::NoHigher);
+    }
+    ask(bus, station, present, status.error).await?;
+    Ok(Requested::Higher)
+}
+
+/// Place of a state in the order of the states.
+fn rank(state: AlState) -> Option<u8> {
+    match state {
         AlState::Init => Some(0),
         AlState::PreOp => Some(1),
         AlState::SafeOp => Some(2),
         AlState::Op => Some(3),
         AlState::Boot => None,
-    };
+    }
+}
+
+/// Whether a SubDevice needs no further request.
+fn is_down(status: AlStatus, state: AlState) -> bool {
     match status.al_state() {
         Some(is) if is == state => !status.error,
         Some(AlState::Boot) => state != AlState::Init,

@@ -1,8 +1,8 @@
 //! Supervision after activation: passes the words of the cyclic half to the model of the segment, and runs the rounds
-//! of scans that the model requests.
+//! of reads that the model requests.
 //!
 //! The exchange posts one word per cycle: how many SubDevices answered on each link, the OR of their AL status, the OR
-//! of their event requests. While it does not change, the bus is only used for one scan per second.
+//! of their event requests. While it does not change, the bus is only used for one round per second.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -14,6 +14,7 @@ use super::inspect::{read_all_unassigned, read_members};
 use super::junction::note_controls;
 use super::shared_segment::SharedSegment;
 use super::unassigned;
+use super::undeclared::report_left;
 use crate::segment::member::Phase;
 use crate::segment::{Observation, Reading, RoundResult};
 use crate::supervisor::Bus;
@@ -35,9 +36,9 @@ pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// One round of scans, and the procedures on the bus that follow from it.
-pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool) {
-    scan_all(&bus, &segment, routine).await;
+/// One round of reads, and the procedures on the bus that follow from it.
+pub(super) async fn run_round(bus: Bus, segment: SharedSegment, routine: bool) {
+    read_all(&bus, &segment, routine).await;
     let round = segment.view().round();
     if round.is_blind {
         frame_limit::explain(&bus, &segment).await;
@@ -49,10 +50,12 @@ pub(super) async fn scan_round(bus: Bus, segment: SharedSegment, routine: bool) 
     segment.observe(Observation::RoundEnded(number));
 }
 
-async fn scan_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
+async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     let versions = segment.view().versions();
-    let before: Vec<Phase> = segment.view().members().iter().map(|member| member.phase).collect();
+    let before: Vec<Phase> = segment.view().members().map(|member| member.phase).collect();
     let unassigned = read_all_unassigned(bus, segment).await;
+    let states: Vec<_> = unassigned.iter().map(|(key, reading)| (key.station, *reading)).collect();
+    report_left(bus, &segment.undeclared, &states);
     let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
     let counted = || segment.board.supervision().map(|(_, seen)| seen.total());
@@ -74,13 +77,13 @@ async fn follow_up(bus: &Bus, segment: &SharedSegment) {
     let mut is_complete = round.is_complete;
     if round.finds_others {
         is_complete = unassigned::search(bus, segment).await;
-        // Clears the ECAT events of SubDevices that are not scanned.
+        // Clears the ECAT events of SubDevices that are not read.
         if bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
-            segment.observe(Observation::ScanAgainIn(PAUSE));
+            segment.observe(Observation::RoundWantedIn(PAUSE));
         }
-        segment.observe(Observation::ScanAgainIn(SEARCH_PAUSE));
+        segment.observe(Observation::RoundWantedIn(SEARCH_PAUSE));
     }
     if round.is_certain && is_complete && !unassigned::admit_all(bus, segment).await {
-        segment.observe(Observation::ScanAgainIn(REPEAT_PAUSE));
+        segment.observe(Observation::RoundWantedIn(REPEAT_PAUSE));
     }
 }

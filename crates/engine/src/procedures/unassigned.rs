@@ -17,20 +17,21 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
-use self::address::give;
+pub(super) use self::address::give;
 pub(super) use self::address::take_away;
 pub(super) use self::address::view;
 use self::doubles::restore;
 pub(super) use self::doubles::{Mark, has_identity, mark};
+pub(super) use self::quiet::level;
 use self::rescan::ports_of;
 use super::frame_limit;
 use super::scan::{ScanError, read_one};
 use super::shared_segment::SharedSegment;
 use crate::info::SubDeviceInfo;
-use crate::segment::Observation;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::member::Phase;
-use crate::segment::unassigned::{Knowledge, Matches, UnassignedSubDevice};
+use crate::segment::unassigned::Matches;
+use crate::segment::{Observation, SubDeviceKey};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before a failed read of an SII is repeated; it doubles with every failure.
@@ -84,12 +85,12 @@ async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
 }
 
 /// Reads a SubDevice, repeatedly until it succeeds or the SubDevice is no longer unassigned.
-pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, (station, since): (StationAddress, u32)) {
+pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, key: SubDeviceKey) {
     let mut pause = FIRST_PAUSE;
     let mut bus_failures = 0;
     loop {
-        let result = read_once(&bus, &segment, station).await;
-        if segment.view().unassigned(station).is_none() {
+        let result = read_once(&bus, &segment, key).await;
+        if segment.view().unassigned(key).is_none() {
             return;
         }
         let failed_on_bus = match &result {
@@ -101,7 +102,7 @@ pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, (station, 
         let is_patient = failed_on_bus && bus_failures < BUS_PATIENCE;
         let is_read = result.is_ok();
         let reason = |error: ScanError| (!is_patient).then(|| error.to_string());
-        segment.observe(Observation::Read { station, since, read: result.map(Rc::new).map_err(reason) });
+        segment.observe(Observation::Read { key, read: result.map(Rc::new).map_err(reason) });
         if is_read {
             return;
         }
@@ -110,9 +111,10 @@ pub(super) async fn read_unassigned(bus: Bus, segment: SharedSegment, (station, 
     }
 }
 
-async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) -> Result<SubDeviceInfo, ScanError> {
-    quiet::level(bus, station).await?;
-    let position = segment.view().unassigned(station).map(|it| it.position);
+async fn read_once(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Result<SubDeviceInfo, ScanError> {
+    let station = key.station;
+    level(bus, station).await?;
+    let position = segment.view().unassigned(key).map(|it| it.position);
     read_one(bus, position.unwrap_or_default(), station, &segment.cache).await
 }
 
@@ -124,15 +126,14 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, station: StationAddress) 
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
     let Some(identified) = find_places(bus, segment).await else { return false };
     let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
-    let attempts: Vec<u32> = segment.view().members().iter().map(|member| member.attempt).collect();
-    for (station, index) in held {
-        segment.observe(Observation::Held { station, index });
+    let attempts: Vec<u32> = segment.view().members().map(|member| member.attempt).collect();
+    for (key, index) in held {
+        segment.observe(Observation::Held { key, index });
     }
-    for (unassigned, member) in matched {
-        let Knowledge::Known(info) = &unassigned.knowledge else { continue };
+    for (key, member) in matched {
         match member {
-            Some(index) => admit(bus, segment, &unassigned, info, (index, attempts[index])).await,
-            None => segment.observe(Observation::Unexpected(unassigned.station)),
+            Some(index) => admit(bus, segment, key, (index, attempts[index])).await,
+            None => segment.observe(Observation::Unexpected(key)),
         }
     }
     true
@@ -144,7 +145,7 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
 async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
     let is_one_missed = {
         let view = segment.view();
-        !view.all_unassigned().is_empty() && view.members().iter().any(|member| member.phase == Phase::Absent)
+        view.subdevices().unassigned().next().is_some() && view.members().any(|member| member.phase == Phase::Absent)
     };
     if !is_one_missed {
         return Some(Vec::new());
@@ -168,23 +169,17 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
 }
 
 /// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.
-async fn admit(
-    bus: &Bus,
-    segment: &SharedSegment,
-    unassigned: &UnassignedSubDevice,
-    info: &SubDeviceInfo,
-    (index, attempt): (usize, u32),
-) {
-    let station = unassigned.station;
-    let fitted = segment.view().as_member(unassigned, info, index);
+async fn admit(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey, (index, attempt): (usize, u32)) {
+    let fitted = segment.view().as_member(key, index);
     let info = match fitted {
-        Ok(info) => info,
-        Err(reason) => return segment.observe(Observation::Misfit { station, index, reason }),
+        Some(Ok(info)) => info,
+        Some(Err(reason)) => return segment.observe(Observation::Misfit { key, index, reason }),
+        None => return,
     };
-    let written = bus.fpwr(station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;
+    let written = bus.fpwr(key.station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;
     // The reply to the first attempt may be lost; then the old address no longer answers.
     if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return;
     }
-    segment.observe(Observation::Admitted { station, index, attempt, info: Box::new(info) });
+    segment.observe(Observation::Admitted { key, index, attempt, info: Box::new(info) });
 }

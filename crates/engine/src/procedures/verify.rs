@@ -21,58 +21,43 @@ use crate::supervisor::Bus;
 
 /// Interval of the checks: up to three datagrams per SubDevice and second.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Consecutive repetitions of a SubDevice's configuration for the same difference. If the difference changes each time,
-/// the count restarts.
-const ATTEMPTS: u8 = 3;
-
 /// A SubDevice to be checked.
 struct Suspect {
     index: usize,
     attempt: u32,
     station: StationAddress,
     registers: Vec<Held>,
+    /// Its configuration was repeated because of a difference.
+    is_repaired: bool,
 }
 
 /// Result of a check.
 enum Found {
     /// It holds the written values.
-    Right(usize),
+    Right(Suspect),
     /// It does not; the difference.
     Wrong(Suspect, String),
 }
 
-/// The difference at the last repeated configuration of a SubDevice, and the number of repetitions without success.
-#[derive(Clone, Debug, Default)]
-struct Remedy {
-    reason: String,
-    tries: u8,
-}
-
 /// Runs until the MainDevice stops.
 pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
-    let mut remedies = alloc::vec![Remedy::default(); segment.view().members().len()];
     loop {
         bus.sleep(PAUSE).await;
         let all = bus.gather_in_turns(settled(&segment), check).await;
         let mut wrong = Vec::new();
         for found in all.into_iter().flatten() {
             match found {
-                Found::Right(index) => remedies[index] = Remedy::default(),
+                Found::Right(suspect) if suspect.is_repaired => {
+                    segment.observe_member((suspect.index, suspect.attempt), MemberFinding::Held);
+                }
+                Found::Right(_) => {}
                 Found::Wrong(suspect, _) => wrong.push(suspect),
             }
         }
         // A single difference may be due to a change under way.
         for found in bus.gather(wrong, check).await.into_iter().flatten() {
             if let Found::Wrong(suspect, reason) = found {
-                let remedy = &mut remedies[suspect.index];
-                if remedy.reason != reason {
-                    *remedy = Remedy { reason: reason.clone(), tries: 0 };
-                }
-                let (index, attempt) = (suspect.index, suspect.attempt);
-                if remedy.tries < ATTEMPTS && segment.view().members()[index].attempt == attempt {
-                    remedy.tries += 1;
-                    segment.observe_member((index, attempt), MemberFinding::Undone(reason));
-                }
+                segment.observe_member((suspect.index, suspect.attempt), MemberFinding::Undone(reason));
             }
         }
     }
@@ -81,12 +66,13 @@ pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
 /// Members in their target state, with the registers written for it.
 fn settled(segment: &SharedSegment) -> Vec<Suspect> {
     let access = segment.view();
-    let members = access.members().iter().enumerate();
+    let members = access.members().enumerate();
     members
         .filter_map(|(index, member)| {
             let Phase::Settled(state) = member.phase else { return None };
             let registers = registers(member.setup.as_ref()?, &member.config, state);
-            let suspect = Suspect { index, attempt: member.attempt, station: member.station, registers };
+            let (attempt, station, is_repaired) = (member.attempt, member.station, member.repair.is_under_way());
+            let suspect = Suspect { index, attempt, station, registers, is_repaired };
             (!suspect.registers.is_empty()).then_some(suspect)
         })
         .collect()
@@ -105,6 +91,6 @@ async fn check(bus: Bus, suspect: Suspect) -> Option<Found> {
     }
     Some(match wrong {
         Some(reason) => Found::Wrong(suspect, reason),
-        None => Found::Right(suspect.index),
+        None => Found::Right(suspect),
     })
 }

@@ -43,7 +43,12 @@ pub(crate) async fn visit(
         AlState::Boot => info.bootstrap,
         AlState::Init | AlState::PreOp | AlState::SafeOp | AlState::Op => info.mailbox,
     };
-    let (Some(layout), false) = (layout, state == AlState::Init) else { return Ok(()) };
+    let layout = match (layout, state) {
+        (_, AlState::Init) => return Ok(()),
+        (Some(layout), _) => layout,
+        (None, AlState::Boot) => return Err(ConfigureError::NoBoot),
+        (None, state) => return request(AlState::Init, state).await,
+    };
     let plan = plan(&SubDeviceConfig::from_info(info), info);
     let plan = plan.map_err(|error| ConfigureError::Unfit(SetupError::Plan(error)))?;
     let managers = if state == AlState::Boot { &plan.bootstrap } else { &plan.mailbox };

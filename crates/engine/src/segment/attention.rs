@@ -1,5 +1,5 @@
-//! Decides when all SubDevices are scanned: as soon as posted words differ from those of the last scan, on request, and
-//! once a second.
+//! Decides when a round of reads of all SubDevices begins: as soon as posted words differ from those of the last round,
+//! on request, and once a second.
 
 use core::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::time::Instant;
 
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_micros(500);
-/// Interval of scans without a change: an OR can hide one state behind others.
+/// Interval of rounds without a change: an OR can hide one state behind others.
 const ROUTINE: Duration = Duration::from_secs(1);
 /// A supervision result with a number this much higher than that at the end of a round was certainly sent after the
 /// round's reads.
@@ -31,7 +31,7 @@ pub struct Round {
     pub finds_others: bool,
     /// No others are missing: those without a declaration can be identified.
     pub is_complete: bool,
-    /// Scans do not return though process data does, or the reverse, often enough for a test of the frame limit.
+    /// Reads do not return though process data does, or the reverse, often enough for a test of the frame limit.
     pub is_blind: bool,
     /// The round is valid: no SubDevice was out of reach on purpose, and a count was available.
     pub counts: bool,
@@ -55,10 +55,10 @@ pub(super) struct Attention {
     next_routine: Instant,
     /// Earliest time of the next round.
     earliest: Instant,
-    is_scanning: bool,
+    is_under_way: bool,
     /// Result of the last round.
     pub round: Round,
-    /// Consecutive rounds in which scans were lost though frames returned, or the reverse.
+    /// Consecutive rounds in which reads were lost though frames returned, or the reverse.
     pub blind: u8,
     /// Time of the next evaluation if no words are posted before.
     pub wake: Instant,
@@ -76,7 +76,7 @@ impl Default for Attention {
             is_awaited: false,
             next_routine: Instant::default(),
             earliest: Instant::default(),
-            is_scanning: false,
+            is_under_way: false,
             round: Round::default(),
             blind: 0,
             wake: Instant::default(),
@@ -93,15 +93,15 @@ impl Attention {
             || self.is_wanted
     }
 
-    /// Ports have changed again directly after a scan that cleared their ECAT event: the event is set again, as before
-    /// the scan. `None` if that is impossible.
+    /// Ports have changed again directly after a round that cleared their ECAT event: the event is set again, as before
+    /// the round. `None` if that is impossible.
     fn has_missed(&mut self, words: &Words) -> Option<bool> {
         let (number, supervision) = words.supervision?;
         if !EcatEvent::from_bits(supervision.irq).dl_status {
             self.missed = 0;
             return None;
         }
-        // Events of SubDevices that are not scanned stay set for ever.
+        // Events of SubDevices that are not read stay set for ever.
         if self.missed >= MOST_MISSED {
             return None;
         }
@@ -121,7 +121,7 @@ impl Attention {
     ) -> Instant {
         // A missing answer has no meaning while SubDevices are out of reach on purpose; the end of this state is an
         // observation.
-        if self.is_scanning || disturbance == Some(Disturbance::IsolateRings) {
+        if self.is_under_way || disturbance == Some(Disturbance::IsolateRings) {
             return Instant::NEVER;
         }
         if now < self.earliest {
@@ -132,8 +132,8 @@ impl Attention {
         if !changed && now < self.next_routine {
             return if missed.is_some() { self.next_routine.min(now + PAUSE) } else { self.next_routine };
         }
-        effects.start(Task::Scan { routine: !changed && !self.is_awaited });
-        (self.is_scanning, self.is_awaited, self.is_wanted) = (true, false, false);
+        effects.start(Task::Round { routine: !changed && !self.is_awaited });
+        (self.is_under_way, self.is_awaited, self.is_wanted) = (true, false, false);
         self.seen = words.supervision.map_or(self.seen, |(_, supervision)| supervision);
         self.ring = words.ring;
         self.reported = reported;
@@ -159,7 +159,7 @@ impl Attention {
 
     /// A round has ended; `number` is the latest result's.
     pub fn end(&mut self, number: Option<u32>, now: Instant) {
-        self.is_scanning = false;
+        self.is_under_way = false;
         self.checked = number.unwrap_or(0);
         self.earliest = now + PAUSE;
     }

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::member::Member;
+use super::subdevices::SubDevices;
 use crate::ring_status::{Cable, CableErrors};
 use crate::topology::Topology;
 
@@ -28,9 +28,12 @@ pub struct Cabling {
 }
 
 /// Station addresses by position: those of members, and at other positions those of the scan.
-pub fn stations_by_position(members: &[Member], found: impl Iterator<Item = StationAddress>) -> Vec<StationAddress> {
+pub fn stations_by_position(
+    subdevices: &SubDevices,
+    found: impl Iterator<Item = StationAddress>,
+) -> Vec<StationAddress> {
     let mut stations: Vec<StationAddress> = found.collect();
-    for member in members {
+    for member in subdevices.members() {
         if let Some(station) = member.node.and_then(|node| stations.get_mut(node)) {
             *station = member.station;
         }

@@ -7,11 +7,13 @@ mod node;
 mod observation;
 mod state;
 mod status;
+mod timeline;
 
 pub use life::Due;
 pub(super) use life::{Compensation, Delays, Life, Lock, Running, Unwritten};
 pub use measured::Measured;
 pub use node::Node;
-pub use observation::{Answer, ClockObservation, Difference};
+pub use observation::{Answer, Answers, ClockObservation, Difference, LatchedTimes};
 pub use state::Clocks;
 pub use status::{ClockStatus, HiddenDelay};
+pub(super) use timeline::Step;

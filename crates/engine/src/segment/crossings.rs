@@ -7,7 +7,7 @@ use ringcat_wire::address::{Position, StationAddress};
 
 use super::cabling::Cabling;
 use super::choices::Choices;
-use super::member::Member;
+use super::subdevices::SubDevices;
 use crate::junction::JunctionMode;
 use crate::topology::{Finding, Topology};
 
@@ -107,11 +107,11 @@ pub(super) struct Crossings {
 
 impl Crossings {
     /// Crossings that the scan reported are not reported again.
-    pub fn new(cabling: &Cabling, members: &[Member], choices: Choices) -> Crossings {
+    pub fn new(cabling: &Cabling, subdevices: &SubDevices, choices: Choices) -> Crossings {
         let topology = &cabling.topology;
         let reported = topology.findings.iter().filter_map(|finding| match *finding {
             Finding::CrossedLine { node, entry_port } => {
-                let member = members.iter().find(|member| member.node == Some(node))?;
+                let member = subdevices.members().find(|member| member.node == Some(node))?;
                 let subdevice = Some((member.station, Position(node as u16)));
                 Some(Crossing { subdevice, entry_port: Some(entry_port) })
             }

@@ -3,9 +3,9 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
+use super::key::SubDeviceKey;
 use super::start::Start;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
@@ -49,8 +49,8 @@ pub enum Check {
 /// A procedure on the bus. It returns its result as an observation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
-    /// Scans all SubDevices.
-    Scan {
+    /// Reads all SubDevices: which answer, in which state, with which ports.
+    Round {
         /// Nothing has changed: a few SubDevices at a time.
         routine: bool,
     },
@@ -76,10 +76,8 @@ pub enum Task {
     },
     /// Reads the SII of a SubDevice without a declaration.
     ReadUnassigned {
-        /// Its temporary address.
-        station: StationAddress,
-        /// The version of the addresses in which it got this address.
-        since: u32,
+        /// The SubDevice.
+        key: SubDeviceKey,
     },
     /// Scans the segment for crossed lines.
     ExamineCabling {

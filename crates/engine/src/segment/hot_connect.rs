@@ -3,18 +3,19 @@
 use alloc::vec::Vec;
 
 use super::effect::{Effects, Task};
-use super::member::{Member, Phase};
+use super::member::Phase;
+use super::subdevices::SubDevices;
 use crate::config::groups;
 use crate::declared::GroupId;
 use crate::event::Event;
 
 /// Per group: SubDevices that answer, SubDevices in their declared states, and all SubDevices.
-pub fn counts(members: &[Member]) -> Vec<(usize, usize, usize)> {
-    let groups = groups(members.iter().map(|member| &*member.config));
+pub fn counts(subdevices: &SubDevices) -> Vec<(usize, usize, usize)> {
+    let groups = groups(subdevices.members().map(|member| &*member.member.config));
     let count = |group: &Vec<usize>| {
-        let all = group.iter().map(|index| &members[*index]);
+        let all = group.iter().filter_map(|index| subdevices.member(*index));
         let present = all.clone().filter(|member| member.phase != Phase::Absent).count();
-        let settled = all.filter(|member| member.phase == Phase::Settled(member.config.target)).count();
+        let settled = all.filter(|member| member.is_as_declared()).count();
         (present, settled, group.len())
     };
     groups.iter().map(count).collect()
@@ -35,8 +36,8 @@ pub(super) struct HotConnect {
 }
 
 impl HotConnect {
-    pub fn new(members: &[Member], follow: bool) -> HotConnect {
-        let groups = groups(members.iter().map(|member| &*member.config));
+    pub fn new(subdevices: &SubDevices, follow: bool) -> HotConnect {
+        let groups = groups(subdevices.members().map(|member| &*member.member.config));
         let joined = groups.iter().map(|_| false).collect();
         HotConnect { groups, joined, follow, changes: 0, followed: 0, is_following: false }
     }
@@ -47,9 +48,9 @@ impl HotConnect {
     }
 
     /// Reports changes since the last time.
-    pub fn observe(&mut self, members: &[Member], effects: &mut Effects) {
+    pub fn observe(&mut self, subdevices: &SubDevices, effects: &mut Effects) {
         for (number, group) in self.groups.iter().enumerate() {
-            let settled = |index: &usize| members[*index].phase == Phase::Settled(members[*index].config.target);
+            let settled = |index: &usize| subdevices.member(*index).is_some_and(|member| member.is_as_declared());
             let is = group.iter().all(settled);
             if core::mem::replace(&mut self.joined[number], is) != is {
                 let group = number;

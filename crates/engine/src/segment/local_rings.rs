@@ -6,7 +6,7 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 
 use super::cabling::{Cabling, End};
-use super::member::Member;
+use super::subdevices::SubDevices;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::ring_status::{Cable, CableErrors};
@@ -42,10 +42,10 @@ pub(super) struct LocalRings {
 
 impl LocalRings {
     /// Monitors the rings of a cabling.
-    pub fn new(cabling: &Cabling, members: &[Member]) -> LocalRings {
-        let declared = |node: usize| members.iter().position(|member| member.node == Some(node));
+    pub fn new(cabling: &Cabling, subdevices: &SubDevices) -> LocalRings {
         let stations = cabling.stations.clone();
-        let places = Places { declared: (0..stations.len()).map(declared).collect(), stations };
+        let places =
+            Places { declared: (0..stations.len()).map(|node| subdevices.member_at(node)).collect(), stations };
         LocalRings { version: cabling.version, ..LocalRings::over(&cabling.topology, places) }
     }
 
@@ -62,9 +62,9 @@ impl LocalRings {
     }
 
     /// Takes over the cabling of a new rescan, if there is one. `status` is by the positions of that rescan.
-    pub fn follow(&mut self, cabling: &Cabling, members: &[Member], status: &[Option<NodeStatus>]) {
+    pub fn follow(&mut self, cabling: &Cabling, subdevices: &SubDevices, status: &[Option<NodeStatus>]) {
         if self.version != cabling.version {
-            self.go_over(LocalRings::new(cabling, members), status);
+            self.go_over(LocalRings::new(cabling, subdevices), status);
         }
     }
 

@@ -1,11 +1,13 @@
-//! A SubDevice declared by the application: its identity, its phase, its incidents.
+//! The state of a SubDevice declared by the application: its phase, its target, its incidents.
 
 use alloc::rc::Rc;
+use core::ops::Deref;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
+use super::repair::Repair;
 use super::setup::{Setup, SetupError};
 use crate::config::SubDeviceConfig;
 use crate::info::SubDeviceInfo;
@@ -22,17 +24,13 @@ pub enum Phase {
     Settled(AlState),
 }
 
-/// A SubDevice declared by the application.
+/// The state of a SubDevice declared by the application.
 #[derive(Debug)]
 pub struct Member {
     /// The declaration.
     pub config: Rc<SubDeviceConfig>,
     /// Its target state: that of the declaration, or one requested since.
     pub target: AlState,
-    /// Its identity and features; `None` if it has never answered.
-    pub info: Option<Rc<SubDeviceInfo>>,
-    /// Its station address.
-    pub station: StationAddress,
     /// Its phase.
     pub phase: Phase,
     /// Number of the configuration attempt under way; procedures of earlier attempts end.
@@ -49,17 +47,19 @@ pub struct Member {
     pub incidents: Incidents,
     /// Number of its mappings, increased also when its process data is expected anew: inputs read before prove nothing.
     pub(super) mapping: u32,
-    /// Consecutive scans without an answer.
+    /// Consecutive rounds without an answer.
     pub(super) silent: u8,
     /// Process data does not wait for it although it is not lost.
     pub(super) suspended: bool,
     /// The SubDevice that answers at its address while it is lost.
     pub(super) mistaken: Mistaken,
+    /// Repeated configurations because of lost registers.
+    pub repair: Repair,
 }
 
 /// First pause before the SubDevice at the address of a lost member is identified again.
 const FIRST_PAUSE: Duration = Duration::from_millis(2);
-/// Longest pause: the interval of the routine scans.
+/// Longest pause: the interval of the routine rounds.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// Consecutive identifications after which it is reported.
 const PATIENCE: u32 = 10;
@@ -108,6 +108,11 @@ impl Member {
         self.setup.is_some() || self.unfit.is_some()
     }
 
+    /// Whether it is in its declared state.
+    pub fn is_as_declared(&self) -> bool {
+        self.phase == Phase::Settled(self.config.target)
+    }
+
     /// Whether its process data is exchanged in a state.
     pub fn exchanges(&self, state: AlState) -> bool {
         let early = || self.setup.as_ref().is_none_or(|setup| !setup.plan.is_op_only());
@@ -126,30 +131,47 @@ impl Member {
         self.attempt
     }
 
-    /// A member with the data of the scan only.
-    pub fn new(
+    /// A member of which nothing was observed since the scan.
+    pub(super) fn new(
         config: SubDeviceConfig,
-        info: Option<Rc<SubDeviceInfo>>,
-        station: StationAddress,
-        setup: Option<Rc<Setup>>,
+        node: Option<usize>,
+        setup: Result<Rc<Setup>, Option<SetupError>>,
     ) -> Member {
-        let node = info.as_ref().map(|info| usize::from(info.position.0));
+        let (setup, unfit) = setup.map_or_else(|unfit| (None, unfit), |setup| (Some(setup), None));
         Member {
             target: config.target,
             config: Rc::new(config),
-            info,
-            station,
             phase: Phase::Absent,
             attempt: 0,
             configured: false,
             node,
             setup,
-            unfit: None,
+            unfit,
             incidents: Incidents::default(),
             mapping: 0,
             silent: 0,
             suspended: false,
             mistaken: Mistaken::default(),
+            repair: Repair::default(),
         }
+    }
+}
+
+/// A declared SubDevice: its state, and what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct MemberView<'a> {
+    /// Its station address.
+    pub station: StationAddress,
+    /// Its identity and features; `None` if it has never answered.
+    pub info: Option<&'a Rc<SubDeviceInfo>>,
+    /// Its state.
+    pub member: &'a Member,
+}
+
+impl Deref for MemberView<'_> {
+    type Target = Member;
+
+    fn deref(&self) -> &Member {
+        self.member
     }
 }

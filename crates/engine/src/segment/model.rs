@@ -15,14 +15,16 @@ use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
+use super::key::SubDeviceKey;
 use super::local_rings::LocalRings;
-use super::member::Member;
+use super::member::MemberView;
 use super::port_control::{BlockedPort, PortControl};
 use super::ring::{Ring, Words};
 use super::scan::Found;
 use super::silence::Silence;
 use super::stage::Stage;
-use super::unassigned::UnassignedSubDevice;
+use super::subdevices::SubDevices;
+use super::unassigned::UnassignedView;
 use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
@@ -34,10 +36,8 @@ use crate::time::Instant;
 /// What an application declares, compared with what the scan has found.
 #[derive(Debug)]
 pub struct Declared {
-    /// The declared SubDevices.
-    pub members: Vec<Member>,
-    /// SubDevices without a declaration.
-    pub unassigned: Vec<UnassignedSubDevice>,
+    /// The SubDevices, declared or not.
+    pub subdevices: SubDevices,
     /// Layout of process data.
     pub layout: Layout,
     /// Connections of all SubDevices.
@@ -56,8 +56,7 @@ impl Default for Declared {
     /// Nothing.
     fn default() -> Declared {
         Declared {
-            members: Vec::new(),
-            unassigned: Vec::new(),
+            subdevices: SubDevices::default(),
             layout: Layout::default(),
             cabling: Cabling::default(),
             clocks: Clocks::undeclared(),
@@ -72,10 +71,10 @@ impl Default for Declared {
 #[derive(Debug)]
 pub struct Segment {
     pub(super) stage: Stage,
-    /// The declared SubDevices.
-    pub(super) members: Vec<Member>,
-    /// SubDevices that answer and have no declaration, or are not yet identified.
-    pub(super) unassigned: Vec<UnassignedSubDevice>,
+    /// The SubDevices that were found, and those that are declared and absent.
+    pub(super) subdevices: SubDevices,
+    /// Number of the first attempts to configure the members: findings of an earlier application are refused.
+    pub(super) first_attempt: u32,
     /// Layout of process data.
     pub(super) layout: Layout,
     /// Connections according to the scan or a later rescan.
@@ -110,15 +109,15 @@ impl Segment {
 
     /// A segment with a declaration, of which nothing was observed.
     pub(super) fn of(declared: Declared, choices: Choices) -> Segment {
-        let Declared { members, unassigned, layout, cabling, clocks, ring, carriers, board } = declared;
+        let Declared { subdevices, layout, cabling, clocks, ring, carriers, board } = declared;
         Segment {
             stage: Stage::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
-            local_rings: LocalRings::new(&cabling, &members),
+            local_rings: LocalRings::new(&cabling, &subdevices),
             silence: Silence::default(),
-            crossings: Crossings::new(&cabling, &members, choices),
-            hot_connect: HotConnect::new(&members, choices.follow_groups),
+            crossings: Crossings::new(&cabling, &subdevices, choices),
+            hot_connect: HotConnect::new(&subdevices, choices.follow_groups),
             attention: Attention::default(),
             slot: Slot::default(),
             addresses: Addresses::default(),
@@ -126,8 +125,8 @@ impl Segment {
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),
             port_controls: Vec::new(),
-            members,
-            unassigned,
+            subdevices,
+            first_attempt: 0,
             layout,
             cabling,
             clocks,
@@ -156,14 +155,24 @@ impl Segment {
         self.slot.next_number()
     }
 
-    /// The declared SubDevices, by their indices in the declaration.
-    pub fn members(&self) -> &[Member] {
-        &self.members
+    /// The SubDevices that were found, and those that are declared and absent.
+    pub fn subdevices(&self) -> &SubDevices {
+        &self.subdevices
     }
 
-    /// SubDevices that answer and have no declaration, or are not yet identified.
-    pub fn all_unassigned(&self) -> &[UnassignedSubDevice] {
-        &self.unassigned
+    /// The declared SubDevices, by their indices in the declaration.
+    pub fn members(&self) -> impl Iterator<Item = MemberView<'_>> + Clone {
+        self.subdevices.members()
+    }
+
+    /// The SubDevice with an index in the declaration.
+    pub fn member(&self, index: usize) -> Option<MemberView<'_>> {
+        self.subdevices.member(index)
+    }
+
+    /// The unassigned SubDevice with a key, unless it has left.
+    pub fn unassigned(&self, key: SubDeviceKey) -> Option<UnassignedView<'_>> {
+        self.subdevices.unassigned().find(|it| it.key == key)
     }
 
     /// Layout of process data.
@@ -256,7 +265,7 @@ impl Segment {
         self.frames_tested_until
     }
 
-    /// The last round of scans.
+    /// The last round of reads.
     pub fn round(&self) -> Round {
         self.attention.round
     }
@@ -285,29 +294,19 @@ impl Segment {
     pub fn occupants(&self) -> Vec<Occupant> {
         let at = |(node, station): (usize, &StationAddress)| Occupant {
             station: *station,
-            declared: self.member_at(node).map(SubDeviceId),
+            declared: self.subdevices.member_at(node).map(SubDeviceId),
         };
         self.cabling.stations.iter().enumerate().map(at).collect()
     }
 
     /// The SubDevice with a station address.
     pub fn occupant(&self, station: StationAddress) -> Occupant {
-        Occupant { station, declared: self.member_of(station).map(SubDeviceId) }
-    }
-
-    /// The member at a position of the cabling.
-    pub fn member_at(&self, node: usize) -> Option<usize> {
-        self.members.iter().position(|member| member.node == Some(node))
-    }
-
-    /// The member with a station address.
-    pub fn member_of(&self, station: StationAddress) -> Option<usize> {
-        self.members.iter().position(|member| member.station == station)
+        Occupant { station, declared: self.subdevices.member_of(station).map(SubDeviceId) }
     }
 
     /// The station address of the member at a place.
     pub fn station_of(&self, node: usize) -> Option<StationAddress> {
-        self.members.iter().find(|member| member.node == Some(node)).map(|member| member.station)
+        self.members().find(|member| member.node == Some(node)).map(|member| member.station)
     }
 
     /// Changes of hot connect groups so far.

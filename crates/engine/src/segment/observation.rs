@@ -12,12 +12,13 @@ use ringcat_wire::register::DlControl;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
+use super::key::SubDeviceKey;
 use super::model::Declared;
 use super::port_control::BlockedPort;
 use super::reading::Reading;
 use super::ring::Words;
 use super::round_result::RoundResult;
-use super::scan::Scan;
+use super::scan::{Found, Scan};
 use super::seen::Seen;
 use super::versions::Versions;
 use super::view::View;
@@ -56,6 +57,8 @@ pub enum MemberFinding<'a> {
     Configured(bool),
     /// Its registers do not hold the written values; the missing value.
     Undone(String),
+    /// They do, after its configuration was repeated.
+    Held,
     /// How it takes part in process data from now on.
     ProcessData(ProcessDataStep),
     /// It refused the requested state; the previous target state.
@@ -69,7 +72,7 @@ pub enum MemberFinding<'a> {
 pub enum Observation<'a> {
     /// Words posted by the exchange, and carriers of the links.
     Words(Words),
-    /// Intermediate result of a round of scans. `others`: answers of SubDevices without a declaration.
+    /// Intermediate result of a round of reads. `others`: answers of SubDevices without a declaration.
     PartOfRound {
         /// Version of the model at the request.
         versions: Versions,
@@ -80,14 +83,14 @@ pub enum Observation<'a> {
         /// SubDevices that the latest supervision result counts.
         counted: Option<Wkc>,
     },
-    /// A round of scans is complete.
+    /// A round of reads is complete.
     Round(RoundResult<'a>),
-    /// All effects of a round of scans are completed. With the number of the latest supervision result.
+    /// All effects of a round of reads are completed. With the number of the latest supervision result.
     RoundEnded(Option<u32>),
     /// Another round is requested.
-    ScanAgain,
+    RoundWanted,
     /// Another round is requested after a pause.
-    ScanAgainIn(Duration),
+    RoundWantedIn(Duration),
     /// It was tested how many datagrams a frame may hold. Until this time no other test is necessary.
     FramesTested(Instant),
 
@@ -95,6 +98,20 @@ pub enum Observation<'a> {
     ScanBegun,
     /// It has ended; the reason if it failed.
     ScanEnded(Result<Scan, String>),
+    /// The segment was scanned again without an application; SubDevices in place have kept their addresses.
+    FoundAgain {
+        /// Version of the model at the request.
+        versions: Versions,
+        /// The SubDevices.
+        found: Rc<Found>,
+    },
+    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part.
+    SiiCompleted {
+        /// Its station address.
+        station: StationAddress,
+        /// Its data.
+        read: &'a SubDeviceInfo,
+    },
     /// A SubDevice is configured for its mailbox before an application is active.
     Visited,
     /// An application declares SubDevices.
@@ -158,19 +175,17 @@ pub enum Observation<'a> {
     Searched(Result<(), String>),
     /// An unassigned SubDevice was read, or could not be: then with the reason, if it is to be reported.
     Read {
-        /// Its address.
-        station: StationAddress,
-        /// The version of the addresses in which it got the address.
-        since: u32,
+        /// The SubDevice.
+        key: SubDeviceKey,
         /// Its data.
         read: Result<Rc<SubDeviceInfo>, Option<String>>,
     },
     /// An unassigned SubDevice matches no declaration.
-    Unexpected(StationAddress),
+    Unexpected(SubDeviceKey),
     /// An unassigned SubDevice is a member but does not fit its declaration.
     Misfit {
-        /// Its address.
-        station: StationAddress,
+        /// The unassigned SubDevice.
+        key: SubDeviceKey,
         /// The member.
         index: usize,
         /// Why.
@@ -178,15 +193,15 @@ pub enum Observation<'a> {
     },
     /// An unassigned SubDevice may be this member, or another one of the same kind.
     Held {
-        /// Its address.
-        station: StationAddress,
-        /// An unassigned SubDevice may be this member, or another one of the same type.
+        /// The unassigned SubDevice.
+        key: SubDeviceKey,
+        /// The member.
         index: usize,
     },
     /// An unassigned SubDevice was identified as a member and has got its address.
     Admitted {
-        /// Its address until then.
-        station: StationAddress,
+        /// The unassigned SubDevice.
+        key: SubDeviceKey,
         /// The member.
         index: usize,
         /// The member's attempt when it was identified.

@@ -1,4 +1,4 @@
-//! Result of a read of one SubDevice in a scan.
+//! Result of a read of one SubDevice in a round.
 
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::DlStatus;

@@ -10,6 +10,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
 use super::cabling::{Cabling, End};
+use super::view::position;
 use crate::junction::{HEAD_PORT, START_PORT};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf, Topology};
 
@@ -96,11 +97,4 @@ fn before(known: &Cabling, head: End) -> Option<&LocalRing> {
 
 fn end(known: &Cabling, at: PortOf) -> Option<End> {
     Some((*known.stations.get(at.node)?, at.port))
-}
-
-/// The position of a station address that only one SubDevice has.
-fn position(stations: &[StationAddress], station: StationAddress) -> Option<usize> {
-    let mut positions = stations.iter().enumerate().filter(|(_, at)| **at == station).map(|(position, _)| position);
-    let first = positions.next()?;
-    positions.next().is_none().then_some(first)
 }

@@ -50,7 +50,7 @@ pub(super) struct Ring {
     dead_way: Option<Link>,
     ways: Damper,
     carriers: [Option<bool>; 2],
-    told_carriers: [Option<bool>; 2],
+    reported_carriers: [Option<bool>; 2],
     cables: [Damper; 2],
     /// Number and counts of the last supervision result that was evaluated.
     last: Option<(u32, (u16, u16))>,
@@ -78,7 +78,7 @@ impl Ring {
             dead_way: None,
             ways: Damper::default(),
             carriers,
-            told_carriers: carriers,
+            reported_carriers: carriers,
             cables: [Damper::default(); 2],
             last: None,
             settling: 0,
@@ -139,14 +139,14 @@ impl Ring {
                 self.cables[at].changed(now);
                 self.carriers[at] = carriers[at];
             }
-            if carriers[at] == self.told_carriers[at] {
+            if carriers[at] == self.reported_carriers[at] {
                 continue;
             }
             if !self.cables[at].may_report(now) {
                 again = Some(now + PAUSE);
                 continue;
             }
-            let before = core::mem::replace(&mut self.told_carriers[at], carriers[at]);
+            let before = core::mem::replace(&mut self.reported_carriers[at], carriers[at]);
             match carriers[at] {
                 Some(false) => effects.report(Event::LinkDown { link }),
                 Some(true) if before == Some(false) => effects.report(Event::LinkUp { link }),
@@ -169,11 +169,11 @@ impl Ring {
             self.dead_way = word.dead_way;
         }
         let is_settled = self.report_ring(words, cabled, now, effects);
-        let is_told = self.report_redundancy(word, now, effects);
+        let is_reported = self.report_redundancy(word, now, effects);
         self.status.state = word.state;
         self.status.changes = word.changes;
         self.status.unsteady = self.damper.is_unsteady(now);
-        !is_settled || !is_told || self.status.unsteady
+        !is_settled || !is_reported || self.status.unsteady
     }
 
     /// True if the state was reported with steady counts.
@@ -279,15 +279,15 @@ impl Ring {
             (RingState::Closed, None) => None,
             (RingState::Unknown, _) => return true,
         };
-        let is_told = match (before, cause) {
+        let is_reported = match (before, cause) {
             (Redundancy::Lost { cause: before, .. }, Some(cause)) => before == cause,
             (Redundancy::Ready, None) => true,
             _ => false,
         };
         let by_way = matches!(cause, Some(RedundancyLoss::OneWay(_)))
             || matches!(before, Redundancy::Lost { cause: RedundancyLoss::OneWay(_), .. });
-        if is_told || (by_way && !self.ways.may_report(now)) {
-            return is_told;
+        if is_reported || (by_way && !self.ways.may_report(now)) {
+            return is_reported;
         }
         let was_lost = matches!(before, Redundancy::Lost { .. });
         match cause {

@@ -1,12 +1,13 @@
-//! Result of a round of scans.
+//! Result of a round of reads.
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::Wkc;
 
+use super::key::SubDeviceKey;
 use super::member::Phase;
 use super::reading::Reading;
 use super::versions::Versions;
 
-/// Result of a round of scans.
+/// Result of a round of reads.
 #[derive(Clone, Copy, Debug)]
 pub struct RoundResult<'a> {
     /// Version of the model at the start of the round.
@@ -15,8 +16,8 @@ pub struct RoundResult<'a> {
     pub readings: &'a [Reading],
     /// Phase of each member when the round began.
     pub before: &'a [Phase],
-    /// SubDevices without a declaration, by station address.
-    pub unassigned: &'a [(StationAddress, Reading)],
+    /// SubDevices without a declaration.
+    pub unassigned: &'a [(SubDeviceKey, Reading)],
     /// SubDevices that the latest supervision result counts; `None` before the first.
     pub counted: Option<Wkc>,
 }

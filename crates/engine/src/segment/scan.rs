@@ -23,7 +23,7 @@ pub struct Scan {
 }
 
 /// The SubDevices that the last scan found. Members and SubDevices without a declaration share their data with it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Found {
     /// By position.

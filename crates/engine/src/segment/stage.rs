@@ -28,6 +28,14 @@ pub(super) struct Scanned {
 }
 
 impl Stage {
+    /// The same, to take over what is learnt about them.
+    pub fn scanned_mut(&mut self) -> Option<&mut Scanned> {
+        match self {
+            Stage::Unscanned | Stage::Scanning => None,
+            Stage::Scanned(scanned) | Stage::Active(scanned) => Some(scanned),
+        }
+    }
+
     /// The SubDevices of the last scan.
     pub fn scanned(&self) -> Option<&Scanned> {
         match self {

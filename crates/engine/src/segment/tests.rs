@@ -19,7 +19,7 @@ use ringcat_wire::sii::Identity;
 use super::clocks::Clocks;
 use super::disturbance::{Disturbance, Wanted};
 use super::effect::{Check, Effect, Effects, Shown, Task};
-use super::member::{Member, Phase};
+use super::member::{MemberView, Phase};
 use super::setup::Setup;
 use super::start::Start;
 use super::*;
@@ -80,7 +80,7 @@ impl Ring {
         };
         let member = |index: usize| {
             let info = Some(Rc::new(info(index)));
-            Member::new(SubDeviceConfig::at_position(index as u16), info, station(index), None)
+            SubDevice::declared(SubDeviceConfig::at_position(index as u16), info, station(index), Err(None))
         };
         let topology = Topology::build(&vec![node(PASS); count], count);
         let cables = cables(&topology, LinkSet::Ring).into_iter().map(|cable| (cable, CableErrors::default()));
@@ -94,8 +94,7 @@ impl Ring {
             version: 0,
         };
         let declared = Declared {
-            members: (0..count).map(member).collect(),
-            unassigned: Vec::new(),
+            subdevices: SubDevices::new((0..count).map(member).collect(), []),
             layout: Layout::with(&[], ring_rules()).unwrap(),
             clocks,
             cabling,
@@ -117,7 +116,7 @@ impl Ring {
             cycles: 1,
         };
         let mut ring = Ring { segment, words, now: Instant(0) };
-        for member in &mut ring.segment.members {
+        for member in ring.segment.subdevices.members_mut() {
             member.phase = Phase::Settled(AlState::Op);
         }
         // Counts become valid after several equal results; the first scans give no events.
@@ -126,6 +125,10 @@ impl Ring {
             ring.scan(&vec![PASS; count]);
         }
         ring
+    }
+
+    fn member(&self, index: usize) -> MemberView<'_> {
+        self.segment.member(index).unwrap()
     }
 
     fn observe(&mut self, seen: Observation<'_>) -> Vec<Effect> {
@@ -143,7 +146,7 @@ impl Ring {
         self.observe(Observation::Words(words))
     }
 
-    /// A round of scans with all in OP; 0 for a silent SubDevice.
+    /// A round of reads with all in OP; 0 for a silent SubDevice.
     fn scan(&mut self, high: &[u8]) -> Vec<Effect> {
         let (status, code) = OP;
         let readings: Vec<Reading> = high
@@ -153,7 +156,7 @@ impl Ring {
                 high => Reading::Answer { status, code, dl_status: node(*high).dl_status },
             })
             .collect();
-        let before: Vec<Phase> = self.segment.members.iter().map(|member| member.phase).collect();
+        let before: Vec<Phase> = self.segment.members().map(|member| member.phase).collect();
         let counted = self.words.supervision.map(|(_, seen)| seen.total());
         let versions = self.segment.versions();
         let round_result = RoundResult { versions, readings: &readings, before: &before, unassigned: &[], counted };
@@ -207,7 +210,7 @@ fn a_cut_is_reported_in_the_cycle_that_shows_it_and_located_by_the_next_scan() {
             let opened = [Event::RingOpened { main, redundant }, Event::RedundancyLost { cause: RedundancyLoss::Open }];
             assert_eq!(reports(&effects), opened, "{at} of {count}");
             assert!(effects.contains(&Effect::MainCount(main)));
-            assert!(effects.contains(&Effect::Start(Task::Scan { routine: false })));
+            assert!(effects.contains(&Effect::Start(Task::Round { routine: false })));
             let mut high = vec![PASS; count];
             (high[at - 1], high[at]) = (BEFORE, BEHIND);
             let place = cable((at - 1, 1), (at, 0));
@@ -300,14 +303,14 @@ fn scans_during_an_isolation_do_not_change_member_states() {
         };
         assert_eq!(reports(&ring.observe(Observation::Round(round_result))), []);
     }
-    assert_eq!(ring.segment.members[0].phase, Phase::Settled(AlState::Op));
+    assert_eq!(ring.member(0).phase, Phase::Settled(AlState::Op));
 }
 
 #[test]
 fn results_of_an_ended_attempt_are_ignored() {
     let mut ring = Ring::closed(1);
     ring.observe(of_member((0, 0), MemberFinding::Undone("FMMUs".into())));
-    assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
+    assert_eq!(ring.member(0).phase, Phase::Configuring);
     for late in [
         of_member((0, 0), MemberFinding::Reached(AlState::Op)),
         of_member((0, 0), MemberFinding::Unreachable),
@@ -315,7 +318,7 @@ fn results_of_an_ended_attempt_are_ignored() {
         of_member((7, 0), MemberFinding::Reached(AlState::Op)),
     ] {
         assert_eq!(ring.observe(late), []);
-        assert_eq!(ring.segment.members[0].phase, Phase::Configuring);
+        assert_eq!(ring.member(0).phase, Phase::Configuring);
     }
     let effects = ring.observe(of_member((0, 1), MemberFinding::Reached(AlState::Op)));
     assert_eq!(reports(&effects), [Event::StateReached { subdevice: SubDeviceId(0), state: AlState::Op }]);
@@ -326,13 +329,13 @@ fn inputs_read_before_a_mapping_do_not_prove_it() {
     let mut ring = Ring::closed(1);
     let step = |step| of_member((0, 0), MemberFinding::ProcessData(step));
     ring.observe(step(ProcessDataStep::Joined));
-    let before = ring.segment.members[0].mapping;
+    let before = ring.member(0).mapping;
     ring.observe(step(ProcessDataStep::Left));
     ring.observe(step(ProcessDataStep::Mapped));
     assert!(ring.segment.board.is_unproven(0));
     ring.observe(Observation::Proven { index: 0, mapping: before });
     assert!(ring.segment.board.is_unproven(0), "they were read before");
-    let mapping = ring.segment.members[0].mapping;
+    let mapping = ring.member(0).mapping;
     ring.observe(Observation::Proven { index: 0, mapping });
     assert!(!ring.segment.board.is_unproven(0));
 }

@@ -20,13 +20,23 @@ pub struct View {
 impl View {
     /// The positions at which a station address answers.
     pub fn positions(&self, station: StationAddress) -> impl Iterator<Item = usize> + '_ {
-        self.stations.iter().enumerate().filter(move |(_, at)| **at == station).map(|(position, _)| position)
+        positions(&self.stations, station)
     }
 
     /// The position of a station address that only one SubDevice has.
     pub fn position(&self, station: StationAddress) -> Option<usize> {
-        let mut positions = self.positions(station);
-        let first = positions.next()?;
-        positions.next().is_none().then_some(first)
+        position(&self.stations, station)
     }
+}
+
+/// The positions of a station address.
+fn positions(stations: &[StationAddress], station: StationAddress) -> impl Iterator<Item = usize> + '_ {
+    stations.iter().enumerate().filter(move |(_, at)| **at == station).map(|(position, _)| position)
+}
+
+/// The position of a station address that only one SubDevice has.
+pub(super) fn position(stations: &[StationAddress], station: StationAddress) -> Option<usize> {
+    let mut positions = positions(stations, station);
+    let first = positions.next()?;
+    positions.next().is_none().then_some(first)
 }

@@ -15,6 +15,7 @@ use core::fmt;
 use core::future::Future;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 
@@ -68,6 +69,13 @@ impl Bus {
     /// The board of the exchange, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
         self.shared.borrow().board.clone()
+    }
+
+    /// Posts an AL status that was read, for readers of the live status.
+    pub(crate) fn post_al_status(&self, station: StationAddress, status: AlStatus, code: AlStatusCode) {
+        if let Some(board) = &self.shared.borrow().board {
+            board.live.post_al_status(station, status, code);
+        }
     }
 
     /// Reports an event.

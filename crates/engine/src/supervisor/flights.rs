@@ -25,6 +25,8 @@ const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
 pub(crate) struct Flights {
     slots: Vec<Option<Flight>>,
     in_flight: usize,
+    /// No deadline is earlier.
+    earliest: Instant,
     /// Number of flights that no longer count against the window.
     released: usize,
     sequence: Sequence,
@@ -39,6 +41,7 @@ impl Flights {
         Flights {
             slots: (0..SLOTS).map(|_| None).collect(),
             in_flight: 0,
+            earliest: Instant::NEVER,
             released: 0,
             sequence: Sequence::default(),
             spare: Vec::new(),
@@ -46,11 +49,24 @@ impl Flights {
         }
     }
 
-    pub(crate) fn next_deadline(&self) -> Option<Instant> {
-        if self.in_flight == 0 {
-            return None;
-        }
-        self.slots.iter().flatten().map(|flight| flight.deadline).min()
+    /// No flight has an earlier deadline; never if there is none. It may be that of an ended flight.
+    #[inline]
+    pub(super) fn next_deadline(&self) -> Instant {
+        if self.in_flight == 0 { Instant::NEVER } else { self.earliest }
+    }
+
+    /// A flight begins.
+    fn put(&mut self, flight: Flight) {
+        self.earliest = self.next_deadline().min(flight.deadline);
+        let slot = Flights::slot(flight.sequence);
+        self.slots[slot] = Some(flight);
+        self.in_flight += 1;
+    }
+
+    /// Flights have ended or not: determines the earliest deadline.
+    fn find_earliest(&mut self) {
+        let deadlines = self.slots.iter().flatten().map(|flight| flight.deadline);
+        self.earliest = deadlines.min().unwrap_or(Instant::NEVER);
     }
 
     fn slot(sequence: Sequence) -> usize {

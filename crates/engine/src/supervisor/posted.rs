@@ -18,6 +18,8 @@ pub struct Posted {
     pub requests: u32,
     /// Number of stops of the time distribution after changes of ports.
     pub holds: u32,
+    /// Changes of the times of clocks and application.
+    pub times: u32,
 }
 
 /// Procedures that wait for a changed word.
@@ -25,6 +27,17 @@ pub struct Posted {
 pub(super) struct Watchers {
     /// Waiting procedures.
     pub waiting: Vec<TaskId>,
-    /// Words posted when they were last woken.
-    pub seen: Posted,
+    /// Words posted when they were last woken, packed.
+    pub seen: PostedWords,
+}
+
+/// [`Posted`] as the words lie on the board: compared several times per cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct PostedWords {
+    /// The result of the latest supervision datagram, and whether there was any.
+    pub supervision: (u64, bool),
+    pub ring: u64,
+    pub carriers: [Option<bool>; 2],
+    pub requests: u32,
+    pub holds: u32,
 }

@@ -116,17 +116,17 @@ impl Shared {
         }
     }
 
-    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+    /// When [`super::Supervisor::poll`] has work to do, received frames aside; never if it has none.
+    pub(crate) fn next_deadline(&self) -> Instant {
         if !self.ready.is_empty() || !self.spawned.is_empty() || self.is_posted() {
-            return Some(self.now);
+            return self.now;
         }
-        let timer = self.timers.peek().map(|Reverse((at, _))| *at);
-        let flights = self.flights.next_deadline();
+        let timer = self.timers.peek().map_or(Instant::NEVER, |Reverse((at, _))| *at);
         let queue = match self.alone.is_held() {
             true => self.alone.next_deadline(self.now),
             false => self.outbox.next_deadline(self.now),
         };
-        [timer, flights, queue].into_iter().flatten().min()
+        timer.min(self.flights.next_deadline()).min(queue.unwrap_or(Instant::NEVER))
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {

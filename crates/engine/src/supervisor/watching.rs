@@ -4,7 +4,7 @@ use core::future::poll_fn;
 use core::task::Poll;
 
 use super::bus::Bus;
-use super::posted::Posted;
+use super::posted::{Posted, PostedWords};
 use super::shared::Shared;
 use super::signal::Signal;
 use crate::time::Instant;
@@ -21,12 +21,21 @@ impl Shared {
             ring: board.ring(),
             carriers: self.carriers,
             holds: board.clocks.holds(),
+            times: board.clocks.times.news(),
         }
     }
 
-    /// Whether a procedure waits for posted words.
+    fn posted_words(&self) -> PostedWords {
+        let (carriers, requests) = (self.carriers, self.bell.rung());
+        let Some(board) = &self.board else { return PostedWords { carriers, requests, ..PostedWords::default() } };
+        let (supervision, ring, holds) = (board.supervision_word(), board.ring_word(), board.clocks.holds());
+        PostedWords { supervision, ring, carriers, requests, holds }
+    }
+
+    /// Whether a procedure waits for posted words, and these have changed.
+    #[inline]
     pub(super) fn is_posted(&self) -> bool {
-        !self.watchers.waiting.is_empty() && self.posted() != self.watchers.seen
+        !self.watchers.waiting.is_empty() && self.posted_words() != self.watchers.seen
     }
 
     /// Wakes the procedures that wait for a change, if a posted word has changed.
@@ -34,7 +43,7 @@ impl Shared {
         if !self.is_posted() {
             return;
         }
-        self.watchers.seen = self.posted();
+        self.watchers.seen = self.posted_words();
         for task in core::mem::take(&mut self.watchers.waiting) {
             self.wake(task);
         }
@@ -67,7 +76,7 @@ impl Bus {
                 return Poll::Ready(());
             }
             let task = shared.current;
-            shared.watchers.seen = posted;
+            shared.watchers.seen = shared.posted_words();
             if !shared.watchers.waiting.contains(&task) {
                 shared.watchers.waiting.push(task);
             }

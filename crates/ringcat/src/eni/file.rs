@@ -6,15 +6,14 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
-use ringcat_config::{Configuration, follow};
-use ringcat_engine::config::{ConfigError, Resolution, resolve};
+use ringcat_config::{Configuration, Difference, Stated, follow};
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::main_device::{Declaration, SubDeviceId};
+use ringcat_engine::main_device::Declaration;
+use ringcat_engine::topology::Topology;
 #[cfg(feature = "sim")]
 use ringcat_sim::network::Network;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
-use ringcat_wire::address::Position;
 
 #[cfg(feature = "sim")]
 use super::segment::segment;
@@ -50,24 +49,6 @@ pub enum LoadFailure {
     TooLarge,
     /// It is not an ENI, or its content cannot be used.
     Eni(Box<EniError>),
-}
-
-/// A difference between a network and a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Difference {
-    /// Index in the file; `None` for a SubDevice that is not in it.
-    pub subdevice: Option<SubDeviceId>,
-    /// The network cannot be activated with this difference.
-    pub is_grave: bool,
-    /// The difference, as text for the operator.
-    pub text: String,
-}
-
-impl fmt::Display for Difference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
-    }
 }
 
 impl fmt::Display for LoadError {
@@ -123,50 +104,29 @@ impl EniFile {
 
     /// Names of the SubDevices for messages: name and station address of the file.
     pub fn names(&self) -> Names {
-        let name = |facts: &ringcat_config::SubDeviceFacts| match facts.station {
-            Some(station) => format!("{} ({station})", facts.name),
-            None => facts.name.clone(),
-        };
-        Names(self.configuration.subdevices.iter().map(name).collect())
+        Names(self.configuration.names())
     }
 
     /// Compares the SubDevices of a scan with the file. Returns each SubDevice that is missing, has another identity,
     /// or is not in the file.
     pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
-        let configs = &self.configuration.declaration.subdevices;
-        let names = self.names().0;
-        let name = |config: usize| names.get(config).cloned().unwrap_or_default();
-        let differs = |config: usize, is_grave: bool, error: &ConfigError| Difference {
-            subdevice: Some(SubDeviceId(config)),
-            is_grave,
-            text: format!("SubDevice {config} \"{}\" of the file: {error}", name(config)),
+        self.configuration.compare(found)
+    }
+
+    /// What the file states of each SubDevice besides the declaration (`Info`), to compare it with a network.
+    pub fn stated(&self) -> Vec<Stated> {
+        let stated = |subdevice: &ringcat_config::eni::SubDevice| {
+            let mut stated = Stated::default();
+            stated.device = subdevice.vendor_id.zip(subdevice.product_code);
+            stated.revision = subdevice.revision;
+            stated
         };
-        let mut differences = Vec::new();
-        // A SubDevice of another identity is reported once.
-        let mut told = Vec::new();
-        for resolution in resolve(configs, found) {
-            match resolution {
-                Resolution::Found { .. } => {}
-                Resolution::Absent { config, error } => {
-                    told.extend(in_its_place(&error));
-                    differences.push(differs(config, false, &error));
-                }
-                Resolution::Failed { config, error } => {
-                    told.extend(in_its_place(&error));
-                    differences.push(differs(config, true, &error));
-                }
-                Resolution::Extra { info } if told.contains(&found[info].position) => {}
-                Resolution::Extra { info } => {
-                    let SubDeviceInfo { position, name, identity, .. } = &found[info];
-                    let text = format!(
-                        "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
-                        identity.vendor_id, identity.product_code
-                    );
-                    differences.push(Difference { subdevice: None, is_grave: false, text });
-                }
-            }
-        }
-        differences
+        self.eni.subdevices.iter().map(stated).collect()
+    }
+
+    /// Cables that differ from `PreviousPort`.
+    pub fn compare_cables(&self, found: &[SubDeviceInfo], topology: &Topology) -> Vec<Difference> {
+        self.configuration.compare_cables(found, topology)
     }
 
     /// A simulated segment as in the file; with `ring` its end is connected to the redundant interface.
@@ -176,13 +136,5 @@ impl EniFile {
     #[cfg(feature = "sim")]
     pub fn simulated(&self, ring: bool) -> Result<Network, SegmentError> {
         Network::from_description(segment(&self.eni, &self.configuration, ring))
-    }
-}
-
-/// Position of a SubDevice with another identity than expected.
-const fn in_its_place(error: &ConfigError) -> Option<Position> {
-    match error {
-        ConfigError::Mismatch { position, .. } => Some(*position),
-        _ => None,
     }
 }

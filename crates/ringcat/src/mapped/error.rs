@@ -100,6 +100,13 @@ pub enum MapError {
         /// What is mapped.
         mapped: Vec<MappedObject>,
     },
+    /// The names in its SII were not read yet: see [`Options::sii_extent`](crate::Options::sii_extent).
+    NamesNotRead {
+        /// The SubDevice.
+        subdevice: SubDeviceId,
+        /// The wanted object.
+        wanted: Wanted,
+    },
     /// It is mapped in the other direction.
     Direction {
         /// The SubDevice.
@@ -147,6 +154,11 @@ impl fmt::Display for MapError {
                 write!(f, "{}: {wanted} is not mapped; mapped: ", called(*subdevice, name))?;
                 list(f, mapped)
             }
+            MapError::NamesNotRead { subdevice, wanted } => write!(
+                f,
+                "SubDevice {subdevice}: {wanted}: the scan did not read names (option sii_extent), and they were not \
+                 read since: complete_siis() reads them"
+            ),
             MapError::Direction { subdevice, name, object } => {
                 let other = match object.direction {
                     Direction::Inputs => "the SubDevice sends it, so it cannot be set",

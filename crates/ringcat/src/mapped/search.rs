@@ -1,7 +1,7 @@
 //! Finds an object in the process data of a SubDevice, by index or name.
 
 use ringcat_engine::exchange::Entry;
-use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
+use ringcat_engine::info::{Direction, PdoInfo, SiiExtent, SubDeviceInfo};
 use ringcat_engine::main_device::{Directory, SubDeviceId};
 
 use super::bits::{ObjectOf, OutputBits};
@@ -15,6 +15,8 @@ const SEPARATOR: char = '.';
 pub(super) struct Search {
     subdevice: SubDeviceId,
     name: String,
+    /// How much of its SII is known.
+    extent: SiiExtent,
     mapped: Vec<MappedObject>,
 }
 
@@ -25,7 +27,7 @@ impl Search {
         if subdevice.0 >= declared {
             return Err(MapError::NotDeclared { subdevice, declared });
         }
-        let (name, pdos) = info.map_or_else(Default::default, |info| (info.name, info.pdos));
+        let (name, pdos, extent) = info.map_or_else(Default::default, |info| (info.name, info.pdos, info.extent));
         let areas = directory.areas(subdevice).iter();
         let mapped = areas.flat_map(|area| {
             let direction = area.direction;
@@ -35,7 +37,7 @@ impl Search {
             let (pdo, name) = names(&pdos, direction, (index, sub_index));
             MappedObject { index, sub_index, direction, entry, name, pdo }
         });
-        Ok(Search { subdevice, name, mapped: mapped.collect() })
+        Ok(Search { subdevice, name, extent, mapped: mapped.collect() })
     }
 
     pub fn into_mapped(self) -> Vec<MappedObject> {
@@ -63,7 +65,10 @@ impl Search {
     /// Finds a mapped object. If it is mapped in both directions, the wanted direction counts. If it is mapped there
     /// more than once, a search by index returns the first place.
     fn find(self, wanted: &Wanted, direction: Direction) -> Result<MappedObject, MapError> {
-        let Search { subdevice, name, mapped } = self;
+        let Search { subdevice, name, extent, mapped } = self;
+        if matches!(wanted, Wanted::Name(_)) && extent < SiiExtent::Complete {
+            return Err(MapError::NamesNotRead { subdevice, wanted: wanted.clone() });
+        }
         let fits = |object: &&MappedObject| match wanted {
             Wanted::Index { index, sub_index } => (object.index, object.sub_index) == (*index, *sub_index),
             Wanted::Name(name) => is_called(object, name),

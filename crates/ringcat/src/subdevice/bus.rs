@@ -1,7 +1,6 @@
 //! Services without a mailbox: states, registers, ports, the EEPROM, error counters.
 
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::main_device::Address;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
@@ -19,13 +18,15 @@ const STATUS_BYTES: usize = 6;
 impl<S: Services> SubDevice<S> {
     /// Brings the SubDevice to a state while all others continue: INIT, PREOP, BOOT for new firmware, SAFEOP, OP. A
     /// declared SubDevice is configured again on the way up, and is brought back to the state after a loss of power. If
-    /// it refuses the state, it goes back to the previous one. Before activation the states are INIT, PREOP and BOOT.
+    /// it refuses the state, it goes back to the previous one.
+    ///
+    /// A SubDevice without a declaration goes to the state with the defaults of its SII, and exchanges no process data:
+    /// its outputs are zero. With [`Options::idle_operation`](crate::Options) it is kept there.
     pub fn request_state(self, state: AlState) -> S::Outcome<(), SubDeviceError> {
-        let address = self.address;
         self.ask(move |engine, number| {
-            match address {
-                Address::Declared(_) => engine.start_state_request(number, state),
-                Address::Scanned(_) => engine.start_visit(number, state),
+            match engine.is_declared(number) {
+                true => engine.start_state_request(number, state),
+                false => engine.start_visit(number, state),
             }
             .ended()
         })

@@ -6,7 +6,7 @@ use ringcat_engine::main_device::{Address, MainDevice as Engine};
 use super::error::SubDeviceFailure;
 use super::name::SubDeviceName;
 
-/// The number of a SubDevice in the engine: its index in the declaration, before activation its position.
+/// The number of a SubDevice in the engine.
 pub(super) fn find(engine: &Engine, address: Address) -> Result<usize, SubDeviceFailure> {
     let Some(scanned) = engine.scanned_count() else { return Err(SubDeviceFailure::NotScanned) };
     let declared = engine.stations().len();
@@ -14,9 +14,8 @@ pub(super) fn find(engine: &Engine, address: Address) -> Result<usize, SubDevice
         Address::Declared(_) if declared == 0 => Err(SubDeviceFailure::NotActive),
         Address::Declared(subdevice) if subdevice.0 < declared => Ok(subdevice.0),
         Address::Declared(_) => Err(SubDeviceFailure::NotDeclared { declared }),
-        Address::Scanned(_) if declared > 0 => Err(SubDeviceFailure::Active),
-        Address::Scanned(position) if usize::from(position.0) < scanned => Ok(position.0.into()),
-        Address::Scanned(_) => Err(SubDeviceFailure::NoPosition { scanned }),
+        Address::Scanned(_) if declared > 0 && !engine.has_idle_operation() => Err(SubDeviceFailure::Active),
+        Address::Scanned(_) => engine.number(address).ok_or(SubDeviceFailure::NoPosition { scanned }),
     }
 }
 

@@ -51,6 +51,7 @@ where
     W: Future<Output = Result<T, E>> + 'static,
 {
     start::<T, SubDeviceFailure, _>(engine, address, within, move |engine, number| {
+        let opening = if engine.is_declared(number) { Opening::LeftAlone } else { opening };
         let mailbox = reach(engine, number, opening);
         async move {
             let (mailbox, visit) = mailbox?;

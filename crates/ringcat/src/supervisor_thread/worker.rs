@@ -20,7 +20,7 @@ use crate::links::Links;
 use crate::not_ready::Failures;
 use crate::window::Window;
 
-/// Longest sleep while tasks read queues of other threads, or while links have no waker.
+/// Longest sleep while tasks read queues that do not end a sleep, or while links have no waker.
 const LONGEST_SLEEP: Duration = Duration::from_micros(500);
 /// Longest sleep soon after a request, so that a sequence of requests does not wait for each one.
 const SHORT_SLEEP: Duration = Duration::from_micros(50);
@@ -44,8 +44,8 @@ pub(super) struct Request {
 pub(super) enum Attention {
     /// When the engine has worked.
     Engine,
-    /// Every half millisecond: it reads queues that other threads fill.
-    #[cfg(any(feature = "eoe", feature = "gateway"))]
+    /// Every half millisecond: it reads queues that do not end a sleep.
+    #[cfg(feature = "eoe")]
     Often,
 }
 
@@ -65,6 +65,17 @@ pub(super) struct Rest {
     pub counters: AcyclicCounters,
     pub events_dropped: u64,
     pub failures: Failures,
+}
+
+impl Published {
+    /// Publishes the states of the engine. A request that changes them does so before its answer.
+    pub fn states_of(&self, engine: &Engine) {
+        let mut rest = self.rest.lock().unwrap_or_else(PoisonError::into_inner);
+        rest.states = engine.states();
+        rest.ring = engine.ring_status();
+        rest.counters = engine.counters();
+        self.settled.store(engine.all_settled(), Ordering::Release);
+    }
 }
 
 /// What runs in the thread.
@@ -141,7 +152,9 @@ impl<L: Links> Worker<L> {
     fn is_due(&mut self, now: Instant) -> bool {
         let Worker { links, engine, .. } = self;
         engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
-        !self.asked.is_empty()
+        let is_called = links.take_call();
+        is_called
+            || !self.asked.is_empty()
             || self.is_often()
             || now >= self.publish_at
             || self.blocked_until.is_some_and(|at| now >= at)
@@ -211,14 +224,11 @@ impl<L: Links> Worker<L> {
             return;
         }
         self.publish_at = now + PUBLISH;
-        let rest = Rest {
-            states: self.engine.states(),
-            ring: self.engine.ring_status(),
-            counters: self.engine.counters(),
-            events_dropped: self.events_dropped + self.engine.events_dropped(),
-            failures: self.failures.clone(),
-        };
-        *self.published.rest.lock().unwrap_or_else(PoisonError::into_inner) = rest;
-        self.published.settled.store(self.engine.all_settled(), Ordering::Release);
+        let dropped = self.events_dropped + self.engine.events_dropped();
+        let mut rest = self.published.rest.lock().unwrap_or_else(PoisonError::into_inner);
+        rest.events_dropped = dropped;
+        rest.failures = self.failures.clone();
+        drop(rest);
+        self.published.states_of(&self.engine);
     }
 }

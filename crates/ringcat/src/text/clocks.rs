@@ -30,6 +30,12 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::WentOnUnlocked { subdevice, reason } => {
             format!("{}: goes on although clocks are not locked: {reason}", names.of(*subdevice))
         }
+        Event::ApplicationTime { jump_ns, shift_ns: 0 } => {
+            format!("the system time of all clocks is the application's time: changed by {jump_ns} ns")
+        }
+        Event::ApplicationTime { shift_ns, .. } => {
+            format!("the application's time has jumped, SYNC signals go on: it is the system time plus {shift_ns} ns")
+        }
         Event::ClocksFailed { reason } => format!("distributed clocks: {reason}"),
         Event::SyncWindow { inside: true, spread_ns } => format!("clocks within the sync window: {spread_ns} ns"),
         Event::SyncWindow { inside: false, spread_ns } => format!("clocks outside the sync window: {spread_ns} ns"),

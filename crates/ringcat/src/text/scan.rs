@@ -10,6 +10,9 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
     Some(match event {
         Event::Counted { main, redundant } => format!("SubDevices answering: {main} on MAIN, {redundant} on REDUNDANT"),
         Event::ScanProgress { done, total } => format!("scanning: {done} of {total} SubDevices read"),
+        Event::SegmentChanged { subdevices, added, removed } => {
+            format!("the segment has changed: {subdevices} SubDevices, {added} added, {removed} removed")
+        }
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
         Event::SiiOddity { position, what } => format!("{}: SII: {what}", at(*position)),

@@ -14,6 +14,12 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::StateError { subdevice, requested: None, status, code } => {
             format!("{}: changed to {status} by itself: {code}", names.of(*subdevice))
         }
+        Event::UndeclaredFailed { position, reason } => {
+            format!("{}: did not reach its requested state: {reason}", names.at(*position, ends[0]))
+        }
+        Event::UndeclaredState { position, status, code } => {
+            format!("{}: changed to {status} by itself: {code}", names.at(*position, ends[0]))
+        }
         Event::Lost { subdevice } => format!("{}: no longer answers", names.of(*subdevice)),
         Event::Returned { subdevice } => format!("{}: answers again", names.of(*subdevice)),
         Event::Missing { subdevice, optional: true } => format!("{}: absent, which is allowed", names.of(*subdevice)),

@@ -144,7 +144,7 @@ fn a_subdevice_that_stays_in_preop_does_not_keep_a_domain_incomplete() -> Result
     let mut application = main_device.activate(declaration)?;
     run(&mut application, 100);
     assert_eq!(application.states()[1], SubDeviceState::Settled(AlState::PreOp));
-    assert_eq!(application.exchange_mut().status(DomainId(0)).state, DomainState::Complete);
+    assert_eq!(application.exchange_mut().status(DomainId(0)).expect("it is declared").state, DomainState::Complete);
     Ok(())
 }
 
@@ -167,6 +167,6 @@ fn an_absent_optional_subdevice_has_its_place_and_leaves_the_domain_complete() -
     let without_place = |event: &Event| matches!(event, Event::PlanOddity { subdevice: SubDeviceId(4), .. });
     assert!(events.iter().any(without_place), "{events:?}");
     assert!(application.all_settled());
-    assert_eq!(application.exchange_mut().status(DomainId(0)).state, DomainState::Complete);
+    assert_eq!(application.exchange_mut().status(DomainId(0)).expect("it is declared").state, DomainState::Complete);
     Ok(())
 }

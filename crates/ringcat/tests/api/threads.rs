@@ -9,7 +9,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, SubDeviceId, SupervisorThread, automatic};
+use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, Position, SubDeviceId, SupervisorThread, automatic};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::{AlState, AlStatus};
@@ -242,5 +242,31 @@ fn second_copies_are_waited_for_and_no_round_trip_is_as_long_as_a_cycle() -> Res
     let trips = cycles.news().round_trips();
     assert!(trips.count() > 20 && trips.quantile(800_000) < LONG / 4, "{trips}");
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    Ok(())
+}
+
+// covers: threads, stop
+#[test]
+fn two_threads_deactivate_and_activate_another_declaration() -> Result<(), Error> {
+    let (mut cyclic, acyclic) = SharedSegment::halves(network());
+    let plant = cyclic.plant();
+    let options = Options::default().with_idle_operation(true);
+    let mut supervisor = SupervisorThread::start(acyclic, &options, || ())?;
+    let preop = AlStatus::new(AlState::PreOp);
+    let all_in_preop = || plant.with_network(|network| network.devices().all(|device| device.al_status() == preop));
+    until("idle operation brings all to PREOP", all_in_preop);
+    for round in 0..3 {
+        let found = supervisor.with(|engine| engine.subdevices())?;
+        let declaration = automatic(&found[..=round], PERIOD);
+        let application = supervisor.activate(declaration, cyclic)?;
+        let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+        until("all declared are in OP", || cycles.supervisor().all_settled());
+        let op = AlStatus::new(AlState::Op);
+        let in_op = plant.with_network(|network| network.devices().filter(|it| it.al_status() == op).count());
+        assert_eq!(in_op, round + 1);
+        (supervisor, cyclic) = cycles.end()?.deactivate(LastOutputs::Zero, LIMIT)?;
+        assert!(all_in_preop());
+        assert!(supervisor.subdevice(Position(2)).sdo_read::<u32>(0x1018, 1)? > 0);
+    }
     Ok(())
 }

@@ -19,6 +19,8 @@ pub struct Datagram<'a> {
     pub index: u8,
     /// C bit.
     pub circulating: bool,
+    /// ADP, or the lower half of a logical address.
+    pub adp: u16,
     /// ADO, or the upper half of a logical address.
     pub ado: u16,
     /// Event request.
@@ -29,6 +31,13 @@ pub struct Datagram<'a> {
     pub wkc: u16,
     /// Offset of its header in the frame.
     pub at: usize,
+}
+
+impl Datagram<'_> {
+    /// Its logical address.
+    pub fn address(&self) -> u32 {
+        u32::from(self.ado) << 16 | u32::from(self.adp)
+    }
 }
 
 /// A frame.
@@ -62,7 +71,9 @@ impl<'a> Frame<'a> {
         let mut datagrams = Vec::new();
         loop {
             let at = end - rest.len();
-            let [command, index, _, _, ado_low, ado_high, low, high, irq_low, irq_high, behind @ ..] = rest else {
+            let [command, index, adp_low, adp_high, ado_low, ado_high, low, high, irq_low, irq_high, behind @ ..] =
+                rest
+            else {
                 return Err(format!("a datagram at {at} is cut off"));
             };
             let flags = u16::from_le_bytes([*low, *high]);
@@ -77,6 +88,7 @@ impl<'a> Frame<'a> {
                 command: *command,
                 index: *index,
                 circulating: flags & 0x4000 != 0,
+                adp: u16::from_le_bytes([*adp_low, *adp_high]),
                 ado: u16::from_le_bytes([*ado_low, *ado_high]),
                 irq: u16::from_le_bytes([*irq_low, *irq_high]),
                 data,

@@ -19,6 +19,8 @@ pub struct Verdict {
     pub reads: u64,
     /// Frames whose copies on both links were compared.
     pub pairs: u64,
+    /// Frames that were sent again within their cycle, on the main link.
+    pub again: u64,
     /// Copies that came back.
     pub returned: u64,
     /// Copies that did not come back.
@@ -54,6 +56,9 @@ impl fmt::Display for Verdict {
         )?;
         writeln!(f, "reads sent as zeros: {reads}; pairs alike: {pairs}, at most {:?} apart", self.longest_pair)?;
         writeln!(f, "copies that came back: {returned}, that did not: {missing}")?;
+        if self.again > 0 {
+            writeln!(f, "sent again within their cycle: {}", self.again)?;
+        }
         for windows in &self.windows {
             write!(f, "{windows}")?;
         }

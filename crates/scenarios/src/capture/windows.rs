@@ -36,6 +36,8 @@ pub struct Sent {
     pub link: usize,
     /// Whether it is acyclic.
     pub acyclic: bool,
+    /// Whether it is sent again within its cycle: it begins none.
+    pub again: bool,
     /// Its bytes without FCS.
     pub length: usize,
     /// Delay after the first copy, if it is the second copy.
@@ -63,6 +65,8 @@ pub struct Windows {
     pub longest_hold_up: Duration,
     /// Largest time by which a frame of `crossed` exceeds its point.
     pub furthest: Duration,
+    /// Frames sent again that found an acyclic frame on the wire.
+    pub tries_held_up: u64,
     /// Crossings that a sender without windows would have made by chance.
     pub by_chance: u64,
 }
@@ -80,7 +84,11 @@ impl fmt::Display for Windows {
              {crossed_in_stalls}; by chance it would be {}",
             self.furthest, self.by_chance
         )?;
-        writeln!(f, "  cycles held up by an acyclic frame: {held_up}, by {:?} at most", self.longest_hold_up)
+        writeln!(f, "  cycles held up by an acyclic frame: {held_up}, by {:?} at most", self.longest_hold_up)?;
+        if self.tries_held_up > 0 {
+            writeln!(f, "  frames sent again behind an acyclic frame: {}", self.tries_held_up)?;
+        }
+        Ok(())
     }
 }
 
@@ -108,7 +116,8 @@ struct Grid {
 
 impl Grid {
     fn find(sent: &[Sent], period: Option<Duration>) -> Option<Grid> {
-        let cyclic: Vec<u64> = sent.iter().filter(|frame| !frame.acyclic).map(|frame| frame.time_ns).collect();
+        let cyclic: Vec<u64> =
+            sent.iter().filter(|frame| !frame.acyclic && !frame.again).map(|frame| frame.time_ns).collect();
         let period_ns = period.map_or_else(|| usual_distance(&cyclic), |period| period.as_nanos() as i64);
         if cyclic.len() < 10 || period_ns <= 0 {
             return None;
@@ -155,7 +164,7 @@ fn usual_distance(times: &[u64]) -> i64 {
 fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
     let mut windows = Windows { period: Duration::from_nanos(grid.period_ns as u64), ..Windows::default() };
     let (Some(first), Some(last)) = (grid.starts.first(), grid.starts.last()) else { return windows };
-    let (mut free_ns, mut chance_ns) = (0, 0);
+    let (mut free_ns, mut chance_ns, mut acyclic_until) = (0, 0, 0);
     // Acyclic frames since the last cycle: times at which they have left the wire.
     let mut waiting: Vec<(u64, bool)> = Vec::new();
     let mut starts = grid.starts.iter().copied().peekable();
@@ -165,7 +174,9 @@ fn measure_link(sent: &[Sent], grid: &Grid) -> Windows {
             waiting.clear();
         }
         let busy_ns = wire_ns(frame.length);
+        windows.tries_held_up += u64::from(frame.again && acyclic_until > frame.time_ns);
         free_ns = free_ns.max(frame.time_ns) + busy_ns;
+        acyclic_until = if frame.acyclic { free_ns } else { acyclic_until };
         if frame.acyclic && (*first..*last).contains(&frame.time_ns) {
             windows.acyclic += 1;
             chance_ns += busy_ns;

@@ -44,6 +44,8 @@ const PLANTS: [Plant; 3] = [
 ];
 const TWO_HUNDRED: Plant = Plant { outputs: 90, inputs: 89, servos: 20, coupler: true };
 const RING_OF_16: Plant = Plant { outputs: 8, inputs: 5, servos: 2, coupler: true };
+/// All of them may receive their process data twice in a cycle.
+const RING_OF_10: Plant = Plant { outputs: 5, inputs: 4, servos: 0, coupler: true };
 
 impl Plant {
     fn count(&self) -> usize {

@@ -9,10 +9,11 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
 use ringcat::{Application, LastOutputs, MainDevice, Options, automatic};
 use ringcat_link::Recorder;
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
+use ringcat_wire::register::map;
 use scenarios::capture::ethercat::Frame;
 use scenarios::capture::pcapng::{Capture, Packet};
 use scenarios::capture::{Verdict, judge, judge_frames};
@@ -28,6 +29,11 @@ type Recorded = Application<Tee<SimulatedSegment>>;
 
 /// Records scan, OP, `work` and stop; returns the file.
 fn recorded(network: Network, ring: bool, work: impl FnOnce(&mut Recorded)) -> Vec<u8> {
+    recorded_as(network, ring, false, work)
+}
+
+/// As [`recorded`], with lost frames sent again or not.
+fn recorded_as(network: Network, ring: bool, again: bool, work: impl FnOnce(&mut Recorded)) -> Vec<u8> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let number = COUNT.fetch_add(1, Ordering::Relaxed);
     let path: PathBuf = std::env::temp_dir().join(format!("ringcat-capture-{}-{number}.pcapng", std::process::id()));
@@ -36,7 +42,8 @@ fn recorded(network: Network, ring: bool, work: impl FnOnce(&mut Recorded)) -> V
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
-    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    let declaration = automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(again);
+    let mut application = main_device.activate(declaration).expect("it fits");
     settle(&mut application);
     work(&mut application);
     application.stop(LastOutputs::Zero, AlState::Init, LIMIT).expect("all go to INIT");
@@ -84,6 +91,51 @@ fn eventful() -> Vec<u8> {
         settle(run);
         cycles(run, 100);
     })
+}
+
+/// A ring of 16 that loses frames on a cable while registers are read; also the number of frames sent again.
+fn lossy() -> (Vec<u8>, u64) {
+    let mut sent_again = 0;
+    let bytes = recorded_as(ring_of_16(Duration::from_micros(10)), true, true, |run| {
+        cycles(run, 200);
+        for round in 0..40 {
+            let direction = Some(Direction::AToB);
+            fault(run, &Fault::Drop { cable: CableId(round % 16 + 1), direction, count: 1 });
+            let _ended = run.engine_mut().start_register_read(round % 16, map::USER_RAM, 64);
+            cycles(run, 5);
+        }
+        sent_again = run.cyclic_counters().sent_again;
+    });
+    (bytes, sent_again)
+}
+
+// covers: capture, lost-frames
+#[test]
+fn a_capture_of_frames_that_are_sent_again_has_no_findings() {
+    let (bytes, sent_again) = lossy();
+    let verdict = judge(&bytes, None).expect("a capture");
+    println!("{verdict}");
+    assert_eq!(verdict.broken, 0, "{verdict}");
+    assert!(verdict.again == sent_again && sent_again > 20, "{sent_again}: {verdict}");
+    for windows in &verdict.windows {
+        assert_eq!((windows.period, windows.crossed, windows.held_up), (CYCLE, 0, 0), "{verdict}");
+        assert_eq!((windows.late, windows.tries_held_up), (0, 0), "a further try begins no cycle: {verdict}");
+    }
+    // The same with outputs of another cycle in a further try.
+    let mut capture = read(&bytes);
+    let mut is_again = false;
+    for packet in capture.packets.iter_mut().filter(|packet| packet.sent) {
+        let frame = Frame::parse(&packet.bytes).expect("it was sent");
+        let logical = frame.datagrams.iter().all(|datagram| datagram.command >= LRD);
+        let written = frame.datagrams.iter().find(|datagram| datagram.command == LWR).map(|datagram| datagram.at);
+        if let Some(at) = written.filter(|_| logical && !frame.is_acyclic()) {
+            packet.bytes[at + 10] ^= 0x40;
+            is_again = true;
+            break;
+        }
+    }
+    let verdict = judge_frames(&capture, None).expect("a capture");
+    assert!(is_again && verdict.findings.iter().any(|it| it.contains("sent again with other outputs")), "{verdict}");
 }
 
 fn read(bytes: &[u8]) -> Capture {

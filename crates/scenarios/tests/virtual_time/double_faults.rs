@@ -28,6 +28,7 @@ use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 use scenarios::check::Delivery;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{
     MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, TWO_RINGS, at, descriptions, wired_with,
 };
@@ -191,7 +192,7 @@ impl Run {
         let options = Options::default().with_junctions(JunctionMode::Automatic);
         let mut domains = 0;
         let declare = |scan: &Scan| {
-            let declaration = declare(scan, &mut dice);
+            let declaration = declare(scan, &mut dice).with_lost_frames_sent_again(seeds::sends_again(seed));
             domains = declaration.domains.len();
             declaration
         };

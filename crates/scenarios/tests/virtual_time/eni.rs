@@ -118,7 +118,7 @@ impl Plant {
     }
 
     fn is_complete(&mut self) -> bool {
-        self.application.exchange_mut().status(DomainId(0)).state == DomainState::Complete
+        self.application.exchange_mut().status(DomainId(0)).expect("it is declared").state == DomainState::Complete
     }
 
     /// All SubDevices in OP, with all clocks locked.
@@ -256,7 +256,7 @@ fn bring_up(path: &Path) -> Result<u32, String> {
     plant.run(20);
     let network = plant.application.links().network();
     assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
-    let status = plant.application.exchange_mut().status(DomainId(0));
+    let status = plant.application.exchange_mut().status(DomainId(0)).expect("it is declared");
     assert_eq!((status.wkc, status.state), (status.expected, DomainState::Complete));
     Ok(status.wkc)
 }

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, automatic};
+use ringcat::{Event, Options, Scan, automatic};
 use ringcat_sim::cable::{CableId, Direction, Endpoint};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port;
@@ -13,6 +13,7 @@ use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, devices};
 use scenarios::world::{CYCLE, World};
 
@@ -84,8 +85,9 @@ fn run(seed: u64, course: Course) -> Vec<String> {
         }
     }
     let options = Options::default().with_enhanced_line_crossed(course == Course::Enhanced);
-    let mut world =
-        World::with(seed, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("activation");
+    let declare =
+        |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed));
+    let mut world = World::with(seed, network, &options, declare).expect("activation");
     // Lost copies change the devices; freshness is checked in other scenarios.
     world.judge_latched(false);
     if course == Course::Scan {

@@ -20,6 +20,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{PortKind, map};
 use scenarios::check::Delivery;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{
     MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_IN_RING, TWO_RINGS, at, descriptions, line, ring, wired_with,
 };
@@ -99,7 +100,7 @@ fn subdevices_that_latch_fmmus_before_safeop_exchange_process_data() {
         world.settle();
     }
     world.run_cycles(20);
-    assert_eq!(world.application().exchange().status(DOMAIN).state, DomainState::Complete);
+    assert_eq!(world.application().exchange().status(DOMAIN).expect("it is declared").state, DomainState::Complete);
     assert!(world.all_in_op());
 }
 
@@ -357,16 +358,33 @@ impl Run {
     }
 }
 
-/// Runs a seed; returns the number of proven areas of process data.
-fn run(seed: u64) -> u64 {
+/// Amount of checks of a seed.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    /// Areas of process data that were found in the logs of their devices.
+    proven: u64,
+    /// Frames that were sent again.
+    again: u64,
+    /// Areas that these frames spared, as they must.
+    spared: u64,
+}
+
+/// Runs a seed.
+fn run(seed: u64) -> Tally {
     let mut dice = Dice::new(seed);
     let (network, cables) = random_segment(&mut dice);
     let under_way = 1 + dice.below(3) as u8;
-    let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
+    let declare = |scan: &ringcat::Scan| {
+        let declaration = automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
+        declaration.with_lost_frames_sent_again(seeds::sends_again(seed))
+    };
     let mut world =
         World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Latched outputs are checked elsewhere; here only the logs are used.
     world.judge_latched(false);
+    if under_way == 1 {
+        world.compare_tries();
+    }
     world.settle();
     let lost = *dice.pick(&[0, 0, 0, 1, 10, 50, 200]);
     world.application_mut().links_mut().lose_per_mille(lost, seed);
@@ -387,26 +405,35 @@ fn run(seed: u64) -> u64 {
         world.all_in_op() && last == Some(Delivery::Complete)
     });
     run.world.run_cycles(20);
-    let status = run.world.application().exchange().status(DOMAIN);
+    let status = run.world.application().exchange().status(DOMAIN).expect("it is declared");
     assert_eq!(status.state, DomainState::Complete);
-    run.world.proven()
+    let again = run.world.application().cyclic_counters().sent_again;
+    Tally { proven: run.world.proven(), again, spared: run.world.spared() }
 }
 
 fn runs(seeds: Range<u64>) {
-    let (mut proven, mut failed) = (0, Vec::new());
+    let (mut all, mut failed) = (Tally::default(), Vec::new());
     for seed in seeds.clone() {
         match std::panic::catch_unwind(|| run(seed)) {
-            Ok(areas) => proven += areas,
+            Ok(one) => {
+                let Tally { proven, again, spared } = all;
+                all = Tally { proven: proven + one.proven, again: again + one.again, spared: spared + one.spared };
+            }
             Err(_) => failed.push(seed),
         }
     }
     println!(
-        "freshness, seeds {} to {}: {proven} areas of process data found in the logs of their devices, {} seeds failed",
+        "freshness, seeds {} to {}: {} areas of process data found in the logs of their devices, {} frames sent again, \
+         {} areas spared, {} seeds failed",
         seeds.start,
         seeds.end - 1,
+        all.proven,
+        all.again,
+        all.spared,
         failed.len()
     );
     assert_eq!(failed, [], "seeds that fail");
+    assert!(all.again > 0 && all.spared > 0 || seeds.end - seeds.start < 100, "frames were lost in some seeds");
 }
 
 // covers: freshness
@@ -423,5 +450,5 @@ fn fresh_inputs_were_written_into_this_frame_seeds_100_to_199() {
 
 #[test]
 fn seeds_from_the_environment() {
-    crate::explorer::from_environment(|seed| println!("{} areas of process data proven", run(seed)), runs);
+    crate::explorer::from_environment(|seed| println!("{} areas of process data proven", run(seed).proven), runs);
 }

@@ -19,6 +19,7 @@ use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 use scenarios::check::Delivery;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{descriptions, devices, line, ring};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, Mark, World};
@@ -348,8 +349,10 @@ fn random_network(dice: &mut Dice) -> (Network, usize) {
 fn run(seed: u64) -> u64 {
     let mut dice = Dice::new(seed ^ 0x4C07);
     let (network, cables) = random_network(&mut dice);
+    let declare = |scan: &Scan| declare(scan).with_lost_frames_sent_again(seeds::sends_again(seed));
     let mut world = World::with(seed, network, &Options::default(), declare).expect("scan and activation");
     world.judge_latched(false);
+    world.compare_tries();
     world.until(LIMIT, "all settled", |world| world.application().all_settled());
     let lost = *dice.pick(&[0, 0, 10, 50]);
     world.application_mut().links_mut().lose_per_mille(lost, seed);

@@ -97,7 +97,11 @@ fn of_two_subdevices_at_one_address_that_of_this_session_keeps_it() {
             if cycle > 2 {
                 let exchange = application.exchange();
                 assert_eq!(exchange.freshness(DOMAIN, 1) == Freshness::Fresh, kind != "digital-output-8", "{what}");
-                assert_eq!(exchange.status(DOMAIN).state, DomainState::Complete, "{what}, cycle {cycle}");
+                assert_eq!(
+                    exchange.status(DOMAIN).expect("it is declared").state,
+                    DomainState::Complete,
+                    "{what}, cycle {cycle}"
+                );
                 assert_eq!(exchange.image(DOMAIN), image, "{what}, cycle {cycle}");
             }
         }
@@ -169,7 +173,7 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     network.cut(CableId(2));
     network.power_on(DeviceIndex(1));
     (0..2_000).for_each(|_| application.cycle(|_| ()));
-    assert_eq!(application.exchange().status(DOMAIN).state, DomainState::Complete);
+    assert_eq!(application.exchange().status(DOMAIN).expect("it is declared").state, DomainState::Complete);
     assert_eq!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
 }
 

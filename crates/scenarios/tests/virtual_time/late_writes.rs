@@ -27,7 +27,7 @@ fn world() -> World {
 }
 
 fn is_well(world: &World) -> bool {
-    let status = world.application().exchange().status(DomainId(0));
+    let status = world.application().exchange().status(DomainId(0)).expect("it is declared");
     world.all_in_op() && world.application().all_settled() && status.state == DomainState::Complete
 }
 

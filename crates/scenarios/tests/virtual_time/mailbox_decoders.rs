@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use scenarios::dice::Dice;
-use scenarios::fuzz_targets::{TARGETS, Target, eni, esi, mutate, seeds};
+use scenarios::fuzz_targets::{TARGETS, Target, eni, esi, mutate, network, seeds};
 use scenarios::seeds::from_environment;
 
 /// Mutants of each file of a corpus.
@@ -112,6 +112,23 @@ fn mutants_of_an_esi_are_descriptions_with_images_or_errors() {
             let share = readable * 100 / (ENI_MUTANTS + 1);
             assert!((10..90).contains(&share), "{share} % are read: the changes are too small or too large");
         }
+    }
+}
+
+// covers: network-file
+#[test]
+fn mutants_of_a_network_file_are_networks_with_a_canonical_text_or_errors() {
+    for seed in from_environment().unwrap_or(13..14) {
+        let mut dice = Dice::new(seed);
+        let mut readable = 0;
+        for number in 0..=ENI_MUTANTS {
+            let whole = network::WHOLE;
+            let mutant = if number == 0 { whole.to_owned() } else { network::mutate(whole, &mut dice) };
+            let _running = Running("network", mutant.as_bytes());
+            readable += usize::from(network::is_read(mutant.as_bytes()));
+        }
+        let share = readable * 100 / (ENI_MUTANTS + 1);
+        assert!((10..90).contains(&share), "{share} % are read: the changes are too small or too large");
     }
 }
 

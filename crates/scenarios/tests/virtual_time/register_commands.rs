@@ -194,7 +194,7 @@ fn a_command_may_have_its_own_time_limit() {
     assert!(text.contains("25 ms"), "{text}");
 }
 
-// covers: 8.2, eni-commands
+// covers: 8.2, eni-image
 #[test]
 fn a_register_check_ends_when_its_subdevice_loses_power() {
     let mut world = world(&[check(Transition::Ps, map::AL_STATUS, &[8, 0], &[0x0F, 0], 3_600_000)]);

@@ -62,14 +62,18 @@ fn inputs_of_a_disabled_sync_manager_are_not_fresh() {
                     if dead == 1 || fmmus.is_some() {
                         assert_eq!(exchange.freshness(DOMAIN, 0), Freshness::Fresh, "{what}");
                     }
-                    assert_eq!(exchange.status(DOMAIN).state, DomainState::Incomplete, "{what}");
+                    assert_eq!(
+                        exchange.status(DOMAIN).expect("it is declared").state,
+                        DomainState::Incomplete,
+                        "{what}"
+                    );
                 }
                 let now = world.now();
                 assert!(world.network_mut().device_mut(DeviceIndex(1)).controller.pdi_write(control, &[0], now));
                 world.until(Duration::from_secs(1), &what, |world| {
                     let exchange = world.application().exchange();
                     let is_fresh = exchange.freshness(DOMAIN, 1) == Freshness::Fresh;
-                    is_fresh && exchange.status(DOMAIN).state == DomainState::Complete
+                    is_fresh && exchange.status(DOMAIN).expect("it is declared").state == DomainState::Complete
                 });
             }
         }

@@ -48,7 +48,7 @@ fn states(world: &World) -> Vec<AlState> {
 /// All declared SubDevices are in OP, and the process data is complete.
 fn until_settled(world: &mut World) {
     world.until(Duration::from_secs(3), "all in OP and complete", |world| {
-        let status = world.application().exchange().status(DomainId(0));
+        let status = world.application().exchange().status(DomainId(0)).expect("it is declared");
         world.application().all_settled() && status.wkc == status.expected
     });
 }
@@ -129,7 +129,7 @@ fn a_subdevice_of_another_main_device_is_set_to_init_and_left_out() {
     let device = world.network().device(DeviceIndex(5));
     assert_eq!(device.al_status(), AlStatus::new(AlState::Init));
     assert_eq!(device.controller.register(map::FMMU_BASE, Fmmu::LEN), [0; Fmmu::LEN]);
-    let status = world.application().exchange().status(DomainId(0));
+    let status = world.application().exchange().status(DomainId(0)).expect("it is declared");
     assert_eq!(status.wkc, status.expected);
 }
 

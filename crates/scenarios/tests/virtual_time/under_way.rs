@@ -235,7 +235,7 @@ fn inputs_never_become_older_through_breaks_and_are_complete_after() {
         stamped.run(50);
         let before = stamped.incomplete();
         stamped.run(50);
-        let status = stamped.world.application().exchange().status(DOMAIN);
+        let status = stamped.world.application().exchange().status(DOMAIN).expect("it is declared");
         assert_eq!((stamped.incomplete() - before, status.state), (0, DomainState::Complete), "seed {seed}");
         assert_eq!(stamped.world.left_op(mark), [], "seed {seed}");
         assert!(stamped.world.application().cyclic_counters().incomplete > 0, "seed {seed}: nothing was lost");

@@ -29,6 +29,9 @@ impl Controller {
         {
             self.system_time_written(u32::from_le_bytes([*a, *b, *c, *d]), first_bit);
         }
+        if is(map::DC_SYSTEM_TIME_OFFSET, 8) {
+            self.sync_unit.offset_written(self.memory.u64(map::DC_SYSTEM_TIME_OFFSET), self.clock.local(now));
+        }
         if is(map::DC_SPEED_COUNTER_START, 2) {
             self.clock.restart_loop(now);
             self.memory.set_u32(map::DC_SYSTEM_TIME_DIFFERENCE, 0);

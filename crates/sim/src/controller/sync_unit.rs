@@ -33,6 +33,10 @@ pub(super) struct SyncUnit {
     implausible: bool,
     /// Numbers of acknowledged SYNC0 and SYNC1 pulses.
     seen: [u64; 2],
+    /// DC_SYSTEM_TIME_OFFSET.
+    offset: u64,
+    /// Pulses of SYNC0 before `first`.
+    before: u64,
 }
 
 impl SyncUnit {
@@ -43,7 +47,7 @@ impl SyncUnit {
         if runs {
             return;
         }
-        (self.first, self.implausible, self.seen) = (None, false, [0; 2]);
+        (self.first, self.implausible, self.seen, self.before) = (None, false, [0; 2], 0);
         if !activation.cyclic_unit {
             return;
         }
@@ -63,6 +67,18 @@ impl SyncUnit {
         self.first = (!self.implausible && comes).then(|| now.wrapping_add(ahead));
     }
 
+    /// DC_SYSTEM_TIME_OFFSET was written. An active unit compares the system time with the time of its next pulse,
+    /// which stays the same: after a jump beyond it there are no pulses, after a jump back none until then.
+    pub fn offset_written(&mut self, offset: u64, local: u64) {
+        let (was, is) = (local.wrapping_add(self.offset), local.wrapping_add(offset));
+        self.offset = offset;
+        if was == is || self.first.is_none() {
+            return;
+        }
+        (self.before, self.first) = (self.pulses(was), self.next_sync0(was));
+        self.first = self.first.filter(|next| next.wrapping_sub(is) < 1 << 63);
+    }
+
     /// Whether a write to the start time activates the unit.
     pub fn awaits_start_time(&self) -> bool {
         self.activation.auto_activation && !self.activation.cyclic_unit
@@ -70,7 +86,8 @@ impl SyncUnit {
 
     /// Pulses of SYNC0 up to a system time.
     pub fn pulses(&self, now: u64) -> u64 {
-        self.first.filter(|_| self.activation.sync0).map_or(0, |first| pulses(first, self.settings.sync0_cycle_ns, now))
+        let later = |first| pulses(first, self.settings.sync0_cycle_ns, now);
+        self.before + self.first.filter(|_| self.activation.sync0).map_or(0, later)
     }
 
     /// Pulses of SYNC1 up to a system time.
@@ -197,6 +214,22 @@ mod tests {
         let settings = SyncSettings { start, sync0_cycle_ns: 1_000, sync1_cycle_ns: 300, wide, acknowledged: true };
         unit.activate(activation, settings, now);
         unit
+    }
+
+    #[test]
+    fn a_jump_of_the_system_time_moves_no_pulse_and_one_beyond_the_next_pulse_ends_them() {
+        let mut unit = SyncUnit::default();
+        let cyclic = DcActivation { cyclic_unit: true, sync0: true, ..DcActivation::default() };
+        let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, wide: true, ..SyncSettings::default() };
+        unit.activate(cyclic, settings, 0);
+        assert_eq!((unit.pulses(12_500), unit.next_sync0(12_500)), (3, Some(13_000)));
+        // 300 ns forward before the next pulse, then 5 us back.
+        unit.offset_written(300, 12_500);
+        assert_eq!((unit.pulses(12_800), unit.next_sync0(12_800)), (3, Some(13_000)));
+        unit.offset_written(300_u64.wrapping_sub(5_000), 12_600);
+        assert_eq!((unit.pulses(7_900), unit.next_sync0(7_900)), (3, Some(13_000)));
+        unit.offset_written(100_000, 12_700);
+        assert_eq!((unit.pulses(112_700), unit.next_sync0(112_700)), (3, None));
     }
 
     // covers: 7.3

@@ -107,7 +107,8 @@ impl File {
                         None => at,
                     }
                 }
-                None => message,
+                // The reader names no place only for a key of too many parts.
+                None => message.at_line(line_of_longest_key(text)),
             }
         })
     }
@@ -202,6 +203,12 @@ fn describe(message: &str) -> String {
         words.collect::<Vec<_>>().join(" ")
     });
     words.collect::<Vec<_>>().join(", ")
+}
+
+/// The line with the most points: that of a key of too many parts.
+fn line_of_longest_key(text: &str) -> usize {
+    let longest = (1..).zip(text.lines()).max_by_key(|(_, line)| line.matches('.').count());
+    longest.map_or(1, |(number, _)| number)
 }
 
 pub(super) type Place = Option<core::ops::Range<usize>>;

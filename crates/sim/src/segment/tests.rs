@@ -249,6 +249,18 @@ fn errors_name_line_and_device() {
 }
 
 #[test]
+fn a_key_of_too_many_parts_and_too_deep_a_value_have_a_line() {
+    for parts in [81, 1000] {
+        let key = vec!["a"; parts].join(".");
+        for text in [format!("[segment]\nname = \"x\"\n{key} = 1\n"), format!("[segment]\n\n[{key}]\n")] {
+            assert_eq!(refused(&text), "line 3: recursion limit", "{parts} parts");
+        }
+    }
+    let nested = format!("\n[segment]\nname = {}{}", "[".repeat(200), "]".repeat(200));
+    assert!(refused(&nested).starts_with("line 3: cannot recurse further"), "{}", refused(&nested));
+}
+
+#[test]
 fn a_missing_file_is_named() {
     let error = Segment::load(Path::new("nowhere/none.toml")).unwrap_err();
     assert_eq!(error.file, Some(PathBuf::from("nowhere/none.toml")));

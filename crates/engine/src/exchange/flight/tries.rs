@@ -1,10 +1,9 @@
 //! What a frame needs to be sent again within its cycle: the outputs of its first try, and what its copies prove.
 
-use super::CyclicFrame;
+use super::{CyclicFrame, Shown};
 use crate::exchange::image::InputNumber;
 use crate::exchange::proved::Proved;
 use crate::link::Link;
-use crate::ring::Arrivals;
 
 impl CyclicFrame {
     /// Bits of the links on which copies leave.
@@ -28,7 +27,7 @@ impl CyclicFrame {
 
     /// What the received copies prove about a SubDevice in a process data datagram.
     pub(crate) fn proves(&self, datagram: usize, subdevice: usize) -> Proved {
-        let links = Link::ALL.map(|link| self.arrivals.arrived & link.bit() != 0);
+        let links = Link::ALL.map(|link| self.shown.arrivals.arrived & link.bit() != 0);
         self.places.get(datagram).map_or(Proved::default(), |place| place.proves(subdevice, links))
     }
 
@@ -56,10 +55,6 @@ impl CyclicFrame {
             }
         }
         self.left = first.left;
-        self.wkc = 0;
-        self.is_overtaken = false;
-        self.complete = false;
-        self.arrivals = Arrivals::default();
-        self.seen = 0;
+        self.shown = Shown::default();
     }
 }

@@ -59,7 +59,7 @@ impl Place {
 impl Span {
     /// Copies from a frame with more bytes around into another one.
     pub fn load_again(&self, origin: &Span, from: &[u8], to: &mut [u8]) {
-        let from_at = origin.frame_at + self.image_at.saturating_sub(origin.image_at);
-        copy(from, from_at, to, self.frame_at, self.length);
+        let from_at = usize::from(origin.frame_at) + self.image_at.saturating_sub(origin.image_at) as usize;
+        copy(from, from_at, to, self.frame_at.into(), self.length);
     }
 }

@@ -32,7 +32,12 @@ pub(in crate::procedures) async fn compensate_drift(bus: Bus, segment: SharedSeg
     };
     let (mut next, mut reading, mut number) = (bus.now(), None, 0);
     while left > 0 {
+        if segment.board.clocks.times.is_called() {
+            break;
+        }
         let Some(stations) = references(&segment.view()) else {
+            // Meanwhile the time may jump.
+            reading = None;
             let from = bus.now();
             let _ = bus.within(PAUSE * left, segment.until(references)).await;
             let waited = bus.now().since(from).as_nanos().div_ceil(PAUSE.as_nanos());

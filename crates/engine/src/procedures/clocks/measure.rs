@@ -212,7 +212,7 @@ async fn survey_segment(bus: &Bus, segment: &SharedSegment) -> Result<Survey, St
         let surveyed = survey_once(bus, segment).await;
         // The ECAT events of ports that changed before have been read and cleared by this survey, so another scan is
         // needed.
-        segment.observe(Observation::ScanAgain);
+        segment.observe(Observation::RoundWanted);
         match surveyed {
             Ok(Some(survey)) => return Ok(survey),
             Ok(None) => {}
@@ -304,9 +304,9 @@ fn evaluate(
     let clocks = view.clocks();
     let at = |station: StationAddress| survey.stations.iter().position(|at| *at == station);
     let is_there = |node: &Node| at(node.station).is_some();
-    let reference = clocks.reference.filter(|index| is_there(&clocks.nodes[*index]));
+    let reference = clocks.reference.filter(|station| at(*station).is_some());
     let reference = reference.or_else(|| clocks.elect(is_there));
-    let on_clock = reference.and_then(|index| at(clocks.nodes[index].station)).unwrap_or(0);
+    let on_clock = reference.and_then(at).unwrap_or(0);
     let passages: Vec<Passage> = survey.stations.iter().map(|station| clocks.passage_of(*station)).collect();
     if let Some(odd) = measurements.disagreement(on_clock) {
         // If most latches of a port show impossible times, no frame enters there.

@@ -10,7 +10,7 @@ use ringcat_wire::register::map;
 use super::measure::{Opening, latch, measure};
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{ClockObservation, Node};
+use crate::segment::clocks::{ClockObservation, LatchedTimes, Node};
 use crate::supervisor::{Bus, BusError};
 
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
@@ -30,7 +30,7 @@ pub(super) async fn set_up(bus: &Bus, segment: &SharedSegment, opening: Opening)
         (view.clocks().stations(), view.clocks().epoch)
     };
     let wanted = bus.now().0.wrapping_add(epoch);
-    let latched = latch(bus, segment, &stations, None).await.map_err(text)?;
+    let latched = latched_times(bus, segment, &stations).await.map_err(text)?;
     segment.observe_clocks(ClockObservation::Latched { latched: &latched, wanted });
     set_filters(bus, segment).await;
     write_all(bus, segment).await.map_err(text)
@@ -62,11 +62,11 @@ async fn write_all(bus: &Bus, segment: &SharedSegment) -> Result<(), BusError> {
 /// Writes the filter depths that differ from the written ones.
 pub(super) async fn set_filters(bus: &Bus, segment: &SharedSegment) {
     let all = segment.view().clocks().filters();
-    let written = bus.gather(all, |bus, (index, station, depths)| async move {
-        bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (index, depths))
+    let written = bus.gather(all, |bus, (station, depths)| async move {
+        bus.fpwr(station, map::DC_FILTER_DIFFERENCE, &depths).await.ok().map(|()| (station, depths))
     });
     // SubDevices without these registers, and absent ones, are not changed.
-    let written: Vec<(usize, [u8; 2])> = written.await.into_iter().flatten().collect();
+    let written: Vec<(StationAddress, [u8; 2])> = written.await.into_iter().flatten().collect();
     segment.observe_clocks(ClockObservation::FiltersWritten(&written));
 }
 
@@ -99,23 +99,30 @@ pub(super) async fn write_delays(bus: &Bus, segment: &SharedSegment, link: Link)
     Ok(())
 }
 
+/// Latches one frame in all clocks.
+async fn latched_times(
+    bus: &Bus,
+    segment: &SharedSegment,
+    stations: &[StationAddress],
+) -> Result<LatchedTimes, BusError> {
+    let latched = latch(bus, segment, stations, None).await?;
+    let times = stations.iter().zip(latched);
+    Ok(times.filter_map(|(station, latched)| Some((*station, latched?))).collect())
+}
+
 /// Sets up one clock that has lost its registers: its offset is computed from a frame that it and its reference latch,
 /// or from the time of the host without a reference.
-pub(super) async fn set_up_one(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), BusError> {
+pub(super) async fn set_up_one(bus: &Bus, segment: &SharedSegment, station: StationAddress) -> Result<(), BusError> {
     let host = bus.now().0;
     let stations = segment.view().clocks().stations();
-    let latched = latch(bus, segment, &stations, None).await?;
-    if latched.get(index).copied().flatten().is_none() {
+    let latched = latched_times(bus, segment, &stations).await?;
+    if !latched.contains_key(&station) {
         return Ok(());
     }
-    segment.observe_clocks(ClockObservation::LatchedFor { index, latched: &latched, host });
-    let (station, registers) = {
-        let view = segment.view();
-        let node = &view.clocks().nodes[index];
-        (node.station, registers(node))
-    };
+    segment.observe_clocks(ClockObservation::LatchedFor { station, latched: &latched, host });
+    let Some(registers) = segment.view().clocks().node_at(station).map(registers) else { return Ok(()) };
     write(bus, station, registers).await?;
-    segment.observe_clocks(ClockObservation::OneSetUp { index });
+    segment.observe_clocks(ClockObservation::OneSetUp(station));
     set_filters(bus, segment).await;
     Ok(())
 }

@@ -14,7 +14,7 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{ClockObservation, Clocks};
+use crate::segment::clocks::{ClockObservation, Clocks, Node};
 use crate::supervisor::{Bus, BusError};
 
 /// Minimum time from the read of the clock to the first pulse (protocol 7.3).
@@ -26,44 +26,41 @@ const MEASURING_LIMIT: Duration = Duration::from_secs(1);
 
 /// Sets up a clock that has lost its registers with its power, or was added later.
 pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, member: usize) -> Result<(), BusError> {
-    let Some(index) = index_of(segment, member) else { return Ok(()) };
+    let Some(station) = clock_of(segment, member) else { return Ok(()) };
     // The first clock of a segment starts the set-up of all, which includes each SubDevice that answers by then.
     let are_set_up = segment.until(|segment| segment.clocks().are_set_up().then_some(()));
     if bus.within(MEASURING_LIMIT, are_set_up).await.is_err() {
         return Ok(());
     }
-    let (station, expected, is_new) = {
-        let view = segment.view();
-        let node = &view.clocks().nodes[index];
-        (node.station, node.offset_ns, node.unit.is_none())
-    };
+    let known = |node: &Node| (node.offset_ns, node.unit.is_none());
+    let Some((expected, is_new)) = segment.view().clocks().node_at(station).map(known) else { return Ok(()) };
     let offset: [u8; 4] = bus.fprd_array(station, map::DC_SYSTEM_TIME_OFFSET).await?;
     if u32::from_le_bytes(offset) == expected as u32 && !is_new {
         return Ok(());
     }
-    segment.observe_clocks(ClockObservation::RegistersLost { index });
+    segment.observe_clocks(ClockObservation::RegistersLost(station));
     // Its delay is known when the segment has been measured with it. The wait is limited for a segment that changes
     // repeatedly.
     let measured = segment.until(|segment| segment.clocks().doubtful_since().is_none().then_some(()));
     let _ = bus.within(MEASURING_LIMIT, measured).await;
-    set_up_one(bus, segment, index).await?;
+    set_up_one(bus, segment, station).await?;
     segment.observe_clocks(ClockObservation::TimeWanted);
     Ok(())
 }
 
 /// The clock of a member; a clock that was not found by the scan is added. `None` if the known clocks are not set up
 /// yet: their set-up includes it.
-fn index_of(segment: &SharedSegment, member: usize) -> Option<usize> {
+fn clock_of(segment: &SharedSegment, member: usize) -> Option<StationAddress> {
     let has_clock = |info: &SubDeviceInfo| info.controller.features.dc;
     {
         let view = segment.view();
-        view.members().get(member)?.info.as_ref().filter(|info| has_clock(info))?;
-        if let Some(index) = view.clocks().index_of(member) {
-            return view.clocks().are_set_up().then_some(index);
+        view.member(member)?.info.filter(|info| has_clock(info))?;
+        if let Some(node) = view.clocks().of_member(member) {
+            return view.clocks().are_set_up().then_some(node.station);
         }
     }
     segment.observe_clocks(ClockObservation::Came { member });
-    segment.view().clocks().index_of(member)
+    segment.view().clocks().of_member(member).map(|node| node.station)
 }
 
 /// Programs the SYNC unit and starts it. The clock must be approximately right by then.
@@ -77,14 +74,18 @@ pub(in crate::procedures) async fn start_signals(
 ) -> Result<(), SignalsError> {
     let [control, activation] = signals.assign_activate.to_le_bytes();
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
+    segment.observe_clocks(ClockObservation::Signals { station, are_starting: false });
     let result = wait_until_about_right(bus, segment, member, limit).await;
     or_go_on(bus, segment, member, result).map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
-    let sync1 = if activation & 0x04 != 0 { signals.sync1_register_ns() } else { 0 };
+    let sync1 = signals.active_sync1_ns();
     let mut cycles = [0; 8];
     cycles[..4].copy_from_slice(&signals.sync0_cycle_ns.to_le_bytes());
     cycles[4..].copy_from_slice(&sync1.to_le_bytes());
     bus.fpwr(station, map::DC_SYNC0_CYCLE, &cycles).await?;
+    // From now on the system time does not jump.
+    segment.until(|segment| (!segment.clocks().are_offsets_due()).then_some(())).await;
+    segment.observe_clocks(ClockObservation::Signals { station, are_starting: true });
     let low = u32::from_le_bytes(bus.fprd_array(station, map::DC_SYSTEM_TIME).await?);
     let near = bus.now().0.wrapping_add(segment.view().clocks().epoch);
     let earliest = extend(low, near).wrapping_add(AHEAD_NS);
@@ -98,9 +99,10 @@ pub(in crate::procedures) async fn start_signals(
 fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
     let begin = match segment.view().clocks().config.pulse_grid {
         PulseGrid::SystemTime => None,
-        PulseGrid::FirstApplicationTime => segment.board.clocks.first_application_time(),
+        PulseGrid::FirstApplicationTime => segment.board.clocks.times.first(),
     };
-    begin.and_then(|begin| begin.checked_rem(cycle)).map_or(0, |ns| ns as i64)
+    let shift = segment.view().clocks().shift();
+    begin.and_then(|begin| begin.wrapping_sub(shift).checked_rem(cycle)).map_or(0, |ns| ns as i64)
 }
 
 /// What follows from clocks that are not locked in time. A SubDevice with an unknown delay never goes on: its time may
@@ -124,10 +126,10 @@ async fn wait_until_about_right(
     limit: Duration,
 ) -> Result<(), NotLocked> {
     let check = |clocks: &Clocks| {
-        let index = clocks.index_of(member);
-        let difference_ns = index.and_then(|index| clocks.nodes.get(index)).and_then(|node| node.difference_ns);
+        let node = clocks.of_member(member);
+        let difference_ns = node.and_then(|node| node.difference_ns);
         let is_near = difference_ns.is_some_and(|ns| ns.unsigned_abs() <= GOOD_ENOUGH_NS);
-        let is_right = clocks.are_set_up() && (is_near || index == clocks.reference);
+        let is_right = clocks.are_set_up() && (is_near || node.map(|node| node.station) == clocks.reference);
         let lack = NotLocked { waited: limit, difference_ns, window_ns: GOOD_ENOUGH_NS, other: None, hidden: None };
         if is_right { Ok(()) } else { Err(lack) }
     };
@@ -149,17 +151,16 @@ pub(in crate::procedures) async fn wait_for_lock(
         (config.lock_limit, config.lock_window_ns, config.lock_samples)
     };
     let check = |clocks: &Clocks| {
-        let own = clocks.index_of(member);
-        let is_open = |index: &usize| {
-            let node = &clocks.nodes[*index];
-            node.has_clock && node.link.is_some() && node.good < samples && Some(*index) != clocks.reference
-        };
+        let own = clocks.of_member(member);
+        let is_open =
+            |node: &&Node| node.has_clock && node.link.is_some() && node.good < samples && !clocks.is_reference(node);
         // Its own clock first: if that is right, another clock is the cause of the wait.
-        let at_fault = own.filter(is_open).or_else(|| (0..clocks.nodes.len()).find(is_open));
-        let difference_ns = at_fault.or(own).and_then(|index| clocks.nodes[index].difference_ns);
-        let other = at_fault.filter(|index| Some(*index) != own).map(|index| clocks.nodes[index].position);
+        let at_fault = own.filter(is_open).or_else(|| clocks.nodes.iter().find(is_open));
+        let difference_ns = at_fault.or(own).and_then(|node| node.difference_ns);
+        let is_other = |node: &&Node| node.member != Some(member);
+        let other = at_fault.filter(is_other).map(|node| node.position);
         // The delay may become known: a branch is unplugged, or known cables are back.
-        let hidden = own.and_then(|index| clocks.hidden(index)).filter(|hidden| !hidden.is_estimated);
+        let hidden = own.and_then(|node| clocks.hidden(node)).filter(|hidden| !hidden.is_estimated);
         let is_locked = clocks.are_set_up() && at_fault.is_none() && hidden.is_none();
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
     };

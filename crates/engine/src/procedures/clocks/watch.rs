@@ -19,10 +19,11 @@ use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, DcSy
 
 use super::changes::{Change, SETTLE, answering, wait_for_change};
 use super::measure::Opening;
+use super::offsets::{write_missed, write_offsets};
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{Answer, ClockObservation, Difference, Due};
+use crate::segment::clocks::{Answer, Answers, ClockObservation, Difference, Due, Node};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
 
@@ -79,6 +80,7 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
 async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
     let mut seen = (segment.board.ring().changes, answering(segment));
+    let mut seen_times = segment.board.clocks.times.news();
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
     loop {
@@ -95,12 +97,17 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
             next_measurement = bus.now() + SETTLE;
         }
         let were_locked = segment.view().clocks().are_locked();
+        let times = segment.board.clocks.times.news();
+        if times != seen_times {
+            (seen_times, next_read) = (times, bus.now());
+        }
         let is_explained = bus.now() < explained_until;
         if changed || bus.now() >= next_read || (is_explained && is_held) {
             read_all(bus, segment, is_explained).await;
             let is_routine = {
                 let view = segment.view();
-                were_locked && !view.clocks().is_any_outside() && !view.clocks().are_links_unconfirmed()
+                let is_certain = !view.clocks().are_links_unconfirmed() && !view.clocks().is_time_pending();
+                were_locked && !view.clocks().is_any_outside() && is_certain
             };
             next_read = if is_routine { bus.now() + ROUTINE } else { bus.now() };
         }
@@ -150,23 +157,22 @@ async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
 /// Reads all differences, and executes the resulting actions.
 async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     let holds = segment.board.clocks.holds();
-    let stations: Vec<Option<StationAddress>> = {
+    let stations: Vec<StationAddress> = {
         let view = segment.view();
-        view.clocks().nodes.iter().map(|node| node.has_clock.then_some(node.station)).collect()
+        view.clocks().nodes.iter().filter(|node| node.has_clock).map(|node| node.station).collect()
     };
     let answers = bus.gather(stations, |bus, station| async move {
-        let Some(station) = station else { return Some(Answer::default()) };
         let target = Target::Station(station, map::DC_SYSTEM_TIME_DIFFERENCE);
         // Including DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE. A lost frame gives no information.
         let reply = bus.transfer(Command::Fprd, target, vec![0; 8], Some(Wkc(1))).await.ok()?;
-        Some(decode(&reply))
+        Some((station, decode(&reply)))
     });
-    let mut answers: Vec<Option<Answer>> = answers.await;
+    let mut answers: Answers = answers.await.into_iter().flatten().collect();
     read_in_front(bus, segment, &mut answers).await;
     segment.observe_clocks(ClockObservation::Answers { answers: &answers, is_explained, holds });
     let due = segment.view().clocks().due();
     match due {
-        Due::Nothing => {}
+        Due::Nothing | Due::Offsets => {}
         Due::Filters => set_filters(bus, segment).await,
         Due::Delays => {
             let links = segment.view().clocks().unwritten();
@@ -180,6 +186,11 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
         }
     }
     follow_reference(bus, segment).await;
+    if segment.view().clocks().are_offsets_due() {
+        write_offsets(bus, segment).await;
+        set_filters(bus, segment).await;
+    }
+    write_missed(bus, segment).await;
 }
 
 fn decode(reply: &Reply) -> Answer {
@@ -200,32 +211,32 @@ fn decode(reply: &Reply) -> Answer {
 /// Clocks that frames pass before the reference receive the time predicted by the host, so their own differences
 /// contain the sending delay of the host. Their true differences are computed from one frame that reads them and the
 /// reference.
-async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option<Answer>]) {
-    let groups: Vec<(usize, Vec<usize>)> = {
+async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut Answers) {
+    let delayed = |node: &Node| (node.station, node.delay_ns);
+    let groups: Vec<_> = {
         let view = segment.view();
-        Link::ALL.into_iter().filter_map(|link| view.clocks().in_front_on(link)).collect()
+        let groups = Link::ALL.into_iter().filter_map(|link| view.clocks().in_front_on(link));
+        let with_delays = |(reference, in_front): (&Node, Vec<&Node>)| {
+            (delayed(reference), in_front.into_iter().map(delayed).collect::<Vec<_>>())
+        };
+        groups.map(with_delays).collect()
     };
     for (reference, in_front) in groups {
         for some in in_front.chunks(IN_A_FRAME) {
-            let stations: Vec<StationAddress> = {
-                let view = segment.view();
-                some.iter().chain([&reference]).map(|index| view.clocks().nodes[*index].station).collect()
-            };
+            let stations = some.iter().chain([&reference]).map(|(station, _)| *station);
             let read = |station| (Command::Fprd, Target::Station(station, map::DC_SYSTEM_TIME), vec![0; 4]);
-            let replies = bus.transfer_all(stations.into_iter().map(read), Some(Wkc(1))).await;
+            let replies = bus.transfer_all(stations.map(read), Some(Wkc(1))).await;
             let Ok(replies) = replies else { continue };
             let Some((of_reference, others)) = replies.split_last() else { continue };
             let time = |reply: &Reply| reply.data.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-            let view = segment.view();
-            let delay = |index: usize| view.clocks().nodes[index].delay_ns;
-            for (index, reply) in some.iter().zip(others) {
-                let Some(answer) = answers[*index].as_mut().filter(|answer| answer.link.is_some()) else { continue };
+            for ((station, delay_ns), reply) in some.iter().zip(others) {
+                let Some(answer) = answers.get_mut(station).filter(|answer| answer.link.is_some()) else { continue };
                 // Another frame passed at another time.
                 if reply.frame != of_reference.frame || [reply, of_reference].map(Reply::wkc) != [Wkc(1); 2] {
-                    answers[*index] = None;
+                    answers.remove(station);
                     continue;
                 }
-                let way = (delay(*index) - delay(reference)) as u32;
+                let way = (delay_ns - reference.1) as u32;
                 let ahead = time(reply).wrapping_sub(time(of_reference)).wrapping_sub(way) as i32;
                 answer.difference = Difference::InFront(ahead);
             }
@@ -235,11 +246,7 @@ async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut [Option
 
 /// Reads the reference clock: the system time at a host time.
 async fn follow_reference(bus: &Bus, segment: &SharedSegment) {
-    let station = {
-        let view = segment.view();
-        view.clocks().reference.map(|index| view.clocks().nodes[index].station)
-    };
-    let Some(station) = station else { return };
+    let Some(station) = segment.view().clocks().reference else { return };
     let target = Target::Station(station, map::DC_SYSTEM_TIME);
     let Ok(reply) = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await else { return };
     let (Some(bytes), Wkc(1)) = (reply.data.first_chunk(), reply.wkc()) else { return };

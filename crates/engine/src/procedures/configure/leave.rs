@@ -14,7 +14,7 @@ impl BringUp<'_> {
     /// Changes to the target state. Without a shorter path the change goes through INIT.
     pub(in crate::procedures) async fn travel(&self) -> Result<(), ConfigureError> {
         let (status, _) = al_state::read_status(self.bus, self.station).await?;
-        let configured = self.segment.view().members()[self.index].configured;
+        let configured = self.segment.view().member(self.index).is_some_and(|member| member.configured);
         let from = status.al_state().filter(|_| !status.error).unwrap_or(AlState::Init);
         match (from, self.target) {
             (AlState::PreOp, AlState::SafeOp | AlState::Op) if self.is_prepared() => self.up_from_preop().await,

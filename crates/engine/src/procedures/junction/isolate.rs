@@ -193,9 +193,9 @@ fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides
 async fn read(bus: &Bus, segment: &SharedSegment, ring: &Ring, found: &mut [Option<NodeStatus>]) {
     let members: Vec<_> = {
         let access = segment.view();
-        let of_ring = access.members().iter().filter_map(|member| {
+        let of_ring = access.members().filter_map(|member| {
             let node = member.node.filter(|node| *node == ring.head || ring.holds(*node))?;
-            let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
+            let ports = member.info.map(|info| info.controller.ports).unwrap_or_default();
             Some((node, member.station, ports))
         });
         of_ring.collect()

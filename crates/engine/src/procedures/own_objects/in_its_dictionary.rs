@@ -27,7 +27,7 @@ impl<W: Fn(u8) -> bool> Requested<W> {
     /// `wants` returns whether a subindex is requested; others are not read.
     pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Requested<W> {
         let view = segment.view();
-        let info = view.members().get(index).and_then(|member| member.info.as_ref());
+        let info = view.member(index).and_then(|member| member.info);
         let speaks = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
         Requested { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
     }

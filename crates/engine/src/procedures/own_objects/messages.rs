@@ -16,8 +16,7 @@ use crate::supervisor::Bus;
 /// All entries; places without a message are empty.
 pub(super) fn read(bus: &Bus, segment: Option<&SharedSegment>) -> Values {
     let station = |subdevice: SubDeviceId| {
-        let station =
-            segment.and_then(|segment| segment.view().members().get(subdevice.0).map(|member| member.station));
+        let station = segment.and_then(|segment| segment.view().member(subdevice.0).map(|member| member.station));
         station.unwrap_or_default()
     };
     bus.history(|history| {

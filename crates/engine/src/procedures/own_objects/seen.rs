@@ -20,6 +20,6 @@ pub(crate) struct Seen {
 
 impl Seen {
     pub(super) fn declared(&self) -> usize {
-        self.segment.as_ref().map_or(0, |segment| segment.view().members().len())
+        self.segment.as_ref().map_or(0, |segment| segment.view().subdevices().member_count())
     }
 }

@@ -16,7 +16,7 @@ use crate::info::SubDeviceInfo;
 use crate::procedures::services::statistics;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::Segment;
-use crate::segment::member::{Member, Phase};
+use crate::segment::member::{MemberView, Phase};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::PortOf;
 
@@ -74,8 +74,7 @@ pub(super) async fn read(seen: &Seen, shared: &Shared, object: Object, wanted: O
         }
         (Object::DetectedAddresses(list), _) => addresses(list, &shared.detection.found(seen)),
         (Object::ConfiguredAddresses(list), segment) => {
-            let stations =
-                |segment: &SharedSegment| segment.view().members().iter().map(|member| member.station).collect();
+            let stations = |segment: &SharedSegment| segment.view().members().map(|member| member.station).collect();
             addresses(list, &segment.as_ref().map_or(Vec::new(), stations))
         }
         (Object::MainDeviceDiagnosis, _) => main_device(seen, shared),
@@ -107,8 +106,8 @@ fn main_device(seen: &Seen, shared: &Shared) -> Values {
 
 /// The lowest state of the mandatory SubDevices; 0 while a SubDevice is missing or on its way.
 fn lowest_state(segment: &Segment) -> u16 {
-    let mandatory = segment.members().iter().filter(|member| !member.config.optional);
-    let code = |member: &Member| match member.phase {
+    let mandatory = segment.members().filter(|member| !member.config.optional);
+    let code = |member: MemberView<'_>| match member.phase {
         Phase::Settled(state) => u16::from(state.code()),
         Phase::Absent | Phase::Configuring => 0,
     };
@@ -116,7 +115,7 @@ fn lowest_state(segment: &Segment) -> u16 {
 }
 
 async fn dl_status(bus: &Bus, segment: &SharedSegment, index: usize) -> Option<[u8; DlStatus::LEN]> {
-    let station = segment.view().members().get(index)?.station;
+    let station = segment.view().member(index)?.station;
     bus.fprd_array(station, map::DL_STATUS).await.ok()
 }
 
@@ -126,8 +125,8 @@ async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted:
     let device_type = requested.device_type(4).await;
     let has_history = requested.has_history(40).await;
     let access = segment.view();
-    let Some(member) = access.members().get(index) else { return Vec::new() };
-    let (expected, info) = (&member.config.expected, member.info.as_deref());
+    let Some(member) = access.member(index) else { return Vec::new() };
+    let (expected, info) = (&member.config.expected, member.info.map(|info| &**info));
     let planned = member.setup.as_ref().and_then(|setup| setup.plan.mailbox_layout());
     let mailbox = planned.or_else(|| info.and_then(|info| info.mailbox));
     let string = |of: fn(&SubDeviceInfo) -> &str| info.map_or("", of).as_bytes();
@@ -152,7 +151,7 @@ async fn configuration(bus: &Bus, segment: &SharedSegment, index: usize, wanted:
 }
 
 /// The ports with a cable at the scan.
-fn preset_ports(segment: &Segment, member: &Member) -> [bool; 4] {
+fn preset_ports(segment: &Segment, member: MemberView<'_>) -> [bool; 4] {
     let Some((node, here)) = member.node.and_then(|node| Some((node, segment.cabling().topology.nodes.get(node)?)))
     else {
         return [false; 4];
@@ -164,7 +163,7 @@ fn preset_ports(segment: &Segment, member: &Member) -> [bool; 4] {
     })
 }
 
-fn link_status(segment: &Segment, member: &Member, status: Option<DlStatus>) -> u8 {
+fn link_status(segment: &Segment, member: MemberView<'_>, status: Option<DlStatus>) -> u8 {
     let Some(status) = status else { return NO_LINK };
     let mut bits = 0;
     for (number, (port, preset)) in status.ports.iter().zip(preset_ports(segment, member)).enumerate() {
@@ -180,16 +179,16 @@ fn link_status(segment: &Segment, member: &Member, status: Option<DlStatus>) -> 
 }
 
 /// Ports 1 to 3: communication, and above it the physical link.
-fn link_preset(segment: &Segment, member: &Member) -> u8 {
+fn link_preset(segment: &Segment, member: MemberView<'_>) -> u8 {
     let ports = preset_ports(segment, member);
     (1..4).filter(|port| ports[*port]).map(|port| 0x11 << (port - 1)).sum()
 }
 
-fn flags(segment: &Segment, index: usize, member: &Member) -> u8 {
+fn flags(segment: &Segment, index: usize, member: MemberView<'_>) -> u8 {
     let ends_at_link =
         segment.cabling().cables.iter().find(|(cable, _)| cable.far.is_none()).and_then(|(cable, _)| cable.near);
     let port = ends_at_link.filter(|end| Some(end.node) == member.node).map_or(0, |end| end.port & 3);
-    let groups = groups(segment.members().iter().map(|member| &*member.config));
+    let groups = groups(segment.members().map(|member| &*member.member.config));
     let head = groups.iter().any(|group| group.first() == Some(&index));
     let group = match (head, member.config.group.is_some()) {
         (true, _) => GROUP_HEAD,
@@ -202,8 +201,8 @@ fn flags(segment: &Segment, index: usize, member: &Member) -> u8 {
 async fn information(bus: &Bus, segment: &SharedSegment, index: usize) -> Values {
     let status = dl_status(bus, segment, index).await.unwrap_or_default();
     let access = segment.view();
-    let Some(member) = access.members().get(index) else { return Vec::new() };
-    let identity = member.info.as_ref().map(|info| info.identity).unwrap_or_default();
+    let Some(member) = access.member(index) else { return Vec::new() };
+    let identity = member.info.map(|info| info.identity).unwrap_or_default();
     vec![
         u16_(1, member.station.0),
         u32_(5, identity.vendor_id),
@@ -233,7 +232,7 @@ async fn registers(bus: &Bus, station: StationAddress) -> Result<Registers, BusE
 
 async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index: usize, wanted: Option<u8>) -> Values {
     let bus = &seen.bus;
-    let Some(station) = segment.view().members().get(index).map(|member| member.station) else { return Vec::new() };
+    let Some(station) = segment.view().member(index).map(|member| member.station) else { return Vec::new() };
     let kept = &segment.statistics;
     let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, kept, index, station)).await;
     let registers = registers.unwrap_or_default();
@@ -241,7 +240,7 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
     let has_news = requested.has_news(19).await;
     let counted = counted.ok().or_else(|| kept.find(index)).unwrap_or_default();
     let access = segment.view();
-    let Some(member) = access.members().get(index) else { return Vec::new() };
+    let Some(member) = access.member(index) else { return Vec::new() };
     let [al_low, al_high, _, _, code_low, code_high] = registers.al_status;
     let ports = registers.dl_status.map(|status| status.ports).unwrap_or_default();
     let connection =
@@ -271,14 +270,14 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
 }
 
 /// The SubDevice at a port at the scan.
-fn neighbour(segment: &Segment, member: &Member, port: u8) -> Option<StationAddress> {
+fn neighbour(segment: &Segment, member: MemberView<'_>, port: u8) -> Option<StationAddress> {
     let node = member.node?;
     let here = segment.cabling().topology.nodes.get(node)?;
     let other = match here.parent {
         Some((parent, _)) if port == here.entry_port => parent,
         _ => here.children[usize::from(port)]?,
     };
-    segment.members().iter().find(|member| member.node == Some(other)).map(|member| member.station)
+    segment.members().find(|member| member.node == Some(other)).map(|member| member.station)
 }
 
 #[cfg(test)]

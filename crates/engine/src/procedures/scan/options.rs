@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
 use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::sii::SiiCache;
@@ -13,6 +14,8 @@ pub struct ScanOptions {
     pub settle: Duration,
     /// How long to wait for the first SubDevice.
     pub patience: Duration,
+    /// How much of each SII is read.
+    pub extent: SiiExtent,
     /// SII contents read before.
     pub cache: SiiCache,
     /// Handling of rings behind junctions.

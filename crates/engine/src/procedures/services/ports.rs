@@ -92,7 +92,7 @@ pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<u
     if opened.is_err() {
         segment.observe(Observation::Blocked(&blocked));
     }
-    segment.observe(Observation::ScanAgain);
+    segment.observe(Observation::RoundWanted);
     opened.map(|()| blocked.len())
 }
 
@@ -129,7 +129,7 @@ async fn set_all(
 fn neighbours(bus: &Bus, segment: &SharedSegment, subdevice: usize) -> Result<Vec<BlockedPort>, ServiceError> {
     let access = segment.view();
     let missing = ServiceError::NoSubDevice { subdevice: SubDeviceId(subdevice).into() };
-    let node = access.members().get(subdevice).and_then(|member| member.node).ok_or(missing)?;
+    let node = access.member(subdevice).and_then(|member| member.node).ok_or(missing)?;
     let here = access.cabling().topology.nodes.get(node).ok_or(missing)?;
     let port = |node: usize, port: u8| access.station_of(node).map(|station| BlockedPort { station, port });
     let parent = here

@@ -23,7 +23,7 @@ pub(crate) async fn collect(bus: Bus, segment: SharedSegment) {
         let begin = bus.now();
         let period = kept.period();
         if period.is_some() {
-            let stations: Vec<_> = segment.view().members().iter().map(|member| member.station).enumerate().collect();
+            let stations: Vec<_> = segment.view().members().map(|member| member.station).enumerate().collect();
             let own = kept.clone();
             let read_one = move |bus: Bus, (subdevice, station)| {
                 let kept = own.clone();

@@ -14,6 +14,7 @@ use ringcat_wire::sii::{CategoryHeader, CategoryKind, SiiHeader};
 
 use super::contents::SiiContents;
 use super::shared_words::SharedWords;
+use crate::info::SiiExtent;
 
 /// Entries of the cache, more than a segment has types of SubDevices; beyond this the oldest entry is removed.
 const MAX_ENTRIES: usize = 1024;
@@ -47,6 +48,8 @@ enum Known {
 #[derive(Debug)]
 struct Entry {
     area: FixedArea,
+    /// What its readers read of the categories.
+    extent: SiiExtent,
     known: Known,
     words: SharedWords,
 }
@@ -72,6 +75,12 @@ pub struct SiiCache {
     pace: Rc<Cell<Option<Duration>>>,
 }
 
+impl Entry {
+    fn is_of(&self, area: &FixedArea, extent: SiiExtent) -> bool {
+        self.area == *area && self.extent == extent
+    }
+}
+
 impl SiiCache {
     /// An empty cache; a disabled one stores nothing.
     pub fn new(enabled: bool) -> SiiCache {
@@ -93,18 +102,19 @@ impl SiiCache {
         self.entries.borrow_mut().retain(|entry| matches!(entry.known, Known::Once { read: None, .. }));
     }
 
-    /// The stored contents, or the right to read them for the SubDevice with this address.
-    pub(super) fn find(&self, area: &FixedArea, station: StationAddress) -> Found {
+    /// The stored contents of this extent, or the right to read them for the SubDevice with this address.
+    pub(super) fn find(&self, area: &FixedArea, extent: SiiExtent, station: StationAddress) -> Found {
         /// Concurrent readers: as many as have to agree.
         const READERS: usize = 2;
-        let claim = |words| Claim { entries: self.entries.clone(), area: *area, station, words };
+        let claim = |words| Claim { entries: self.entries.clone(), area: *area, extent, station, words };
         let mut entries = self.entries.borrow_mut();
-        let Some(Entry { known, words, .. }) = entries.iter_mut().find(|entry| entry.area == *area) else {
+        let Some(Entry { known, words, .. }) = entries.iter_mut().find(|entry| entry.is_of(area, extent)) else {
             if entries.len() >= MAX_ENTRIES {
                 entries.remove(0);
             }
             let words = SharedWords::default();
-            entries.push(Entry { area: *area, known: Known::Once { read: None, readers: 1 }, words: words.clone() });
+            let known = Known::Once { read: None, readers: 1 };
+            entries.push(Entry { area: *area, extent, known, words: words.clone() });
             return Found::Nothing(claim(words));
         };
         match known {
@@ -136,6 +146,7 @@ impl SiiCache {
 pub(super) struct Claim {
     entries: Rc<RefCell<Vec<Entry>>>,
     area: FixedArea,
+    extent: SiiExtent,
     station: StationAddress,
     words: SharedWords,
 }
@@ -148,7 +159,7 @@ impl Claim {
 
     pub(super) fn settle(self, chain: Vec<CategoryHeader>, contents: SiiContents) {
         let mut entries = self.entries.borrow_mut();
-        let Some(entry) = entries.iter_mut().find(|entry| entry.area == self.area) else { return };
+        let Some(entry) = entries.iter_mut().find(|entry| entry.is_of(&self.area, self.extent)) else { return };
         let now = (chain, contents);
         let next = match &entry.known {
             Known::Once { read: Some((station, read)), .. } if *station != self.station => {
@@ -172,7 +183,7 @@ impl Claim {
 impl Drop for Claim {
     fn drop(&mut self) {
         self.entries.borrow_mut().retain_mut(|entry| match &mut entry.known {
-            Known::Once { read, readers } if entry.area == self.area => {
+            Known::Once { read, readers } if entry.area == self.area && entry.extent == self.extent => {
                 *readers = readers.saturating_sub(1);
                 if *readers == 0 {
                     entry.words = SharedWords::default();
@@ -196,11 +207,13 @@ mod tests {
     }
 
     fn contents(area: &FixedArea) -> SiiContents {
-        SiiContents { header: SiiHeader::decode(area), categories: Vec::new(), end: ChainEnd::Sound { at: area.len() } }
+        let end = ChainEnd::Sound { at: area.len() };
+        let (header, extent) = (SiiHeader::decode(area), SiiExtent::Complete);
+        SiiContents { header, extent, categories: Vec::new(), has_more: false, end }
     }
 
     fn claim(cache: &SiiCache, area: &FixedArea, station: u16) -> Option<Claim> {
-        match cache.find(area, StationAddress(station)) {
+        match cache.find(area, SiiExtent::Complete, StationAddress(station)) {
             Found::Nothing(claim) => Some(claim),
             Found::BeingRead(_) | Found::Contents(..) | Found::Disputed => None,
         }
@@ -216,7 +229,7 @@ mod tests {
         for station in [1, 2] {
             claim(&cache, &area(1), station).expect("free again").settle(Vec::new(), contents(&area(1)));
         }
-        assert!(matches!(cache.find(&area(1), StationAddress(3)), Found::Contents(..)));
+        assert!(matches!(cache.find(&area(1), SiiExtent::Complete, StationAddress(3)), Found::Contents(..)));
         assert_eq!(cache.len(), 1);
     }
 
@@ -228,7 +241,7 @@ mod tests {
         }
         let other = SiiContents { end: ChainEnd::Unreadable, ..contents(&area(1)) };
         claim(&cache, &area(1), 2).expect("another one").settle(Vec::new(), other);
-        assert!(matches!(cache.find(&area(1), StationAddress(3)), Found::Disputed));
+        assert!(matches!(cache.find(&area(1), SiiExtent::Complete, StationAddress(3)), Found::Disputed));
     }
 
     #[test]

@@ -1,33 +1,25 @@
-//! Contents of an SII: its fixed area, the categories that the engine uses, and the end of their chain.
+//! Contents of an SII: its fixed area, the categories of an extent, and the end of their chain.
 
 use alloc::vec::Vec;
 
 use ringcat_wire::sii::{Category, CategoryKind, SiiHeader};
 
+use crate::info::SiiExtent;
+
 /// Words before the categories.
 pub(super) const HEADER_WORDS: u32 = (SiiHeader::LEN / 2) as u32;
-
-/// Whether the engine uses a category.
-pub(super) const fn is_needed(kind: CategoryKind) -> bool {
-    matches!(
-        kind,
-        CategoryKind::Strings
-            | CategoryKind::General
-            | CategoryKind::Fmmu
-            | CategoryKind::SyncManager
-            | CategoryKind::TxPdo
-            | CategoryKind::RxPdo
-            | CategoryKind::Dc
-    )
-}
 
 /// Contents of an SII.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SiiContents {
     /// The fixed area; its reserved words from 0x24 on are not read and zero.
     pub header: SiiHeader,
-    /// The requested categories, each with the byte address of its header and its data.
+    /// How much of the categories was read.
+    pub extent: SiiExtent,
+    /// The categories of the extent, each with the byte address of its header and its data.
     pub categories: Vec<(CategoryKind, usize, Vec<u8>)>,
+    /// Whether the chain has categories of larger extents, which were not read.
+    pub has_more: bool,
     /// The end of the chain of categories.
     pub end: ChainEnd,
 }
@@ -69,10 +61,16 @@ impl SiiContents {
     /// For an EEPROM that cannot be read: as if it were erased.
     pub(in crate::procedures) fn unreadable() -> SiiContents {
         let header = SiiHeader::decode(&[0xFF; SiiHeader::LEN]);
-        SiiContents { header, categories: Vec::new(), end: ChainEnd::Unreadable }
+        SiiContents {
+            header,
+            extent: SiiExtent::Complete,
+            categories: Vec::new(),
+            has_more: false,
+            end: ChainEnd::Unreadable,
+        }
     }
 
-    /// The requested categories, in the order of the EEPROM.
+    /// The categories of the extent, in the order of the EEPROM.
     pub fn categories(&self) -> impl Iterator<Item = Category<'_>> {
         self.categories.iter().map(|(kind, offset, data)| Category { kind: *kind, offset: *offset, data })
     }

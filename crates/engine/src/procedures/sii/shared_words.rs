@@ -14,7 +14,9 @@ use core::cell::RefCell;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::sii::{CategoryHeader, CategoryKind};
 
-use super::contents::{HEADER_WORDS, is_needed};
+use super::contents::HEADER_WORDS;
+use super::extents::words_of;
+use crate::info::SiiExtent;
 
 /// SubDevices that read a word.
 const READERS: usize = 2;
@@ -166,15 +168,16 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// The blocks of a chain of categories, each with `width` words.
-    pub fn new(chain: &[CategoryHeader], width: u32) -> Blocks {
+    /// The blocks of those categories of a chain that an extent contains, each with `width` words.
+    pub fn new(chain: &[CategoryHeader], extent: SiiExtent, width: u32) -> Blocks {
         let mut blocks = Vec::new();
         let mut header = HEADER_WORDS;
         for (number, category) in chain.iter().enumerate() {
             let end = header + 2 + u32::from(category.words);
-            if is_needed(category.kind) {
-                let firsts = (header + width..end).step_by(width as usize);
-                let block = |first| Block { first, count: width.min(end - first), category: number };
+            let read = (header + 2).saturating_add(words_of(extent, category.kind)).min(end);
+            if extent.contains(category.kind) {
+                let firsts = (header + width..read).step_by(width as usize);
+                let block = |first| Block { first, count: width.min(read - first), category: number };
                 blocks.extend(firsts.map(block));
             }
             header = end;
@@ -240,7 +243,7 @@ mod tests {
     #[test]
     fn differing_names_end_the_sharing_of_names_alone() {
         let shared = SharedWords::default();
-        let blocks = Blocks::new(&CHAIN, 4);
+        let blocks = Blocks::new(&CHAIN, SiiExtent::Complete, 4);
         assert!(shared.claim(StationAddress(1), &blocks).is_some());
         for by in [1, 2] {
             report(&shared, by, &CHAIN, GENERAL, 7);
@@ -257,7 +260,7 @@ mod tests {
     fn two_subdevices_read_each_block_from_the_last_one_on() {
         for (width, firsts) in [(4, [12, 4].as_slice()), (2, &[12, 10, 6, 4, 2])] {
             let shared = SharedWords::default();
-            let blocks = Blocks::new(&CHAIN, width);
+            let blocks = Blocks::new(&CHAIN, SiiExtent::Complete, width);
             let expected: Vec<u32> = firsts.iter().map(|at| HEADER_WORDS + at).collect();
             for (by, expected) in [(1, &expected), (2, &expected), (3, &Vec::new())] {
                 let claimed = core::iter::from_fn(|| shared.claim(StationAddress(by), &blocks));

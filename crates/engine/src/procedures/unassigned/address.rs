@@ -61,7 +61,7 @@ fn fresh(segment: &SharedSegment, present: &[StationAddress]) -> StationAddress 
 
 /// Gives each SubDevice with one of these addresses one of its own. Returns the new addresses, and whether none of the
 /// old ones is left.
-pub(super) async fn give(
+pub(in super::super) async fn give(
     bus: &Bus,
     segment: &SharedSegment,
     view: &View,

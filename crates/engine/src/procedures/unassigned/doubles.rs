@@ -38,7 +38,7 @@ pub(in super::super) async fn mark(
 ) -> Result<Mark, BusError> {
     let (expected, is_mapped) = {
         let access = segment.view();
-        let Some(member) = access.members().get(index) else { return Ok(Mark::None) };
+        let Some(member) = access.member(index) else { return Ok(Mark::None) };
         let registers = member.setup.as_ref().map(|setup| setup.fmmu_registers());
         (registers.unwrap_or_default(), member.configured)
     };
@@ -65,8 +65,8 @@ pub(in super::super) async fn has_identity(
 ) -> bool {
     let known = {
         let view = segment.view();
-        let Some(member) = view.members().get(index) else { return false };
-        member.info.as_ref().map(|info| info.identity)
+        let Some(member) = view.member(index) else { return false };
+        member.info.map(|info| info.identity)
     };
     let Some(known) = known else { return true };
     if sii::claim(bus, station).await.is_err() {
@@ -102,7 +102,7 @@ pub(super) async fn restore(
 /// Members whose addresses several SubDevices have.
 fn doubled(segment: &SharedSegment, view: &View) -> Vec<(usize, StationAddress)> {
     let access = segment.view();
-    let members = access.members().iter().enumerate().map(|(index, member)| (index, member.station));
+    let members = access.members().enumerate().map(|(index, member)| (index, member.station));
     members.filter(|(_, station)| view.positions(*station).count() > 1).collect()
 }
 
@@ -117,7 +117,7 @@ async fn keeper(
     station: StationAddress,
 ) -> Result<Option<StationAddress>, BusError> {
     let has_moved = before.counts != after.counts;
-    let known: Vec<StationAddress> = segment.view().members().iter().map(|member| member.station).collect();
+    let known: Vec<StationAddress> = segment.view().members().map(|member| member.station).collect();
     // If positions have changed meanwhile, any SubDevice without an assigned address may be one of them.
     let is_candidate = |at: &usize| match before.stations.get(*at) {
         Some(then) if !has_moved => *then == station,

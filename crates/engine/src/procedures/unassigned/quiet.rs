@@ -22,7 +22,7 @@ const INIT_LIMIT: Duration = Duration::from_millis(100);
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// Sets the initial state of one SubDevice; other registers are written with its configuration.
-pub(super) async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
+pub(in super::super) async fn level(bus: &Bus, station: StationAddress) -> Result<(), BusError> {
     bus.fpwr(station, map::DL_CONTROL.offset(1), &[0]).await?;
     bus.fpwr(station, map::DL_CONTROL.offset(3), &[0]).await?;
     bus.fpwr(station, map::ECAT_EVENT_MASK, &event_mask().encode()).await?;

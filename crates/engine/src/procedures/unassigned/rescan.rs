@@ -20,9 +20,8 @@ use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
 use crate::segment::disturbance::Disturbance;
-use crate::segment::unassigned::Knowledge;
 use crate::segment::view::View;
-use crate::segment::{Observation, Seen, Versions, retrace};
+use crate::segment::{Observation, Seen, SubDevice, Versions, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -136,7 +135,7 @@ fn report_moved(bus: &Bus, rescan: &Rescan) {
 /// Also returns whether the cabling was taken over.
 async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
     let until = bus.now() + limit;
-    segment.observe(Observation::ScanAgain);
+    segment.observe(Observation::RoundWanted);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
         let turn = segment.disturb(Disturbance::Rescan, LIMIT).await;
@@ -144,7 +143,7 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
         let scanned = if turn.is_some() { scan_once(bus, segment).await } else { Ok(None) };
         drop(turn);
         // This scan has cleared the ECAT events of ports that changed before.
-        segment.observe(Observation::ScanAgain);
+        segment.observe(Observation::RoundWanted);
         let is_last = bus.now() >= until;
         match scanned {
             Ok(Some(rescan)) if is_last || (rescan.is_complete() && segment.view().are_places_valid(versions)) => {
@@ -178,21 +177,17 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
     let mut subdevices = Vec::new();
     let nodes = access.nodes(&seen, &ports);
     for (at, station) in seen.stations.iter().enumerate() {
-        let unassigned = access.unassigned(*station);
-        let known = match (owners.at(at), unassigned.map(|it| &it.knowledge)) {
-            (Some(index), _) => access.members()[index].info.as_deref(),
-            (None, Some(Knowledge::Known(info))) => Some(&**info),
-            (None, _) => None,
-        };
-        let identified = match (owners.at(at), known) {
+        let unassigned = access.subdevices().at(*station).and_then(SubDevice::as_unassigned);
+        // Until it is reported as undeclared it may be a missing member.
+        let undeclared = unassigned.filter(|it| it.reported).and_then(|it| it.knowledge.info());
+        let identified = match (owners.at(at), undeclared) {
             (Some(index), _) => Identified::Declared(SubDeviceId(index)),
-            // Until it is reported as undeclared it may be a missing member.
-            (None, Some(info)) if unassigned.is_some_and(|it| it.reported) => Identified::Undeclared(info.identity),
-            (None, _) => Identified::Unknown,
+            (None, Some(info)) => Identified::Undeclared(info.identity),
+            (None, None) => Identified::Unknown,
         };
         subdevices.push(Found { position: Position(at as u16), station: *station, identified, moved_from: None });
     }
-    let place_at_scan = |index: usize| access.members()[index].node;
+    let place_at_scan = |index: usize| access.member(index)?.node;
     // If a ring is open at another place than at the scan, or was open then and has branches, frames pass its
     // SubDevices in another order (CR-09): not a move.
     let scanned = &access.cabling().topology;
@@ -206,7 +201,7 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
         mark_moved(&mut subdevices, place_at_scan);
     }
     let is_found = |it: &SubDeviceId| subdevices.iter().any(|found| found.identified == Identified::Declared(*it));
-    let missing = (0..access.members().len()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
+    let missing = (0..access.subdevices().member_count()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
     let topology = retrace::cabling(access.cabling(), &seen.stations, &nodes, usize::from(seen.counts.0.0));
     let counts = LinkCounts { main: seen.counts.0.0, redundant: seen.counts.1.0 };
     Ok(Some(Rescan { counts, subdevices, missing, topology }))

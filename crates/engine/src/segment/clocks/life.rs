@@ -1,7 +1,9 @@
 //! Phases of the clocks of a segment: from the declaration to the lock, and from each change to the next measurement.
 
+use alloc::collections::BTreeMap;
 use alloc::string::String;
-use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
 
 use crate::clocks::SyncWindow;
 use crate::link::Link;
@@ -35,8 +37,8 @@ pub struct Running {
     pub due: Due,
     /// Whether all clocks have reached the window.
     pub lock: Lock,
-    /// By index, the links of the last answers, if they contradict the known links: the next answers must confirm them.
-    pub unconfirmed: Option<Vec<Option<Option<Link>>>>,
+    /// The links of the last answers, if they contradict the known links: the next answers must confirm them.
+    pub unconfirmed: Option<BTreeMap<StationAddress, Option<Link>>>,
 }
 
 /// The static drift compensation: while it runs, differences do not show the accuracy of the cyclic distribution.
@@ -80,6 +82,8 @@ pub enum Due {
     Delays,
     /// Filter depths.
     Filters,
+    /// Offsets: the application's time is another one. No time is distributed until they are written.
+    Offsets,
 }
 
 /// Whether all clocks have reached the window.

@@ -4,7 +4,8 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
 use crate::clocks::Unknown;
-use crate::config::{Passage, SubDeviceConfig};
+use crate::clocks::start::whole_cycle;
+use crate::config::{Passage, SubDeviceConfig, SyncSignals};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
 
@@ -26,6 +27,12 @@ pub struct Node {
     pub has_clock: bool,
     /// SYNC signals are declared for it.
     pub is_configured: bool,
+    /// Time after which its SYNC signals repeat, in nanoseconds; 0 without.
+    pub pattern_ns: u64,
+    /// Its SYNC signals are being started, or run.
+    pub has_signals: bool,
+    /// Its offset was changed while it did not answer.
+    pub missed_offset: bool,
     /// Its declared passage times.
     pub passage: Option<Passage>,
     /// Delay from the entry of frames into the segment to its processing unit, with fraction.
@@ -60,6 +67,11 @@ pub struct Node {
     pub link: Option<Link>,
 }
 
+/// Time after which SYNC0 and SYNC1 repeat together, in nanoseconds.
+const fn pattern_ns(signals: &SyncSignals) -> u64 {
+    whole_cycle(signals.sync0_cycle_ns, signals.active_sync1_ns())
+}
+
 impl Node {
     /// A SubDevice, and its index and declaration if it is declared.
     pub fn new(info: &SubDeviceInfo, member: Option<(usize, &SubDeviceConfig)>) -> Node {
@@ -70,6 +82,9 @@ impl Node {
             member: member.map(|(index, _)| index),
             has_clock: info.controller.features.dc,
             is_configured: member.is_some_and(|(_, config)| config.sync.is_some()),
+            pattern_ns: member.and_then(|(_, config)| config.sync).map_or(0, |signals| pattern_ns(&signals)),
+            has_signals: false,
+            missed_offset: false,
             passage: member.and_then(|(_, config)| config.passage),
             unit: None,
             hidden: None,

@@ -1,16 +1,20 @@
 //! Observations of clocks.
 
+use alloc::collections::BTreeMap;
 use alloc::string::String;
 
 use ringcat_wire::address::StationAddress;
 
 use super::measured::Measured;
 use crate::clocks::{Cables, Latched, Wiring};
+use crate::config::ReferenceClock;
 use crate::link::Link;
 
 /// An observation of clocks: measured, written, read or lost.
 #[derive(Debug)]
 pub enum ClockObservation<'a> {
+    /// The application has chosen the reference.
+    ReferenceChosen(ReferenceClock),
     /// The set-up of all clocks begins.
     SetUpBegun,
     /// The set-up failed, for this reason.
@@ -25,10 +29,10 @@ pub enum ClockObservation<'a> {
     OpenedWithoutResult(Option<Wiring>),
     /// The delays of all clocks, for their set-up.
     Measured(&'a Measured),
-    /// Local times latched by one frame, by index, and the system time that they are to show.
+    /// Local times latched by one frame, and the system time that they are to show.
     Latched {
         /// Local times.
-        latched: &'a [Option<Latched>],
+        latched: &'a LatchedTimes,
         /// System time of that frame where it entered the segment.
         wanted: u64,
     },
@@ -48,8 +52,8 @@ pub enum ClockObservation<'a> {
         /// The number of stops of the distribution when it began.
         holds: u32,
     },
-    /// Filter depths are written, by index.
-    FiltersWritten(&'a [(usize, [u8; 2])]),
+    /// Filter depths are written.
+    FiltersWritten(&'a [(StationAddress, [u8; 2])]),
 
     /// A declared SubDevice with a clock that was not found by the scan.
     Came {
@@ -57,24 +61,18 @@ pub enum ClockObservation<'a> {
         member: usize,
     },
     /// The registers of a clock do not hold the written values, or were never written.
-    RegistersLost {
-        /// Its index.
-        index: usize,
-    },
+    RegistersLost(StationAddress),
     /// Local times latched by one frame, for the set-up of one clock.
     LatchedFor {
-        /// Its index.
-        index: usize,
-        /// Local times by index.
-        latched: &'a [Option<Latched>],
+        /// Its station address.
+        station: StationAddress,
+        /// Local times.
+        latched: &'a LatchedTimes,
         /// System time according to the host, used without a reference.
         host: u64,
     },
     /// Offset and delay of that clock are written.
-    OneSetUp {
-        /// Its index.
-        index: usize,
-    },
+    OneSetUp(StationAddress),
     /// Clocks have to be synchronized with their reference.
     TimeWanted,
     /// The static drift compensation has ended.
@@ -82,8 +80,8 @@ pub enum ClockObservation<'a> {
 
     /// The differences of all clocks.
     Answers {
-        /// By index; `None` if the answer was lost.
-        answers: &'a [Option<Answer>],
+        /// Clocks of which the answer was lost are left out.
+        answers: &'a Answers,
         /// A ring has opened or closed, which explains changes of ports.
         is_explained: bool,
         /// The number of stops of the distribution when they were read.
@@ -94,6 +92,18 @@ pub enum ClockObservation<'a> {
         /// The number of stops of the distribution when the answers were read.
         holds: u32,
     },
+    /// SYNC signals of a clock are being started, or are off.
+    Signals {
+        /// Its station address.
+        station: StationAddress,
+        /// They are being started.
+        are_starting: bool,
+    },
+    /// The offsets that are due are written, except to these clocks.
+    OffsetsWritten {
+        /// Clocks that did not answer.
+        missed: &'a [StationAddress],
+    },
     /// DC_SYSTEM_TIME of the reference, and the host time at which the frame was sent.
     ReferenceTime {
         /// The lower half of the system time.
@@ -102,6 +112,12 @@ pub enum ClockObservation<'a> {
         sent_at: u64,
     },
 }
+
+/// Local times latched by one frame.
+pub type LatchedTimes = BTreeMap<StationAddress, Latched>;
+
+/// Answers of clocks.
+pub type Answers = BTreeMap<StationAddress, Answer>;
 
 /// The answer of one clock, and the link on which it arrived.
 #[derive(Clone, Copy, Debug, Default)]

@@ -8,6 +8,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use super::life::{Compensation, Delays, Due, Life, Lock, Running};
 use super::node::Node;
 use super::status::{ClockStatus, HiddenDelay};
+use super::timeline::{Times, common_pattern};
 use crate::board::clocks::References;
 use crate::clocks::DelayRange;
 use crate::clocks::{Cables, FRACTION, Passage, Wiring, branches, round};
@@ -37,8 +38,8 @@ pub struct Clocks {
     pub(in crate::segment) life: Life,
     /// By position of the scan, then later ones.
     pub nodes: Vec<Node>,
-    /// The index of the reference.
-    pub reference: Option<usize>,
+    /// The reference.
+    pub reference: Option<StationAddress>,
     /// Measured cable times.
     pub cables: Cables,
     /// Measurements so far.
@@ -47,6 +48,8 @@ pub struct Clocks {
     pub opened_without_result: Option<Wiring>,
     /// System time of the reference clock at host time zero.
     pub epoch: u64,
+    /// The application's time.
+    pub(in crate::segment) times: Times,
 }
 
 impl Clocks {
@@ -70,7 +73,17 @@ impl Clocks {
         let config = config.unwrap_or_default();
         let epoch = config.epoch;
         let (reference, cables, measured, opened_without_result) = (None, Cables::default(), 0, None);
-        Clocks { config, life, nodes, reference, cables, measured, opened_without_result, epoch }
+        Clocks {
+            config,
+            life,
+            nodes,
+            reference,
+            cables,
+            measured,
+            opened_without_result,
+            epoch,
+            times: Times::default(),
+        }
     }
 
     /// No clocks.
@@ -146,16 +159,51 @@ impl Clocks {
         self.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
     }
 
+    /// Whether all offsets are being changed.
+    pub fn are_offsets_due(&self) -> bool {
+        self.due() == Due::Offsets
+    }
+
+    /// Whether readings of the reference are necessary, because the application's time is far from its time.
+    pub fn is_time_pending(&self) -> bool {
+        self.times.is_pending() || self.are_offsets_due()
+    }
+
+    /// Application time minus system time.
+    pub fn shift(&self) -> u64 {
+        self.times.timeline.shift
+    }
+
+    /// Offsets of the clocks that answer.
+    pub fn offsets(&self) -> Vec<(StationAddress, i64)> {
+        let answering = self.nodes.iter().filter(|node| node.has_clock && node.link.is_some());
+        answering.map(|node| (node.station, node.offset_ns)).collect()
+    }
+
+    /// Clocks that answer again, and whose offsets were changed meanwhile.
+    pub fn without_offset(&self) -> Vec<StationAddress> {
+        let lacking = self.nodes.iter().filter(|node| node.missed_offset && node.has_clock && node.link.is_some());
+        lacking.map(|node| node.station).collect()
+    }
+
+    /// The common pattern of the SYNC signals that run; `None` without any. A declared pattern counts also if it does
+    /// not run yet.
+    pub(in crate::segment) fn running_pattern(&self) -> Option<u64> {
+        let runs = |node: &Node| node.has_signals && node.pattern_ns > 0 && node.link.is_some();
+        let patterns = self.nodes.iter().map(|node| node.pattern_ns).filter(|pattern| *pattern > 0);
+        self.nodes.iter().any(runs).then(|| common_pattern(patterns))
+    }
+
     /// Each clock of the segment, by position of the scan; then later ones.
     pub fn status(&self) -> Vec<ClockStatus> {
-        let with_clock = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock);
-        let status = |(index, node): (usize, &Node)| ClockStatus {
+        let with_clock = self.nodes.iter().filter(|node| node.has_clock);
+        let status = |node: &Node| ClockStatus {
             position: Position(node.position),
             station: node.station,
             subdevice: node.member.map(SubDeviceId),
-            is_reference: self.reference == Some(index),
+            is_reference: self.is_reference(node),
             delay_ns: node.delay_ns,
-            hidden: self.hidden(index),
+            hidden: self.hidden(node),
             offset_ns: node.offset_ns,
             drift_ppb: node.drift_ppb,
             difference_ns: node.difference_ns,
@@ -166,10 +214,9 @@ impl Clocks {
     }
 
     /// Why the delay of a clock is not known.
-    pub fn hidden(&self, index: usize) -> Option<HiddenDelay> {
-        let node = &self.nodes[index];
+    pub fn hidden(&self, node: &Node) -> Option<HiddenDelay> {
         let hidden = node.hidden?;
-        let reference = self.reference_on(node.link.unwrap_or(Link::Main)).and_then(|index| self.nodes[index].unit);
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main)).and_then(|reference| reference.unit);
         let range = hidden.range.zip(reference);
         Some(HiddenDelay {
             fork: hidden.fork.map(|fork| Position(fork as u16)),
@@ -182,37 +229,42 @@ impl Clocks {
     }
 
     /// Elects the reference among the nodes with `can`: the configured one, or the first that the configuration allows.
-    pub fn elect(&self, can: impl Fn(&Node) -> bool) -> Option<usize> {
-        let able = |(_, node): &(usize, &Node)| node.has_clock && !node.is_unset && can(node);
-        let candidates = || self.nodes.iter().enumerate().filter(able).map(|(index, _)| index);
+    pub fn elect(&self, can: impl Fn(&Node) -> bool) -> Option<StationAddress> {
+        let able = |node: &&Node| node.has_clock && !node.is_unset && can(node);
+        let candidates = || self.nodes.iter().filter(able);
         let preferred = match self.config.reference {
             ReferenceClock::FirstWithClock => None,
-            ReferenceClock::FirstConfigured => candidates().find(|index| self.nodes[*index].is_configured),
-            ReferenceClock::Declared(SubDeviceId(member)) => {
-                candidates().find(|index| self.nodes[*index].member == Some(member))
-            }
+            ReferenceClock::FirstConfigured => candidates().find(|node| node.is_configured),
+            ReferenceClock::Declared(SubDeviceId(member)) => candidates().find(|node| node.member == Some(member)),
         };
-        preferred.or_else(|| candidates().next())
+        preferred.or_else(|| candidates().next()).map(|node| node.station)
     }
 
-    /// Index of the reference clock on a link: the reference of the segment if it is on that link, otherwise the first
+    /// Whether it is the reference of the segment.
+    pub fn is_reference(&self, node: &Node) -> bool {
+        self.reference == Some(node.station)
+    }
+
+    /// The reference of the segment.
+    pub fn reference_node(&self) -> Option<&Node> {
+        self.node_at(self.reference?)
+    }
+
+    /// The reference clock on a link: the reference of the segment if it is on that link, otherwise the first
     /// clock that frames pass. `None` if delays on that link have different origins.
-    pub fn reference_on(&self, link: Link) -> Option<usize> {
+    pub fn reference_on(&self, link: Link) -> Option<&Node> {
         if self.is_mixed(link) {
             return None;
         }
-        let here = |index: &usize| {
-            let node = &self.nodes[*index];
-            node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some()
-        };
-        let first = || (0..self.nodes.len()).filter(here).min_by_key(|index| self.nodes[*index].unit);
-        self.reference.filter(here).or_else(first)
+        let here = |node: &&Node| node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some();
+        let first = || self.nodes.iter().filter(here).min_by_key(|node| node.unit);
+        self.reference_node().filter(here).or_else(first)
     }
 
     /// The references whose time the copies of cyclic frames distribute.
     pub fn references(&self) -> References {
-        let station = |link| self.reference_on(link).map(|index| self.nodes[index].station);
-        let redundant_leads = self.reference.and_then(|index| self.nodes[index].link) == Some(Link::Redundant);
+        let station = |link| self.reference_on(link).map(|node| node.station);
+        let redundant_leads = self.reference_node().and_then(|node| node.link) == Some(Link::Redundant);
         References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads }
     }
 
@@ -225,38 +277,42 @@ impl Clocks {
     }
 
     /// The reference of a link and the clocks that frames pass before it.
-    pub fn in_front_on(&self, link: Link) -> Option<(usize, Vec<usize>)> {
+    pub fn in_front_on(&self, link: Link) -> Option<(&Node, Vec<&Node>)> {
         let reference = self.reference_on(link)?;
-        let unit = self.nodes[reference].unit;
-        let is_in_front = |(_, node): &(usize, &Node)| {
-            node.has_clock && !node.is_unset && node.link == Some(link) && node.unit.is_some() && node.unit < unit
+        let is_in_front = |node: &&Node| {
+            let is_used = node.has_clock && !node.is_unset && node.link == Some(link);
+            is_used && node.unit.is_some() && node.unit < reference.unit
         };
-        Some((reference, self.nodes.iter().enumerate().filter(is_in_front).map(|(index, _)| index).collect()))
+        Some((reference, self.nodes.iter().filter(is_in_front).collect()))
     }
 
-    /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED by index. References
-    /// and clocks before them receive the time predicted by the host, all others the time of a reference.
-    pub fn filters(&self) -> Vec<(usize, StationAddress, [u8; 2])> {
-        let nodes = self.nodes.iter().enumerate().filter(|(_, node)| node.has_clock && node.link.is_some());
-        let depths = nodes.map(|(index, node)| (index, node.station, self.filter_depths(index)));
-        depths.filter(|(index, _, depths)| self.nodes[*index].filter_depths != Some(*depths)).collect()
-    }
-
-    fn filter_depths(&self, index: usize) -> [u8; 2] {
-        let node = &self.nodes[index];
-        let reference = self.reference_on(node.link.unwrap_or(Link::Main));
-        let is_behind = reference.is_some_and(|reference| match node.unit {
-            Some(_) => node.unit > self.nodes[reference].unit,
-            None => node.position > self.nodes[reference].position,
+    /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED. References and
+    /// clocks before them receive the time predicted by the host, all others the time of a reference.
+    pub fn filters(&self) -> Vec<(StationAddress, [u8; 2])> {
+        let references = Link::ALL.map(|link| self.reference_on(link));
+        let nodes = self.nodes.iter().filter(|node| node.has_clock && node.link.is_some());
+        let depths = nodes.map(|node| {
+            let reference = references[usize::from(node.link == Some(Link::Redundant))];
+            (node, self.filter_depths(node, reference))
         });
-        let is_steered = reference == Some(index) && (self.config.bus_shift || self.reference != Some(index));
+        let changed = depths.filter(|(node, depths)| node.filter_depths != Some(*depths));
+        changed.map(|(node, depths)| (node.station, depths)).collect()
+    }
+
+    fn filter_depths(&self, node: &Node, reference: Option<&Node>) -> [u8; 2] {
+        let is_behind = reference.is_some_and(|reference| match node.unit {
+            Some(_) => node.unit > reference.unit,
+            None => node.position > reference.position,
+        });
+        let is_on_link = reference.is_some_and(|reference| reference.station == node.station);
+        let is_steered = is_on_link && (self.config.bus_shift || !self.is_reference(node));
         let difference = if is_behind { EXACT_DEPTH } else { HOST_DEPTH };
         [difference, if is_steered { STEADY_DEPTH } else { SPEED_DEPTH }]
     }
 
-    /// Index of a declared SubDevice.
-    pub fn index_of(&self, member: usize) -> Option<usize> {
-        self.nodes.iter().position(|node| node.member == Some(member))
+    /// A declared SubDevice.
+    pub fn of_member(&self, member: usize) -> Option<&Node> {
+        self.nodes.iter().find(|node| node.member == Some(member))
     }
 
     /// The SubDevice with a station address.
@@ -264,7 +320,12 @@ impl Clocks {
         self.nodes.iter().find(|node| node.station == station)
     }
 
-    /// Station addresses by index.
+    /// The SubDevice with a station address, to be changed.
+    pub(in crate::segment) fn node_at_mut(&mut self, station: StationAddress) -> Option<&mut Node> {
+        self.nodes.iter_mut().find(|node| node.station == station)
+    }
+
+    /// Station addresses, by position of the scan, then of later ones.
     pub fn stations(&self) -> Vec<StationAddress> {
         self.nodes.iter().map(|node| node.station).collect()
     }

@@ -18,9 +18,9 @@ use crate::segment::versions::Versions;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 
-/// Scans for the place of a break: its neighbours may detect the lost link later than frames show it.
+/// Rounds for the place of a break: its neighbours may detect the lost link later than frames show it.
 const SCANS: u8 = 25;
-/// Pause between two of these scans, and between the first few.
+/// Pause between two of these rounds, and between the first few.
 const PAUSE: Duration = Duration::from_millis(10);
 const FIRST_LOOKS: u8 = 5;
 const FIRST_PAUSE: Duration = Duration::from_millis(1);
@@ -29,9 +29,9 @@ impl Segment {
     /// Port states of members, by their position in the cabling.
     pub(in crate::segment) fn by_position(&self, readings: &[Reading]) -> Vec<Option<NodeStatus>> {
         let mut by_position = vec![None; self.cabling.topology.nodes.len()];
-        for (member, reading) in self.members.iter().zip(readings) {
+        for (member, reading) in self.members().zip(readings) {
             let (Some(node), Reading::Answer { dl_status, .. }) = (member.node, reading) else { continue };
-            let ports = member.info.as_ref().map(|info| info.controller.ports).unwrap_or_default();
+            let ports = member.info.map(|info| info.controller.ports).unwrap_or_default();
             if let Some(slot) = by_position.get_mut(node) {
                 *slot = Some(NodeStatus { dl_status: *dl_status, receive_times: None, ports });
             }
@@ -39,7 +39,7 @@ impl Segment {
         by_position
     }
 
-    /// Reports breaks that are located now. `reported` is the reported state of the ring when the scans began.
+    /// Reports breaks that are located now. `reported` is the reported state of the ring when the round began.
     pub(in crate::segment) fn observe_breaks(
         &mut self,
         readings: &[Reading],
@@ -50,7 +50,7 @@ impl Segment {
         if core::mem::replace(&mut self.breaks.state, reported) != reported {
             self.breaks.readings = SCANS;
         }
-        // The ring may have closed during the scans.
+        // The ring may have closed during the round.
         if reported != RingState::Open || self.ring.reported() != RingState::Open {
             return;
         }
@@ -99,7 +99,7 @@ impl Segment {
         now: Instant,
         effects: &mut Effects,
     ) {
-        self.local_rings.follow(&self.cabling, &self.members, status);
+        self.local_rings.follow(&self.cabling, &self.subdevices, status);
         if self.local_rings.is_empty() {
             return;
         }

@@ -2,6 +2,7 @@
 
 mod answers;
 mod delays;
+mod times;
 
 use alloc::string::String;
 
@@ -9,6 +10,7 @@ use ringcat_wire::address::{Position, StationAddress};
 
 use crate::board::clocks::References;
 use crate::clocks::extend;
+use crate::config::ReferenceClock;
 use crate::event::Event;
 use crate::link::Link;
 use crate::segment::clocks::{
@@ -22,7 +24,8 @@ impl Segment {
     /// Processes an observation of clocks.
     pub(super) fn observe_clocks(&mut self, seen: ClockObservation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
-            ClockObservation::SetUpBegun => self.clocks.reference = self.clocks.elect(|_| true),
+            ClockObservation::ReferenceChosen(reference) => self.observe_choice(reference, effects),
+            ClockObservation::SetUpBegun => self.observe_begun_set_up(),
             ClockObservation::SetUpFailed(reason) => self.observe_failed_set_up(reason, effects),
             ClockObservation::SegmentChanged => self.doubt(now),
             ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
@@ -41,9 +44,13 @@ impl Segment {
             ClockObservation::FiltersWritten(filters) => self.observe_filters(filters),
 
             ClockObservation::Came { member } => self.observe_clock(member),
-            ClockObservation::RegistersLost { index } => self.observe_lost_registers(index, now),
-            ClockObservation::LatchedFor { index, latched, host } => self.clocks.set_offset(index, latched, host),
-            ClockObservation::OneSetUp { index } => self.clocks.nodes[index].is_unset = false,
+            ClockObservation::RegistersLost(station) => self.observe_lost_registers(station, now),
+            ClockObservation::LatchedFor { station, latched, host } => self.clocks.set_offset(station, latched, host),
+            ClockObservation::OneSetUp(station) => {
+                if let Some(node) = self.clocks.node_at_mut(station) {
+                    (node.is_unset, node.missed_offset) = (false, false);
+                }
+            }
             ClockObservation::TimeWanted => self.compensate(effects),
             ClockObservation::Compensated => {
                 if let Some(running) = self.clocks.running_mut() {
@@ -56,9 +63,16 @@ impl Segment {
                 self.follow_links(answers, is_explained, holds, now, effects);
             }
             ClockObservation::Followed { holds } => self.follow(holds),
+            ClockObservation::Signals { station, are_starting } => {
+                if let Some(node) = self.clocks.node_at_mut(station) {
+                    node.has_signals = are_starting;
+                }
+            }
+            ClockObservation::OffsetsWritten { missed } => self.observe_written_offsets(missed, effects),
             ClockObservation::ReferenceTime { low, sent_at } => {
                 let near = sent_at.wrapping_add(self.clocks.epoch);
                 self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
+                self.compare_times(effects);
             }
         }
         self.post_clock_words();
@@ -111,11 +125,14 @@ impl Segment {
         }
     }
 
-    fn observe_filters(&mut self, filters: &[(usize, [u8; 2])]) {
-        for (index, depths) in filters {
-            self.clocks.nodes[*index].filter_depths = Some(*depths);
+    fn observe_filters(&mut self, filters: &[(StationAddress, [u8; 2])]) {
+        for (station, depths) in filters {
+            if let Some(node) = self.clocks.node_at_mut(*station) {
+                node.filter_depths = Some(*depths);
+            }
         }
-        if let Some(running) = self.clocks.running_mut() {
+        // Another procedure may have written them while delays or offsets are due.
+        if let Some(running) = self.clocks.running_mut().filter(|running| running.due == Due::Filters) {
             running.due = Due::Nothing;
         }
     }
@@ -123,7 +140,7 @@ impl Segment {
     /// The static drift compensation starts, unless it is under way.
     fn compensate(&mut self, effects: &mut Effects) {
         let Some(running) = self.clocks.running_mut() else { return };
-        if running.compensation == Compensation::Idle {
+        if running.compensation == Compensation::Idle && !self.board.clocks.times.is_called() {
             running.compensation = Compensation::Running;
             effects.start(Task::CompensateDrift);
         }
@@ -131,18 +148,19 @@ impl Segment {
 
     /// A clock that was not found by the scan.
     fn observe_clock(&mut self, member: usize) {
-        let Some(declared) = self.members.get(member) else { return };
-        if let Some(info) = &declared.info
-            && self.clocks.index_of(member).is_none()
+        let Some(declared) = self.subdevices.member(member) else { return };
+        if let Some(info) = declared.info
+            && self.clocks.of_member(member).is_none()
         {
             self.clocks.nodes.push(Node::new(info, Some((member, &*declared.config))));
         }
     }
 
-    fn observe_lost_registers(&mut self, index: usize, now: Instant) {
-        let node = &mut self.clocks.nodes[index];
+    fn observe_lost_registers(&mut self, station: StationAddress, now: Instant) {
+        let Some(node) = self.clocks.node_at_mut(station) else { return };
         (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
-        if self.clocks.reference == Some(index) {
+        node.has_signals = false;
+        if self.clocks.reference == Some(station) {
             self.clocks.reference = None;
         }
         self.doubt(now);
@@ -200,8 +218,8 @@ impl Segment {
     fn elect(&mut self, effects: &mut Effects) -> bool {
         let clocks = &mut self.clocks;
         let before = clocks.reference;
-        let is_there = |index: usize| clocks.nodes[index].link.is_some() && !clocks.nodes[index].is_unset;
-        if !before.is_some_and(is_there) {
+        let is_there = |node: &Node| node.link.is_some() && !node.is_unset;
+        if !clocks.reference_node().is_some_and(is_there) {
             clocks.reference = clocks.elect(|node| node.link.is_some() && node.unit.is_some());
         }
         if clocks.reference == before {
@@ -211,8 +229,21 @@ impl Segment {
         true
     }
 
+    /// The next answers show that the distributed references are others: delays are written from the new one first.
+    fn observe_choice(&mut self, reference: ReferenceClock, effects: &mut Effects) {
+        self.clocks.config.reference = reference;
+        if !self.clocks.are_set_up() {
+            return;
+        }
+        let chosen = self.clocks.elect(|node| node.link.is_some() && node.unit.is_some());
+        if chosen.is_some() && chosen != self.clocks.reference {
+            self.clocks.reference = chosen;
+            self.report_reference(effects);
+        }
+    }
+
     fn report_reference(&self, effects: &mut Effects) {
-        let reference = self.clocks.reference.map(|index| &self.clocks.nodes[index]);
+        let reference = self.clocks.reference_node();
         let event = Event::ReferenceClock { position: reference.map(|node| Position(node.position)) };
         match reference {
             Some(node) => effects.report_of(event, self.occupant(node.station)),
@@ -223,7 +254,7 @@ impl Segment {
     /// Reports delays that are not known, except those that are already reported.
     fn report_hidden(&mut self, effects: &mut Effects) {
         for index in 0..self.clocks.nodes.len() {
-            let hidden = self.clocks.hidden(index);
+            let hidden = self.clocks.hidden(&self.clocks.nodes[index]);
             let node = &mut self.clocks.nodes[index];
             let fork = |hidden: HiddenDelay| hidden.fork.map(|fork| usize::from(fork.0));
             let now = hidden.map(|hidden| (fork(hidden), hidden.is_estimated));

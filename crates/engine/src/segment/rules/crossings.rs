@@ -15,7 +15,6 @@ use crate::segment::effect::{Effects, Task};
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::reading::Reading;
-use crate::segment::unassigned::UnassignedSubDevice;
 use crate::segment::versions::Versions;
 
 impl Segment {
@@ -27,12 +26,12 @@ impl Segment {
         };
         let now: Vec<Option<u16>> = readings.iter().map(ports).collect();
         // A silent SubDevice that is not lost yet will answer or be lost soon.
-        let phase = |index: usize| self.members.get(index).map_or(Phase::Absent, |member| member.phase);
+        let phase = |index: usize| self.member(index).map_or(Phase::Absent, |member| member.phase);
         let is_open = |(index, ports): (usize, &Option<u16>)| ports.is_none() && phase(index) != Phase::Absent;
         // Clocks that are being measured need the receive times of their own frame.
         let waits = self.crossings.search == Search::UnderWay || self.slot.running() == Some(Disturbance::OpenByPort);
         // A SubDevice that may be a member, and the end of a ring, must be identified first.
-        let waits = waits || !self.unassigned.iter().all(UnassignedSubDevice::is_settled);
+        let waits = waits || !self.subdevices.unassigned().all(|it| it.is_settled());
         let is_new = now != self.crossings.ports || self.crossings.search == Search::Again;
         if waits || !is_new || now.iter().enumerate().any(is_open) {
             return;
@@ -77,14 +76,14 @@ impl Segment {
             }
             return;
         }
-        let is_told = |new: &Crossing| match new.station() {
+        let is_reported = |new: &Crossing| match new.station() {
             Some(station) => reported.crossings.iter().any(|old| old.station() == Some(station)),
             // The place may be known from when the ring was open.
             None => !reported.crossings.is_empty(),
         };
-        for Crossing { subdevice, entry_port } in found.crossings.iter().filter(|new| !is_told(new)).copied() {
+        for Crossing { subdevice, entry_port } in found.crossings.iter().filter(|new| !is_reported(new)).copied() {
             let position = subdevice.map(|(station, now)| {
-                let member = self.members.iter().find(|member| member.station == station);
+                let member = self.members().find(|member| member.station == station);
                 member.and_then(|member| member.node).map_or(now, |node| Position(node as u16))
             });
             let event = Event::LineCrossed { position, entry_port };

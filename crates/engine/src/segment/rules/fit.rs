@@ -3,12 +3,12 @@
 use crate::config::ConfigAddress;
 use crate::segment::matching::Fit;
 use crate::segment::model::Segment;
-use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
+use crate::segment::unassigned::UnassignedView;
 
 /// How well an unassigned SubDevice matches an absent member.
-pub(super) fn fit(segment: &Segment, it: &UnassignedSubDevice, index: usize) -> Fit {
-    let member = &segment.members[index];
-    let Knowledge::Known(info) = &it.knowledge else { return Fit::Unreadable };
+pub(super) fn fit(segment: &Segment, it: UnassignedView<'_>, index: usize) -> Fit {
+    let Some(member) = segment.member(index) else { return Fit::No };
+    let Some(info) = it.knowledge.info() else { return Fit::Unreadable };
     let identity = &info.identity;
     let mark_fits = match member.config.address {
         address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
@@ -19,7 +19,7 @@ pub(super) fn fit(segment: &Segment, it: &UnassignedSubDevice, index: usize) -> 
     if !mark_fits || member.config.expected.mismatch(info).is_some() {
         return Fit::No;
     }
-    let Some(known) = member.info.as_ref().map(|info| info.identity) else { return Fit::NeverSeen };
+    let Some(known) = member.info.map(|info| info.identity) else { return Fit::NeverSeen };
     if (known.vendor_id, known.product_code) != (identity.vendor_id, identity.product_code) {
         Fit::No
     } else if identity.serial != 0 && identity.serial == known.serial {

@@ -8,21 +8,21 @@ use crate::config::groups;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
-use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
+use crate::segment::unassigned::UnassignedView;
 use crate::time::Instant;
 
 /// Removes members of groups from the candidates and returns them. Candidates that may be members once they are read
 /// are removed too, without a result.
-pub(super) fn members(
-    segment: &Segment,
-    unassigned: &mut Vec<UnassignedSubDevice>,
+pub(super) fn members<'a>(
+    segment: &'a Segment,
+    unassigned: &mut Vec<UnassignedView<'a>>,
     now: Instant,
-) -> Vec<(UnassignedSubDevice, Option<usize>)> {
-    let groups = groups(segment.members.iter().map(|member| &*member.config));
+) -> Vec<(UnassignedView<'a>, usize)> {
+    let groups = groups(segment.members().map(|member| &*member.member.config));
     if groups.is_empty() {
         return Vec::new();
     }
-    let mut matched: Vec<(UnassignedSubDevice, Option<usize>)> = Vec::new();
+    let mut matched: Vec<(UnassignedView<'a>, usize)> = Vec::new();
     // By position: the present SubDevice that is not read yet, or the member that it is.
     let mut before: Option<(u16, Option<usize>)> = None;
     let mut rest = Vec::new();
@@ -33,11 +33,11 @@ pub(super) fn members(
             _ => candidate.behind,
         };
         let waits_behind = matches!(before, Some((position, None)) if position.checked_add(1) == Some(at));
-        let member = head(segment, &groups, &candidate).or_else(|| follower(segment, &groups, &candidate, ahead?));
+        let member = head(segment, &groups, candidate).or_else(|| follower(segment, &groups, candidate, ahead?));
         match member {
             Some(index) => {
                 before = Some((at, Some(index)));
-                matched.push((candidate, Some(index)));
+                matched.push((candidate, index));
             }
             // A SubDevice directly behind one that is not identified yet may belong to the group of that one.
             None if candidate.is_awaited(now) || waits_behind => {
@@ -55,7 +55,7 @@ pub(super) fn members(
 }
 
 /// The head that a candidate is: absent, and the only one with its alias or identification.
-fn head(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice) -> Option<usize> {
+fn head(segment: &Segment, groups: &[Vec<usize>], candidate: UnassignedView<'_>) -> Option<usize> {
     let heads = groups.iter().filter_map(|members| members.first().copied());
     heads
         .into_iter()
@@ -63,23 +63,20 @@ fn head(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevic
 }
 
 /// No other SubDevice has the same alias or identification.
-fn is_alone(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) -> bool {
-    let address = segment.members[index].config.address;
-    let others = segment.unassigned.iter().filter(|other| other.station != candidate.station);
-    others.into_iter().all(|other| match &other.knowledge {
-        Knowledge::Known(info) => !address.is_mark_of(info),
-        Knowledge::Reading(_) | Knowledge::Unreadable(_) => true,
-    })
+fn is_alone(segment: &Segment, candidate: UnassignedView<'_>, index: usize) -> bool {
+    let Some(address) = segment.member(index).map(|member| member.config.address) else { return false };
+    let mut others = segment.subdevices().unassigned().filter(|other| other.key != candidate.key);
+    others.all(|other| other.knowledge.info().is_none_or(|info| !address.is_mark_of(info)))
 }
 
 /// The next member of the group of the member directly before the candidate.
-fn follower(segment: &Segment, groups: &[Vec<usize>], candidate: &UnassignedSubDevice, ahead: usize) -> Option<usize> {
+fn follower(segment: &Segment, groups: &[Vec<usize>], candidate: UnassignedView<'_>, ahead: usize) -> Option<usize> {
     let members = groups.iter().find(|members| members.contains(&ahead))?;
     let next = members.iter().skip_while(|index| **index != ahead).nth(1)?;
     is_absent_and_fits(segment, candidate, *next).then_some(*next)
 }
 
-fn is_absent_and_fits(segment: &Segment, candidate: &UnassignedSubDevice, index: usize) -> bool {
-    let known = matches!(candidate.knowledge, Knowledge::Known(_));
-    known && segment.members[index].phase == Phase::Absent && fit(segment, candidate, index) != Fit::No
+fn is_absent_and_fits(segment: &Segment, candidate: UnassignedView<'_>, index: usize) -> bool {
+    let is_absent = segment.member(index).is_some_and(|member| member.phase == Phase::Absent);
+    candidate.knowledge.info().is_some() && is_absent && fit(segment, candidate, index) != Fit::No
 }

@@ -11,11 +11,11 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::Effects;
+use crate::segment::key::SubDeviceKey;
 use crate::segment::matching::{Fit, assign};
-use crate::segment::member::Phase;
 use crate::segment::model::Segment;
-use crate::segment::owners::ranks;
-use crate::segment::unassigned::{HOLD, Matches, UnassignedSubDevice};
+use crate::segment::order::ranks;
+use crate::segment::unassigned::{HOLD, Matches, UnassignedView};
 use crate::time::Instant;
 
 impl Segment {
@@ -23,13 +23,13 @@ impl Segment {
     /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches
     /// proven by cables.
     pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
-        let mut unassigned = self.unassigned.clone();
+        let mut unassigned: Vec<UnassignedView<'_>> = self.subdevices.unassigned().collect();
         unassigned.sort_by_key(|it| it.position);
-        let mut matched = group_matching::members(self, &mut unassigned, now);
-        let by_cable = |it: &UnassignedSubDevice| identified.iter().find(|(station, _)| *station == it.station);
-        for (it, index) in unassigned.iter().filter_map(|it| Some((it, by_cable(it)?.1))) {
-            matched.push((it.clone(), Some(index)));
-        }
+        let of_groups = group_matching::members(self, &mut unassigned, now);
+        let by_cable = |it: &UnassignedView<'_>| identified.iter().find(|(station, _)| *station == it.key.station);
+        let by_cables = unassigned.iter().filter_map(|it| Some((*it, by_cable(it)?.1)));
+        let sure = of_groups.into_iter().chain(by_cables).map(|(it, index)| (it.key, Some(index)));
+        let mut matched: Vec<(SubDeviceKey, Option<usize>)> = sure.collect();
         unassigned.retain(|it| by_cable(it).is_none());
         let mut held = Vec::new();
         for gap in unassigned.chunk_by(|one, other| one.between == other.between) {
@@ -39,12 +39,12 @@ impl Segment {
             let mut absent = self.absent_between(gap[0].between);
             absent.retain(|index| identified.iter().all(|(_, other)| other != index));
             let from_main: Vec<bool> = gap.iter().map(|it| it.from_main).collect();
-            let fit = |candidate: usize, place: usize| fit(self, &gap[candidate], absent[place]);
-            for (it, place) in gap.iter().zip(assign(&from_main, absent.len(), fit)) {
+            let fit = |candidate: usize, place: usize| fit(self, gap[candidate], absent[place]);
+            for (it, place) in gap.iter().copied().zip(assign(&from_main, absent.len(), fit)) {
                 let member = place.map(|place| absent[place]);
                 match member.filter(|index| self.is_doubtful(it, *index, gap, &absent)) {
-                    Some(index) => held.push((it.station, index)),
-                    None => matched.push((it.clone(), member)),
+                    Some(index) => held.push((it.key, index)),
+                    None => matched.push((it.key, member)),
                 }
             }
         }
@@ -53,33 +53,21 @@ impl Segment {
 
     /// Another absent member matches as well: there are several members of the type, no serial number, and fewer
     /// SubDevices present than members missing. Outputs of one must not go to another one.
-    fn is_doubtful(
-        &self,
-        it: &UnassignedSubDevice,
-        index: usize,
-        gap: &[UnassignedSubDevice],
-        absent: &[usize],
-    ) -> bool {
+    fn is_doubtful(&self, it: UnassignedView<'_>, index: usize, gap: &[UnassignedView<'_>], absent: &[usize]) -> bool {
         if fit(self, it, index) != Fit::Seen {
             return false;
         }
         let alike = |index: &usize| self.may_be(it, *index);
         let missed = self.absent().filter(alike).count();
         let here = absent.iter().filter(|index| alike(index)).count();
-        let there = gap.iter().filter(|other| self.may_be(other, index)).count();
+        let there = gap.iter().filter(|other| self.may_be(**other, index)).count();
         // With crossed SubDevices in a closed ring, the order changes when it opens.
         missed > 1 && (self.cabling.topology.is_assumed() || here != missed || there != missed)
     }
 
     /// The SubDevice is not configured until it is known which of several members it is; if this lasts, it is reported.
-    pub(in crate::segment) fn hold(
-        &mut self,
-        station: StationAddress,
-        index: usize,
-        now: Instant,
-        effects: &mut Effects,
-    ) {
-        let Some(it) = self.unassigned_mut(station) else { return };
+    pub(in crate::segment) fn hold(&mut self, key: SubDeviceKey, index: usize, now: Instant, effects: &mut Effects) {
+        let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
         let since = *it.held_since.get_or_insert(now);
         if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
             let reason = format!(
@@ -92,19 +80,15 @@ impl Segment {
     }
 
     /// Whether an absent member is between the same two known members.
-    pub(in crate::segment) fn is_between(&self, it: &UnassignedSubDevice, index: usize) -> bool {
+    pub(in crate::segment) fn is_between(&self, it: UnassignedView<'_>, index: usize) -> bool {
         self.absent_between(it.between).contains(&index)
     }
 
     /// Absent members between two others, in the order of the segment.
     fn absent_between(&self, between: (Option<usize>, Option<usize>)) -> Vec<usize> {
-        let rank = ranks(&self.members);
-        let is_absent = |index: &usize| {
-            let member = &self.members[*index];
-            member.phase == Phase::Absent && member.config.group.is_none()
-        };
-        let mut absent: Vec<usize> = (0..self.members.len())
-            .filter(is_absent)
+        let rank = ranks(&self.subdevices);
+        let mut absent: Vec<usize> = self
+            .absent()
             .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
             .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
             .collect();
@@ -113,9 +97,9 @@ impl Segment {
     }
 
     /// If a SubDevice is in the place of the only absent member there: the difference to its declaration.
-    pub(in crate::segment) fn mismatch(&self, it: &UnassignedSubDevice, info: &SubDeviceInfo) -> Option<Event> {
+    pub(in crate::segment) fn mismatch(&self, it: UnassignedView<'_>, info: &SubDeviceInfo) -> Option<Event> {
         let [subdevice] = self.absent_between(it.between)[..] else { return None };
-        let (field, expected, got) = self.members.get(subdevice)?.config.expected.mismatch(info)?;
+        let (field, expected, got) = self.member(subdevice)?.config.expected.mismatch(info)?;
         Some(Event::Mismatch { subdevice: SubDeviceId(subdevice), position: it.position, field, expected, got })
     }
 }

@@ -9,6 +9,7 @@ use core::time::Duration;
 use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlState;
 
+use crate::board::live::Presence;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::{Direction, SubDeviceInfo};
@@ -19,23 +20,24 @@ use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
 use crate::segment::observation::{MemberFinding, ProcessDataStep};
 use crate::segment::reading::{Reading, answers};
+use crate::segment::repair::Repair;
 use crate::segment::round_result::RoundResult;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::versions::Versions;
 use crate::time::Instant;
 
-/// Consecutive scans without an answer after which a SubDevice is lost: at the moment of a cut a copy may have been
+/// Consecutive rounds without an answer after which a SubDevice is lost: at the moment of a cut a copy may have been
 /// processed by none.
 const SILENT_READS: u8 = 2;
 /// Pause before a silent SubDevice is read again.
 const REPEAT_PAUSE: Duration = Duration::from_millis(2);
-/// Consecutive rounds in which scans do not return though process data does, or the reverse, before it is tested
+/// Consecutive rounds in which reads do not return though process data does, or the reverse, before it is tested
 /// whether frames hold too many datagrams.
 const BLIND_ROUNDS: u8 = 2;
 
 impl Segment {
-    /// Processes a complete round of scans.
+    /// Processes a complete round of reads.
     pub(in crate::segment) fn observe_round(
         &mut self,
         round_result: &RoundResult<'_>,
@@ -48,7 +50,7 @@ impl Segment {
             // Some SubDevices were put out of reach on purpose during the round.
             return self.attention.again_in(REPEAT_PAUSE, now);
         }
-        // Either scan frames do not return though SubDevices process those of the exchange, or the reverse.
+        // Either reads do not return though SubDevices process those of the exchange, or the reverse.
         let is_blind = match counted {
             Some(counted) if counted != Wkc(0) => readings.contains(&Reading::Unknown),
             Some(_) | None => answers(readings) > 0,
@@ -60,12 +62,12 @@ impl Segment {
         let (counted, answering) = (usize::from(counted.0), answers(readings) + others);
         // If the count agrees with the answers, a silent SubDevice is certainly absent.
         let needed = if counted == answering { 1 } else { SILENT_READS };
-        let is_certain = self.judge(readings, before, needed, now, effects);
+        let is_certain = self.evaluate(readings, before, needed, now, effects);
         if needed == 1 {
-            self.unassigned.retain(|it| !unassigned.contains(&(it.station, Reading::Silent)));
+            self.subdevices.remove(|key| unassigned.contains(&(key, Reading::Silent)));
         }
         if !is_certain {
-            // One quick repetition, and then the next scan only when something changes.
+            // One quick repetition, and then the next round only when something changes.
             self.attention.again_in(REPEAT_PAUSE, now);
         }
         let reported: RingState = self.attention.reported();
@@ -83,7 +85,7 @@ impl Segment {
     }
 
     /// Derives member states from the answers. True if it is known of all whether they are present.
-    fn judge(
+    fn evaluate(
         &mut self,
         readings: &[Reading],
         before: &[Phase],
@@ -93,7 +95,7 @@ impl Segment {
     ) -> bool {
         let mut certain = true;
         for (index, reading) in readings.iter().enumerate() {
-            let Some(member) = self.members.get_mut(index) else { continue };
+            let Some(member) = self.subdevices.member_mut(index) else { continue };
             match (reading, member.phase) {
                 (Reading::Unknown | Reading::Doubled, _) => certain = false,
                 (Reading::Silent, Phase::Absent) => {
@@ -130,7 +132,7 @@ impl Segment {
         now: Instant,
         effects: &mut Effects,
     ) {
-        let member = &mut self.members[index];
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         match phase {
             Phase::Configuring => {}
             Phase::Settled(state) if !status.error && status.al_state() == Some(state) => {
@@ -171,7 +173,7 @@ impl Segment {
             return;
         }
         for (index, reading) in readings.iter().enumerate() {
-            let Some(member) = self.members.get_mut(index).filter(|_| !reading.is_answer()) else { continue };
+            let Some(member) = self.subdevices.member_mut(index).filter(|_| !reading.is_answer()) else { continue };
             if matches!(member.phase, Phase::Settled(_)) && self.board.takes_part(index) {
                 self.board.set_taking_part(index, false);
                 member.suspended = true;
@@ -181,7 +183,7 @@ impl Segment {
 
     /// A member no longer answers. Procedures under way for it end.
     pub(in crate::segment) fn lose(&mut self, index: usize, effects: &mut Effects) {
-        let Some(member) = self.members.get_mut(index) else { return };
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         member.attempt = member.attempt.wrapping_add(1);
         if member.phase != Phase::Absent {
             member.phase = Phase::Absent;
@@ -189,6 +191,7 @@ impl Segment {
             effects.report(Event::Lost { subdevice: SubDeviceId(index) });
         }
         let is_excused = !member.exchanges(member.target);
+        self.post_presence(index);
         self.board.set_taking_part(index, false);
         self.board.set_unproven(index, false);
         // A member that was on its way to process data counts as missing from now on.
@@ -205,16 +208,20 @@ impl Segment {
         check: Check,
         effects: &mut Effects,
     ) {
-        let Some(member) = self.members.get_mut(index) else { return };
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         let attempt = member.begin_attempt();
+        // Until it is identified it may be another SubDevice.
+        if check != Check::Return {
+            self.post_presence(index);
+        }
         effects.start(Task::BringUp { index, attempt, from, reported, check });
     }
 
     /// Starts the configuration of all members that were found.
     pub(in crate::segment) fn start_all(&mut self, effects: &mut Effects) {
         let from = self.stage.scanned().map_or(Start::Doubtful, |scanned| scanned.registers);
-        for index in 0..self.members.len() {
-            if self.members[index].is_there() {
+        for index in 0..self.subdevices.member_count() {
+            if self.member(index).is_some_and(|member| member.is_there()) {
                 self.start(index, from, None, Check::None, effects);
             }
         }
@@ -233,17 +240,21 @@ impl Segment {
             MemberFinding::Reached(state) => self.settle(index, state, effects),
             MemberFinding::Returned => {
                 member.mistaken = Mistaken::default();
+                self.post_presence(index);
                 effects.report(Event::Returned { subdevice: SubDeviceId(index) });
             }
             MemberFinding::NotReturned => self.keep_absent(index, now, effects),
             MemberFinding::Unreachable => self.lose(index, effects),
             MemberFinding::Configured(is) => member.configured = is,
             MemberFinding::Undone(reason) => {
-                effects.failed(index, reason);
-                // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier
-                // session.
-                self.start(index, Start::Doubtful, None, Check::Identity, effects);
+                if member.repair.begin(&reason) {
+                    effects.failed(index, reason);
+                    // Another SubDevice may answer at its address: a SubDevice that was out of reach since an earlier
+                    // session.
+                    self.start(index, Start::Doubtful, None, Check::Identity, effects);
+                }
             }
+            MemberFinding::Held => member.repair = Repair::default(),
             MemberFinding::ProcessData(step) => self.observe_process_data(index, step, effects),
             MemberFinding::Refused(before) => self.refuse(index, before),
             MemberFinding::ReadAgain(info) => self.observe_info(index, info, effects),
@@ -251,15 +262,16 @@ impl Segment {
     }
 
     /// The SubDevice that answers at a lost member's address is not identified as that member. Its address has been
-    /// taken away, and the next scan finds it without one, unless that failed.
+    /// taken away, and the next round finds it without one, unless that failed.
     fn keep_absent(&mut self, index: usize, now: Instant, effects: &mut Effects) {
-        let member = &mut self.members[index];
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         member.phase = Phase::Absent;
-        let (pause, station) = (member.mistaken.again(now), member.station);
-        if member.mistaken.is_due() {
+        let (pause, is_due) = (member.mistaken.again(now), member.mistaken.is_due());
+        self.post_presence(index);
+        if is_due && let Some(member) = self.member(index) {
             let reason = format!(
                 "the SubDevice at its address {:#06x} is another one or unknown, and does not give up the address",
-                station.0
+                member.station.0
             );
             effects.failed(index, reason);
         }
@@ -271,16 +283,17 @@ impl Segment {
 
     /// A member has reached its requested state.
     fn settle(&mut self, index: usize, state: AlState, effects: &mut Effects) {
-        let member = &mut self.members[index];
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         member.phase = Phase::Settled(state);
         let is_excused = !member.exchanges(state);
+        self.post_presence(index);
         self.board.set_excused(index, is_excused);
         effects.report(Event::StateReached { subdevice: SubDeviceId(index), state });
     }
 
     /// A member gets another target state.
     pub(in crate::segment) fn request(&mut self, index: usize, state: AlState) {
-        let Some(member) = self.members.get_mut(index) else { return };
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         member.target = state;
         let exchanges = member.exchanges(state);
         match member.phase {
@@ -288,6 +301,7 @@ impl Segment {
             Phase::Settled(is) if is == state => {}
             Phase::Settled(_) | Phase::Configuring => {
                 member.begin_attempt();
+                self.post_presence(index);
                 // On the way up its missing answers are excused until it has joined.
                 if !exchanges {
                     self.board.set_excused(index, true);
@@ -298,7 +312,7 @@ impl Segment {
 
     /// A member has refused a state, and keeps its previous target.
     fn refuse(&mut self, index: usize, before: AlState) {
-        let member = &mut self.members[index];
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         member.target = before;
         let is_excused = !member.exchanges(before);
         self.board.set_excused(index, is_excused);
@@ -306,7 +320,7 @@ impl Segment {
 
     /// How a member takes part in process data from now on.
     fn observe_process_data(&mut self, index: usize, step: ProcessDataStep, effects: &mut Effects) {
-        let member = &mut self.members[index];
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         let is_seen_alone = member.setup.as_ref().is_some_and(|setup| setup.presence_fmmu.is_some());
         match step {
             ProcessDataStep::Off => self.board.set_taking_part(index, false),
@@ -335,19 +349,18 @@ impl Segment {
 
     /// A member has delivered all inputs of a mapping. The proof of an earlier mapping is ignored.
     pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
-        if self.members.get(index).is_some_and(|member| member.mapping == mapping) {
+        if self.member(index).is_some_and(|member| member.mapping == mapping) {
             self.board.set_unproven(index, false);
         }
     }
 
     /// A member's SII was read again.
     fn observe_info(&mut self, index: usize, info: &SubDeviceInfo, effects: &mut Effects) {
-        let Segment { members, layout, .. } = self;
-        let member = &mut members[index];
-        match Setup::new(index, &member.config, info, layout) {
+        let Some(member) = self.subdevices.member_mut(index) else { return };
+        match Setup::new(index, &member.config, info, &self.layout) {
             Ok(setup) => {
                 member.take_setup(index, setup, effects);
-                member.info = Some(Rc::new(info.clone()));
+                self.subdevices.identify(index, info.clone());
             }
             // The same error as before.
             Err(_) if member.unfit.is_some() => {}
@@ -357,19 +370,31 @@ impl Segment {
 
     /// Present members will be configured later: an answer meanwhile is not a return.
     pub(in crate::segment) fn delay_all(&mut self) {
-        for member in self.members.iter_mut().filter(|member| member.is_there()) {
+        for member in self.subdevices.members_mut().filter(|member| member.is_there()) {
             member.phase = Phase::Configuring;
         }
+        (0..self.subdevices.member_count()).for_each(|index| self.post_presence(index));
+    }
+
+    /// Posts the phase of a member for readers of the live status.
+    fn post_presence(&self, index: usize) {
+        let Some(member) = self.member(index) else { return };
+        let presence = match member.phase {
+            Phase::Absent => Presence::Offline,
+            Phase::Configuring => Presence::Configuring,
+            Phase::Settled(_) => Presence::Settled,
+        };
+        self.board.live.post_presence(index, presence);
     }
 
     /// Resets the incident counters of all members.
     pub(in crate::segment) fn forget_incidents(&mut self) {
-        self.members.iter_mut().for_each(|member| member.incidents = Incidents::default());
+        self.subdevices.members_mut().for_each(|member| member.incidents = Incidents::default());
     }
 
     /// The member, if this attempt is the current one.
     pub(in crate::segment) fn current(&mut self, index: usize, attempt: u32) -> Option<&mut Member> {
-        self.members.get_mut(index).filter(|member| member.attempt == attempt)
+        self.subdevices.member_mut(index).filter(|member| member.attempt == attempt)
     }
 }
 

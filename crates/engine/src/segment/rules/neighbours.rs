@@ -13,10 +13,11 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::fit::fit;
+use crate::segment::knowledge::Knowledge;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
-use crate::segment::unassigned::{Knowledge, UnassignedSubDevice};
+use crate::segment::unassigned::UnassignedView;
 use crate::segment::view::View;
 use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 
@@ -27,7 +28,7 @@ impl Segment {
     /// An unassigned SubDevice matches several absent members, or one of them without proof by order: then ports have
     /// to be read ([`Segment::identified_by_cables`]).
     pub fn needs_cables(&self) -> bool {
-        self.unassigned.iter().any(|it| {
+        self.subdevices.unassigned().any(|it| {
             let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();
             match fits[..] {
                 [] => false,
@@ -48,28 +49,29 @@ impl Segment {
     pub fn nodes(&self, view: &View, ports: &[DlStatus]) -> Vec<NodeStatus> {
         let owners = self.owners(&view.stations);
         let node = |(at, (station, dl_status)): (usize, (&StationAddress, &DlStatus))| {
-            let known = match (owners.at(at), self.unassigned(*station).map(|it| &it.knowledge)) {
-                (Some(index), _) => self.members[index].info.as_deref(),
-                (None, Some(Knowledge::Known(info))) => Some(&**info),
-                (None, _) => None,
-            };
+            let known = self.known_at(owners.at(at), *station).and_then(Knowledge::info);
             let ports: [PortKind; 4] = known.map(|info| info.controller.ports).unwrap_or_default();
             NodeStatus { dl_status: *dl_status, receive_times: None, ports }
         };
         view.stations.iter().zip(ports).enumerate().map(node).collect()
     }
 
+    /// What is known of the SubDevice at a station address: of the member that it is, or of an unassigned SubDevice.
+    pub fn known_at(&self, owner: Option<usize>, station: StationAddress) -> Option<&Knowledge> {
+        let unassigned = || self.subdevices.unassigned().find(|it| it.key.station == station).map(|it| it.knowledge);
+        owner.map_or_else(unassigned, |index| Some(&self.subdevices.all().get(index)?.knowledge))
+    }
+
     /// Absent members, without those of groups.
     pub(in crate::segment) fn absent(&self) -> impl Iterator<Item = usize> + '_ {
-        let members = self.members.iter().enumerate();
+        let members = self.members().enumerate();
         let absent = members.filter(|(_, member)| member.phase == Phase::Absent && member.config.group.is_none());
         absent.map(|(index, _)| index)
     }
 
     /// Its identity is known, and equals the last known identity of the member.
-    pub(in crate::segment) fn may_be(&self, it: &UnassignedSubDevice, index: usize) -> bool {
-        let is_known = matches!(it.knowledge, Knowledge::Known(_));
-        is_known && matches!(fit(self, it, index), Fit::Seen | Fit::Serial)
+    pub(in crate::segment) fn may_be(&self, it: UnassignedView<'_>, index: usize) -> bool {
+        it.knowledge.info().is_some() && matches!(fit(self, it, index), Fit::Seen | Fit::Serial)
     }
 }
 
@@ -81,13 +83,13 @@ struct Present<'a> {
 }
 
 impl Present<'_> {
-    fn unassigned_at(&self, at: usize) -> Option<&UnassignedSubDevice> {
-        self.segment.unassigned.iter().find(|it| self.view.position(it.station) == Some(at))
+    fn unassigned_at(&self, at: usize) -> Option<UnassignedView<'_>> {
+        self.segment.subdevices.unassigned().find(|it| self.view.position(it.key.station) == Some(at))
     }
 
     /// The absent member that was at a place, if the unassigned SubDevice at a position may be it.
     fn candidate(&self, node: usize, at: usize) -> Option<usize> {
-        let index = self.segment.members.iter().position(|member| member.node == Some(node))?;
+        let index = self.segment.subdevices.member_at(node)?;
         let unassigned = self.unassigned_at(at)?;
         (self.segment.absent().any(|it| it == index) && self.segment.may_be(unassigned, index)).then_some(index)
     }
@@ -141,7 +143,7 @@ impl Present<'_> {
     /// An end of a cable in the previous cabling, if the SubDevice there is known.
     fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
         let Some(PortOf { node, port }) = end else { return Some(None) };
-        let node = self.segment.members.get(members[node]?)?.node?;
+        let node = self.segment.member(members[node]?)?.node?;
         Some(Some(PortOf { node, port }))
     }
 
@@ -149,8 +151,8 @@ impl Present<'_> {
     fn is_as_before(&self, members: &[Option<usize>]) -> bool {
         let before = &self.segment.cabling.topology;
         let counts = (usize::from(self.view.counts.0.0), members.len());
-        let at_home =
-            |(at, index): (usize, &Option<usize>)| index.is_none_or(|it| self.segment.members[it].node == Some(at));
+        let node = |index: usize| self.segment.member(index).and_then(|member| member.node);
+        let at_home = |(at, index): (usize, &Option<usize>)| index.is_none_or(|it| node(it) == Some(at));
         counts == (before.main_count, before.nodes.len()) && members.iter().enumerate().all(at_home)
     }
 
@@ -162,7 +164,7 @@ impl Present<'_> {
         let mut open = Vec::new();
         for ring in &self.segment.cabling.topology.local_rings {
             let place = |end: PortOf| {
-                let index = self.segment.members.iter().position(|member| member.node == Some(end.node));
+                let index = self.segment.subdevices.member_at(end.node);
                 let node = members.iter().position(|member| index.is_some() && *member == index)?;
                 Some(PortOf { node, port: end.port })
             };

@@ -13,7 +13,7 @@ impl Segment {
     pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
         let mut effects = Effects::default();
         self.take(seen, now, &mut effects);
-        self.hot_connect.observe(&self.members, &mut effects);
+        self.hot_connect.observe(&self.subdevices, &mut effects);
         effects
     }
 
@@ -26,15 +26,15 @@ impl Segment {
             }
             Observation::Round(round_result) => self.observe_round(&round_result, now, effects),
             Observation::RoundEnded(number) => self.attention.end(number, now),
-            Observation::ScanAgain => self.attention.want(),
-            Observation::ScanAgainIn(pause) => self.attention.again_in(pause, now),
+            Observation::RoundWanted => self.attention.want(),
+            Observation::RoundWantedIn(pause) => self.attention.again_in(pause, now),
             Observation::FramesTested(until) => self.frames_tested_until = until,
-
             Observation::ScanBegun => self.begin_scan(),
             Observation::ScanEnded(result) => self.end_scan(result, effects),
+            Observation::FoundAgain { versions, found } => self.find_again(versions, found),
             Observation::Activated(declared) => self.activate(*declared, effects),
             Observation::Deactivated => self.deactivate(),
-
+            Observation::SiiCompleted { station, read } => self.observe_whole_sii(station, read, effects),
             Observation::Visited => self.observe_visit(),
             Observation::Started => self.start_all(effects),
             Observation::Delayed => self.delay_all(),
@@ -50,12 +50,12 @@ impl Segment {
             Observation::Offered(station) => self.addresses.offered(station),
             Observation::Given { versions, view, given } => self.observe_given(versions, view, given, now, effects),
             Observation::Searched(result) => self.observe_search(result, effects),
-            Observation::Read { station, since, read } => self.observe_read((station, since), read, effects),
-            Observation::Unexpected(station) => self.observe_unexpected(station, effects),
-            Observation::Misfit { station, index, reason } => self.observe_misfit(station, index, reason, effects),
-            Observation::Held { station, index } => self.hold(station, index, now, effects),
-            Observation::Admitted { station, index, attempt, info } => {
-                self.observe_admitted(station, (index, attempt), *info, effects);
+            Observation::Read { key, read } => self.observe_read(key, read, effects),
+            Observation::Unexpected(key) => self.observe_unexpected(key, effects),
+            Observation::Misfit { key, index, reason } => self.observe_misfit(key, index, reason, effects),
+            Observation::Held { key, index } => self.hold(key, index, now, effects),
+            Observation::Admitted { key, index, attempt, info } => {
+                self.observe_admitted(key, (index, attempt), *info, effects);
             }
 
             Observation::LineChecked { versions, found, in_control } => {

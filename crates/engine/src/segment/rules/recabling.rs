@@ -23,7 +23,7 @@ type Ends = [Option<End>; 2];
 impl Segment {
     /// Whether a rescan can be taken over: no break and no missing SubDevice would be lost from the model.
     pub fn is_whole(&self, words: &Words) -> bool {
-        let is_missed = self.members.iter().any(|member| !member.config.optional && member.phase == Phase::Absent);
+        let is_missed = self.members().any(|member| !member.config.optional && member.phase == Phase::Absent);
         (words.links == LinkSet::Single || self.is_closed(words)) && !is_missed
     }
 
@@ -47,7 +47,7 @@ impl Segment {
         let is_single = words.links == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
         let is_there = |index: usize| seen.members.contains(&Some(index));
-        let is_missed = (0..self.members.len()).any(|index| !is_there(index) && !self.members[index].config.optional);
+        let is_missed = self.members().enumerate().any(|(index, member)| !is_there(index) && !member.config.optional);
         if !is_whole || is_missed {
             return;
         }
@@ -55,7 +55,7 @@ impl Segment {
             let ends = |cable: &Cable| ends(cable, |node| self.station_of(node));
             self.cabling.cables.iter().map(|(cable, errors)| (ends(cable), *errors)).collect()
         };
-        for (index, member) in self.members.iter_mut().enumerate() {
+        for (index, member) in self.subdevices.members_mut().enumerate() {
             member.node = seen.members.iter().position(|owner| *owner == Some(index));
         }
         let counted = |cable: Cable| {
@@ -66,7 +66,7 @@ impl Segment {
         };
         let now = Cabling {
             topology: seen.topology.clone(),
-            stations: stations_by_position(&self.members, seen.stations.iter().copied()),
+            stations: stations_by_position(&self.subdevices, seen.stations.iter().copied()),
             cables: cables(seen.topology, words.links).into_iter().map(counted).collect(),
             closings: core::mem::take(&mut self.cabling.closings),
             version: self.cabling.version,
@@ -92,12 +92,13 @@ impl Segment {
     pub(in crate::segment) fn take_place(&mut self, unassigned: StationAddress, index: usize, effects: &mut Effects) {
         let stations = &mut self.cabling.stations;
         let Some(at) = stations.iter().position(|station| *station == unassigned) else { return };
-        let Some(member) = self.members.get_mut(index) else { return };
+        let Some(own) = self.subdevices.member(index).map(|member| member.station) else { return };
+        let Some(member) = self.subdevices.member_mut(index) else { return };
         // Its temporary address is free now, and so is the member's previous place.
         if let Some(place) = member.node.and_then(|node| stations.get_mut(node)) {
             *place = unassigned;
         }
-        stations[at] = member.station;
+        stations[at] = own;
         member.node = Some(at);
         self.cabling.version = self.cabling.version.wrapping_add(1);
         effects.0.push(Effect::Occupants(self.occupants()));

@@ -1,20 +1,26 @@
 //! The stages of the segment: a scan begins and ends, an application is activated and deactivated.
 
 use alloc::rc::Rc;
-use alloc::string::String;
+use alloc::string::{String, ToString};
+
+use ringcat_wire::address::StationAddress;
 
 use crate::event::Event;
+use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Effect, Effects};
 use crate::segment::model::{Declared, Segment};
-use crate::segment::scan::Scan;
+use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
 use crate::segment::start::Start;
+use crate::segment::subdevices::SubDevices;
+use crate::segment::versions::Versions;
 
 impl Segment {
     /// A scan begins: it assigns new station addresses.
     pub(in crate::segment) fn begin_scan(&mut self) {
         if !self.is_active() {
             self.addresses.change();
+            self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning;
         }
     }
@@ -25,12 +31,46 @@ impl Segment {
             return;
         }
         self.stage = match result {
-            Ok(scan) => Stage::Scanned(Scanned { found: Rc::new(scan.into()), registers: Start::Cleared }),
+            Ok(scan) => {
+                let found = Rc::new(Found::from(scan));
+                self.subdevices = SubDevices::of_scan(&found).begun(self.addresses.version(), self.first_attempt);
+                Stage::Scanned(Scanned { found, registers: Start::Cleared })
+            }
             Err(reason) => {
                 effects.report(Event::ScanFailed { reason });
                 Stage::Unscanned
             }
         };
+    }
+
+    /// The segment was scanned again without an application. A result from before a scan or an application is refused.
+    pub(in crate::segment) fn find_again(&mut self, versions: Versions, found: Rc<Found>) {
+        let is_valid = versions.addresses == self.addresses.version();
+        if let Stage::Scanned(scanned) = &mut self.stage
+            && is_valid
+        {
+            self.subdevices = SubDevices::of_scan(&found).begun(self.addresses.version(), self.first_attempt);
+            *scanned = Scanned { found, registers: Start::Doubtful };
+        }
+    }
+
+    /// The whole SII of a scanned SubDevice was read. The list of SubDevices shares its data with the scan, unless
+    /// there is other data since then.
+    pub(in crate::segment) fn observe_whole_sii(
+        &mut self,
+        station: StationAddress,
+        read: &SubDeviceInfo,
+        effects: &mut Effects,
+    ) {
+        let Some(scanned) = self.stage.scanned_mut() else { return };
+        let found = Rc::make_mut(&mut scanned.found);
+        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == station) else { return };
+        let mut info = (**known).clone();
+        for warning in info.extend(read) {
+            effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+        }
+        let before = core::mem::replace(known, Rc::new(info));
+        self.subdevices.replace(&before, known);
     }
 
     /// Single SubDevices were configured before an application is active.
@@ -51,17 +91,21 @@ impl Segment {
     /// The application ends, or a scan is given up. What the last scan has found stays, and another declaration may
     /// follow at once.
     pub(in crate::segment) fn deactivate(&mut self) {
+        self.board.post_end();
         let scanned = self.stage.scanned().cloned();
+        let subdevices = scanned.as_ref().map(|it| SubDevices::of_scan(&it.found)).unwrap_or_default();
         let stage = scanned.map_or(Stage::Unscanned, |it| Stage::Scanned(Scanned { registers: Start::Doubtful, ..it }));
-        self.begin(stage, Declared::default());
+        self.begin(stage, Declared { subdevices, ..Declared::default() });
     }
 
     /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.
     fn begin(&mut self, stage: Stage, mut declared: Declared) {
         declared.cabling.version = self.cabling.version.wrapping_add(1);
         let mut addresses = core::mem::take(&mut self.addresses);
-        addresses.change();
+        let first_attempt = self.subdevices.next_attempt(self.first_attempt);
+        declared.subdevices = declared.subdevices.begun(addresses.change(), first_attempt);
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
-        *self = Segment { stage, addresses, slot, frames_tested_until, ..Segment::of(declared, choices) };
+        *self =
+            Segment { stage, addresses, slot, frames_tested_until, first_attempt, ..Segment::of(declared, choices) };
     }
 }

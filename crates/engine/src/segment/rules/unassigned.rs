@@ -10,11 +10,14 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Check, Effects, Task};
+use crate::segment::key::SubDeviceKey;
+use crate::segment::knowledge::Knowledge;
 use crate::segment::model::Segment;
-use crate::segment::owners::{Owners, owners_of};
+use crate::segment::order::owners_of;
+use crate::segment::owners::Owners;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
-use crate::segment::unassigned::{At, Knowledge, UnassignedSubDevice};
+use crate::segment::unassigned::{At, Unassigned};
 use crate::segment::versions::Versions;
 use crate::segment::view::View;
 use crate::time::Instant;
@@ -22,16 +25,7 @@ use crate::time::Instant;
 impl Segment {
     /// The member at each position.
     pub fn owners(&self, stations: &[StationAddress]) -> Owners {
-        owners_of(&self.members, stations)
-    }
-
-    /// The unassigned SubDevice with a station address.
-    pub fn unassigned(&self, station: StationAddress) -> Option<&UnassignedSubDevice> {
-        self.unassigned.iter().find(|it| it.station == station)
-    }
-
-    pub(in crate::segment) fn unassigned_mut(&mut self, station: StationAddress) -> Option<&mut UnassignedSubDevice> {
-        self.unassigned.iter_mut().find(|it| it.station == station)
+        owners_of(&self.subdevices, stations)
     }
 
     /// Station addresses that belong to no member and no listed SubDevice, or to several SubDevices.
@@ -39,7 +33,7 @@ impl Segment {
         let owners = self.owners(&view.stations);
         let mut old = Vec::new();
         for (at, station) in view.stations.iter().enumerate() {
-            let is_listed = self.unassigned(*station).is_some();
+            let is_listed = self.subdevices.at(*station).is_some_and(|it| it.as_unassigned().is_some());
             let is_known = owners.at(at).is_some() || (is_listed && view.position(*station).is_some());
             if !is_known && !old.contains(station) {
                 old.push(*station);
@@ -51,7 +45,7 @@ impl Segment {
     /// Addresses are taken away.
     pub(in crate::segment) fn observe_readdressing(&mut self, old: &[StationAddress]) {
         self.addresses.change();
-        self.unassigned.retain(|it| !old.contains(&it.station));
+        self.subdevices.remove(|key| old.contains(&key.station));
     }
 
     /// Stores their present positions.
@@ -61,11 +55,10 @@ impl Segment {
         }
         let owners = self.owners(&view.stations);
         let main_count = usize::from(view.counts.0.0);
-        for it in &mut self.unassigned {
-            if let Some(position) = view.position(it.station) {
+        for (key, _, it) in self.subdevices.all_unassigned_mut() {
+            if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
-                let moved = UnassignedSubDevice::at((it.station, it.since), &at, it.reported, it.knowledge.clone());
-                *it = UnassignedSubDevice { held_since: it.held_since, ..moved };
+                *it = Unassigned { reported: it.reported, held_since: it.held_since, ..Unassigned::at(&at) };
             }
         }
     }
@@ -90,8 +83,9 @@ impl Segment {
         for station in given.iter().copied() {
             let Some(position) = view.position(station) else { continue };
             let at = At { position, owners: &owners, main_count };
-            self.unassigned.push(UnassignedSubDevice::at((station, since), &at, false, Knowledge::Reading(now)));
-            effects.start(Task::ReadUnassigned { station, since });
+            let key = SubDeviceKey { station, since };
+            self.subdevices.add(key, Knowledge::Awaited(now), Unassigned::at(&at));
+            effects.start(Task::ReadUnassigned { key });
         }
     }
 
@@ -100,8 +94,7 @@ impl Segment {
         self.addresses.next(|address| {
             present.contains(&address)
                 || self.cabling.stations.contains(&address)
-                || self.member_of(address).is_some()
-                || self.unassigned(address).is_some()
+                || self.subdevices.at(address).is_some()
         })
     }
 
@@ -118,34 +111,31 @@ impl Segment {
     /// A SubDevice was read, or could not be: then with the reason, if it is to be reported.
     pub(in crate::segment) fn observe_read(
         &mut self,
-        (station, since): (StationAddress, u32),
+        key: SubDeviceKey,
         read: Result<Rc<SubDeviceInfo>, Option<String>>,
         effects: &mut Effects,
     ) {
         self.attention.want();
-        let Some(it) = self.unassigned_mut(station).filter(|it| it.since == since) else { return };
+        let Some((knowledge, _)) = self.subdevices.unassigned_mut(key) else { return };
         match read {
-            Ok(info) => it.knowledge = Knowledge::Known(info),
+            Ok(info) => *knowledge = Knowledge::Known(info),
             Err(None) => {}
             Err(Some(reason)) => {
-                if !matches!(&it.knowledge, Knowledge::Unreadable(before) if *before == reason) {
+                if !matches!(knowledge, Knowledge::Unreadable(before) if *before == reason) {
                     effects.report(Event::ScanFailed { reason: reason.clone() });
-                    it.knowledge = Knowledge::Unreadable(reason);
+                    *knowledge = Knowledge::Unreadable(reason);
                 }
             }
         }
     }
 
     /// A SubDevice is certainly none of the declared ones: reported once.
-    pub(in crate::segment) fn observe_unexpected(&mut self, station: StationAddress, effects: &mut Effects) {
-        let Some(it) = self.unassigned_mut(station) else { return };
-        let Knowledge::Known(info) = it.knowledge.clone() else { return };
-        if core::mem::replace(&mut it.reported, true) {
-            return;
-        }
-        let it = it.clone();
+    pub(in crate::segment) fn observe_unexpected(&mut self, key: SubDeviceKey, effects: &mut Effects) {
+        let Some((Knowledge::Known(info), state)) = self.subdevices.unassigned_mut(key) else { return };
+        let (info, is_reported) = (info.clone(), core::mem::replace(&mut state.reported, true));
+        let Some(it) = self.unassigned(key).filter(|_| !is_reported) else { return };
         effects.report(Event::Unexpected { position: it.position, identity: info.identity });
-        if let Some(mismatch) = self.mismatch(&it, &info) {
+        if let Some(mismatch) = self.mismatch(it, &info) {
             effects.report(mismatch);
         }
     }
@@ -153,12 +143,12 @@ impl Segment {
     /// A SubDevice is a member but does not fit the process image: reported once.
     pub(in crate::segment) fn observe_misfit(
         &mut self,
-        station: StationAddress,
+        key: SubDeviceKey,
         subdevice: usize,
         reason: String,
         effects: &mut Effects,
     ) {
-        let Some(it) = self.unassigned_mut(station) else { return };
+        let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
         if !core::mem::replace(&mut it.reported, true) {
             effects.failed(subdevice, reason);
         }
@@ -168,46 +158,39 @@ impl Segment {
     /// found to be the member, the next round finds the address at a SubDevice that is not the member.
     pub(in crate::segment) fn observe_admitted(
         &mut self,
-        station: StationAddress,
+        key: SubDeviceKey,
         (index, attempt): (usize, u32),
         info: SubDeviceInfo,
         effects: &mut Effects,
     ) {
         self.addresses.change();
-        if self.unassigned(station).is_none() || self.current(index, attempt).is_none() {
+        if self.unassigned(key).is_none() || self.current(index, attempt).is_none() {
             return self.attention.want();
         }
-        self.take_place(station, index, effects);
-        let Segment { members, layout, .. } = self;
-        let Some(member) = members.get_mut(index) else { return };
-        let Ok(setup) = Setup::new(index, &member.config, &info, layout) else { return };
+        self.take_place(key.station, index, effects);
+        let Some(member) = self.subdevices.member_mut(index) else { return };
+        let Ok(setup) = Setup::new(index, &member.config, &info, &self.layout) else { return };
         member.take_setup(index, setup, effects);
-        member.info = Some(Rc::new(info));
         member.configured = false;
-        self.unassigned.retain(|other| other.station != station);
+        self.subdevices.identify(index, info);
+        self.subdevices.remove(|other| other == key);
         effects.report(Event::Returned { subdevice: SubDeviceId(index) });
         // Its state was not set by this session.
         self.start(index, Start::Doubtful, None, Check::None, effects);
     }
 
-    /// The register values that a member needs if it is this SubDevice, with its station address.
+    /// What a member is known as from now on if it is this unassigned SubDevice; `None` if that has left.
     ///
     /// # Errors
     /// It does not fit the process image.
-    pub fn as_member(
-        &self,
-        it: &UnassignedSubDevice,
-        info: &SubDeviceInfo,
-        index: usize,
-    ) -> Result<SubDeviceInfo, String> {
-        let member = &self.members[index];
-        let mut info = SubDeviceInfo { station: member.station, position: it.position, ..info.clone() };
-        if let Some(known) = &member.info {
+    pub fn as_member(&self, key: SubDeviceKey, index: usize) -> Option<Result<SubDeviceInfo, String>> {
+        let (it, member) = (self.unassigned(key)?, self.member(index)?);
+        let found = SubDeviceInfo::clone(it.knowledge.info()?);
+        let mut info = SubDeviceInfo { station: member.station, position: it.position, ..found };
+        if let Some(known) = member.info {
             info.keep_read_online(known);
         }
-        match Setup::new(index, &member.config, &info, &self.layout) {
-            Ok(_) => Ok(info),
-            Err(error) => Err(error.to_string()),
-        }
+        let fits = Setup::new(index, &member.config, &info, &self.layout);
+        Some(fits.map(|_| info).map_err(|error| error.to_string()))
     }
 }

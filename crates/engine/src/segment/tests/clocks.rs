@@ -49,6 +49,8 @@ impl Ring {
     }
 
     fn answers(&mut self, answers: &[Option<Answer>]) -> Vec<Event> {
+        let answered = |(index, answer): (usize, &Option<Answer>)| Some((station(index), (*answer)?));
+        let answers = &answers.iter().enumerate().filter_map(answered).collect();
         reports(&self.clocks(ClockObservation::Answers { answers, is_explained: true, holds: 0 }))
     }
 
@@ -138,7 +140,7 @@ fn a_clock_that_lost_its_registers_is_no_reference_and_starts_a_measurement() {
     let mut ring = set_up(2);
     assert_eq!(ring.segment.clocks().doubtful_since(), None);
     ring.now = Instant(7_000_000);
-    ring.clocks(ClockObservation::RegistersLost { index: 0 });
+    ring.clocks(ClockObservation::RegistersLost(station(0)));
     assert_eq!(ring.segment.clocks().doubtful_since(), Some(ring.now));
     assert_eq!(ring.segment.clocks().reference, None);
     let ended = ring.clocks(ClockObservation::MeasurementEnded { failed: None, holds: 0 });

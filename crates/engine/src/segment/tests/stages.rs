@@ -26,9 +26,14 @@ fn declare(segment: &Segment) -> Box<Declared> {
     let info = segment.found().map(|found| found.subdevices[0].clone());
     // It can be configured.
     let plan = Setup::new(0, &SubDeviceConfig::at_position(0), info.as_ref().unwrap(), &Layout::default()).unwrap();
-    let member = Member::new(SubDeviceConfig::at_position(0), info, station(0), Some(Rc::new(plan)));
+    let member = SubDevice::declared(SubDeviceConfig::at_position(0), info, station(0), Ok(Rc::new(plan)));
     let cabling = Cabling { stations: segment.found().unwrap().stations(), ..Cabling::default() };
-    Box::new(Declared { members: vec![member], cabling, board: Arc::new(Board::new(1)), ..Declared::default() })
+    Box::new(Declared {
+        subdevices: SubDevices::new(vec![member], []),
+        cabling,
+        board: Arc::new(Board::new(1)),
+        ..Declared::default()
+    })
 }
 
 fn bring_up(effects: &Effects) -> Option<Start> {
@@ -42,7 +47,7 @@ fn bring_up(effects: &Effects) -> Option<Start> {
 fn a_scan_is_known_to_the_model_without_an_application() {
     let segment = scanned(3);
     let found = segment.found().unwrap();
-    assert_eq!((found.subdevices.len(), segment.is_active(), segment.members().len()), (3, false, 0));
+    assert_eq!((found.subdevices.len(), segment.is_active(), segment.subdevices().member_count()), (3, false, 0));
     assert_eq!(segment.stations_by_position(), [station(0), station(1), station(2)]);
     assert_eq!((found.scan().main_count, found.scan().redundant_count), (3, 0));
 }
@@ -77,7 +82,7 @@ fn a_declaration_without_a_scan_or_beside_another_one_is_refused() {
         let declared = declare(&segment);
         segment.observe(Observation::Activated(declared), Instant(0));
         segment.observe(Observation::Started, Instant(0));
-        assert_eq!(segment.members()[0].phase, Phase::Configuring);
+        assert_eq!(segment.member(0).unwrap().phase, Phase::Configuring);
     }
 }
 
@@ -87,7 +92,7 @@ fn members_share_the_data_of_the_scan() {
     let declared = declare(&segment);
     segment.observe(Observation::Activated(declared), Instant(0));
     let found = &segment.found().unwrap().subdevices[0];
-    assert!(segment.members()[0].info.as_ref().is_some_and(|info| Rc::ptr_eq(info, found)));
+    assert!(segment.member(0).unwrap().info.is_some_and(|info| Rc::ptr_eq(info, found)));
 }
 
 #[test]
@@ -101,7 +106,7 @@ fn after_deactivation_the_scan_stays_and_nothing_of_the_declaration() {
         registers.push(bring_up(&segment.observe(Observation::Started, Instant(0))));
         let versions = segment.versions();
         segment.observe(Observation::Deactivated, Instant(0));
-        assert_eq!((segment.members().len(), segment.found().unwrap().subdevices.len()), (0, 3));
+        assert_eq!((segment.subdevices().member_count(), segment.found().unwrap().subdevices.len()), (0, 3));
         let now = segment.versions();
         assert!(now.cabling != versions.cabling && now.isolations != versions.isolations);
         assert!(!segment.are_places_valid(versions));
@@ -117,4 +122,39 @@ fn a_subdevice_that_was_visited_is_not_taken_for_a_cleared_one() {
     let declared = declare(&segment);
     segment.observe(Observation::Activated(declared), Instant(0));
     assert_eq!(bring_up(&segment.observe(Observation::Started, Instant(0))), Some(Start::Doubtful));
+}
+
+#[test]
+fn findings_of_an_earlier_application_are_refused() {
+    let mut segment = scanned(3);
+    let mut attempts = Vec::new();
+    for _ in 0..3 {
+        let declared = declare(&segment);
+        segment.observe(Observation::Activated(declared), Instant(0));
+        segment.observe(Observation::Started, Instant(0));
+        let attempt = segment.member(0).unwrap().attempt;
+        for earlier in attempts.iter().copied() {
+            let late = of_member((0, earlier), MemberFinding::Reached(AlState::Op));
+            assert_eq!(segment.observe(late, Instant(0)), Effects::default(), "attempt {earlier} after {attempt}");
+        }
+        segment.observe(Observation::Deactivated, Instant(0));
+        attempts.push(attempt);
+    }
+}
+
+#[test]
+fn the_list_holds_what_was_found_before_during_and_after_an_application() {
+    let mut segment = scanned(3);
+    let stations = |segment: &Segment| -> Vec<StationAddress> {
+        segment.subdevices().all().iter().map(|it| it.key.station).collect()
+    };
+    assert_eq!(stations(&segment), [station(0), station(1), station(2)]);
+    assert_eq!(segment.subdevices().unassigned().count(), 3);
+    let declared = declare(&segment);
+    segment.observe(Observation::Activated(declared), Instant(0));
+    assert_eq!((segment.subdevices().member_count(), stations(&segment)), (1, vec![station(0)]));
+    segment.observe(Observation::Deactivated, Instant(0));
+    assert_eq!((segment.subdevices().member_count(), stations(&segment).len()), (0, 3));
+    segment.observe(Observation::ScanBegun, Instant(0));
+    assert_eq!(stations(&segment), []);
 }

@@ -4,7 +4,7 @@ use alloc::string::String;
 
 use ringcat_wire::sii::Identity;
 
-use crate::segment::unassigned::Knowledge;
+use crate::segment::unassigned::UnassignedView;
 use crate::segment::view::View;
 
 use super::*;
@@ -22,7 +22,7 @@ fn lose(ring: &mut Ring) {
 /// Another SubDevice answers at its address.
 fn replace(ring: &mut Ring) {
     lose(ring);
-    let attempt = ring.segment.members[0].attempt;
+    let attempt = ring.member(0).attempt;
     ring.scan(&[PASS; 3]);
     ring.observe(of_member((0, attempt + 1), MemberFinding::NotReturned));
 }
@@ -35,6 +35,10 @@ fn reset(ring: &mut Ring) {
 fn info(serial: u32, station: StationAddress) -> SubDeviceInfo {
     let identity = Identity { vendor_id: 2, product_code: 7, revision: 1, serial };
     SubDeviceInfo { station, identity, ..SubDeviceInfo::default() }
+}
+
+fn first_unassigned(ring: &Ring) -> UnassignedView<'_> {
+    ring.segment.subdevices.unassigned().next().unwrap()
 }
 
 /// The addresses of three members, with those of `others` behind them.
@@ -65,7 +69,7 @@ fn process_data_steps_of_an_ended_attempt_do_not_reach_the_exchange() {
         ring.segment.board.set_taking_part(0, false);
         assert_eq!(ring.observe(joined(0)), [], "change {number}");
         assert!(!ring.segment.board.takes_part(0), "change {number}: no working counter expects it");
-        let attempt = ring.segment.members[0].attempt;
+        let attempt = ring.member(0).attempt;
         ring.observe(joined(attempt));
         assert!(ring.segment.board.takes_part(0), "change {number}");
     }
@@ -77,10 +81,10 @@ fn an_ended_attempt_does_not_mark_a_member_as_configured() {
         let mut ring = Ring::closed(3);
         change(&mut ring);
         ring.observe(of_member((0, 0), MemberFinding::Configured(true)));
-        assert!(!ring.segment.members[0].configured, "change {number}");
-        let attempt = ring.segment.members[0].attempt;
+        assert!(!ring.member(0).configured, "change {number}");
+        let attempt = ring.member(0).attempt;
         ring.observe(of_member((0, attempt), MemberFinding::Configured(true)));
-        assert!(ring.segment.members[0].configured, "change {number}");
+        assert!(ring.member(0).configured, "change {number}");
     }
 }
 
@@ -89,10 +93,10 @@ fn an_sii_that_was_read_before_a_change_is_not_taken_over() {
     for (number, change) in CHANGES.into_iter().enumerate() {
         let mut ring = Ring::closed(3);
         change(&mut ring);
-        let serial = |ring: &Ring| ring.segment.members[0].info.as_ref().map(|info| info.identity.serial);
+        let serial = |ring: &Ring| ring.member(0).info.map(|info| info.identity.serial);
         ring.observe(of_member((0, 0), MemberFinding::ReadAgain(&info(5, station(0)))));
         assert_eq!(serial(&ring), Some(0), "change {number}");
-        let attempt = ring.segment.members[0].attempt;
+        let attempt = ring.member(0).attempt;
         ring.observe(of_member((0, attempt), MemberFinding::ReadAgain(&info(5, station(0)))));
         assert_eq!(serial(&ring), Some(5), "change {number}");
     }
@@ -102,31 +106,32 @@ fn an_sii_that_was_read_before_a_change_is_not_taken_over() {
 fn a_member_that_came_back_by_itself_is_not_replaced_by_an_admitted_subdevice() {
     let mut ring = Ring::closed(3);
     lose(&mut ring);
-    let attempt = ring.segment.members[0].attempt;
-    give(&mut ring);
+    let attempt = ring.member(0).attempt;
+    let since = give(&mut ring);
     let admitted = || {
         let info = Box::new(info(5, station(0)));
-        Observation::Admitted { station: TEMPORARY, index: 0, attempt, info }
+        Observation::Admitted { key: SubDeviceKey { station: TEMPORARY, since }, index: 0, attempt, info }
     };
     // It answers at its address: it is being configured again.
     ring.scan(&[PASS; 3]);
-    let back = ring.segment.members[0].attempt;
+    let back = ring.member(0).attempt;
     assert_ne!(back, attempt);
     assert_eq!(reports(&ring.observe(admitted())), []);
-    assert_eq!((ring.segment.members[0].attempt, ring.segment.unassigned.len()), (back, 1));
-    assert_eq!(ring.segment.members[0].info.as_ref().map(|info| info.identity.serial), Some(0));
+    assert_eq!((ring.member(0).attempt, ring.segment.subdevices.unassigned().count()), (back, 1));
+    assert_eq!(ring.member(0).info.map(|info| info.identity.serial), Some(0));
 }
 
 #[test]
 fn an_unassigned_subdevice_that_has_left_is_not_admitted() {
     let mut ring = Ring::closed(3);
     lose(&mut ring);
-    let attempt = ring.segment.members[0].attempt;
-    give(&mut ring);
+    let attempt = ring.member(0).attempt;
+    let since = give(&mut ring);
     ring.observe(Observation::Readdressing(&[TEMPORARY]));
     let info = Box::new(info(5, station(0)));
-    let effects = ring.observe(Observation::Admitted { station: TEMPORARY, index: 0, attempt, info });
-    assert_eq!((effects, ring.segment.members[0].phase), (Vec::new(), Phase::Absent));
+    let key = SubDeviceKey { station: TEMPORARY, since };
+    let effects = ring.observe(Observation::Admitted { key, index: 0, attempt, info });
+    assert_eq!((effects, ring.member(0).phase), (Vec::new(), Phase::Absent));
 }
 
 #[test]
@@ -135,10 +140,10 @@ fn what_was_read_of_a_subdevice_is_not_stored_for_the_next_with_its_address() {
     let since = give(&mut ring);
     ring.observe(Observation::Readdressing(&[TEMPORARY]));
     let now = give(&mut ring);
-    let is_known = |ring: &Ring| matches!(ring.segment.unassigned[0].knowledge, Knowledge::Known(_));
+    let is_known = |ring: &Ring| first_unassigned(ring).knowledge.info().is_some();
     for (since, stored) in [(since, false), (now, true)] {
         let read = Ok(Rc::new(info(5, TEMPORARY)));
-        ring.observe(Observation::Read { station: TEMPORARY, since, read });
+        ring.observe(Observation::Read { key: SubDeviceKey { station: TEMPORARY, since }, read });
         assert_eq!(is_known(&ring), stored, "read since {since}");
     }
 }
@@ -166,15 +171,15 @@ fn positions_that_were_read_before_a_change_of_addresses_are_not_stored() {
         // It was at the fifth position, and is at the fourth.
         let before = view(&[other, TEMPORARY]);
         ring.observe(Observation::Places { versions, view: &before });
-        assert_eq!(ring.segment.unassigned[0].position, Position(3), "change {number}");
+        assert_eq!(first_unassigned(&ring).position, Position(3), "change {number}");
         ring.observe(Observation::Given { versions, view: &before, given: &[other] });
-        assert_eq!(ring.segment.unassigned.len(), 1, "change {number}: the next search finds it");
+        assert_eq!(ring.segment.subdevices.unassigned().count(), 1, "change {number}: the next search finds it");
     }
     let mut ring = Ring::closed(3);
     give(&mut ring);
     let versions = ring.segment.versions();
     ring.observe(Observation::Places { versions, view: &view(&[other, TEMPORARY]) });
-    assert_eq!(ring.segment.unassigned[0].position, Position(4));
+    assert_eq!(first_unassigned(&ring).position, Position(4));
 }
 
 #[test]
@@ -185,7 +190,7 @@ fn positions_that_are_read_while_rings_are_examined_are_not_stored() {
     let versions = ring.segment.versions();
     let two = View { stations: [station(0), TEMPORARY].to_vec(), ..view(&[]) };
     ring.observe(Observation::Places { versions, view: &two });
-    assert_eq!(ring.segment.unassigned[0].position, Position(3));
+    assert_eq!(first_unassigned(&ring).position, Position(3));
 }
 
 /// The cabling is replaced: two SubDevices have changed places.
@@ -274,4 +279,22 @@ fn searches_that_fail_repeatedly_test_the_frames_and_are_reported_once() {
         })
         .collect();
     assert_eq!(doubts, [false, false, true, false]);
+}
+
+#[test]
+fn a_configuration_is_repeated_three_times_for_the_same_lost_registers() {
+    let mut ring = Ring::closed(3);
+    let mut undone = |reason: &str| {
+        let attempt = ring.member(0).attempt;
+        let effects = ring.observe(of_member((0, attempt), MemberFinding::Undone(reason.into())));
+        effects.iter().filter(|effect| matches!(effect, Effect::Start(Task::BringUp { .. }))).count()
+    };
+    assert_eq!(["FMMUs"; 5].map(&mut undone), [1, 1, 1, 0, 0]);
+    assert_eq!(["watchdog", "FMMUs"].map(&mut undone), [1, 1], "another difference");
+    assert!(ring.member(0).repair.is_under_way());
+    let attempt = ring.member(0).attempt;
+    ring.observe(of_member((0, attempt - 1), MemberFinding::Held));
+    assert!(ring.member(0).repair.is_under_way(), "an earlier attempt");
+    ring.observe(of_member((0, attempt), MemberFinding::Held));
+    assert!(!ring.member(0).repair.is_under_way());
 }

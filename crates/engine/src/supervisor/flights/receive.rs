@@ -116,7 +116,7 @@ impl Shared {
 
     /// Gives up flights after their deadline.
     pub(in crate::supervisor) fn expire_flights(&mut self) {
-        if self.flights.in_flight == 0 {
+        if self.flights.next_deadline() > self.now {
             return;
         }
         for slot in 0..SLOTS {
@@ -125,6 +125,7 @@ impl Shared {
                 self.expire(slot);
             }
         }
+        self.flights.find_earliest();
     }
 
     /// Completes the datagrams that one addressed SubDevice processed in the received copy (CR-06), and all datagrams

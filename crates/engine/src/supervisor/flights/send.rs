@@ -6,7 +6,6 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
 
-use super::Flights;
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
 use crate::ring::{Class, Identity};
@@ -57,9 +56,7 @@ impl Shared {
                 }
                 transmit(Link::Redundant, copy);
             }
-            let slot = Flights::slot(flight.sequence);
-            self.flights.slots[slot] = Some(flight);
-            self.flights.in_flight += 1;
+            self.flights.put(flight);
         }
         used
     }

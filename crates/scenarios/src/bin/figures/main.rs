@@ -3,6 +3,7 @@
 
 mod clocks;
 mod delays;
+mod disturbed;
 mod ethernet;
 mod files;
 mod phases;
@@ -15,10 +16,11 @@ use std::process::ExitCode;
 /// A subject and the function that prints its figures.
 type Subject = (&'static str, fn() -> ExitCode);
 
-const SUBJECTS: [Subject; 8] = [
+const SUBJECTS: [Subject; 9] = [
     ("ring", ring::main),
     ("startup", startup::main),
     ("phases", phases::main),
+    ("disturbed", disturbed::main),
     ("start_lists", start_lists::main),
     ("ethernet", ethernet::main),
     ("files", files::main),

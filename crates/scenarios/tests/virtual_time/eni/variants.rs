@@ -45,7 +45,7 @@ fn a_hot_connect_group_of_a_file_has_its_places_from_the_start() {
     network.power_off(DeviceIndex(DRIVE));
     let mut plant = activate_on_any(network, file);
     plant.run(300);
-    assert!(plant.application.exchange_mut().status(DomainId(0)).wkc > 0);
+    assert!(plant.application.exchange_mut().status(DomainId(0)).expect("it is declared").wkc > 0);
     set(&mut plant, "Lamps.Channel 2", 1);
     set(&mut plant, "Drive.Target velocity", 0x0102_0304);
     plant.run(4);

@@ -8,6 +8,7 @@ use ringcat_sim::cable::{DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port::{self, A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::dice::Dice;
+use scenarios::seeds;
 use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
 use scenarios::world::{CYCLE, World};
 
@@ -184,7 +185,7 @@ impl Plan {
         let junctions = if strict { JunctionMode::Strict } else { JunctionMode::Automatic };
         let options = Options::default().with_junctions(junctions);
         let connections: &[JunctionConnection] = if strict { &self.connections } else { &[] };
-        let declare = |_: &Scan| self.declaration();
+        let declare = |_: &Scan| self.declaration().with_lost_frames_sent_again(seeds::sends_again(seed));
         World::with_junctions(seed, network, &options, declare, connections)
     }
 

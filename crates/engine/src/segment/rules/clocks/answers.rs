@@ -6,14 +6,14 @@ use crate::board::clocks::References;
 use crate::clocks::SyncWindow;
 use crate::event::Event;
 use crate::link::Link;
-use crate::segment::clocks::{Answer, Delays, Difference, Due, Life, Lock, Node, Running};
+use crate::segment::clocks::{Answers, Delays, Difference, Due, Life, Lock, Node, Running};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::time::Instant;
 
 impl Segment {
     /// Stores the differences. The lock is reported when all are within the window.
-    pub(super) fn observe_differences(&mut self, answers: &[Option<Answer>], effects: &mut Effects) {
+    pub(super) fn observe_differences(&mut self, answers: &Answers, effects: &mut Effects) {
         let differences = self.differences(answers);
         // While no time is distributed, differences belong to a frame with another path.
         if self.board.clocks.is_held() {
@@ -21,16 +21,16 @@ impl Segment {
         }
         let is_compensating = self.clocks.is_compensating();
         let are_locked = self.clocks.are_locked();
-        let references = Link::ALL.map(|link| self.clocks.reference_on(link));
+        let references = Link::ALL.map(|link| self.clocks.reference_on(link).map(|node| node.station));
         let (lock_window_ns, samples) = (self.clocks.config.lock_window_ns, self.clocks.config.lock_samples);
         let (mut all, mut largest) = (self.clocks.reference.is_some(), 0);
-        for (index, (node, (difference, deviation_ppb))) in self.clocks.nodes.iter_mut().zip(differences).enumerate() {
+        for (node, (difference, deviation_ppb)) in self.clocks.nodes.iter_mut().zip(differences) {
             let Some(difference) = difference else {
                 all &= !node.has_clock || node.link.is_none();
                 continue;
             };
             // Nothing is written to a reference, so its difference is zero.
-            let is_reference = references.contains(&Some(index));
+            let is_reference = references.contains(&Some(node.station));
             let difference = if is_reference { 0 } else { difference };
             let magnitude = difference.unsigned_abs();
             node.difference_ns = Some(difference);
@@ -54,9 +54,9 @@ impl Segment {
     }
 
     /// The difference and the deviation of each clock; differences that contain the jitter of the host as a mean.
-    fn differences(&mut self, answers: &[Option<Answer>]) -> Vec<(Option<i32>, i64)> {
-        let difference = |(node, answer): (&mut Node, &Option<Answer>)| {
-            let Some(answer) = answer else { return (None, 0) };
+    fn differences(&mut self, answers: &Answers) -> Vec<(Option<i32>, i64)> {
+        let difference = |node: &mut Node| {
+            let Some(answer) = answers.get(&node.station) else { return (None, 0) };
             let difference = match answer.difference {
                 Difference::Unknown => None,
                 Difference::Own(ns) => Some(ns),
@@ -64,7 +64,7 @@ impl Segment {
             };
             (difference, answer.deviation_ppb)
         };
-        self.clocks.nodes.iter_mut().zip(answers).map(difference).collect()
+        self.clocks.nodes.iter_mut().map(difference).collect()
     }
 
     fn observe_window(&mut self, largest_ns: u32, is_steered: bool, effects: &mut Effects) {
@@ -91,7 +91,7 @@ impl Segment {
     /// ring that opened or closed; in each part the path from clock to clock is unchanged.
     pub(super) fn follow_links(
         &mut self,
-        answers: &[Option<Answer>],
+        answers: &Answers,
         is_explained: bool,
         holds: u32,
         now: Instant,
@@ -129,21 +129,21 @@ impl Segment {
 
     /// Takes over the links of the answers; returns whether any has changed. `None` if the next answers must confirm
     /// them: answers during the opening or closing of a ring belong to both states.
-    fn confirm_links(&mut self, answers: &[Option<Answer>]) -> Option<bool> {
-        let links: Vec<Option<Option<Link>>> = answers.iter().map(|answer| answer.map(|answer| answer.link)).collect();
+    fn confirm_links(&mut self, answers: &Answers) -> Option<bool> {
         let before = self.clocks.running_mut()?.unconfirmed.take();
-        let nodes = &self.clocks.nodes;
-        let is_certain = |(index, link): (usize, &Option<Option<Link>>)| {
-            let has_moved = link.is_some_and(|link| nodes[index].has_clock && link != nodes[index].link);
-            !has_moved || before.as_ref().is_some_and(|before| before.get(index) == Some(link))
+        let is_certain = |node: &Node| {
+            let Some(answer) = answers.get(&node.station).filter(|_| node.has_clock) else { return true };
+            let is_confirmed = || before.as_ref()?.get(&node.station).map(|link| *link == answer.link);
+            answer.link == node.link || is_confirmed() == Some(true)
         };
-        if !links.iter().enumerate().all(is_certain) {
+        if !self.clocks.nodes.iter().all(is_certain) {
+            let links = answers.iter().map(|(station, answer)| (*station, answer.link)).collect();
             self.clocks.running_mut()?.unconfirmed = Some(links);
             return None;
         }
         let mut moved = false;
-        for (node, answer) in self.clocks.nodes.iter_mut().zip(answers) {
-            let Some(answer) = answer.filter(|_| node.has_clock) else { continue };
+        for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
+            let Some(answer) = answers.get(&node.station) else { continue };
             moved |= answer.link != node.link;
             node.link = answer.link;
         }

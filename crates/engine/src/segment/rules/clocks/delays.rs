@@ -4,9 +4,9 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use crate::clocks::{Latched, Unknown, round};
+use crate::clocks::{Unknown, round};
 use crate::link::Link;
-use crate::segment::clocks::{Clocks, Measured, Node};
+use crate::segment::clocks::{Clocks, LatchedTimes, Measured, Node};
 
 /// Repeated measurements of the same path differ by no more than this: such delays count as unchanged.
 const SAME_NS: i64 = 30;
@@ -92,7 +92,7 @@ impl Clocks {
 
     /// Computes the delays on a link from the reference there. Returns whether any has changed.
     pub(super) fn refer(&mut self, link: Link) -> bool {
-        let Some(reference) = self.reference_on(link).and_then(|index| self.nodes[index].unit) else {
+        let Some(reference) = self.reference_on(link).and_then(|reference| reference.unit) else {
             return false;
         };
         let mut changed = false;
@@ -106,10 +106,10 @@ impl Clocks {
     }
 
     /// Computes the offsets with which all clocks show `wanted` where the frame enters the segment, plus their delay.
-    pub(super) fn set_offsets(&mut self, latched: &[Option<Latched>], wanted: u64) {
-        let references = Link::ALL.map(|link| self.reference_on(link).and_then(|index| self.nodes[index].unit));
-        for (node, latched) in self.nodes.iter_mut().zip(latched) {
-            let Some(latched) = latched else { continue };
+    pub(super) fn set_offsets(&mut self, latched: &LatchedTimes, wanted: u64) {
+        let references = Link::ALL.map(|link| self.reference_on(link).and_then(|reference| reference.unit));
+        for node in &mut self.nodes {
+            let Some(latched) = latched.get(&node.station) else { continue };
             // Without a delay it shows the received time: the time at which the frame passes the reference.
             let received = || references[usize::from(node.link == Some(Link::Redundant))];
             let unit = node.unit.or_else(received).map_or(0, round);
@@ -119,16 +119,16 @@ impl Clocks {
 
     /// The offset of one clock, from a frame that it and its reference have latched; from the time of the host without
     /// a reference.
-    pub(super) fn set_offset(&mut self, index: usize, latched: &[Option<Latched>], host: u64) {
-        let time = |index: usize| latched.get(index).copied().flatten().map(|latched| latched.unit);
-        let Some(own) = time(index) else { return };
-        let link = self.nodes[index].link.unwrap_or(Link::Main);
-        let reference = self.reference_on(link).filter(|reference| *reference != index);
-        let system = match reference.and_then(|reference| Some((reference, time(reference)?))) {
-            Some((reference, local)) => local.wrapping_add_signed(self.nodes[reference].offset_ns),
+    pub(super) fn set_offset(&mut self, station: StationAddress, latched: &LatchedTimes, host: u64) {
+        let time = |station: StationAddress| latched.get(&station).map(|latched| latched.unit);
+        let (Some(own), Some(node)) = (time(station), self.node_at(station)) else { return };
+        let reference = self.reference_on(node.link.unwrap_or(Link::Main));
+        let reference = reference.filter(|reference| reference.station != station);
+        let system = match reference.and_then(|reference| Some((reference, time(reference.station)?))) {
+            Some((reference, local)) => local.wrapping_add_signed(reference.offset_ns),
             None => host.wrapping_add(self.epoch),
         };
-        let node = &mut self.nodes[index];
+        let Some(node) = self.node_at_mut(station) else { return };
         node.offset_ns = system.wrapping_add_signed(node.delay_ns).wrapping_sub(own) as i64;
         (node.good, node.difference_ns, node.average, node.worst_ns) = (0, None, None, 0);
     }

@@ -1,4 +1,4 @@
-//! `ringcat run --eni FILE`: the network is the one of the file, outputs are what `--set` says.
+//! `ringcat run --eni FILE` and `--network FILE`: the network is the one of the file, outputs are what `--set` says.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,10 +7,14 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::Directory;
-use ringcat::config::Variable;
+use ringcat::config::{Configuration, Variable};
 use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
+use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
-use ringcat::{ActivateError, Declaration, Direction, Error, Instant, ProcessData, Scan, SubDeviceInfo};
+use ringcat::{
+    ActivateError, Declaration, Direction, Error, Instant, JunctionConnection, JunctionMode, ProcessData, Scan,
+    SubDeviceInfo,
+};
 
 use crate::failure::Failure;
 use crate::json::run;
@@ -22,16 +26,21 @@ const PRINT_PERIOD: Duration = Duration::from_secs(1);
 const NEAR: usize = 3;
 const LIKE: f64 = 0.6;
 
-/// Options about an ENI.
+/// Options about the file of a network.
 #[derive(Args, Debug, Default)]
 #[command(next_help_heading = "Segment")]
-pub struct EniArguments {
+pub struct ConfiguredArguments {
     /// Bring the network of this ENI to OP, instead of the SubDevices found
     ///
     /// TwinCAT, EC-Engineer and other tools export an ENI. `ringcat eni FILE` shows what of it is followed; see
     /// docs/eni.md.
-    #[arg(long, value_name = "FILE", conflicts_with = "cycle")]
+    #[arg(long, value_name = "FILE", conflicts_with = "cycle", group = "file")]
     eni: Option<PathBuf>,
+    /// Bring the network of this network file to OP, instead of the SubDevices found
+    ///
+    /// `ringcat init` writes one from a scan; see docs/network-file.md.
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["cycle", "eni"], group = "file")]
+    network: Option<PathBuf>,
     /// Send LRD and LWR where the file has an LRW over several SubDevices
     ///
     /// With two interfaces that is necessary: a break of the ring would divide the LRW.
@@ -40,81 +49,133 @@ pub struct EniArguments {
     /// Give this output variable of the file a value from the first cycle on
     ///
     /// May be given several times.
-    #[arg(long, value_name = "NAME=VALUE", requires = "eni")]
+    #[arg(long, value_name = "NAME=VALUE", requires = "file")]
     set: Vec<String>,
     /// Print the value of this variable of the file when it changes
     ///
     /// At most once a second, and in the end. May be given several times.
-    #[arg(long, value_name = "NAME", requires = "eni")]
+    #[arg(long, value_name = "NAME", requires = "file")]
     watch: Vec<String>,
 }
 
 /// A network from a file.
 #[derive(Debug)]
-pub struct EniNetwork {
-    file: EniFile,
-    split_lrw: bool,
+pub struct ConfiguredNetwork {
+    file: FileOfNetwork,
     set: Vec<String>,
     watch: Vec<String>,
 }
 
-impl EniArguments {
-    /// Reads the file, if there is one, and prints what of it is not followed.
-    pub fn load(&self) -> Result<Option<EniNetwork>, Failure> {
-        let Some(path) = &self.eni else { return Ok(None) };
-        let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
-        if file.configuration.declaration.subdevices.is_empty() {
+/// The file.
+#[derive(Debug)]
+enum FileOfNetwork {
+    /// An ENI; its LRW may be split.
+    Eni { file: Box<EniFile>, split_lrw: bool },
+    /// A network file.
+    Network(Box<LoadedNetwork>),
+}
+
+impl ConfiguredArguments {
+    /// Reads the file, if there is one, and prints what of it is not followed. Refuses a ring on one interface.
+    pub fn load(&self, has_redundant: bool) -> Result<Option<ConfiguredNetwork>, Failure> {
+        let failed = |error: &dyn std::fmt::Display| Failure::new(error.to_string());
+        let (path, file) = match (&self.eni, &self.network) {
+            (Some(path), _) => {
+                let file = Box::new(EniFile::load(path).map_err(|error| failed(&error))?);
+                (path, FileOfNetwork::Eni { file, split_lrw: self.split_lrw })
+            }
+            (None, Some(path)) => {
+                let file = LoadedNetwork::load(path).map_err(|error| failed(&error))?;
+                (path, FileOfNetwork::Network(Box::new(file)))
+            }
+            (None, None) => return Ok(None),
+        };
+        let network = ConfiguredNetwork { file, set: self.set.clone(), watch: self.watch.clone() };
+        let configuration = network.configuration();
+        if configuration.declaration.subdevices.is_empty() {
             return Err(Failure::new(format!("{}: the file describes no SubDevice", path.display())));
         }
-        if !file.configuration.notices.is_empty() {
+        if !configuration.notices.is_empty() {
             say!("{}: not followed, or done in another way:", path.display());
-            file.configuration.notices.iter().for_each(|notice| say!("  {notice}"));
+            configuration.notices.iter().for_each(|notice| say!("  {notice}"));
         }
-        if file.configuration.declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift) {
+        if configuration.declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift) {
             say!("  the reference clock follows this host (bus shift); with --phase 0us the cycles follow it instead");
         }
-        let network = EniNetwork { file, split_lrw: self.split_lrw, set: self.set.clone(), watch: self.watch.clone() };
+        network.check_links(has_redundant)?;
         network.check_variables()?;
         Ok(Some(network))
     }
 }
 
-impl EniNetwork {
-    /// Names of the SubDevices.
-    pub fn names(&self) -> Names {
-        self.file.names()
+impl ConfiguredNetwork {
+    fn configuration(&self) -> &Configuration {
+        match &self.file {
+            FileOfNetwork::Eni { file, .. } => &file.configuration,
+            FileOfNetwork::Network(network) => &network.configuration,
+        }
     }
 
-    /// Whether the file declares the process data of every SubDevice.
+    /// The network file, where it is one.
+    fn network_file(&self) -> Option<&NetworkFile> {
+        match &self.file {
+            FileOfNetwork::Eni { .. } => None,
+            FileOfNetwork::Network(network) => Some(&network.file),
+        }
+    }
+
+    /// Refuses a ring on one interface.
+    fn check_links(&self, has_redundant: bool) -> Result<(), Failure> {
+        let needs_ring = self.network_file().is_some_and(|file| file.redundancy.ring);
+        if needs_ring && !has_redundant {
+            return Err(Failure::new("the file declares a ring (redundancy.ring): expected --redundant IF"));
+        }
+        Ok(())
+    }
+
+    /// How rings behind junctions are handled, where the file says it.
+    pub fn junctions(&self) -> Option<(JunctionMode, Vec<JunctionConnection>)> {
+        self.network_file().map(NetworkFile::junctions).filter(|(mode, _)| *mode != JunctionMode::Disabled)
+    }
+
+    /// Names of the SubDevices.
+    pub fn names(&self) -> Names {
+        Names(self.configuration().names())
+    }
+
+    /// Whether the file declares the process data of every SubDevice with all registers.
     pub fn is_complete(&self) -> bool {
-        self.file.configuration.declaration.subdevices.iter().all(|config| config.declared.is_some())
+        self.configuration().declaration.subdevices.iter().all(|config| config.declared.is_some())
     }
 
     /// Index in the declaration of the SubDevice with this station address in the file.
     pub fn at_station(&self, station: u16) -> Option<usize> {
-        self.file.configuration.at_station(station)
+        self.configuration().at_station(station)
     }
 
     /// The declaration, where the SubDevices that were found are those of the file. Prints each difference.
     pub fn declaration(&self, found: &[SubDeviceInfo]) -> Result<Declaration, Failure> {
-        let differences = self.file.compare(found);
+        let differences = self.configuration().compare(found);
         for difference in &differences {
             warn(difference);
         }
         if differences.iter().any(|difference| difference.is_grave) {
             return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
         }
-        Ok(self.file.declaration(self.split_lrw))
+        Ok(match &self.file {
+            FileOfNetwork::Eni { file, split_lrw } => file.declaration(*split_lrw),
+            FileOfNetwork::Network(network) => network.declaration(),
+        })
     }
 
     /// Number of SubDevices on the bus that the file lacks. [`EniNetwork::declaration`] prints each; they stay in INIT.
     pub fn undeclared(&self, found: &[SubDeviceInfo]) -> usize {
-        self.file.compare(found).iter().filter(|difference| difference.subdevice.is_none()).count()
+        self.configuration().compare(found).iter().filter(|difference| difference.subdevice.is_none()).count()
     }
 
     /// Warns of cables that are not where the file says. The network works all the same.
     pub fn report_cables(&self, scan: &Scan) {
-        for difference in self.file.compare_cables(&scan.subdevices, &scan.topology) {
+        for difference in self.configuration().compare_cables(&scan.subdevices, &scan.topology) {
             warn(difference);
         }
     }
@@ -149,7 +210,7 @@ impl EniNetwork {
     /// Number of a variable in document order, and what the file says of it. Where an input and an output have one
     /// name, it is the one of this direction.
     fn variable(&self, option: &str, name: &str, wanted: Direction) -> Result<(usize, &Variable), Failure> {
-        let variables = &self.file.configuration.image.variables;
+        let variables = &self.configuration().image.variables;
         let mut named = variables.iter().enumerate().filter(|(_, variable)| variable.name == name);
         let first = named.clone().next();
         let found = named.find(|(_, variable)| variable.direction == wanted).or(first);
@@ -157,7 +218,12 @@ impl EniNetwork {
             let useful = variables.iter().filter(|variable| variable.subdevice.is_some());
             let near = near(name, useful.map(|variable| variable.name.as_str()));
             let near = if near.is_empty() { String::new() } else { format!("; similar: {}", near.join(", ")) };
-            let all = format!("`ringcat eni --details FILE` lists its {} variables", variables.len());
+            let all = match self.file {
+                FileOfNetwork::Eni { .. } => {
+                    format!("`ringcat eni --details FILE` lists its {} variables", variables.len())
+                }
+                FileOfNetwork::Network(_) => format!("it has {} variables", variables.len()),
+            };
             Failure::new(format!("{option}: the file has no variable \"{name}\"{near}; {all}"))
         })?;
         if variable.subdevice.is_none() {
@@ -193,7 +259,7 @@ impl EniNetwork {
     /// The work of the cycles, and the variables to print.
     pub fn work(&self, directory: &Directory) -> Result<(Work, Watched), Failure> {
         let mut image =
-            EniImage::new(&self.file.configuration, directory).map_err(|error| Failure::new(error.to_string()))?;
+            EniImage::new(self.configuration(), directory).map_err(|error| Failure::new(error.to_string()))?;
         for text in &self.set {
             let (number, bits) = self.assignment(text)?;
             let variable = image.variables()[number].clone();
@@ -316,16 +382,17 @@ mod tests {
 
     const MACHINE: &[u8] = include_bytes!("../../files/machine.eni.xml");
 
-    fn network(set: &[&str], watch: &[&str]) -> EniNetwork {
+    fn network(set: &[&str], watch: &[&str]) -> ConfiguredNetwork {
         let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
-        let file = EniFile::from_bytes(MACHINE).unwrap();
-        EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+        let file = Box::new(EniFile::from_bytes(MACHINE).unwrap());
+        let file = FileOfNetwork::Eni { file, split_lrw: false };
+        ConfiguredNetwork { file, set: strings(set), watch: strings(watch) }
     }
 
     // covers: eni-run
     #[test]
     fn variables_are_set_and_printed_and_unknown_ones_are_refused_by_name() {
-        let segment = SimulatedSegment::new(network(&[], &[]).file.simulated(false).unwrap());
+        let segment = SimulatedSegment::new(EniFile::from_bytes(MACHINE).unwrap().simulated(false).unwrap());
         let mut main_device = MainDevice::request(segment, &Options::default());
         let found = main_device.scan().unwrap().subdevices;
         let declaration = network(&[], &[]).declaration(&found).unwrap();
@@ -368,9 +435,10 @@ mod tests {
         let changed = |from: &str, to: &str, set: &[&str], watch: &[&str]| {
             let text = std::str::from_utf8(MACHINE).unwrap();
             assert!(text.contains(from));
-            let file = EniFile::from_bytes(text.replace(from, to).as_bytes()).unwrap();
+            let file = Box::new(EniFile::from_bytes(text.replace(from, to).as_bytes()).unwrap());
+            let file = FileOfNetwork::Eni { file, split_lrw: false };
             let strings = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
-            EniNetwork { file, split_lrw: false, set: strings(set), watch: strings(watch) }
+            ConfiguredNetwork { file, set: strings(set), watch: strings(watch) }
         };
         // Byte 1 of the images belongs to no SubDevice.
         let unowned = "<BitOffs>8</BitOffs>";
@@ -383,7 +451,7 @@ mod tests {
         assert!(text.contains("similar: ") && !text.contains("\"Buttons.Channel 1\""), "{text}");
         let same = changed("Lamps.Channel 1", "Buttons.Channel 1", &["Buttons.Channel 1=1"], &["Buttons.Channel 1"]);
         let (number, bits) = same.assignment("Buttons.Channel 1=1").unwrap();
-        assert_eq!((same.file.configuration.image.variables[number].direction, bits), (Direction::Outputs, 1));
+        assert_eq!((same.configuration().image.variables[number].direction, bits), (Direction::Outputs, 1));
         let (_, watched) = same.variable("--watch", "Buttons.Channel 1", Direction::Inputs).unwrap();
         assert_eq!(watched.direction, Direction::Inputs);
     }
@@ -392,7 +460,7 @@ mod tests {
     #[test]
     fn an_lrw_that_is_refused_is_explained_with_subdevices_and_the_way_out() {
         let network = network(&[], &[]);
-        let lrw = network.file.configuration.declaration.explicit_lrw[0].clone();
+        let lrw = network.configuration().declaration.explicit_lrw[0].clone();
         let text = network.explain(Error::Activate(ActivateError::NamedLrwOnTwoLinks(lrw))).to_string();
         let members = "(Lamps (1002), Valves (1003), Buttons (1004), Drive (1005))";
         assert!(text.contains(members) && text.contains("add --split-lrw"), "{text}");

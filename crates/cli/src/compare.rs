@@ -1,0 +1,114 @@
+//! `ringcat compare`: the network that is there, compared with the one of a file.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ringcat::config::{Configuration, FoundNetwork, Stated};
+use ringcat::eni::EniFile;
+use ringcat::network::LoadedNetwork;
+
+use crate::bus::BusArguments;
+use crate::failure::Failure;
+use crate::json::data::Data;
+use crate::json::network::{Compare, Difference};
+use crate::output::{counted, say};
+use crate::verdict::{Report, Verdict};
+
+/// Columns of a line.
+const WIDTH: usize = 80;
+/// Columns of the kind of a difference, and the blanks before it.
+const KIND: usize = 16;
+
+/// What a user should know before.
+const ABOUT_COMPARE: &str = "\
+A SubDevice that is missing or additional is one difference, not another
+identity of all SubDevices behind it. Differences that prevent OP are marked
+with an exclamation mark. All SubDevices are in INIT afterwards.
+
+Exit status: 0 no difference, 1 at least one, 2 the network or the file could
+not be read.";
+
+/// Options of `ringcat compare`.
+#[derive(Args, Debug)]
+#[command(after_long_help = ABOUT_COMPARE)]
+pub struct CompareArguments {
+    #[command(flatten)]
+    bus: BusArguments,
+    /// The network of an ENI
+    #[arg(long, value_name = "FILE", required_unless_present = "network", help_heading = "Segment")]
+    eni: Option<PathBuf>,
+    /// The network of a network file (see docs/network-file.md)
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "eni", help_heading = "Segment")]
+    network: Option<PathBuf>,
+}
+
+/// Scans and prints every difference.
+pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
+    let (configuration, stated) = load(arguments)?;
+    let with_firmware: Vec<(u32, u32)> =
+        stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
+    let bus =
+        arguments.bus.scan(|info| with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)))?;
+    let found = &bus.scan.subdevices;
+    let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
+    let differences = configuration.differences(network, &stated);
+    for difference in &differences {
+        let mark = if difference.is_grave { '!' } else { ' ' };
+        let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
+        for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
+            say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
+        }
+    }
+    let names = configuration.names();
+    let json = |it: &ringcat::eni::Difference| Difference {
+        kind: it.kind.word().to_owned(),
+        subdevice: it.subdevice.map(|at| at.0),
+        name: it.subdevice.and_then(|at| names.get(at.0).cloned()),
+        position: it.position.map(|position| position.0),
+        is_grave: it.is_grave,
+        text: it.text.clone(),
+    };
+    let data = Data::Compare(Compare {
+        declared: configuration.declaration.subdevices.len(),
+        found: found.len(),
+        differences: differences.iter().map(json).collect(),
+    });
+    let subdevices = counted(found.len(), "SubDevice", "SubDevices");
+    let verdict = if differences.is_empty() {
+        Verdict::Held(format!("{subdevices}, as in the file"))
+    } else {
+        let grave = differences.iter().filter(|it| it.is_grave).count();
+        let count = counted(differences.len(), "difference", "differences");
+        Verdict::Failed(format!("{count} between {subdevices} and the file, {grave} of them prevent OP"))
+    };
+    Ok(Report { verdict, data })
+}
+
+fn load(arguments: &CompareArguments) -> Result<(Configuration, Vec<Stated>), Failure> {
+    if let Some(path) = &arguments.network {
+        let network = LoadedNetwork::load(path).map_err(|error| Failure::new(error.to_string()))?;
+        let stated = network.stated();
+        return Ok((network.configuration, stated));
+    }
+    let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --eni FILE or --network FILE"))?;
+    let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+    let stated = file.stated();
+    Ok((file.configuration, stated))
+}
+
+/// A text in lines of at most this number of characters; longer words have lines of their own.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let (length, own) = (lines.last().map_or(0, |line| line.chars().count()), word.chars().count());
+        match lines.last_mut() {
+            Some(line) if length == 0 => line.push_str(word),
+            Some(line) if length + 1 + own <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}

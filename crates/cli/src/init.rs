@@ -1,0 +1,127 @@
+//! `ringcat init`: a network file from a scan.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use ringcat::config::network::model::CheckRevision;
+use ringcat::network::{NetworkFile, ScanOptions};
+
+use crate::bus::BusArguments;
+use crate::failure::Failure;
+use crate::json::data::Data;
+use crate::json::network::Init;
+use crate::output::{counted, say, warn};
+use crate::times::{cycle, in_words};
+use crate::verdict::{Report, Verdict};
+
+/// What a user should know before.
+const ABOUT_INIT: &str = "\
+The file has the SubDevices in their order with vendor, product, PDOs, names of
+variables, mailboxes and cables, as found. `ringcat run --network FILE` brings
+exactly this network to OP; `ringcat compare --network FILE` names what differs
+later. docs/network-file.md explains every key. All SubDevices are in INIT
+afterwards.";
+
+/// Options of `ringcat init`.
+#[derive(Args, Debug)]
+#[command(after_long_help = ABOUT_INIT)]
+pub struct InitArguments {
+    #[command(flatten)]
+    bus: BusArguments,
+    /// Name of the network
+    #[arg(long, value_name = "NAME", default_value = "machine", help_heading = "Network")]
+    name: String,
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Network")]
+    cycle: Duration,
+    /// Use the distributed clocks
+    #[arg(long, help_heading = "Network")]
+    clocks: bool,
+    /// Find SubDevices with an alias of their own by it, not by position
+    #[arg(long, help_heading = "Network")]
+    by_alias: bool,
+    /// How revisions are compared
+    #[arg(long, value_enum, default_value = "none", help_heading = "Network")]
+    revisions: Revisions,
+    /// Accept only SubDevices with the serial numbers found
+    #[arg(long, help_heading = "Network")]
+    serials: bool,
+    /// Read the versions of the firmware too, for `ringcat compare`
+    #[arg(long, help_heading = "Network")]
+    firmware: bool,
+    /// File to write
+    #[arg(long, value_name = "FILE.toml", help_heading = "Output")]
+    out: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long, help_heading = "Output")]
+    overwrite: bool,
+}
+
+/// Comparison of revisions.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Revisions {
+    /// Any revision is accepted
+    None,
+    /// Equal
+    Equal,
+    /// Equal or greater
+    EqualOrGreater,
+}
+
+impl From<Revisions> for CheckRevision {
+    fn from(revisions: Revisions) -> CheckRevision {
+        match revisions {
+            Revisions::None => CheckRevision::None,
+            Revisions::Equal => CheckRevision::Equal,
+            Revisions::EqualOrGreater => CheckRevision::EqualOrGreater,
+        }
+    }
+}
+
+/// Scans and writes the file.
+pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
+    let out = &arguments.out;
+    if !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
+        return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
+    }
+    let bus = arguments.bus.scan(|_| arguments.firmware)?;
+    let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
+    options.ring = bus.ring;
+    options.clocks = arguments.clocks;
+    options.by_alias = arguments.by_alias;
+    options.check_revision = arguments.revisions.into();
+    options.check_serial = arguments.serials;
+    let mut file = NetworkFile::from_scan(&bus.scan.subdevices, &bus.scan.topology, &options);
+    for (subdevice, firmware) in file.subdevice.iter_mut().zip(&bus.firmware) {
+        subdevice.firmware = firmware.clone().unwrap_or_default();
+    }
+    for (subdevice, info) in file.subdevice.iter().zip(&bus.scan.subdevices) {
+        if subdevice.sync_manager.is_empty() && !info.sync_managers.is_empty() && !info.pdos.is_empty() {
+            let (position, name) = (info.position, &subdevice.name);
+            warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
+        }
+    }
+    let text = file.to_text();
+    // What is written must be what `run` reads.
+    NetworkFile::read(&out.display().to_string(), text.as_bytes()).map_err(|error| Failure::new(error.to_string()))?;
+    let mut opening = OpenOptions::new();
+    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
+    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
+    let digest = file.digest().to_string();
+    let variables = file.configuration().image.variables.len();
+    let subdevices = file.subdevice.len();
+    say!("digest {digest}");
+    let held = format!(
+        "{} with {} at {} in {}",
+        counted(subdevices, "SubDevice", "SubDevices"),
+        counted(variables, "variable", "variables"),
+        in_words(arguments.cycle),
+        out.display()
+    );
+    let data = Data::Init(Init { subdevices, variables, bytes: text.len(), digest });
+    Ok(Report { verdict: Verdict::Held(held), data })
+}

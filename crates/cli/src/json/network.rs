@@ -1,0 +1,48 @@
+//! What `ringcat init --json` and `ringcat compare --json` print.
+
+use serde::Serialize;
+
+/// A network file from a scan.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Init {
+    /// SubDevices in the file
+    pub subdevices: usize,
+    /// Variables of the process image
+    pub variables: usize,
+    /// Bytes of the file
+    pub bytes: usize,
+    /// SHA-256 of the canonical text of the file, in hexadecimal digits
+    pub digest: String,
+}
+
+/// A network compared with a file.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Compare {
+    /// SubDevices in the file
+    pub declared: usize,
+    /// SubDevices that were found
+    pub found: usize,
+    /// The differences, in the order of the file
+    pub differences: Vec<Difference>,
+}
+
+/// A difference.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Difference {
+    /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, process data, firmware or
+    /// cable
+    pub kind: String,
+    /// Index of the SubDevice in the file, from 0; null for one that is not in it
+    pub subdevice: Option<usize>,
+    /// Its name in the file; null for one that is not in it
+    pub name: Option<String>,
+    /// Its position on the bus, from 0; null for one that was not found
+    pub position: Option<u16>,
+    /// The network cannot reach OP with this difference
+    pub is_grave: bool,
+    /// The difference in words
+    pub text: String,
+}

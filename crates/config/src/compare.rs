@@ -1,0 +1,146 @@
+//! A network that was found, compared with a declared one: every difference, for people and programs.
+//!
+//! [`Configuration::compare`] follows the rules of an activation: it reports what the engine would refuse, by position.
+//! [`Configuration::differences`] explains two networks: a SubDevice that is missing or additional is one difference,
+//! not a wrong identity of all behind it.
+
+mod align;
+mod cables;
+mod contents;
+mod difference;
+
+use std::collections::BTreeSet;
+
+use ringcat_engine::config::{ConfigError, Resolution, resolve};
+use ringcat_engine::declared::SubDeviceId;
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_wire::address::Position;
+
+use crate::configuration::Configuration;
+use align::Place;
+
+pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated};
+
+impl Configuration {
+    /// Names of the SubDevices for messages: name and station address of the file.
+    pub fn names(&self) -> Vec<String> {
+        let name = |facts: &crate::SubDeviceFacts| match facts.station {
+            Some(station) => format!("{} ({station})", facts.name),
+            None => facts.name.clone(),
+        };
+        self.subdevices.iter().map(name).collect()
+    }
+
+    /// Compares the SubDevices of a scan with the file as an activation does. Returns each SubDevice that is missing,
+    /// has another identity, or is not in the file.
+    pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
+        let names = self.names();
+        let differs = |config: usize, is_grave: bool, error: &ConfigError| {
+            let (kind, position) = match error {
+                ConfigError::Mismatch { position, field, .. } => (DifferenceKind::of_field(*field), Some(*position)),
+                _ => (DifferenceKind::Missing, None),
+            };
+            let name = names.get(config).cloned().unwrap_or_default();
+            let text = format!("SubDevice {config} \"{name}\" of the file: {error}");
+            Difference { subdevice: Some(SubDeviceId(config)), position, kind, is_grave, text }
+        };
+        let mut differences = Vec::new();
+        // A SubDevice of another identity is reported once.
+        let mut reported = BTreeSet::new();
+        for resolution in resolve(&self.declaration.subdevices, found) {
+            match resolution {
+                Resolution::Found { .. } => {}
+                Resolution::Absent { config, error } => {
+                    reported.extend(in_its_place(&error));
+                    differences.push(differs(config, false, &error));
+                }
+                Resolution::Failed { config, error } => {
+                    reported.extend(in_its_place(&error));
+                    differences.push(differs(config, true, &error));
+                }
+                Resolution::Extra { info } if reported.contains(&found[info].position) => {}
+                Resolution::Extra { info } => differences.push(additional(&found[info])),
+            }
+        }
+        differences
+    }
+
+    /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
+    /// another place, revision, serial number, PDOs, mailboxes, cables. `stated` are the [`Stated`] properties by the
+    /// index of the SubDevice; it may be empty.
+    pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
+        let FoundNetwork { subdevices: found, topology, firmware } = network;
+        let names = self.names();
+        let mut differences = Vec::new();
+        let mut pairs = Vec::new();
+        for place in align::align(self, found, stated) {
+            match place {
+                Place::Both { config, info, moved } => {
+                    if moved {
+                        differences.push(order(config, &names, &found[info]));
+                    }
+                    let both = contents::Both {
+                        config,
+                        declared: &self.declaration.subdevices[config],
+                        name: &names[config],
+                        stated: stated.get(config),
+                        info: &found[info],
+                        firmware: firmware.get(info).and_then(Option::as_deref),
+                    };
+                    both.compare(&mut differences);
+                    pairs.push((config, info));
+                }
+                Place::Missing { config } => differences.push(self.missing(config, &names)),
+                Place::Additional { info } => differences.push(additional(&found[info])),
+            }
+        }
+        if !differences.iter().any(|difference| difference.kind == DifferenceKind::Order) {
+            differences.extend(cables::compare(self, &pairs, found, topology));
+        }
+        differences
+    }
+
+    fn missing(&self, config: usize, names: &[String]) -> Difference {
+        let declared = &self.declaration.subdevices[config];
+        let (expected, place) = (&declared.expected, declared.address);
+        let device = match (expected.vendor_id, expected.product_code) {
+            (Some(vendor), Some(product)) => format!(", vendor {vendor:#010x}, product {product:#010x}"),
+            _ => String::new(),
+        };
+        let optional = if declared.optional { ", which is optional" } else { "" };
+        Difference {
+            subdevice: Some(SubDeviceId(config)),
+            position: None,
+            kind: DifferenceKind::Missing,
+            is_grave: !declared.optional,
+            text: format!("\"{}\" ({place}{device}) is missing{optional}", names[config]),
+        }
+    }
+}
+
+fn order(config: usize, names: &[String], info: &SubDeviceInfo) -> Difference {
+    Difference {
+        subdevice: Some(SubDeviceId(config)),
+        position: Some(info.position),
+        kind: DifferenceKind::Order,
+        is_grave: true,
+        text: format!("\"{}\" is at position {}, the file has it at another place", names[config], info.position),
+    }
+}
+
+fn additional(info: &SubDeviceInfo) -> Difference {
+    let SubDeviceInfo { position, name, identity, .. } = info;
+    let text = format!(
+        "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
+        identity.vendor_id, identity.product_code
+    );
+    Difference { subdevice: None, position: Some(*position), kind: DifferenceKind::Additional, is_grave: false, text }
+}
+
+/// Position of a SubDevice with another identity than expected.
+const fn in_its_place(error: &ConfigError) -> Option<Position> {
+    match error {
+        ConfigError::Mismatch { position, .. } => Some(*position),
+        _ => None,
+    }
+}

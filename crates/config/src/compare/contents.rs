@@ -1,0 +1,142 @@
+//! One SubDevice: identity, PDOs and mailboxes of the file and of the bus.
+
+use ringcat_engine::config::{DeclaredSyncManager, PdoEntry, PdoMapping, SubDeviceConfig, SyncManagerRole};
+use ringcat_engine::declared::SubDeviceId;
+use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
+use ringcat_engine::plan::plan;
+
+use super::difference::{Difference, DifferenceKind, Stated};
+
+/// A SubDevice of the file and the one that was found.
+pub(super) struct Both<'a> {
+    /// Index in the file.
+    pub(super) config: usize,
+    /// Its declaration.
+    pub(super) declared: &'a SubDeviceConfig,
+    /// Its name.
+    pub(super) name: &'a str,
+    /// What the file states besides.
+    pub(super) stated: Option<&'a Stated>,
+    /// What the scan found.
+    pub(super) info: &'a SubDeviceInfo,
+    /// Version of its firmware, if it was read.
+    pub(super) firmware: Option<&'a str>,
+}
+
+impl Both<'_> {
+    /// Appends the differences.
+    pub(super) fn compare(&self, differences: &mut Vec<Difference>) {
+        let (declared, stated, info) = (self.declared, self.stated, self.info);
+        if self.identity(differences) {
+            return;
+        }
+        let mut add = |kind, is_grave, text: String| differences.push(self.difference(kind, is_grave, text));
+        if let Some(expected) = mailbox(declared, stated) {
+            let got =
+                info.mailbox.as_ref().map(|it| [(it.receive_offset, it.receive_size), (it.send_offset, it.send_size)]);
+            if got != Some(expected) {
+                let text = format!("expected mailboxes {}, got {}", buffers(Some(expected)), buffers(got));
+                add(DifferenceKind::Mailbox, false, text);
+            }
+        }
+        for pdo in pdos(declared) {
+            if let Some(text) = pdo_difference(pdo, info) {
+                add(DifferenceKind::Pdos, false, text);
+            }
+        }
+        if let Err(error) = plan(declared, info) {
+            add(DifferenceKind::ProcessData, true, error.to_string());
+        }
+        let expected = stated.map(|stated| stated.firmware.as_str()).filter(|firmware| !firmware.is_empty());
+        if let (Some(expected), Some(got)) = (expected, self.firmware)
+            && expected != got
+        {
+            let text = format!("expected firmware \"{}\", got \"{}\"", expected.escape_debug(), got.escape_debug());
+            add(DifferenceKind::Firmware, false, text);
+        }
+    }
+
+    /// Appends the differences of the identity; whether it is another device, which has nothing to compare.
+    fn identity(&self, differences: &mut Vec<Difference>) -> bool {
+        let identity = &self.info.identity;
+        let stated = self.stated.cloned().unwrap_or_default();
+        if let Some((field, expected, got)) = self.declared.expected.mismatch(self.info) {
+            let kind = DifferenceKind::of_field(field);
+            let text = format!("expected {field} {expected:#010x}, got {got:#010x}");
+            differences.push(self.difference(kind, true, text));
+            return kind == DifferenceKind::Device;
+        }
+        if let Some((vendor, product)) = stated.device
+            && (vendor, product) != (identity.vendor_id, identity.product_code)
+        {
+            let got = format!("{:#010x} and {:#010x}", identity.vendor_id, identity.product_code);
+            let text = format!("the file has vendor {vendor:#010x} and product {product:#010x}, found {got}");
+            differences.push(self.difference(DifferenceKind::Device, false, text));
+            return true;
+        }
+        if let Some(revision) = stated.revision.filter(|revision| *revision != identity.revision) {
+            let text = format!("the file has revision {revision:#010x}, found {:#010x}", identity.revision);
+            differences.push(self.difference(DifferenceKind::Revision, false, text));
+        }
+        false
+    }
+
+    fn difference(&self, kind: DifferenceKind, is_grave: bool, text: String) -> Difference {
+        Difference {
+            subdevice: Some(SubDeviceId(self.config)),
+            position: Some(self.info.position),
+            kind,
+            is_grave,
+            text: format!("position {} \"{}\": {text}", self.info.position, self.name),
+        }
+    }
+}
+
+/// Mailboxes of the file.
+fn mailbox(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<[(u16, u16); 2]> {
+    let of = |role: SyncManagerRole| {
+        let mut sync_managers = declared.declared.iter().flatten();
+        sync_managers
+            .find(|it: &&DeclaredSyncManager| it.role == role)
+            .map(|it| (it.register.start, it.register.length))
+    };
+    let own = of(SyncManagerRole::MailboxOut).zip(of(SyncManagerRole::MailboxIn)).map(|(out, back)| [out, back]);
+    own.or(stated.and_then(|stated| stated.mailbox))
+}
+
+fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
+    let Some([(out, out_length), (back, back_length)]) = mailbox else { return "none".to_owned() };
+    format!("{out:#06x} ({out_length} bytes) and {back:#06x} ({back_length} bytes)")
+}
+
+/// All PDOs of a declaration.
+fn pdos(declared: &SubDeviceConfig) -> impl Iterator<Item = &PdoMapping> {
+    let of_file = declared.declared.iter().flatten().flat_map(|it| &it.pdos);
+    let assigned = declared.pdos.iter().flatten().flat_map(|it| &it.pdos);
+    of_file.chain(assigned.filter(|_| declared.declared.is_none()))
+}
+
+/// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no
+/// difference: its dictionary was not read.
+fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo) -> Option<String> {
+    if info.pdos.is_empty() {
+        return None;
+    }
+    let index = pdo.index;
+    let Some(described) = info.pdo(index) else {
+        return Some(format!("PDO {index:#06x} is not among the {} that the SubDevice describes", info.pdos.len()));
+    };
+    let ours = pdo.entries.as_ref()?;
+    let theirs: Vec<PdoEntry> = entries(described);
+    let at = (0..ours.len().max(theirs.len())).find(|at| ours.get(*at) != theirs.get(*at))?;
+    let word = |entry: Option<&PdoEntry>| match entry {
+        None => "nothing".to_owned(),
+        Some(entry) if entry.index == 0 => format!("a gap of {} bits", entry.bit_length),
+        Some(entry) => format!("{:#06x}:{:02x} of {} bits", entry.index, entry.sub_index, entry.bit_length),
+    };
+    Some(format!("PDO {index:#06x}, entry {}: expected {}, got {}", at + 1, word(ours.get(at)), word(theirs.get(at))))
+}
+
+fn entries(described: &PdoInfo) -> Vec<PdoEntry> {
+    described.entries.iter().map(|entry| PdoEntry::new(entry.index, entry.sub_index, entry.bit_length)).collect()
+}

@@ -1,0 +1,115 @@
+//! A difference, and what is compared.
+
+use std::fmt;
+
+use ringcat_engine::config::IdentityField;
+use ringcat_engine::declared::SubDeviceId;
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::topology::Topology;
+use ringcat_wire::address::Position;
+
+/// A difference between a network and a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Difference {
+    /// Index in the file; `None` for a SubDevice that is not in it.
+    pub subdevice: Option<SubDeviceId>,
+    /// Position on the bus; `None` for a SubDevice that was not found.
+    pub position: Option<Position>,
+    /// The kind.
+    pub kind: DifferenceKind,
+    /// The network cannot be activated with this difference.
+    pub is_grave: bool,
+    /// The difference, as text for the operator.
+    pub text: String,
+}
+
+/// Kind of a difference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum DifferenceKind {
+    /// A SubDevice of the file was not found.
+    Missing,
+    /// A SubDevice is not in the file.
+    Additional,
+    /// A SubDevice is at another place.
+    Order,
+    /// Another device: vendor or product.
+    Device,
+    /// Another revision.
+    Revision,
+    /// Another serial number.
+    Serial,
+    /// Another explicit device identification.
+    Identification,
+    /// Other PDOs.
+    Pdos,
+    /// Other mailboxes.
+    Mailbox,
+    /// The process data of the file cannot be set up.
+    ProcessData,
+    /// Another firmware version.
+    Firmware,
+    /// Another cabling.
+    Cable,
+}
+
+impl DifferenceKind {
+    /// A word for programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            DifferenceKind::Missing => "missing",
+            DifferenceKind::Additional => "additional",
+            DifferenceKind::Order => "order",
+            DifferenceKind::Device => "device",
+            DifferenceKind::Revision => "revision",
+            DifferenceKind::Serial => "serial",
+            DifferenceKind::Identification => "identification",
+            DifferenceKind::Pdos => "pdos",
+            DifferenceKind::Mailbox => "mailbox",
+            DifferenceKind::ProcessData => "process data",
+            DifferenceKind::Firmware => "firmware",
+            DifferenceKind::Cable => "cable",
+        }
+    }
+
+    pub(super) const fn of_field(field: IdentityField) -> DifferenceKind {
+        match field {
+            IdentityField::Revision | IdentityField::MinimumRevision => DifferenceKind::Revision,
+            IdentityField::Serial => DifferenceKind::Serial,
+            IdentityField::Identification => DifferenceKind::Identification,
+            _ => DifferenceKind::Device,
+        }
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Properties of a SubDevice that a file states and an activation does not compare.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Stated {
+    /// Vendor and product, also where they are not compared.
+    pub device: Option<(u32, u32)>,
+    /// Revision, also where it is not compared.
+    pub revision: Option<u32>,
+    /// Mailboxes: start and length of the one that the MainDevice writes, and of the one that it reads.
+    pub mailbox: Option<[(u16, u16); 2]>,
+    /// Version of the firmware (object 0x100A); empty if it is not compared.
+    pub firmware: String,
+}
+
+/// A network that was found.
+#[derive(Clone, Copy, Debug)]
+pub struct FoundNetwork<'a> {
+    /// The SubDevices of the scan.
+    pub subdevices: &'a [SubDeviceInfo],
+    /// Their cables.
+    pub topology: &'a Topology,
+    /// Versions of their firmware, in the same order; `None` or too short where they were not read.
+    pub firmware: &'a [Option<String>],
+}

@@ -1,0 +1,22 @@
+//! Network files of RingCAT: a configured network as TOML. Input is the text of a file, output a [`NetworkFile`] or an
+//! error with file, line and key; [`NetworkFile::configuration`] is its declaration for the engine. The format is
+//! described in `docs/network-file.md`.
+
+mod check;
+mod declare;
+mod error;
+mod from_scan;
+pub mod model;
+mod read;
+#[cfg(test)]
+mod schema;
+mod unique;
+mod values;
+mod write;
+
+pub use error::NetworkError;
+pub use from_scan::ScanOptions;
+pub use model::NetworkFile;
+pub use read::MAX_NETWORK_BYTES;
+pub use values::{Bytes, Mac, Shift, Time};
+pub use write::Digest;

@@ -1,0 +1,84 @@
+//! Errors of network files: file, line, key, and what was expected.
+
+use std::fmt;
+
+/// An error in a network file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct NetworkError {
+    /// The file, as the caller named it.
+    pub file: String,
+    /// Line, from 1; `None` for an error of the whole file.
+    pub line: Option<usize>,
+    /// The key, from the root: `subdevice[3].sync_manager[0].number`. Empty for an error of the whole file.
+    pub key: String,
+    /// Name of the SubDevice concerned; empty if there is none.
+    pub subdevice: String,
+    /// Expected and actual value.
+    pub message: String,
+}
+
+impl fmt::Display for NetworkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
+        f.write_str(": ")?;
+        if !self.subdevice.is_empty() {
+            write!(f, "SubDevice \"{}\": ", self.subdevice.escape_debug())?;
+        }
+        if !self.key.is_empty() {
+            write!(f, "{}: ", self.key)?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for NetworkError {}
+
+/// A value that does not fit, by the path of its key.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// The key.
+    pub(super) path: Vec<Step>,
+    /// Expected and actual value.
+    pub(super) message: String,
+}
+
+/// A step to a key.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// A key of a table.
+    Key(String),
+    /// An element of an array, from 0.
+    Index(usize),
+}
+
+impl From<&str> for Step {
+    fn from(key: &str) -> Step {
+        Step::Key(key.to_owned())
+    }
+}
+
+impl From<usize> for Step {
+    fn from(index: usize) -> Step {
+        Step::Index(index)
+    }
+}
+
+/// A path as text.
+pub(super) fn path_text(path: &[Step]) -> String {
+    let mut text = String::new();
+    for step in path {
+        match step {
+            Step::Key(key) if text.is_empty() => text.push_str(key),
+            Step::Key(key) => {
+                text.push('.');
+                text.push_str(key);
+            }
+            Step::Index(index) => text.push_str(&format!("[{index}]")),
+        }
+    }
+    text
+}

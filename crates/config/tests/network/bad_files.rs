@@ -1,0 +1,156 @@
+//! Bad files: each is refused with file, line, key and reason, in bounded time and memory.
+
+use std::time::{Duration, Instant};
+
+use ringcat_config::network::NetworkFile;
+
+use crate::WHOLE;
+
+fn refusal(text: impl AsRef<[u8]>) -> String {
+    let begin = Instant::now();
+    let error = NetworkFile::read("bad.toml", text.as_ref()).expect_err("it is refused").to_string();
+    assert!(begin.elapsed() < Duration::from_secs(20), "in bounded time");
+    assert!(error.starts_with("bad.toml") && error.len() < 800, "{error}");
+    error
+}
+
+/// The error of the file with a text replaced once.
+fn changed(from: &str, to: &str) -> String {
+    assert!(WHOLE.contains(from), "{from}");
+    refusal(WHOLE.replacen(from, to, 1))
+}
+
+/// A text of the file, what takes its place, and a part of the error.
+const CHANGES: &[(&str, &str, &str)] = &[
+    ("ringcat_network = 1", "ringcat_network = 2", "bad.toml:1: ringcat_network: expected version 1 of the format"),
+    ("ringcat_network = 1\n", "", "bad.toml: expected a network file of RingCAT"),
+    (
+        "position = 1\n",
+        "positon = 1\n",
+        "bad.toml:49: SubDevice \"Drive\": subdevice[1].positon: unknown key `positon`",
+    ),
+    (
+        "product = 0x1b960402",
+        "product = -1",
+        "SubDevice \"Drive\": subdevice[1].product: got the number `-1`, expected a whole number from 0",
+    ),
+    (
+        "number = 2\n",
+        "number = 300\n",
+        "subdevice[1].sync_manager[0].number: got the number `300`, expected a whole number from 0 to 255",
+    ),
+    (
+        "period = \"250us\"",
+        "period = \"250\"",
+        "bad.toml:27: domain[0].period: expected a time with ns, us, ms, s or min",
+    ),
+    ("data = \"e8 03\"", "data = \"e8 0\"", "subdevice[1].startup[0].sdo.data: expected pairs of hexadecimal digits"),
+    ("target = \"SAFEOP\"", "target = \"safeop\"", "subdevice[1].target: unknown word `safeop`, expected one of"),
+    ("optional = true", "optional = 1", "subdevice[1].optional: got the number `1`, expected true or false"),
+    ("name = \"Tool 2\"", "name = \"Tool\"", "subdevice[3].name: the name is also that of subdevice[2]"),
+    (
+        "reference = \"Drive\"",
+        "reference = \"drive\"",
+        "clocks.reference: expected the name of a SubDevice of the file, got \"drive\"",
+    ),
+    (
+        "domain = \"fast\"",
+        "domain = \"quick\"",
+        "subdevice[1].domain: expected a domain of the file (\"fast\", \"slow\"), got \"quick\"",
+    ),
+    ("number = 3\n", "number = 2\n", "subdevice[1].sync_manager[1].number: 2 is also the number of sync_manager[0]"),
+    ("number = 3\n", "number = 16\n", "subdevice[1].sync_manager[1].number: expected 0 to 15, got 16"),
+    (
+        "index = 0x1a01",
+        "index = 0x1a00",
+        "subdevice[1].sync_manager[1].pdo[1].index: 0x1a00 is also the index of pdo[0]",
+    ),
+    (
+        "{ bits = 8 }",
+        "{ bits = 0 }",
+        "subdevice[1].sync_manager[0].pdo[0].entries[2].bits: expected 1 to 255 bits, got 0",
+    ),
+    ("under_way = 2", "under_way = 5", "domain[0].under_way: expected 1 to 4, got 5"),
+    ("alias = 5\n", "", "subdevice[2].group: the head of group \"tool 1\" needs an alias or an identification"),
+    ("offset = 2", "position = 4", "subdevice[4].position: expected one of position, alias and identification"),
+    ("port = 2 }", "port = 4 }", "subdevice[1].plugged_into.port: expected a port from 0 to 3, got 4"),
+    (
+        "plugged_into = { subdevice = \"Coupler\"",
+        "plugged_into = { subdevice = \"Tool\"",
+        "expected a SubDevice that is listed before",
+    ),
+    (
+        "junctions = \"strict\"",
+        "junctions = \"automatic\"",
+        "redundancy.connection: expected connections with junctions = \"strict\"",
+    ),
+    ("idn = { drive = 1", "idn = { drive = 8", "subdevice[1].startup[3].idn.drive: expected 0 to 7, got 8"),
+    ("mask = \"0f 00\"", "mask = \"0f\"", "subdevice[1].startup[6].check.mask: expected 2 bytes as in data, got 1"),
+    (
+        "at = \"SO\"\n",
+        "at = \"SO\"\nsdo = { index = 1, data = \"\" }\n",
+        "expected one of sdo, upload, idn, ip, write and check, got 2 of them",
+    ),
+    (
+        "index = 0x8020, complete = true",
+        "index = 0x8020, sub = 2, complete = true",
+        "complete access begins at subindex 0 or 1, got 2",
+    ),
+    (
+        "sync0_cycle = \"250us\"",
+        "sync0_cycle = \"-1us\"",
+        "subdevice[1].sync.sync0_cycle: expected 0ns to 2147483647ns, got -1us",
+    ),
+    (
+        "read = { start = 0x1080, length = 128 }",
+        "read = { start = 0xffff, length = 128 }",
+        "subdevice[1].mailbox.read: expected an end within 64 KiB",
+    ),
+    ("[clocks]\n", "[clock]\n", "unknown key `clock`"),
+    ("name = \"Drive\"\n", "name = \"Drive\"\nname = \"Drive\"\n", "duplicate key"),
+];
+
+// covers: network-file
+#[test]
+fn errors_name_line_key_subdevice_and_what_was_expected() {
+    for (from, to, expected) in CHANGES.iter().copied() {
+        let error = changed(from, to);
+        assert!(error.contains(expected), "{from} -> {to}: {error}");
+        let line = error.split(':').nth(1).and_then(|line| line.parse::<usize>().ok());
+        assert!(line.is_some() || error.contains("expected a network file"), "{error}");
+    }
+    let (before, rest) = WHOLE.split_once("[clocks]\n").expect("a table");
+    let (_, after) = rest.split_once("\n\n").expect("a further table");
+    let without_clocks = format!("{before}{after}");
+    assert!(refusal(without_clocks).contains("subdevice[1].sync: SYNC signals need distributed clocks"));
+}
+
+// covers: network-file
+#[test]
+fn a_truncated_file_is_valid_or_refused_at_every_length() {
+    for length in 0..WHOLE.len() {
+        let Some(text) = WHOLE.get(..length) else { continue };
+        if let Err(error) = NetworkFile::read("bad.toml", text.as_bytes()) {
+            assert!(error.to_string().starts_with("bad.toml:"), "{error}");
+        }
+    }
+    assert!(NetworkFile::read("bad.toml", &WHOLE.as_bytes()[..300]).is_err());
+}
+
+// covers: network-file
+#[test]
+fn deep_large_and_binary_files_are_refused_in_bounded_time() {
+    refusal(format!("ringcat_network = 1\nname = {}", "[".repeat(1_000_000)));
+    refusal(format!("ringcat_network = 1\nname = {}", "{a=".repeat(1_000_000)));
+    refusal(format!("ringcat_network = 1\n[{}]\n", vec!["a"; 200_000].join(".")));
+    refusal(vec![b' '; (64 << 20) + 1]);
+    assert_eq!(refusal(b"ringcat_network = 1\nname = \"\xff\"\n"), "bad.toml:2: expected UTF-8 text");
+    refusal([0u8; 4096]);
+    refusal("<EtherCATConfig/>");
+    let many: String = (0..70_000).map(|n| format!("[[subdevice]]\nname = \"{n}\"\n")).collect();
+    let many = format!("ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n{many}");
+    assert!(refusal(many).contains("expected at most 65534 SubDevices, got 70000"));
+    let bits: String = "{ bits = 255 }, ".repeat(3_000);
+    let long = WHOLE.replacen("index = 0x1a01\n", &format!("index = 0x1a01\nentries = [{bits}]\n"), 1);
+    assert!(refusal(long).contains("subdevice[1].sync_manager[1].pdo: expected at most 65535 bytes, got 95627"));
+}

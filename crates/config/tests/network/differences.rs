@@ -1,0 +1,90 @@
+//! A network compared with a file: each difference has one message.
+
+use std::time::Duration;
+
+use ringcat_config::network::{NetworkFile, ScanOptions};
+use ringcat_config::{DifferenceKind, FoundNetwork};
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::topology::Topology;
+use ringcat_wire::address::Position;
+use ringcat_wire::sii::Identity;
+
+/// SubDevices of these products, at consecutive positions.
+fn bus(products: &[u32]) -> Vec<SubDeviceInfo> {
+    (0..)
+        .zip(products)
+        .map(|(position, product)| {
+            let mut info = SubDeviceInfo::default();
+            info.position = Position(position);
+            info.identity = Identity { vendor_id: 7, product_code: *product, revision: 1, serial: 0 };
+            info.name = format!("P{product}");
+            info
+        })
+        .collect()
+}
+
+fn file_of(found: &[SubDeviceInfo]) -> NetworkFile {
+    NetworkFile::from_scan(found, &Topology::default(), &ScanOptions::new("machine", Duration::from_millis(1)))
+}
+
+/// Kinds and indices in the file, with positions on the bus.
+fn differences(file: &NetworkFile, found: &[SubDeviceInfo]) -> Vec<(DifferenceKind, Option<usize>, Option<u16>)> {
+    let topology = Topology::default();
+    let network = FoundNetwork { subdevices: found, topology: &topology, firmware: &[] };
+    let all = file.configuration().differences(network, &file.stated());
+    assert!(all.iter().all(|it| !it.text.is_empty()));
+    all.into_iter().map(|it| (it.kind, it.subdevice.map(|at| at.0), it.position.map(|at| at.0))).collect()
+}
+
+use DifferenceKind::{Additional, Device, Missing, Order, Revision, Serial};
+
+// covers: network-file
+#[test]
+fn one_missing_or_additional_subdevice_is_one_difference() {
+    let file = file_of(&bus(&[1, 2, 3, 4, 4, 5]));
+    assert_eq!(differences(&file, &bus(&[1, 2, 3, 4, 4, 5])), []);
+    assert_eq!(differences(&file, &bus(&[1, 3, 4, 4, 5])), [(Missing, Some(1), None)]);
+    assert_eq!(differences(&file, &bus(&[2, 3, 4, 4, 5])), [(Missing, Some(0), None)]);
+    assert_eq!(differences(&file, &bus(&[1, 2, 9, 3, 4, 4, 5])), [(Additional, None, Some(2))]);
+    assert_eq!(differences(&file, &bus(&[9, 1, 2, 3, 4, 4, 5])), [(Additional, None, Some(0))]);
+    assert_eq!(differences(&file, &bus(&[1, 2, 9, 4, 4, 5])), [(Device, Some(2), Some(2))]);
+    assert_eq!(differences(&file, &bus(&[1, 3, 2, 4, 4, 5])).len(), 1, "one of the two has moved");
+    assert_eq!(differences(&file, &bus(&[2, 3, 4, 4, 5, 1])), [(Order, Some(0), Some(5))]);
+    assert_eq!(differences(&file, &[]).len(), 6);
+    assert_eq!(differences(&file_of(&[]), &bus(&[1, 2])).len(), 2);
+}
+
+// covers: network-file
+#[test]
+fn revisions_and_serial_numbers_differ_without_another_place() {
+    let found = bus(&[1, 2, 3]);
+    let mut file = file_of(&found);
+    let mut other = found.clone();
+    other[1].identity.revision = 2;
+    assert_eq!(differences(&file, &other), [(Revision, Some(1), Some(1))]);
+    file.subdevice[2].serial = Some(5);
+    assert_eq!(differences(&file, &found), [(Serial, Some(2), Some(2))]);
+}
+
+// covers: network-file
+#[test]
+fn a_subdevice_with_an_alias_is_found_anywhere() {
+    let mut found = bus(&[1, 2, 3]);
+    found[0].alias = 8;
+    let mut options = ScanOptions::new("machine", Duration::from_millis(1));
+    options.by_alias = true;
+    let file = NetworkFile::from_scan(&found, &Topology::default(), &options);
+    let mut moved = bus(&[2, 3, 1]);
+    moved[2].alias = 8;
+    assert_eq!(differences(&file, &moved), []);
+}
+
+// covers: network-file
+#[test]
+fn large_different_networks_are_compared_in_bounded_time() {
+    let file = file_of(&bus(&(0..6_000).map(|n| n % 50).collect::<Vec<_>>()));
+    let found = bus(&(0..6_000).map(|n| (n + 1) % 49 + 1).collect::<Vec<_>>());
+    let begin = std::time::Instant::now();
+    assert!(!differences(&file, &found).is_empty());
+    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+}

@@ -1,0 +1,99 @@
+//! The end of an application: all SubDevices go to PREOP with mailboxes, and the scan is kept (seed of IgH 2.2: back to
+//! idle).
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
+
+use super::al_state::read_status;
+use super::idle::{present, scan_again};
+use super::scan::ScanOptions;
+use super::shared_segment::SharedSegment;
+use super::stop::{StopError, ToStop, all_known, stop};
+use super::undeclared::run_due;
+use crate::info::SubDeviceInfo;
+use crate::segment::{Observation, Segment, SubDevice};
+use crate::supervisor::Bus;
+use crate::time::Instant;
+
+/// Pause before the segment is scanned again while it changes.
+const PAUSE: Duration = Duration::from_millis(2);
+
+/// What was known of the SubDevices when the application ended.
+pub(crate) struct Remainder {
+    to_stop: Vec<ToStop>,
+    known: Vec<Rc<SubDeviceInfo>>,
+}
+
+impl Remainder {
+    /// To be called before the application ends in the model.
+    pub(crate) fn of(segment: &Segment) -> Remainder {
+        let mut known: Vec<Rc<SubDeviceInfo>> = segment.subdevices().all().iter().filter_map(addressed).collect();
+        for info in segment.found().map(|found| found.subdevices.as_slice()).unwrap_or_default() {
+            if !known.iter().any(|other| other.station == info.station) {
+                known.push(info.clone());
+            }
+        }
+        Remainder { to_stop: all_known(segment), known }
+    }
+}
+
+/// What is known of a SubDevice, with its present station address.
+fn addressed(subdevice: &SubDevice) -> Option<Rc<SubDeviceInfo>> {
+    let (info, station) = (subdevice.knowledge.info()?, subdevice.key.station);
+    Some(if info.station == station { info.clone() } else { Rc::new(SubDeviceInfo { station, ..(**info).clone() }) })
+}
+
+/// Brings all SubDevices to PREOP: declared ones from the states of their application, the others too. Those that do
+/// not answer are left out.
+pub(crate) async fn deactivate(
+    bus: &Bus,
+    segment: &SharedSegment,
+    options: &ScanOptions,
+    remainder: Remainder,
+    limit: Duration,
+) -> Result<(), StopError> {
+    let until = bus.now() + limit;
+    let Remainder { to_stop, known } = remainder;
+    let declared = to_stop.clone();
+    // A SubDevice that does not leave its state must not take the time of the others.
+    let stopped = stop(bus, to_stop, AlState::PreOp, limit / 2).await;
+    scan_until(bus, segment, options, &known, until).await;
+    segment.undeclared.follow(&present(&segment.view()));
+    segment.observe(Observation::Visited);
+    let settling = run_due(bus, &segment.undeclared);
+    let is_settled = bus.within(until.since(bus.now()), settling).await.is_ok();
+    if is_settled { Ok(()) } else { late(bus, segment, &declared, limit).await.map_or(stopped, Err) }
+}
+
+/// The scan as it is now, without an EEPROM of known SubDevices. If the segment does not become stable, the last scan
+/// is kept.
+async fn scan_until(
+    bus: &Bus,
+    segment: &SharedSegment,
+    options: &ScanOptions,
+    known: &[Rc<SubDeviceInfo>],
+    until: Instant,
+) {
+    while bus.now() < until {
+        let versions = segment.view().versions();
+        if let Ok(Some(found)) = scan_again(bus, segment, options, known).await {
+            return segment.observe(Observation::FoundAgain { versions, found: Rc::new(found) });
+        }
+        bus.sleep(PAUSE).await;
+    }
+}
+
+/// The first SubDevice that answers and is not in PREOP.
+async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Option<StopError> {
+    let stations: Vec<StationAddress> = segment.undeclared.unsettled();
+    let states = bus.gather(stations, |bus, station| async move { (station, read_status(&bus, station).await) }).await;
+    let mut late = states.into_iter().filter_map(|(station, read)| Some((station, read.ok()?)));
+    let (station, (status, code)) = late.next()?;
+    let others = late.count();
+    let subdevice = declared.iter().find(|(_, other)| *other == station).and_then(|(subdevice, _)| *subdevice);
+    Some(StopError::NotReached { subdevice, station, requested: AlState::PreOp, status, code, limit, others })
+}

@@ -1,0 +1,117 @@
+//! Follows a change of the segment without an application: SubDevices that kept their station addresses stay as they
+//! are, the others get addresses and are read.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::register::map;
+
+use crate::info::{SiiExtent, SubDeviceInfo};
+use crate::procedures::dictionary::complete;
+use crate::procedures::scan::{Learned, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
+use crate::procedures::shared_segment::SharedSegment;
+use crate::procedures::unassigned::{give, level, view};
+use crate::segment::Found;
+use crate::segment::view::View;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::Topology;
+
+/// Scans the segment again; `None` while it changes. `known`: SubDevices with their station addresses.
+///
+/// A SubDevice that lost its power has lost its station address, too. So an address that one SubDevice has shows which
+/// one it is.
+pub(crate) async fn scan_again(
+    bus: &Bus,
+    segment: &SharedSegment,
+    options: &ScanOptions,
+    known: &[Rc<SubDeviceInfo>],
+) -> Result<Option<Found>, ScanError> {
+    let Some(before) = seen(bus).await? else { return Ok(None) };
+    if before.stations.is_empty() {
+        return Ok(Some(nothing()));
+    }
+    let others = unknown(&before, known);
+    let (given, now) = if others.is_empty() {
+        (Vec::new(), before)
+    } else {
+        let (given, is_complete) = give(bus, segment, &before, &others).await?;
+        let now = if is_complete { seen(bus).await? } else { None };
+        let Some(now) = now else { return Ok(None) };
+        (given, now)
+    };
+    bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
+    let places: Vec<(Position, StationAddress)> = (0..).map(Position).zip(now.stations.iter().copied()).collect();
+    let fresh = places.iter().copied().filter(|(_, station)| given.contains(station)).collect();
+    let mut read = read_new(bus, options, fresh).await?.into_iter();
+    let registers =
+        bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
+    let mut subdevices = Vec::with_capacity(now.stations.len());
+    for registers in registers.await {
+        let registers = registers?;
+        let known = known.iter().find(|info| info.station == registers.station && !given.contains(&info.station));
+        subdevices.push(match known {
+            Some(info) => info.seen_at(&registers),
+            None => {
+                let Some(info) = read.next() else { return Ok(None) };
+                Rc::new(SubDeviceInfo { dl_status: registers.dl_status, position: registers.position, ..info })
+            }
+        });
+    }
+    let main_count = usize::from(now.counts.0.0);
+    let infos: Vec<SubDeviceInfo> = subdevices.iter().map(|info| (**info).clone()).collect();
+    let Learned { topology, .. } = connect(bus, options.junctions, &infos, main_count).await?;
+    Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
+}
+
+/// A segment without SubDevices.
+pub(super) fn nothing() -> Found {
+    Found { subdevices: Vec::new(), topology: Topology::default(), main_count: 0 }
+}
+
+/// All station addresses; none if no frame returns. `None` while the segment changes.
+async fn seen(bus: &Bus) -> Result<Option<View>, BusError> {
+    match view(bus).await {
+        Err(BusError::Lost { .. }) => {
+            Ok(Some(View { counts: Default::default(), ring: Default::default(), stations: Vec::new() }))
+        }
+        result => result,
+    }
+}
+
+/// Addresses that belong to no known SubDevice, or to several SubDevices.
+fn unknown(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
+    let mut unknown = Vec::new();
+    for station in &view.stations {
+        let is_known = known.iter().any(|info| info.station == *station) && view.position(*station).is_some();
+        if !is_known && !unknown.contains(station) {
+            unknown.push(*station);
+        }
+    }
+    unknown
+}
+
+/// Reads SubDevices with new addresses; they are in INIT.
+async fn read_new(
+    bus: &Bus,
+    options: &ScanOptions,
+    fresh: Vec<(Position, StationAddress)>,
+) -> Result<Vec<SubDeviceInfo>, ScanError> {
+    if fresh.is_empty() {
+        return Ok(Vec::new());
+    }
+    let cache = options.cache.clone();
+    let read = bus.gather(fresh, |bus, (position, station)| {
+        let cache = cache.clone();
+        async move {
+            level(&bus, station).await?;
+            let contents = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
+            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &contents))
+        }
+    });
+    let subdevices = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let main_count = subdevices.len();
+    let mut scan = Scan { subdevices, topology: Topology::default(), main_count, redundant_count: 0 };
+    complete(bus, &mut scan, options.pdos).await;
+    Ok(scan.subdevices)
+}

@@ -1,0 +1,204 @@
+//! Whether the clocks follow the time that the application gives, and what is necessary for it.
+
+use alloc::vec::Vec;
+
+use crate::board::clock_times::{Timeline, Wanted};
+
+/// Differences up to this are made up by the control loop of the reference.
+const FAR_NS: i64 = 100_000;
+/// Readings of the reference until a far time counts.
+const READINGS: usize = 16;
+/// These readings differ by no more than this, or by no more than this part of the difference, as a shift.
+const SAME_NS: i64 = 100_000;
+const SAME_SHARE: u32 = 3;
+/// Longest pattern of SYNC signals that is kept: the rest of a jump, at most half of it, is made up gradually.
+const LONGEST_PATTERN_NS: u64 = 20_000_000;
+
+/// Application time and system time.
+#[derive(Debug, Default)]
+pub struct Times {
+    /// The posted system time.
+    pub timeline: Timeline,
+    /// System time to be reached minus system time, by each reading while they are far apart.
+    far: Vec<i64>,
+    /// The number of the last wanted time that was compared.
+    compared: u32,
+    /// The first time that the application has set was followed, or is not to be followed any more.
+    is_first_followed: bool,
+}
+
+/// What follows from a time that is far away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// All clocks are set: their system time jumps by this, and the shift is 0.
+    Jump(u64),
+    /// The system time goes on, with this shift from now on.
+    Shift(u64),
+}
+
+impl Times {
+    /// The first application time is the system time of the set-up. Returns that time at host time zero.
+    pub fn begin(&mut self, first_epoch: Option<u64>) -> Option<u64> {
+        self.is_first_followed |= first_epoch.is_some();
+        first_epoch
+    }
+
+    /// Whether readings of the reference are necessary.
+    pub fn is_pending(&self) -> bool {
+        !self.far.is_empty()
+    }
+
+    /// Takes a reading of the reference: the system time at host time zero. Returns the next step. `first` is the first
+    /// time that the application has set, at host time zero. `pattern_ns` is the common pattern of running SYNC
+    /// signals; `None` if none is running.
+    pub fn compare(
+        &mut self,
+        epoch: u64,
+        wanted: Option<Wanted>,
+        first: Option<u64>,
+        pattern_ns: Option<u64>,
+    ) -> Option<Step> {
+        let first = first.filter(|_| !self.is_first_followed && pattern_ns.is_none());
+        let (target, written) = match (wanted, first) {
+            (Some(wanted), _) if wanted.number == self.compared => return None,
+            (Some(wanted), _) => {
+                self.compared = wanted.number;
+                (wanted.epoch, wanted.epoch.wrapping_sub(wanted.shift))
+            }
+            (None, Some(first)) => (first, first),
+            (None, None) => return None,
+        };
+        let difference = written.wrapping_sub(epoch) as i64;
+        if difference.unsigned_abs() <= FAR_NS.unsigned_abs() {
+            self.is_first_followed |= first.is_some();
+            self.far.clear();
+            return None;
+        }
+        let same = SAME_NS.max((difference >> SAME_SHARE).saturating_abs());
+        if self.far.first().is_some_and(|first| first.wrapping_sub(difference).saturating_abs() > same) {
+            self.far.clear();
+        }
+        self.far.push(difference);
+        if self.far.len() < READINGS {
+            return None;
+        }
+        self.far.sort_unstable();
+        let middle = self.far[READINGS / 2];
+        self.far.clear();
+        self.is_first_followed |= first.is_some();
+        // The whole difference between both times: the present shift is not kept.
+        let whole = target.wrapping_sub(written).wrapping_add_signed(middle);
+        Some(match pattern_ns {
+            None => Step::Jump(whole),
+            Some(pattern) => Step::Shift(nearest_multiple(whole, pattern)),
+        })
+    }
+
+    /// Another system time begins: it jumps, and differs from the application time by a shift. `epoch` is the system
+    /// time at host time zero.
+    pub fn turn(&mut self, jump: u64, shift: u64, epoch: u64) -> Timeline {
+        let Timeline { number, jumped, .. } = self.timeline;
+        let (number, jumped) = (number.wrapping_add(1), jumped.wrapping_add(jump));
+        self.timeline = Timeline { number, jumped, shift, epoch };
+        self.timeline
+    }
+}
+
+/// The multiple of a pattern that is nearest to a signed time.
+fn nearest_multiple(time: u64, pattern_ns: u64) -> u64 {
+    let (time, pattern) = (time as i64, pattern_ns.max(1) as i64);
+    let rest = time.rem_euclid(pattern);
+    let down = time.wrapping_sub(rest);
+    if rest > pattern / 2 { down.wrapping_add(pattern) as u64 } else { down as u64 }
+}
+
+/// The time after which all these patterns of SYNC signals repeat together, in nanoseconds; that of the longest if this
+/// takes too long.
+pub fn common_pattern(patterns: impl Iterator<Item = u64> + Clone) -> u64 {
+    let common = patterns.clone().try_fold(1, |common: u64, pattern| {
+        let together = common.checked_mul(pattern / greatest_divisor(common, pattern))?;
+        (together <= LONGEST_PATTERN_NS).then_some(together)
+    });
+    common.or_else(|| patterns.max()).unwrap_or(1)
+}
+
+fn greatest_divisor(a: u64, b: u64) -> u64 {
+    let (mut a, mut b) = (a, b);
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a.max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn wanted(number: u32, epoch: u64, shift: u64) -> Option<Wanted> {
+        Some(Wanted { epoch, shift, number })
+    }
+
+    #[test]
+    fn a_far_time_counts_after_16_readings_that_agree() {
+        let mut times = Times::default();
+        for number in 1..=15 {
+            assert_eq!(times.compare(5, wanted(number, 900 * MS, 0), None, None), None);
+        }
+        assert!(times.is_pending());
+        // Once near: all over again. A time that was not given again does not count.
+        assert_eq!(times.compare(900 * MS, wanted(16, 900 * MS, 0), None, None), None);
+        assert!(!times.is_pending());
+        let steps: Vec<Step> = (17..=32)
+            .flat_map(|number| [number; 3])
+            .filter_map(|number| times.compare(5, wanted(number, 900 * MS, 0), None, None))
+            .collect();
+        assert_eq!(steps, [Step::Jump(900 * MS - 5)]);
+    }
+
+    #[test]
+    fn a_host_that_stalls_now_and_then_gives_no_far_time() {
+        let mut times = Times::default();
+        for number in 1..1_000 {
+            let late = if number % 7 == 0 { 0 } else { u64::from(number) * 7_919 % 1_000_000 };
+            let step = times.compare(40 * MS + late, wanted(number, 40 * MS, 0), None, None);
+            assert_eq!(step, None, "{number}");
+        }
+    }
+
+    #[test]
+    fn with_sync_signals_the_shift_is_the_nearest_multiple_of_their_pattern() {
+        for (jump, shift) in [(7_300_000_i64, 7 * MS as i64), (-7_300_000, -7 * MS as i64), (600_000, MS as i64)] {
+            let mut times = Times::default();
+            let application = (40 * MS).wrapping_add_signed(jump);
+            let step =
+                (1..=16).find_map(|number| times.compare(40 * MS, wanted(number, application, 0), None, Some(MS)));
+            assert_eq!(step, Some(Step::Shift(shift as u64)), "{jump}");
+        }
+        // While half a jump is made up, another one comes: the shift counts from the application's time.
+        let mut times = Times::default();
+        let (application, in_effect) = (40 * MS + 9_400_000, 9_200_000);
+        let step =
+            (1..=16).find_map(|number| times.compare(38 * MS, wanted(number, application, in_effect), None, Some(MS)));
+        assert_eq!(step, Some(Step::Shift(11 * MS)));
+    }
+
+    #[test]
+    fn a_first_time_is_followed_once_and_not_while_signals_run() {
+        let mut times = Times::default();
+        let first = |times: &mut Times, pattern| (0..16).find_map(|_| times.compare(0, None, Some(9 * MS), pattern));
+        assert_eq!(first(&mut times, Some(MS)), None);
+        assert_eq!(first(&mut times, None), Some(Step::Jump(9 * MS)));
+        assert_eq!(first(&mut times, None), None);
+        assert_eq!(Times::default().begin(Some(3)), Some(3));
+    }
+
+    // covers: dc-reference
+    #[test]
+    fn patterns_repeat_together_after_their_least_common_multiple_up_to_20_ms() {
+        let common = |patterns: &[u64]| common_pattern(patterns.iter().copied());
+        assert_eq!((common(&[]), common(&[MS]), common(&[2 * MS, 3 * MS])), (1, MS, 6 * MS));
+        assert_eq!(common(&[MS, 333_333]), MS, "333 s are too long");
+    }
+}

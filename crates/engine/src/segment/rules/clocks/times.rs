@@ -1,0 +1,73 @@
+//! Effects of the time that the application gives.
+
+use ringcat_wire::address::StationAddress;
+
+use crate::board::clocks::References;
+use crate::event::Event;
+use crate::segment::clocks::{Delays, Due, Life, Running, Step, Unwritten};
+use crate::segment::effect::Effects;
+use crate::segment::model::Segment;
+
+impl Segment {
+    /// The set-up of all clocks begins, with the application's time if it is known.
+    pub(super) fn observe_begun_set_up(&mut self) {
+        let first = self.board.clocks.times.first_epoch();
+        self.clocks.epoch = self.clocks.times.begin(first).unwrap_or(self.clocks.epoch);
+        self.clocks.reference = self.clocks.elect(|_| true);
+    }
+
+    /// Compares a reading of the reference with the application's time.
+    pub(super) fn compare_times(&mut self, effects: &mut Effects) {
+        let is_calm = match &self.clocks.life {
+            Life::Running(Running { delays: Delays::Valid, unwritten, due: Due::Nothing, .. }) => {
+                *unwritten == Unwritten::default() && !self.board.clocks.is_held()
+            }
+            _ => false,
+        };
+        if !is_calm || self.board.clocks.references().0 != self.clocks.references() {
+            return;
+        }
+        let pattern_ns = self.clocks.running_pattern();
+        let words = &self.board.clocks.times;
+        let (epoch, wanted, first) = (self.clocks.epoch, words.wanted(), words.first_epoch());
+        match self.clocks.times.compare(epoch, wanted, first, pattern_ns) {
+            None => {}
+            Some(Step::Jump(jump)) => self.begin_jump(jump),
+            Some(Step::Shift(shift)) => {
+                words.post_timeline(self.clocks.times.turn(0, shift, epoch));
+                self.board.clocks.post_references(self.clocks.references());
+                effects.report(Event::ApplicationTime { jump_ns: 0, shift_ns: shift as i64 });
+            }
+        }
+    }
+
+    /// All offsets are changed by a jump. No time is distributed until they are written.
+    fn begin_jump(&mut self, jump: u64) {
+        self.board.clocks.post_references(References::default());
+        self.clocks.epoch = self.clocks.epoch.wrapping_add(jump);
+        for node in &mut self.clocks.nodes {
+            node.offset_ns = node.offset_ns.wrapping_add(jump as i64);
+        }
+        self.clocks.times.turn(jump, 0, self.clocks.epoch);
+        if let Some(running) = self.clocks.running_mut() {
+            running.due = Due::Offsets;
+        }
+    }
+
+    pub(super) fn observe_written_offsets(&mut self, missed: &[StationAddress], effects: &mut Effects) {
+        for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
+            node.missed_offset |= node.link.is_none() || missed.contains(&node.station);
+        }
+        let timeline = self.clocks.times.timeline;
+        let before = self.board.clocks.times.timeline().jumped;
+        self.board.clocks.times.post_timeline(timeline);
+        self.board.clocks.post_references(self.clocks.references());
+        if let Some(running) = self.clocks.running_mut() {
+            running.due = Due::Filters;
+        }
+        effects.report(Event::ApplicationTime {
+            jump_ns: timeline.jumped.wrapping_sub(before) as i64,
+            shift_ns: timeline.shift as i64,
+        });
+    }
+}

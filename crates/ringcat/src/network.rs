@@ -1,0 +1,91 @@
+//! Networks from a network file of RingCAT (TOML): the file gives the declaration, the process image and its variables.
+//!
+//! `ringcat-config` reads the file; [`EniImage`](crate::eni::EniImage) is its process image at run time, as for an ENI.
+//! The format is described in `docs/network-file.md`.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use ringcat_config::network::{MAX_NETWORK_BYTES, NetworkError};
+use ringcat_config::{Configuration, Stated};
+use ringcat_engine::main_device::Declaration;
+
+pub use ringcat_config::network::{Digest, NetworkFile, ScanOptions};
+
+/// A network file with the configuration derived from it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct LoadedNetwork {
+    /// Content of the file.
+    pub file: NetworkFile,
+    /// The configuration derived from it.
+    pub configuration: Configuration,
+}
+
+/// Why a network file cannot be used.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum NetworkFailure {
+    /// The file cannot be read.
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        error: io::Error,
+    },
+    /// Its content is not valid.
+    Content(Box<NetworkError>),
+}
+
+impl fmt::Display for NetworkFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NetworkFailure::Read { path, error } => write!(f, "{}: cannot be read: {error}", path.display()),
+            NetworkFailure::Content(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for NetworkFailure {}
+
+impl LoadedNetwork {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`NetworkFailure`]: with file, line and key where something in it is wrong.
+    pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkFailure> {
+        // The limit applies to the bytes that are read: a device or a pipe reports no length.
+        let mut bytes = Vec::new();
+        let room = MAX_NETWORK_BYTES as u64 + 1;
+        let read = File::open(path).and_then(|file| file.take(room).read_to_end(&mut bytes));
+        read.map_err(|error| NetworkFailure::Read { path: path.to_owned(), error })?;
+        LoadedNetwork::from_bytes(&path.display().to_string(), &bytes)
+    }
+
+    /// Reads the bytes of a file; `name` is the file in messages.
+    ///
+    /// # Errors
+    /// [`NetworkFailure::Content`]: with file, line and key.
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<LoadedNetwork, NetworkFailure> {
+        let file = NetworkFile::read(name, bytes).map_err(|error| NetworkFailure::Content(Box::new(error)))?;
+        Ok(LoadedNetwork::new(file))
+    }
+
+    /// A network file that the application has made.
+    pub fn new(file: NetworkFile) -> LoadedNetwork {
+        let configuration = file.configuration();
+        LoadedNetwork { file, configuration }
+    }
+
+    /// The declaration to activate.
+    pub fn declaration(&self) -> Declaration {
+        self.configuration.declaration.clone()
+    }
+
+    /// What the file states of each SubDevice besides the declaration, to compare it with a network.
+    pub fn stated(&self) -> Vec<Stated> {
+        self.file.stated()
+    }
+}

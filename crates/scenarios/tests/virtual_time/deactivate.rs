@@ -1,0 +1,253 @@
+//! The end of an application: all SubDevices in PREOP with mailboxes, the scan kept, another declaration at once
+//! (protocol 5.3, phases of IgH).
+
+use std::time::Duration;
+
+use ringcat::{
+    Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, Options, Position, Retries,
+    Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
+};
+use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::register::{Fmmu, map};
+use scenarios::segments::{SIXTEEN, descriptions, line, ring};
+use scenarios::tap::Tap;
+use scenarios::world::CYCLE;
+
+const LIMIT: Duration = Duration::from_secs(1);
+/// Two with a mailbox, two with device emulation, two with neither.
+const MIXED: [&str; 6] =
+    ["servo", "digital-output-8", "emulated-output-8", "servo", "emulated-input-8", "digital-input-8"];
+const PREOP: AlStatus = AlStatus::new(AlState::PreOp);
+
+fn networks() -> [Network; 2] {
+    let options = NetworkOptions::default;
+    [line(descriptions(&MIXED), options()), ring(descriptions(&MIXED), options())]
+}
+
+fn scanned(network: Network, options: &Options) -> (MainDevice<Tap>, Scan) {
+    let mut main_device = MainDevice::request(Tap::new(network), options);
+    let scan = main_device.scan().expect("it can be scanned");
+    (main_device, scan)
+}
+
+fn activate(main_device: MainDevice<Tap>, declaration: Declaration) -> Application<Tap> {
+    main_device.activate(declaration).map_err(Error::from).expect("it fits")
+}
+
+fn cycles(application: &mut Application<Tap>, count: usize) {
+    (0..count).for_each(|_| application.cycle(|_| ()));
+}
+
+fn settle(application: &mut Application<Tap>) {
+    let end = application.now() + Duration::from_secs(2);
+    while !application.all_settled() {
+        assert!(application.now() < end, "{:?}", application.states());
+        application.cycle(|_| ());
+    }
+}
+
+/// Declares the SubDevices at these positions, each in a domain of its own.
+fn declare(scan: &Scan, positions: &[usize], clocks: bool) -> Declaration {
+    let mut declaration = Declaration::default();
+    for at in positions {
+        let domain = declaration.add_domain(CYCLE);
+        declaration.add_to(domain, SubDeviceConfig::from_info(&scan.subdevices[*at]));
+    }
+    declaration.with_optional_clocks(clocks.then(ClockConfig::default))
+}
+
+fn statuses(main_device: &mut MainDevice<Tap>) -> Vec<AlStatus> {
+    main_device.links_mut().network().devices().map(|device| device.al_status()).collect()
+}
+
+/// Bytes of FMMUs that are not zero, in all devices.
+fn mapped(main_device: &mut MainDevice<Tap>) -> usize {
+    let network = main_device.links_mut().network();
+    let fmmus = |device: &ringcat_sim::device::Device| {
+        let count = Fmmu::LEN * usize::from(device.controller.config().fmmu_count);
+        device.controller.register(map::FMMU_BASE, count).iter().filter(|byte| **byte != 0).count()
+    };
+    network.devices().map(fmmus).sum()
+}
+
+// covers: stop
+#[test]
+fn after_deactivation_every_subdevice_is_in_preop_with_its_mailbox() {
+    for ran in [0, 3, 8, 20, 500] {
+        for declared in [&[0, 1, 2, 3, 4, 5][..], &[1, 4], &[3], &[]] {
+            for network in networks() {
+                let (main_device, scan) = scanned(network, &Options::default());
+                let mut application = activate(main_device, declare(&scan, declared, false));
+                cycles(&mut application, ran);
+                let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+                assert_eq!(statuses(&mut ended), [PREOP; MIXED.len()], "{declared:?} after {ran}");
+                assert_eq!(mapped(&mut ended), 0);
+                for servo in [0, 3] {
+                    let vendor = ended.subdevice(Position(servo)).sdo_read::<u32>(0x1018, 1).expect("it answers");
+                    assert_eq!(vendor, scan.subdevices[usize::from(servo)].identity.vendor_id);
+                }
+                assert_eq!(statuses(&mut ended), [PREOP; MIXED.len()], "the mailbox was open already");
+            }
+        }
+    }
+}
+
+// covers: stop
+#[test]
+fn another_declaration_is_active_at_once_after_deactivation() {
+    for network in networks() {
+        let (mut main_device, scan) = scanned(network, &Options::default());
+        let network = main_device.links_mut().network_mut();
+        // A word that is read again would be wrong.
+        (0..MIXED.len()).for_each(|at| network.device_mut(DeviceIndex(at)).controller.sii_image_mut().fill(0));
+        let rounds: [(&[usize], bool); 5] =
+            [(&[0, 1, 2, 3, 4, 5], false), (&[3, 1], true), (&[5], false), (&[0, 3], true), (&[2, 3, 4], false)];
+        for (declared, clocks) in rounds {
+            let mut application = activate(main_device, declare(&scan, declared, clocks));
+            settle(&mut application);
+            cycles(&mut application, 20);
+            for domain in 0..declared.len() {
+                let status = application.process(DomainId(domain));
+                assert!(status.wkc == status.expected, "{status:?}");
+            }
+            let network = application.links().network();
+            let in_op =
+                network.devices().enumerate().filter(|(_, device)| device.al_status().state == AlState::Op.code());
+            let mut expected = declared.to_vec();
+            expected.sort_unstable();
+            assert_eq!(in_op.map(|(at, _)| at).collect::<Vec<_>>(), expected);
+            main_device = application.deactivate(LastOutputs::Held, LIMIT).expect("all follow");
+            assert_eq!(statuses(&mut main_device), [PREOP; MIXED.len()], "{declared:?}");
+            while let Some(event) = main_device.pop_event() {
+                assert!(!matches!(event.event, Event::SiiOddity { .. } | Event::ScanFailed { .. }), "{event:?}");
+            }
+        }
+    }
+}
+
+// covers: stop
+#[test]
+fn activation_after_deactivation_of_100_takes_the_state_changes_and_10_ms() {
+    let kinds: Vec<&str> = SIXTEEN.into_iter().cycle().take(100).collect();
+    let described = descriptions(&kinds);
+    let times = described.iter().map(|it| it.transitions);
+    let changes = times.map(|it| it.to_init + it.to_preop + it.to_safeop + it.to_op).max().expect("there are some");
+    let (main_device, scan) = scanned(ring(described, NetworkOptions::default()), &Options::default());
+    let declaration = automatic(&scan.subdevices, CYCLE);
+    let mut application = activate(main_device, declaration.clone());
+    settle(&mut application);
+    let begun = application.now();
+    let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+    let deactivation = ended.now().since(begun);
+    let network = ended.links_mut().network_mut();
+    (0..kinds.len()).for_each(|at| network.device_mut(DeviceIndex(at)).controller.sii_image_mut().fill(0));
+    let begun = ended.now();
+    let mut application = activate(ended, declaration);
+    settle(&mut application);
+    let activation = application.now().since(begun);
+    println!("100 SubDevices: deactivation {deactivation:?}, activation {activation:?}, state changes {changes:?}");
+    assert!(activation <= changes + Duration::from_millis(10), "{activation:?}");
+    assert!(application.links().network().devices().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
+}
+
+// covers: stop
+#[test]
+fn a_subdevice_that_came_while_active_is_known_after_deactivation() {
+    for network in networks() {
+        let (mut main_device, _) = scanned(network, &Options::default());
+        main_device.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(5)));
+        main_device.links_mut().network_mut().advance_by(Duration::from_millis(20));
+        let scan = main_device.scan().expect("the others are there");
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        declaration.subdevices.iter_mut().for_each(|config| config.optional = true);
+        let mut application = activate(main_device, declaration);
+        settle(&mut application);
+        application.links_mut().network_mut().apply(Fault::PowerOn(DeviceIndex(5)));
+        application.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(4)));
+        cycles(&mut application, 100);
+        application.links_mut().network_mut().apply(Fault::PowerOn(DeviceIndex(4)));
+        cycles(&mut application, 500);
+        let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+        assert_eq!(statuses(&mut ended), [PREOP; MIXED.len()]);
+        // SubDevices of one type share their names, as they share their SII.
+        let names: Vec<String> = ended.subdevices().into_iter().map(|info| info.name).collect();
+        assert_eq!(names.len(), MIXED.len());
+        assert!(names.iter().zip(MIXED).all(|(name, kind)| name.starts_with(kind)), "{names:?}");
+        let declaration = automatic(&ended.subdevices(), CYCLE);
+        settle(&mut activate(ended, declaration));
+    }
+}
+
+// covers: stop
+#[test]
+fn a_subdevice_that_does_not_leave_op_is_named_and_the_main_device_is_returned() {
+    for network in networks() {
+        let (main_device, scan) = scanned(network, &Options::default());
+        let mut application = activate(main_device, automatic(&scan.subdevices, CYCLE));
+        settle(&mut application);
+        application.links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), true));
+        let limit = Duration::from_millis(60);
+        let refused = application.deactivate(LastOutputs::Held, limit).expect_err("device 3 hangs");
+        let Error::Stop(StopError::NotReached { subdevice, others, .. }) = &refused.error else {
+            panic!("{}", refused.error)
+        };
+        assert_eq!((*subdevice, *others), (Some(3), 0));
+        let mut ended = refused.main_device;
+        ended.links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), false));
+        settle(&mut activate(ended, automatic(&scan.subdevices, CYCLE)));
+    }
+}
+
+/// An application in which device 3 refuses SAFEOP this many times.
+fn refusing(network: Network, retries: Retries, times: u32) -> Application<Tap> {
+    let (mut main_device, scan) = scanned(network, &Options::default().with_retries(retries));
+    let (device, code) = (DeviceIndex(3), AlStatusCode(0x8042));
+    let refuse = Fault::RefuseTransition { device, to: AlState::SafeOp, code, times };
+    main_device.links_mut().network_mut().apply(refuse);
+    activate(main_device, automatic(&scan.subdevices, CYCLE))
+}
+
+fn refusals(application: &mut Application<Tap>) -> usize {
+    std::iter::from_fn(|| application.pop_event()).filter(|it| matches!(it.event, Event::StateError { .. })).count()
+}
+
+// covers: stop
+#[test]
+fn a_failed_configuration_waits_for_a_request_where_the_policy_says_so() {
+    for network in networks() {
+        let mut application = refusing(network, Retries::OnRequest, 2);
+        cycles(&mut application, 3_000);
+        assert_eq!(refusals(&mut application), 1, "it is not repeated by itself");
+        assert_eq!(application.states()[3], SubDeviceState::Configuring);
+        assert!(Services::retry(&mut application, None));
+        cycles(&mut application, 100);
+        assert_eq!(refusals(&mut application), 1, "the second attempt");
+        assert!(Services::retry(&mut application, Some(SubDeviceId(3).into())));
+        assert!(!Services::retry(&mut application, Some(SubDeviceId(99).into())));
+        cycles(&mut application, 100);
+        assert!(application.all_settled());
+    }
+}
+
+// covers: stop
+#[test]
+fn a_requested_retry_does_not_wait_for_the_end_of_a_pause() {
+    for network in networks() {
+        let mut application = refusing(network, Retries::Always, 7);
+        cycles(&mut application, 4_000);
+        assert!(!application.all_settled());
+        let before = refusals(&mut application);
+        assert!((5..7).contains(&before), "pauses grow: {before}");
+        for _ in before..7 {
+            assert!(Services::retry(&mut application, Some(SubDeviceId(3).into())));
+            cycles(&mut application, 50);
+            refusals(&mut application);
+        }
+        assert!(Services::retry(&mut application, None));
+        cycles(&mut application, 50);
+        assert!(application.all_settled());
+    }
+}

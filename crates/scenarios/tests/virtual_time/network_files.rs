@@ -1,0 +1,94 @@
+//! Network files from scans: the network runs unchanged on the same bus, and the difference on another one is named.
+
+use std::time::{Duration, Instant};
+
+use ringcat::config::{DifferenceKind, FoundNetwork};
+use ringcat::eni::EniImage;
+use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{MainDevice, Options, Scan};
+
+const LIMIT: Duration = Duration::from_secs(30);
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// A ring of a coupler, terminals and drives.
+fn segment(inputs: usize, drives: usize) -> String {
+    let devices = [("coupler", 1), ("digital-output-8", 3), ("digital-input-8", inputs), ("servo", drives)];
+    let device = |(kind, count): (&str, usize)| format!("[[device]]\ntype = \"{kind}\"\ncount = {count}\n");
+    format!("[segment]\nring = true\n{}", devices.map(device).concat())
+}
+
+fn scanned(text: &str) -> (MainDevice<SimulatedSegment>, Scan) {
+    let links = SimulatedSegment::from_toml(text).expect("the segment is valid");
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan().expect("the scan succeeds");
+    (main_device, scan)
+}
+
+/// The text of the network file of a scan.
+fn text_of(scan: &Scan) -> String {
+    let mut options = ScanOptions::new("machine", PERIOD);
+    options.ring = true;
+    NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options).to_text()
+}
+
+// covers: network-file
+#[test]
+fn a_network_from_a_scan_reaches_op_on_the_same_bus_with_its_variables() {
+    let (main_device, scan) = scanned(&segment(2, 2));
+    let network = LoadedNetwork::from_bytes("machine.toml", text_of(&scan).as_bytes()).expect("the file is valid");
+    assert_eq!(network.configuration.compare(&scan.subdevices), []);
+    assert_eq!(network.configuration.compare_cables(&scan.subdevices, &scan.topology), []);
+    let mut application = main_device.activate(network.declaration()).expect("the network is the one of the file");
+    let mut image = EniImage::new(&network.configuration, application.directory()).expect("the image fits");
+    assert!(image.unplaced().is_empty());
+    let lamp = image.variable("digital-output-8 2.Channel 3.Output").expect("a lamp").clone();
+    let target = image.variable("servo 2.Command.Target velocity").expect("a drive").clone();
+    let mode = image.variable("servo 2.Feedback.Mode display").expect("a drive").clone();
+    application.wait_until_op(LIMIT).expect("all SubDevices reach OP");
+    for _ in 0..100 {
+        application.cycle(|data| {
+            image.take_inputs(data);
+            image.write(&lamp, 1);
+            image.write(&target, 5);
+            image.give_outputs(data);
+        });
+    }
+    let device = |at| application.links().network().device(ringcat::sim::cable::DeviceIndex(at));
+    assert_eq!(device(2).outputs(), [0b100]);
+    assert_eq!(device(7).outputs()[6..10], [5, 0, 0, 0]);
+    assert_eq!(image.read(&mode), 0);
+}
+
+// covers: network-file
+#[test]
+fn on_another_bus_the_file_names_what_differs() {
+    let (_, scan) = scanned(&segment(3, 2));
+    let network = LoadedNetwork::from_bytes("machine.toml", text_of(&scan).as_bytes()).expect("the file is valid");
+    let on = |text: &str| {
+        let (_, scan) = scanned(text);
+        let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] };
+        let differences = network.configuration.differences(found, &network.stated());
+        differences.into_iter().map(|it| (it.kind, it.subdevice.map(|at| at.0))).collect::<Vec<_>>()
+    };
+    assert_eq!(on(&segment(3, 2)), []);
+    let cable = (DifferenceKind::Cable, Some(7));
+    // The drive behind the missing terminal is plugged into another one.
+    assert_eq!(on(&segment(2, 2)), [(DifferenceKind::Missing, Some(6))]);
+    assert_eq!(on(&segment(4, 2)), [(DifferenceKind::Additional, None), cable]);
+    assert_eq!(on(&segment(3, 1)), [(DifferenceKind::Missing, Some(8))]);
+}
+
+// covers: network-file
+#[test]
+fn a_network_file_of_100_subdevices_takes_less_than_2_s_beyond_the_scan() {
+    let (_, scan) = scanned(&segment(40, 56));
+    assert_eq!(scan.subdevices.len(), 100);
+    let begin = Instant::now();
+    let text = text_of(&scan);
+    let network = LoadedNetwork::from_bytes("machine.toml", text.as_bytes()).expect("the file is valid");
+    let took = begin.elapsed();
+    println!("network file of 100 SubDevices, {} bytes: written and read in {took:?}", text.len());
+    assert!(took < Duration::from_secs(2), "{took:?}");
+    assert_eq!(network.file.to_text(), text);
+}
