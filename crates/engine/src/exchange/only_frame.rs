@@ -30,7 +30,7 @@ impl Exchange {
     #[inline(always)]
     pub fn process_unchanged(&mut self) -> bool {
         let (Some(domain), Some(frame)) = (self.domains.first_mut(), self.frames.first()) else { return false };
-        self.has_only_frame && frame.is_home() && domain.judge_unchanged(frame.wkc(), frame.left())
+        self.has_only_frame && frame.is_home() && domain.evaluate_unchanged(frame.wkc(), frame.left())
     }
 
     /// Copies the outputs of the only domain into its frame. [`Exchange::send_only_frame`] has to follow.

@@ -106,7 +106,7 @@ impl Watch {
             self.counts = None;
             return;
         }
-        let Some(seen) = self.look().await else { return };
+        let Some(seen) = self.broadcast().await else { return };
         self.report_ring(seen);
         if self.segment.view().found().is_none() {
             return self.scan_anew(seen).await;
@@ -174,7 +174,7 @@ impl Watch {
     }
 
     /// One broadcast; `None` if a lost frame is no evidence yet.
-    async fn look(&mut self) -> Option<Seen> {
+    async fn broadcast(&mut self) -> Option<Seen> {
         if self.is_unplugged() {
             return Some(Seen::default());
         }
