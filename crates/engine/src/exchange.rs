@@ -117,7 +117,7 @@ pub struct Exchange {
     decide_at: Instant,
     /// There is one frame.
     is_alone: bool,
-    /// The short way of one frame exists ([`Exchange::load_only_frame`]).
+    /// The fast path of one frame exists ([`Exchange::load_only_frame`]).
     has_only_frame: bool,
     /// The frame that was sent last.
     newest: u16,

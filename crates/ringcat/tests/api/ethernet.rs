@@ -134,7 +134,7 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
 
 // covers: eoe-interfaces
 #[test]
-fn an_interface_that_must_not_be_made_is_told_once_and_everything_else_goes_on() -> Result<(), Error> {
+fn an_interface_that_cannot_be_created_is_reported_once_and_all_else_continues() -> Result<(), Error> {
     let (supervisor, cyclic) = start()?;
     let make = |name: &str, _| Err(TapError::Permission { name: name.to_owned() });
     let ethernet = supervisor.start_ethernet_on(OPTIONS, Box::new(make))?;

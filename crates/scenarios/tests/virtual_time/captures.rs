@@ -16,7 +16,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::map;
 use scenarios::capture::ethercat::Frame;
 use scenarios::capture::pcapng::{Capture, Packet};
-use scenarios::capture::{Verdict, judge, judge_frames};
+use scenarios::capture::{Verdict, judge, evaluate_frames};
 use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, line, ring_of_16};
 
@@ -134,7 +134,7 @@ fn a_capture_of_frames_that_are_sent_again_has_no_findings() {
             break;
         }
     }
-    let verdict = judge_frames(&capture, None).expect("a capture");
+    let verdict = evaluate_frames(&capture, None).expect("a capture");
     assert!(is_again && verdict.findings.iter().any(|it| it.contains("sent again with other outputs")), "{verdict}");
 }
 
@@ -210,7 +210,7 @@ fn a_tee_changes_nothing_and_records_each_link_and_direction() {
 fn tampered(capture: &Capture, tamper: impl FnOnce(&mut Vec<Packet>)) -> Verdict {
     let mut capture = capture.clone();
     tamper(&mut capture.packets);
-    judge_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
+    evaluate_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
 }
 
 /// The first sent frame of process data in the second half with such a datagram, and the offset of the datagram. (On

@@ -31,7 +31,7 @@ fn late_double_and_corrupt_copies_change_nothing() {
 }
 
 #[test]
-fn frames_of_more_than_256_flights_are_told_apart() {
+fn frames_of_more_than_256_flights_are_distinguished() {
     let mut ring = Ring::new();
     let [first, _] = ring.send();
     for _ in 0..256 {
