@@ -107,9 +107,9 @@ enum Command {
     ///
     /// Names every SubDevice that is missing, additional or different.
     Compare(compare::CompareArguments),
-    /// Exchanges process data with outputs zero
+    /// Brings all SubDevices to OP and exchanges process data
     ///
-    /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
+    /// Outputs are zero, except those that --set gives a value. The run ends with an orderly stop.
     Run(run::RunArguments),
     /// Shows the state of a ring and of its cables
     ///
