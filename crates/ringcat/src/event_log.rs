@@ -73,7 +73,7 @@ impl EventLog {
     }
 
     /// Sets whether each event has a line, without condensing.
-    pub fn one_by_one(self, one_by_one: bool) -> EventLog {
+    pub fn with_every_event(self, one_by_one: bool) -> EventLog {
         EventLog { one_by_one, ..self }
     }
 
@@ -239,7 +239,7 @@ mod tests {
     // covers: run
     #[test]
     fn one_by_one_nothing_is_condensed() {
-        let mut log = EventLog::new(Instant(0), Names::default()).one_by_one(true);
+        let mut log = EventLog::new(Instant(0), Names::default()).with_every_event(true);
         assert!((0..1_000).all(|ms| log.event(&at(ms, foreign())).is_some()));
         assert_eq!(log.counts(Instant(9_000_000_000)), Vec::<String>::new());
         assert!((1..100).all(|cycle| log.left_out(cycle, Instant(cycle)).is_some()));
