@@ -79,7 +79,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     } else {
         let preventing = differences.iter().filter(|it| it.prevents_op).count();
         let count = counted(differences.len(), "difference", "differences");
-        Verdict::Failed(format!("{count} between {subdevices} and the file, {preventing} of them prevent OP"))
+        Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
 }

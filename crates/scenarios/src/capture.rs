@@ -1,8 +1,8 @@
 //! Checks of captures: recomputes from a file alone whether a MainDevice followed the rules on the wire.
 //!
-//! Input: a pcapng file with both directions of one or two links, main link first. Output: a [`Verdict`]. It has parsers
-//! of its own for pcapng, Ethernet and EtherCAT: no code of the engine or of `ringcat-wire` is used, so that a common
-//! misreading is detected. Constants are those of protocol 1.1 to 1.4 and 9.7.
+//! Input: a pcapng file with both directions of one or two links, main link first. Output: a [`Verdict`]. It has
+//! parsers of its own for pcapng, Ethernet and EtherCAT: no code of the engine or of `ringcat-wire` is used, so that a
+//! common misreading is detected. Constants are those of protocol 1.1 to 1.4 and 9.7.
 //!
 //! Checks of every sent frame:
 //!
