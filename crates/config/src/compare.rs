@@ -134,7 +134,13 @@ fn additional(info: &SubDeviceInfo) -> Difference {
         "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
         identity.vendor_id, identity.product_code
     );
-    Difference { subdevice: None, position: Some(*position), kind: DifferenceKind::Additional, prevents_op: false, text }
+    Difference {
+        subdevice: None,
+        position: Some(*position),
+        kind: DifferenceKind::Additional,
+        prevents_op: false,
+        text,
+    }
 }
 
 /// Position of a SubDevice with another identity than expected.

@@ -152,6 +152,13 @@ fn only_what_is_known(name: &str) {
     none(known.compare(name, &found, rule.mended));
 }
 
+#[test]
+fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
+    let tree = tree();
+    let page = tree.file("docs/performance.md").expect("the page exists");
+    assert!(page.text.contains("\n## Before and after issue 15\n"));
+}
+
 // covers: api
 #[test]
 fn public_error_types_implement_error() {
