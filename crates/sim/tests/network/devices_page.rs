@@ -10,6 +10,8 @@ use ringcat_sim::description::{DeviceDescription, PdoDescription};
 use ringcat_wire::sii::{MailboxProtocols, PdoDirection};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/devices.md");
+/// Communication objects that the page names for all devices with CoE.
+const COMMUNICATION: [u16; 9] = [0x1000, 0x1001, 0x1008, 0x1009, 0x100A, 0x1018, 0x1C00, 0x1C12, 0x1C13];
 /// Entries of a list beyond this number are given by the last one.
 const LISTED: usize = 16;
 
@@ -27,6 +29,7 @@ fn page() -> String {
     let mut text = OPENING.to_owned();
     for name in catalogue::names() {
         let description = catalogue::by_name(name).expect("the catalogue has its names");
+        assert_eq!(description.identity.vendor_id, catalogue::VENDOR_ID, "{name}");
         let (product, revision) = (description.identity.product_code, description.identity.revision);
         let _ = write!(text, "\n## {name}\n\nProduct 0x{product:08X}, revision 0x{revision:08X}");
         let mailbox = description.mailbox.map(|mailbox| mailbox.standard);
@@ -76,6 +79,9 @@ fn entries(pdo: &PdoDescription) -> String {
 
 fn objects(text: &mut String, description: &DeviceDescription) {
     let dictionary = Dictionary::new(description);
+    for index in COMMUNICATION {
+        assert!(dictionary.object(index).is_some(), "{}: {index:#06x}", description.order_code);
+    }
     let is_own = |object: &&Object| object.index >= 0x2000 && object.role == ObjectRole::Plain;
     let own: Vec<&Object> = dictionary.objects().iter().filter(is_own).collect();
     if own.is_empty() {
