@@ -58,6 +58,7 @@ mod network_files;
 mod odd_sii;
 mod own_datagrams;
 mod own_objects;
+mod part_sequences;
 mod places;
 mod power_cycles;
 mod real_images;
