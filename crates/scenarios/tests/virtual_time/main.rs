@@ -55,6 +55,7 @@ mod mail_storm;
 mod mail_unrequested;
 mod mailbox_decoders;
 mod network_files;
+mod observers;
 mod odd_sii;
 mod own_datagrams;
 mod own_objects;
