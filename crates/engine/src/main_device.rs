@@ -16,10 +16,12 @@ mod ethernet;
 mod found;
 mod gateway;
 mod idle;
+mod image_memory;
 mod live_status;
 mod loaded;
 mod lrw;
 mod mail;
+mod memories;
 mod options;
 mod pending;
 mod prepare;
@@ -28,6 +30,7 @@ mod registered;
 mod registered_area;
 mod registration;
 mod repeats;
+mod sampling;
 mod sent_once;
 mod services;
 pub mod snapshot;
@@ -51,6 +54,7 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
@@ -86,6 +90,7 @@ use crate::segment::{Choices, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
+use memories::Memories;
 
 /// Unfetched events at which those of the cyclic half wait in their queue: a quarter of the log.
 const UNFETCHED: usize = 1024;
@@ -119,6 +124,8 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
+    /// Memory of the loaded declaration.
+    memories: Memories,
     /// Ethernet of declared SubDevices, if a port was requested.
     ports: Vec<Option<EthernetPort>>,
     /// Messages of a gateway's clients.
@@ -157,6 +164,7 @@ impl MainDevice {
             statistics: None,
             statistics_period: None,
             loaded: None,
+            memories: Memories::default(),
             ports: Vec::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),

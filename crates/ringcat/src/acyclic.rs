@@ -47,6 +47,9 @@ pub trait AcyclicHalf {
     /// Its counters. Not for the cyclic path.
     fn counters(&self) -> AcyclicCounters;
 
+    /// Calls a function with the time and its counters now and each second until the application ends.
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static);
+
     /// Data of the scan about a declared SubDevice. Not for the cyclic path.
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo>;
 
@@ -116,6 +119,10 @@ impl AcyclicHalf for Inline {
 
     fn counters(&self) -> AcyclicCounters {
         self.engine.counters()
+    }
+
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static) {
+        self.engine.sample_each_second(take);
     }
 
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
@@ -390,6 +391,11 @@ impl<L: Links> MainDevice<L> {
             Ok(active) => Ok(Application::new(self.links, Inline::new(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }
+    }
+
+    /// Gives back the memory for the image of a domain after a failed activation ([`Declaration::place_image`]).
+    pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
+        self.engine.unused_memory(domain)
     }
 
     pub(crate) fn from_parts(links: L, engine: Engine, acyclic_bytes: usize) -> MainDevice<L> {

@@ -15,6 +15,7 @@ use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
@@ -246,6 +247,11 @@ impl SupervisorThread {
         Ok(self.with(move |engine| engine.load(declaration))??)
     }
 
+    /// Gives back the memory for the image of a domain after a failed activation ([`Declaration::place_image`]).
+    pub fn unused_memory(&self, domain: DomainId) -> Option<&'static mut [u8]> {
+        self.with(move |engine| engine.unused_memory(domain)).ok().flatten()
+    }
+
     /// Second step, as [`crate::MainDevice::add_junction_connection`].
     ///
     /// # Errors
@@ -408,6 +414,14 @@ impl AcyclicHalf for SupervisorThread {
 
     fn counters(&self) -> AcyclicCounters {
         SupervisorThread::counters(self)
+    }
+
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static) {
+        // If the thread has ended there is nothing to sample.
+        let _ = self.begin(move |engine, _| {
+            engine.sample_each_second(take);
+            Box::new(|_, _| true)
+        });
     }
 
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {

@@ -70,6 +70,20 @@ pub enum ActivateError {
         /// Number of the domain.
         domain: DomainId,
     },
+    /// Memory that was given for an image is shorter than the image.
+    MemoryTooShort {
+        /// Number of the domain.
+        domain: DomainId,
+        /// Bytes of the image.
+        needed: usize,
+        /// Bytes of the memory.
+        got: usize,
+    },
+    /// A copy of the declaration has the memory for an image, too.
+    MemoryShared {
+        /// Number of the domain.
+        domain: DomainId,
+    },
     /// Process data has another size or direction than when its place was registered.
     Registered {
         /// Number of the domain.
@@ -166,6 +180,15 @@ impl fmt::Display for ActivateError {
             ),
             ActivateError::MixedPlaces { domain } => {
                 write!(f, "domain {domain} has members and registered areas: register all of its process data, or none")
+            }
+            ActivateError::MemoryTooShort { domain, needed, got } => {
+                write!(f, "domain {domain}: its image has {needed} bytes, the memory for it {got}")
+            }
+            ActivateError::MemoryShared { domain } => {
+                write!(
+                    f,
+                    "domain {domain}: a copy of the declaration has the memory for its image, too: drop it before"
+                )
             }
             ActivateError::Registered { .. } => self.fmt_registered(f),
             ActivateError::NoDomain { subdevice } => write!(
