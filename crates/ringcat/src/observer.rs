@@ -17,9 +17,7 @@ use ringcat_engine::main_device::{Directory, LiveStatus, SubDeviceId};
 use ringcat_engine::time::Instant;
 use ringcat_wire::address::LogicalAddress;
 
-use crate::application::Application;
 use crate::link_figures::{LinkFigures, LinkSamples};
-use crate::links::Links;
 use crate::news::{News, pack_status, unpack_status};
 use crate::process_data::Rate;
 use crate::words::Words;
@@ -46,7 +44,7 @@ const BY_LINK: u64 = 2;
 ///         println!("{:?}, by link {:?}: {:02x?}", domain.status, domain.wkc_by_link, domain.image);
 ///     }
 ///     let [second, ..] = observer.link(Link::Main).rates;
-///     println!("{:.0} frames/s, {:.0} bytes/s, {:.1} lost/s", second.frames_per_s, second.bytes_per_s, second.lost_per_s);
+///     println!("{:.0} frames/s, {:.1} lost/s", second.frames_per_s, second.lost_per_s);
 ///     Ok(())
 /// }
 /// ```
@@ -133,6 +131,10 @@ impl fmt::Display for NoSnapshot {
 impl std::error::Error for NoSnapshot {}
 
 impl Observer {
+    pub(crate) fn new(observed: Arc<Observed>) -> Observer {
+        Observer(observed)
+    }
+
     /// Requests a snapshot; the next cycle takes it, and [`Observer::take`] returns it. Neither waits nor allocates.
     pub fn request(&self) -> SnapshotRequest {
         let request = SnapshotRequest(self.0.words.next());
@@ -266,11 +268,4 @@ fn fmmus(directory: &Directory) -> Vec<DomainFmmu> {
         })
     };
     all.flat_map(of).filter(|fmmu| fmmu.length > 0).collect()
-}
-
-impl<L: Links, H> Application<L, H> {
-    /// A handle for other threads: snapshots of the process data, FMMUs, figures of the links.
-    pub fn observer(&self) -> Observer {
-        Observer(self.cyclic.observed.clone())
-    }
 }

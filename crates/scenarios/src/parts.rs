@@ -1,9 +1,9 @@
 //! Cycles in parts: links that record what leaves and hold back what arrives, and a checker of outputs on the wire and
 //! inside the SubDevices.
 //!
-//! Each write of the application fills all outputs of a domain with a number of its own. On the wire: a domain leaves in
-//! a send after it was queued, with the number that it had then, and at no other time. Inside a SubDevice: each number
-//! that it took has left, whole, and never follows a newer one.
+//! Each write of the application fills all outputs of a domain with a number of its own. On the wire: a domain leaves
+//! in a send after it was queued, with the number that it had then, and at no other time. Inside a SubDevice: each
+//! number that it took has left, whole, and never follows a newer one.
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Direction, DomainId, Instant, Link, Links};

@@ -249,7 +249,7 @@ impl Links for Apart {
     }
 }
 
-// covers: snapshots, cycle-probes, no-allocation
+// covers: threads, cycles, no-allocation
 #[test]
 fn snapshots_and_probes_take_no_memory_in_the_cyclic_thread() {
     let (cyclic, acyclic) = SharedSegment::halves(ring_of_16(Duration::from_micros(10)));

@@ -41,9 +41,9 @@ impl Exchange {
         self.domains.get_mut(id.0)?.inputs_mut().bytes.give_back()
     }
 
-    /// Working counters of a domain's last evaluated cycle by the link on which copies were sent, for readers beside the
-    /// application: what the first try of each frame has shown. `None` before the first evaluation and as soon as the
-    /// domain is queued again.
+    /// Working counters of a domain's last evaluated cycle by the link on which copies were sent, for readers beside
+    /// the application: what the first try of each frame has shown. `None` before the first evaluation and as soon as
+    /// the domain is queued again.
     pub fn wkc_by_link(&self, id: DomainId) -> Option<[u32; 2]> {
         let domain = self.domains.get(id.0)?;
         let evaluated = domain.evaluated();

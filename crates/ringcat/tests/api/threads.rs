@@ -74,7 +74,7 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     Ok(())
 }
 
-// covers: snapshots, cycle-probes
+// covers: threads, cycles
 #[test]
 fn several_threads_read_whole_snapshots_while_cycles_run() -> Result<(), Error> {
     const SNAPSHOTS: usize = 60;

@@ -36,7 +36,7 @@ fn worlds() -> [World; 3] {
     [World::in_op(1, alone), two, World::in_op(3, ring_of_16(FAST))]
 }
 
-// covers: snapshots
+// covers: threads
 #[test]
 fn a_snapshot_shows_the_images_and_states_of_one_cycle() {
     for mut world in worlds() {
@@ -78,7 +78,7 @@ fn a_snapshot_shows_the_images_and_states_of_one_cycle() {
     }
 }
 
-// covers: snapshots
+// covers: threads
 #[test]
 fn working_counters_by_link_show_the_sides_of_a_break() {
     let mut world = World::in_op(4, ring_of_16(FAST));
@@ -103,7 +103,7 @@ fn working_counters_by_link_show_the_sides_of_a_break() {
     }
 }
 
-// covers: snapshots
+// covers: threads
 #[test]
 fn an_application_with_a_loop_of_its_own_answers_requests_too() {
     let mut world = World::in_op(5, ring_of_16(FAST));
@@ -126,7 +126,7 @@ fn an_application_with_a_loop_of_its_own_answers_requests_too() {
     }
 }
 
-// covers: snapshots
+// covers: threads
 #[test]
 fn fmmus_are_those_in_the_registers_of_the_subdevices() {
     use ringcat_wire::address::RegisterAddress;
@@ -153,7 +153,7 @@ fn fmmus_are_those_in_the_registers_of_the_subdevices() {
     assert!(found > 10 && observer.fmmus().iter().any(|fmmu| fmmu.domain == DomainId(1)));
 }
 
-// covers: snapshots
+// covers: threads
 #[test]
 fn rates_of_links_are_those_that_the_segment_has_counted() {
     let period = 5 * CYCLE;
@@ -208,7 +208,7 @@ fn rates_of_links_are_those_that_the_segment_has_counted() {
     }
 }
 
-// covers: image-memory
+// covers: layout
 #[test]
 fn an_image_lies_in_memory_of_the_application_and_outlives_it() {
     for is_ring in [false, true] {
@@ -242,7 +242,7 @@ fn an_image_lies_in_memory_of_the_application_and_outlives_it() {
     }
 }
 
-// covers: image-memory
+// covers: layout
 #[test]
 fn memory_that_is_too_short_or_has_two_owners_is_refused_and_comes_back() {
     let network = line(descriptions(&["block", "digital-output-8"]), NetworkOptions::default());
@@ -295,7 +295,7 @@ impl Links for Ticking {
     }
 }
 
-// covers: cycle-probes
+// covers: cycles
 #[test]
 fn each_job_of_a_cycle_has_its_time_once_per_cycle() {
     let network = ring(descriptions(&["block", "digital-output-8"]), NetworkOptions::default());
@@ -330,7 +330,7 @@ fn each_job_of_a_cycle_has_its_time_once_per_cycle() {
     assert_eq!(count(&probe), [100; 5]);
 }
 
-// covers: cycle-probes
+// covers: cycles
 #[test]
 fn the_return_of_the_last_frame_is_reported_once_per_cycle_and_not_where_it_is_lost() {
     for (seed, is_ring, detection) in [(8, false, FAST), (9, true, FAST)] {

@@ -1,8 +1,8 @@
 //! Random sequences of the parts of a cycle: receive, process, queue, send, in any order and number, with domains of
 //! several periods and without, received in another thread than the one that configured, cables cut meanwhile.
 //!
-//! Checked at all times: the wire has what was queued and nothing else, SubDevices take only what left and nothing older
-//! after something newer ([`scenarios::parts`]); fresh inputs are what the SubDevice put into the frame
+//! Checked at all times: the wire has what was queued and nothing else, SubDevices take only what left and nothing
+//! older after something newer ([`scenarios::parts`]); fresh inputs are what the SubDevice put into the frame
 //! ([`scenarios::truth`]). Without faults also: each cycle that came back is complete, and each that did not leave is
 //! without an answer.
 //!
