@@ -35,6 +35,7 @@ mod states;
 mod steps;
 mod working_counters;
 
+use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -119,8 +120,8 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
-    /// Ethernet of declared SubDevices, if a port was requested.
-    ports: Vec<Option<EthernetPort>>,
+    /// Ethernet of declared SubDevices whose port was requested, by their indices in the declaration.
+    ports: BTreeMap<usize, EthernetPort>,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
@@ -157,7 +158,7 @@ impl MainDevice {
             statistics: None,
             statistics_period: None,
             loaded: None,
-            ports: Vec::new(),
+            ports: BTreeMap::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
@@ -441,6 +442,7 @@ fn choices(options: &Options) -> Choices {
     Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
+        idle_operation: options.idle_operation,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }
