@@ -15,9 +15,7 @@ use std::time::Duration;
 use ringcat_engine::event::EventsSince;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
-use ringcat_engine::main_device::{
-    Address, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, RawDatagram,
-};
+use ringcat_engine::main_device::{Address, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, RawDatagram};
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::unassigned::rescan::Rescan;

@@ -93,7 +93,10 @@ impl<S: Services> SubDevice<S> {
     }
 
     /// Starts a service in the engine.
-    fn ask<T, E, W>(self, work: impl FnOnce(&mut Engine, Address) -> W + Send + 'static) -> S::Outcome<T, SubDeviceError>
+    fn ask<T, E, W>(
+        self,
+        work: impl FnOnce(&mut Engine, Address) -> W + Send + 'static,
+    ) -> S::Outcome<T, SubDeviceError>
     where
         T: Send + 'static,
         SubDeviceFailure: From<E>,

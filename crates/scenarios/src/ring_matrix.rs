@@ -4,7 +4,7 @@
 use std::cell::Cell;
 use std::time::Duration;
 
-use ringcat::{DomainId, Event, Options, Redundancy, RingState, automatic, SubDeviceId};
+use ringcat::{DomainId, Event, Options, Redundancy, RingState, SubDeviceId, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::mail::foe::{self, FoeOptions};

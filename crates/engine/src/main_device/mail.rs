@@ -7,7 +7,7 @@ use ringcat_wire::al::AlState;
 
 use super::MainDevice;
 use super::pending::Pending;
-use crate::declared::Address;
+use crate::declared::{Address, SubDeviceId};
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{EmergencyRing, Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
@@ -44,7 +44,11 @@ impl MainDevice {
             Ok(Addressed::Member(index)) => self.start(request_state(&bus, &self.segment, index, state)),
             Ok(Addressed::Undeclared(key)) => {
                 self.segment.observe(Observation::Visited);
-                let known = self.segment.view().unassigned(key).and_then(|it| Some((it.position, it.knowledge.info()?.clone())));
+                let known = self
+                    .segment
+                    .view()
+                    .unassigned(key)
+                    .and_then(|it| Some((it.position, it.knowledge.info()?.clone())));
                 let work = known.map(|(position, info)| request(&bus, &self.segment, (position, &info), state));
                 self.start(async move { work.ok_or(ConfigureError::NoSetup)?.await })
             }
@@ -89,18 +93,28 @@ impl MainDevice {
     ///
     /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
     pub fn emergencies(&mut self, subdevice: impl Into<Address>) -> EmergencyRing {
-        self.emergencies.borrow_mut().of(subdevice.into())
+        let subdevice = self.declared_or(subdevice);
+        self.emergencies.borrow_mut().of(subdevice)
     }
 
     /// Keeps further emergencies of a SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]. With
     /// a size of 0 they are only counted, and reported as events.
     pub fn create_emergency_ring(&mut self, subdevice: impl Into<Address>, size: usize) -> EmergencyRing {
-        let subdevice = subdevice.into();
+        let subdevice = self.declared_or(subdevice);
         let ring = self.emergencies.borrow_mut().create(subdevice, size);
         if let Some(mailbox) = self.mailbox(subdevice) {
             mailbox.keep_emergencies_in(ring.clone());
         }
         ring
+    }
+
+    /// The index of a declared SubDevice, also if it is named by its position; otherwise the address as it is.
+    fn declared_or(&self, subdevice: impl Into<Address>) -> Address {
+        let subdevice = subdevice.into();
+        match self.segment.view().find(subdevice) {
+            Some(Addressed::Member(index)) => Address::Declared(SubDeviceId(index)),
+            Some(Addressed::Undeclared(_)) | None => subdevice,
+        }
     }
 
     /// A mailbox that is not in use yet, with the ring of its SubDevice.

@@ -89,7 +89,11 @@ impl MainDevice {
     }
 
     /// Starts a read of the loop control of a port.
-    pub fn start_port_read(&mut self, subdevice: impl Into<Address>, port: u8) -> Pending<Result<LoopControl, ServiceError>> {
+    pub fn start_port_read(
+        &mut self,
+        subdevice: impl Into<Address>,
+        port: u8,
+    ) -> Pending<Result<LoopControl, ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
     }
 
@@ -108,10 +112,7 @@ impl MainDevice {
 
     /// Starts to cut off a declared SubDevice, by closing the ports of its neighbours. In a line the SubDevices behind
     /// it are cut off too.
-    pub fn start_block(
-        &mut self,
-        subdevice: impl Into<Address>,
-    ) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
+    pub fn start_block(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
         let (bus, segment, index) = (self.bus(), self.segment.clone(), self.find_member(subdevice));
         self.start(async move { ports::block(&bus, &segment, index?).await })
     }

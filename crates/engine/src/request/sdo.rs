@@ -56,7 +56,8 @@ mod tests {
         assert_eq!(request.state(), RequestState::Busy);
         let order = served.take().unwrap();
         assert_eq!(order.subject, Subject::Object { index: 0x2000, sub_index: 7, complete_access: true });
-        assert_eq!((order.subdevice, order.timeout, order.capacity), (3, Duration::from_millis(5), 8));
+        assert_eq!((order.timeout, order.capacity), (Duration::from_millis(5), 8));
+        assert_eq!(order.subdevice, SubDeviceId(3).into());
         assert_eq!((order.access, served.take()), (Access::Read, None));
         assert_eq!(request.set_object(1, 1, false), Err(RequestRefused::Busy));
         assert_eq!(request.read(), Err(RequestRefused::Busy));

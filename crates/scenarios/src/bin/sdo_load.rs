@@ -16,7 +16,7 @@ use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::window::{Half, Window};
-use ringcat::{Instant, Limits, Link, SdoAddress, automatic, SubDeviceId};
+use ringcat::{Instant, Limits, Link, SdoAddress, SubDeviceId, automatic};
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::mail::coe::SdoError;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
-use ringcat::{Application, LastOutputs, MainDevice, Options, automatic, SubDeviceId};
+use ringcat::{Application, LastOutputs, MainDevice, Options, SubDeviceId, automatic};
 use ringcat_link::Recorder;
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;

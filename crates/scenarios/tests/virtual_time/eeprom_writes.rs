@@ -125,7 +125,11 @@ fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
         world.finish(LIMIT, work)
     };
     // The PDI has the EEPROM, and gets it back.
-    let to_pdi = world.application_mut().engine_mut().start_register_write(SubDeviceId(DEVICE.0), map::SII_CONFIGURATION, vec![1]);
+    let to_pdi = world.application_mut().engine_mut().start_register_write(
+        SubDeviceId(DEVICE.0),
+        map::SII_CONFIGURATION,
+        vec![1],
+    );
     assert_eq!(world.finish(LIMIT, to_pdi), Ok(()));
     assert_eq!(alias(&mut world, false), Ok(SiiWritten::new(2, 6)));
     let register = |world: &World, at| world.network().device(DEVICE).controller.register(at, 2).to_vec();
@@ -133,7 +137,11 @@ fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     let of_image = image(&world);
     assert_eq!(of_image[8..10], [0xBC, 0x0A]);
     assert!(ringcat_wire::sii::Sii::parse(&of_image).is_ok(), "the checksum is right");
-    let from_pdi = world.application_mut().engine_mut().start_register_write(SubDeviceId(DEVICE.0), map::SII_CONFIGURATION, vec![0]);
+    let from_pdi = world.application_mut().engine_mut().start_register_write(
+        SubDeviceId(DEVICE.0),
+        map::SII_CONFIGURATION,
+        vec![0],
+    );
     assert_eq!(world.finish(LIMIT, from_pdi), Ok(()));
     let reload = world.application_mut().engine_mut().start_sii_reload(SubDeviceId(DEVICE.0));
     assert_eq!(world.finish(LIMIT, reload), Ok(()));

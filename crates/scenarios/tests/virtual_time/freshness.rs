@@ -9,7 +9,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic, SubDeviceId};
+use ringcat::{
+    DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, SubDeviceId, automatic,
+};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -116,7 +118,8 @@ fn a_slow_transition_to_safeop_leaves_inputs_of_others_fresh() {
         let options = NetworkOptions::default();
         let mut world = World::in_op(1, if closed { ring(described, options) } else { line(described, options) });
         for (subdevice, kind) in kinds.iter().enumerate() {
-            let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Init);
+            let request =
+                world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Init);
             world.finish(Duration::from_secs(5), request).expect("it goes there");
             let mark = world.mark();
             let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Op);
@@ -210,7 +213,8 @@ fn a_domain_is_incomplete_while_outputs_are_not_accepted() {
             let mut world = World::in_op(1, line(described, NetworkOptions::default()));
             world.judge_latched(false);
             world.run_cycles(20);
-            let write = world.application_mut().engine_mut().start_register_write(SubDeviceId(0), map::fmmu(0), vec![0; 16]);
+            let write =
+                world.application_mut().engine_mut().start_register_write(SubDeviceId(0), map::fmmu(0), vec![0; 16]);
             world.finish(Duration::from_secs(1), write).expect("it is there");
             world.run_cycles(3);
             let mark = world.mark();

@@ -7,8 +7,8 @@ mod sequences;
 use std::time::Duration;
 
 use ringcat::{
-    Address, Application, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, MainDevicePhase, Options, Position,
-    RegisterAddress, RequestState, Services, SubDeviceConfig, SubDeviceId, TimedEvent, automatic,
+    Address, Application, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, MainDevicePhase, Options,
+    Position, RegisterAddress, RequestState, Services, SubDeviceConfig, SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -285,7 +285,8 @@ fn requests_of_the_cyclic_thread_reach_subdevices_without_a_declaration() {
         let mut application = activate(main_device, &[1, 3, 5]);
         cycles(&mut application, 300);
         // One without a declaration, a declared one by its position and by its index, and none.
-        let addresses: [Address; 4] = [Position(0).into(), Position(3).into(), SubDeviceId(1).into(), Position(6).into()];
+        let addresses: [Address; 4] =
+            [Position(0).into(), Position(3).into(), SubDeviceId(1).into(), Position(6).into()];
         let mut requests = addresses.map(|address| Services::create_sdo_request(&mut application, address, 4));
         for request in &mut requests {
             request.set_object(0x1018, 1, false).and_then(|()| request.read()).expect("it is free");

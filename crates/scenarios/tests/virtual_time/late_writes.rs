@@ -64,7 +64,11 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
         };
         let before = held(&world);
         let mark = world.mark();
-        let write = world.application_mut().engine_mut().start_register_write(SubDeviceId(subdevice), register, vec![0; length]);
+        let write = world.application_mut().engine_mut().start_register_write(
+            SubDeviceId(subdevice),
+            register,
+            vec![0; length],
+        );
         world.finish(Duration::from_secs(1), write).expect("it is there");
         world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
         // Some SubDevices detect it themselves.

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Limits, MainDevice, Options, Position, RequestFailure, RequestState, TransferLimits, automatic, SubDeviceId};
+use ringcat::{
+    Limits, MainDevice, Options, Position, RequestFailure, RequestState, SubDeviceId, TransferLimits, automatic,
+};
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_sim::application::foe::firmware;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{ConfigureError, Event, Limits, SubDeviceState, SubDeviceId};
+use ringcat::{ConfigureError, Event, Limits, SubDeviceId, SubDeviceState};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
 use ringcat_engine::supervisor::UnderWay;

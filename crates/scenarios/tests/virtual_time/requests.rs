@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat::{RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler, SubDeviceId};
+use ringcat::{
+    RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, SubDeviceId, VoeHandler,
+};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::address::RegisterAddress;

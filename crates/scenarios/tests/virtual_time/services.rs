@@ -47,7 +47,8 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
         world.run_cycles(25);
     }
     let engine = world.application().engine();
-    let [here, behind, neighbour] = [2, 3, 1].map(|subdevice| engine.statistics(SubDeviceId(subdevice)).expect("declared"));
+    let [here, behind, neighbour] =
+        [2, 3, 1].map(|subdevice| engine.statistics(SubDeviceId(subdevice)).expect("declared"));
     // Frames damaged on the way back are lost, so not all ten are counted in both directions.
     assert!(here.ports[0].invalid_frames >= 300, "{:?}", here.ports);
     assert_eq!(here.ports[0].forwarded, 0);

@@ -7,9 +7,8 @@ use crate::declared::Address;
 /// A segment of five SubDevices. If it is active, those at positions 1 and 3 are declared, in reverse order, and there
 /// is a third declared one that is absent.
 fn segment(is_active: bool, idle_operation: bool) -> Segment {
-    let info = |at: usize| {
-        SubDeviceInfo { position: Position(at as u16), station: station(at), ..SubDeviceInfo::default() }
-    };
+    let info =
+        |at: usize| SubDeviceInfo { position: Position(at as u16), station: station(at), ..SubDeviceInfo::default() };
     let topology = Topology::build(&[node(PASS); 5], 5);
     let scan = Scan { subdevices: (0..5).map(info).collect(), topology, main_count: 5, redundant_count: 0 };
     let mut segment = Segment::new(Choices { idle_operation, ..choices() });
@@ -67,10 +66,9 @@ fn an_address_names_the_same_entry_in_each_stage_or_none() {
         (position(5), none, none, none),
         (position(u16::MAX), none, none, none),
     ];
-    let [scanned, active, both] =
-        [segment(false, true), segment(true, false), segment(true, true)].each_ref().map(|segment| {
-            table.map(|(address, ..)| named(segment, address))
-        });
+    let [scanned, active, both] = [segment(false, true), segment(true, false), segment(true, true)]
+        .each_ref()
+        .map(|segment| table.map(|(address, ..)| named(segment, address)));
     for (at, (address, before, without, with)) in table.into_iter().enumerate() {
         assert_eq!((scanned[at], active[at], both[at]), (before, without, with), "{address}");
     }

@@ -5,7 +5,12 @@ use crate::layout::Layout;
 use super::*;
 
 pub(super) fn choices() -> Choices {
-    Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false, idle_operation: false }
+    Choices {
+        enhanced_line_crossed: false,
+        junctions: JunctionMode::Disabled,
+        follow_groups: false,
+        idle_operation: false,
+    }
 }
 
 fn scan(count: usize) -> Scan {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionMode, RawDatagram, SubDeviceState, SubDeviceId};
+use ringcat::{Event, JunctionMode, RawDatagram, SubDeviceId, SubDeviceState};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_wire::address::Position;
