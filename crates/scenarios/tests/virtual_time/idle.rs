@@ -277,7 +277,7 @@ fn undeclared_subdevices_have_mailbox_state_and_eeprom_while_others_are_in_op() 
     }
 }
 
-// covers: states, requests
+// covers: states, jobs
 #[test]
 fn requests_of_the_cyclic_thread_reach_subdevices_without_a_declaration() {
     for network in networks() {
