@@ -38,6 +38,7 @@ mod states;
 mod steps;
 mod working_counters;
 
+use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -126,8 +127,8 @@ pub struct MainDevice {
     loaded: Option<Loaded>,
     /// Memory of the loaded declaration.
     memories: Memories,
-    /// Ethernet of declared SubDevices, if a port was requested.
-    ports: Vec<Option<EthernetPort>>,
+    /// Ethernet of declared SubDevices whose port was requested, by their indices in the declaration.
+    ports: BTreeMap<usize, EthernetPort>,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
@@ -165,7 +166,7 @@ impl MainDevice {
             statistics_period: None,
             loaded: None,
             memories: Memories::default(),
-            ports: Vec::new(),
+            ports: BTreeMap::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
@@ -449,6 +450,7 @@ fn choices(options: &Options) -> Choices {
     Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
+        idle_operation: options.idle_operation,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

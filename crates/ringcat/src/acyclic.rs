@@ -11,7 +11,7 @@ use ringcat_engine::time::Instant;
 use crate::error::Error;
 use crate::links::Links;
 use crate::not_ready::{KeptEvents, Reason};
-use crate::subdevice::{SubDeviceName, info};
+use crate::subdevice::SubDeviceName;
 use crate::window::{Half, Window};
 
 /// Functions of the acyclic half for an application, in either thread.
@@ -126,7 +126,7 @@ impl AcyclicHalf for Inline {
     }
 
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        info(&self.engine, subdevice.0)
+        self.engine.info(subdevice)
     }
 
     fn keep_events(&mut self, now: Instant) {

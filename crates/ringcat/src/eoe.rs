@@ -318,7 +318,7 @@ impl Switch {
             }
         }
         let interfaces = self.ends.iter().filter_map(|end| {
-            let status = engine.ethernet_port(end.subdevice.subdevice.0)?.status();
+            let status = engine.ethernet_port(end.subdevice.subdevice)?.status();
             let End { name, subdevice, refused, .. } = end;
             Some(EthernetInterface { name: name.clone(), subdevice: *subdevice, status, refused: *refused })
         });
@@ -351,7 +351,7 @@ impl End {
     /// Moves frames in both directions. Returns the new carrier state if it has to change.
     fn pass(&mut self, engine: &mut Engine) -> Option<bool> {
         let mut room = [0; MAX_FRAME + 1];
-        let port = engine.ethernet_port(self.subdevice.subdevice.0);
+        let port = engine.ethernet_port(self.subdevice.subdevice);
         let Some(port) = port.filter(|port| port.is_up()) else {
             // Frames for an absent SubDevice must not reach it after its return.
             for _ in 0..QUEUE {

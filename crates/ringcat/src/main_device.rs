@@ -324,7 +324,7 @@ impl<L: Links> MainDevice<L> {
 
     /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
     pub fn mailbox(&self, position: Position) -> Option<Mailbox> {
-        self.engine.mailbox(position.0.into())
+        self.engine.mailbox(position)
     }
 
     /// Runs an async function of the engine to its end.

@@ -38,7 +38,7 @@ use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
 use crate::not_ready::Reason;
-use crate::subdevice::{SubDeviceName, info};
+use crate::subdevice::SubDeviceName;
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
@@ -425,7 +425,7 @@ impl AcyclicHalf for SupervisorThread {
     }
 
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        self.with(move |engine| info(engine, subdevice.0)).ok().flatten()
+        self.with(move |engine| engine.info(subdevice)).ok().flatten()
     }
 
     fn keep_events(&mut self, _now: Instant) {}

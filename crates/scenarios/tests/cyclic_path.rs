@@ -183,8 +183,10 @@ fn copying_does_not_allocate() {
 fn requests_do_not_allocate_in_the_cyclic_thread() {
     let options = Options::new(MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]), None);
     let mut engine = MainDevice::new(options, Instant(0));
-    let (mut object, mut register) = (engine.create_sdo_request(0, 100), engine.create_register_request(0, 100));
-    let (mut idn, mut vendor) = (engine.create_soe_request(0, 100), engine.create_voe_handler(0, 100));
+    let (mut object, mut register) =
+        (engine.create_sdo_request(SubDeviceId(0), 100), engine.create_register_request(SubDeviceId(0), 100));
+    let (mut idn, mut vendor) =
+        (engine.create_soe_request(SubDeviceId(0), 100), engine.create_voe_handler(SubDeviceId(0), 100));
     let mut out = [0; 100];
     let used = counted(|| {
         for _ in 0..CYCLES {

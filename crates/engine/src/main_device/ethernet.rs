@@ -6,7 +6,7 @@ use ringcat_wire::address::Position;
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
-use crate::declared::SubDeviceId;
+use crate::declared::{Address, SubDeviceId};
 use crate::mail::eoe::EthernetPort;
 
 /// A SubDevice that supports Ethernet frames.
@@ -46,16 +46,13 @@ impl MainDevice {
     }
 
     /// The Ethernet of a declared SubDevice. Its port is opened at the first call and lasts until the MainDevice stops;
-    /// `None` if no SubDevice is declared, or this mailbox has a port already.
-    pub fn ethernet_port(&mut self, subdevice: usize) -> Option<&EthernetPort> {
-        let mailbox = self.active()?.mailbox(subdevice)?;
-        while self.ports.len() <= subdevice {
-            self.ports.push(None);
+    /// `None` if no such SubDevice is declared, or this mailbox has a port already.
+    pub fn ethernet_port(&mut self, subdevice: impl Into<Address>) -> Option<&EthernetPort> {
+        let index = self.find_member(subdevice).ok()?;
+        if !self.ports.contains_key(&index) {
+            let port = EthernetPort::open(&self.segment.mailbox(index)?)?;
+            self.ports.insert(index, port);
         }
-        let port = self.ports.get_mut(subdevice)?;
-        if port.is_none() {
-            *port = EthernetPort::open(&mailbox);
-        }
-        port.as_ref()
+        self.ports.get(&index)
     }
 }
