@@ -25,7 +25,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("domain", &[]),
     ("declared", &[]),
     ("bell", &[]),
-    ("request", &["bell"]),
+    ("request", &["declared", "bell"]),
     ("junction", &["declared"]),
     // frames
     ("ring", &["time", "link"]),

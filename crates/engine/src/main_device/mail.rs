@@ -56,9 +56,9 @@ impl MainDevice {
         }
     }
 
-    /// A request for objects of a SubDevice of up to `size` bytes, to be made from the cyclic thread once the MainDevice
-    /// is active. It may be created before or after activation, and its address is resolved at each use; it ends when
-    /// it is dropped.
+    /// A request for objects of a SubDevice of up to `size` bytes, to be made from the cyclic thread once the
+    /// MainDevice is active. It may be created before or after activation, and its address is resolved at each use; it
+    /// ends when it is dropped.
     pub fn create_sdo_request(&mut self, subdevice: impl Into<Address>, size: usize) -> SdoRequest {
         let (request, served) = SdoRequest::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
