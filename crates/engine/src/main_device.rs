@@ -8,12 +8,14 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod clients;
 mod clocks;
 mod datagrams;
 mod declaration;
 mod declare;
 mod ethernet;
 mod found;
+mod function;
 mod gateway;
 mod idle;
 mod live_status;
@@ -31,10 +33,13 @@ mod repeats;
 mod sent_once;
 mod services;
 pub mod snapshot;
+mod state_of_all;
 mod states;
 mod steps;
+mod tool;
 mod working_counters;
 
+use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -51,6 +56,7 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use function::{Function, Permission};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
@@ -87,7 +93,8 @@ use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
 
-/// Unfetched events at which those of the cyclic half wait in their queue: a quarter of the log.
+/// Unfetched events at which those of the cyclic half wait in their queue, unless clients have queues of their own: a
+/// quarter of the log.
 const UNFETCHED: usize = 1024;
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
@@ -119,8 +126,8 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
-    /// Ethernet of declared SubDevices, if a port was requested.
-    ports: Vec<Option<EthernetPort>>,
+    /// Ethernet of SubDevices whose port was requested.
+    ports: BTreeMap<Address, EthernetPort>,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
@@ -157,7 +164,7 @@ impl MainDevice {
             statistics: None,
             statistics_period: None,
             loaded: None,
-            ports: Vec::new(),
+            ports: BTreeMap::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
@@ -275,7 +282,7 @@ impl MainDevice {
     /// Takes the events of the cyclic half into the log, as long as they leave room for those of the acyclic half.
     fn number_cyclic_events(&mut self, now: Instant) {
         let Some(cyclic) = self.cyclic_events.as_mut() else { return };
-        while self.supervisor.events_unfetched() < UNFETCHED {
+        while self.supervisor.has_event_clients() || self.supervisor.events_unfetched() < UNFETCHED {
             let Some(words) = cyclic.pop() else { return };
             let lost = cyclic.dropped();
             if let Some(event) = CyclicEvent::unpack(words) {
