@@ -90,7 +90,7 @@ lints() {
 # The library with each of its features alone: what `--workspace` builds has them all.
 features() {
     local feature
-    for feature in "" packet sim eni esi gateway eoe serde tracing; do
+    for feature in "" packet sim eni network esi gateway eoe serde tracing; do
         echo "ringcat with \"$feature\""
         cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
     done
@@ -104,7 +104,7 @@ documentation() {
 # which comes from GitHub; registries of crates do not have it. Withdrawn (yanked) versions are found by ci/package.
 dependencies() {
     local database=https://github.com/rustsec/advisory-db
-    cargo test --quiet --workspace --test tree -- crates_from_elsewhere
+    cargo test --quiet --workspace --test tree -- external_crates_match_deny_toml
     if ! command -v cargo-deny >/dev/null; then
         echo "skipped: advisories: cargo-deny is not installed (cargo install cargo-deny --locked, about three minutes)"
         return

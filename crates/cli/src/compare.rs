@@ -53,7 +53,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
     let differences = configuration.differences(network, &stated);
     for difference in &differences {
-        let mark = if difference.is_grave { '!' } else { ' ' };
+        let mark = if difference.prevents_op { '!' } else { ' ' };
         let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
         for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
             say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
@@ -65,7 +65,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         subdevice: it.subdevice.map(|at| at.0),
         name: it.subdevice.and_then(|at| names.get(at.0).cloned()),
         position: it.position.map(|position| position.0),
-        is_grave: it.is_grave,
+        prevents_op: it.prevents_op,
         text: it.text.clone(),
     };
     let data = Data::Compare(Compare {
@@ -77,9 +77,9 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let verdict = if differences.is_empty() {
         Verdict::Held(format!("{subdevices}, as in the file"))
     } else {
-        let grave = differences.iter().filter(|it| it.is_grave).count();
+        let preventing = differences.iter().filter(|it| it.prevents_op).count();
         let count = counted(differences.len(), "difference", "differences");
-        Verdict::Failed(format!("{count} between {subdevices} and the file, {grave} of them prevent OP"))
+        Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
 }

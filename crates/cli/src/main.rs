@@ -38,7 +38,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use verdict::{conclude, conclude_error_told, conclude_text};
+use verdict::{conclude, conclude_printed_error, conclude_text};
 
 /// Width of help that does not go to a terminal.
 const PIPE_WIDTH: usize = 80;
@@ -107,9 +107,9 @@ enum Command {
     ///
     /// Names every SubDevice that is missing, additional or different.
     Compare(compare::CompareArguments),
-    /// Exchanges process data with outputs zero
+    /// Brings all SubDevices to OP and exchanges process data
     ///
-    /// Brings all SubDevices on a network interface to OP, exchanges process data with outputs zero, and stops.
+    /// Outputs are zero, except those that --set gives a value. The run ends with an orderly stop.
     Run(run::RunArguments),
     /// Shows the state of a ring and of its cables
     ///
@@ -202,7 +202,7 @@ fn explain(error: &clap::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let (message, details) = message_of(&error.to_string());
-    conclude_error_told(&message, details)
+    conclude_printed_error(&message, details)
 }
 
 /// The message of an error of the command line, and its further lines. What a first line that ends with a colon

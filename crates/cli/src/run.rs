@@ -86,7 +86,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
     let (cycles, watched, sent_once) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
-    let log = RunLog::new(begin, EventLog::new(begin, names).one_by_one(arguments.tell_all), surroundings);
+    let log = RunLog::new(begin, EventLog::new(begin, names).with_every_event(arguments.all_events), surroundings);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
     let before = Seen::of(run.cycles.news());

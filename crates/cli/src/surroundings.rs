@@ -190,7 +190,7 @@ mod tests {
 
     // covers: other-main-device
     #[test]
-    fn a_scan_that_fails_says_what_was_noticed_meanwhile() {
+    fn a_scan_that_fails_reports_what_was_noticed_before() {
         let failed = || Error::Scan(ScanError::NoAnswer);
         let plain = surroundings(None).explain(failed(), 0).to_string();
         assert!(plain.contains("first SubDevice powered?") && !plain.contains("meanwhile"), "{plain}");

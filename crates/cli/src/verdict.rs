@@ -100,7 +100,7 @@ fn conclude_report(verdict: &Verdict, data: &Data) -> ExitCode {
 pub fn conclude_error(text: &str) -> ExitCode {
     let (first, more) = text.split_once('\n').unwrap_or((text, ""));
     more.lines().for_each(warn);
-    conclude_error_told(first, more.lines().map(str::to_owned).collect())
+    conclude_printed_error(first, more.lines().map(str::to_owned).collect())
 }
 
 /// The only line of a command that explains the program, with `--json`: help, the version.
@@ -110,7 +110,7 @@ pub fn conclude_text(message: &str, details: Vec<String>) -> ExitCode {
 }
 
 /// As [`conclude_error`], where the details have been printed.
-pub fn conclude_error_told(message: &str, details: Vec<String>) -> ExitCode {
+pub fn conclude_printed_error(message: &str, details: Vec<String>) -> ExitCode {
     if output::is_json() {
         output::write_json(&line_without_data(Outcome::Error, ERROR, message, details));
     }

@@ -35,14 +35,14 @@ impl Configuration {
     /// has another identity, or is not in the file.
     pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {
         let names = self.names();
-        let differs = |config: usize, is_grave: bool, error: &ConfigError| {
+        let differs = |config: usize, prevents_op: bool, error: &ConfigError| {
             let (kind, position) = match error {
                 ConfigError::Mismatch { position, field, .. } => (DifferenceKind::of_field(*field), Some(*position)),
                 _ => (DifferenceKind::Missing, None),
             };
             let name = names.get(config).cloned().unwrap_or_default();
             let text = format!("SubDevice {config} \"{name}\" of the file: {error}");
-            Difference { subdevice: Some(SubDeviceId(config)), position, kind, is_grave, text }
+            Difference { subdevice: Some(SubDeviceId(config)), position, kind, prevents_op, text }
         };
         let mut differences = Vec::new();
         // A SubDevice of another identity is reported once.
@@ -112,7 +112,7 @@ impl Configuration {
             subdevice: Some(SubDeviceId(config)),
             position: None,
             kind: DifferenceKind::Missing,
-            is_grave: !declared.optional,
+            prevents_op: !declared.optional,
             text: format!("\"{}\" ({place}{device}) is missing{optional}", names[config]),
         }
     }
@@ -123,7 +123,7 @@ fn order(config: usize, names: &[String], info: &SubDeviceInfo) -> Difference {
         subdevice: Some(SubDeviceId(config)),
         position: Some(info.position),
         kind: DifferenceKind::Order,
-        is_grave: true,
+        prevents_op: true,
         text: format!("\"{}\" is at position {}, the file has it at another place", names[config], info.position),
     }
 }
@@ -134,7 +134,13 @@ fn additional(info: &SubDeviceInfo) -> Difference {
         "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
         identity.vendor_id, identity.product_code
     );
-    Difference { subdevice: None, position: Some(*position), kind: DifferenceKind::Additional, is_grave: false, text }
+    Difference {
+        subdevice: None,
+        position: Some(*position),
+        kind: DifferenceKind::Additional,
+        prevents_op: false,
+        text,
+    }
 }
 
 /// Position of a SubDevice with another identity than expected.

@@ -117,7 +117,7 @@ pub struct Exchange {
     decide_at: Instant,
     /// There is one frame.
     is_alone: bool,
-    /// The short way of one frame exists ([`Exchange::load_only_frame`]).
+    /// The fast path of one frame exists ([`Exchange::load_only_frame`]).
     has_only_frame: bool,
     /// The frame that was sent last.
     newest: u16,
@@ -275,7 +275,7 @@ impl Exchange {
         if let Some(frame) = domain.only().and_then(|at| self.frames.get(at))
             && frame.is_complete()
             && !frame.is_waiting()
-            && domain.judge_again(frame.wkc(), frame.left())
+            && domain.evaluate_repeated(frame.wkc(), frame.left())
         {
             return domain.status(false);
         }
@@ -286,7 +286,7 @@ impl Exchange {
     #[inline(never)]
     fn process_all(&mut self, id: DomainId, now: Instant) -> DomainStatus {
         let Some(domain) = self.domains.get_mut(id.0) else { return DomainStatus::default() };
-        let mut judged = false;
+        let mut evaluated = false;
         while let Some(set) = domain.oldest() {
             let frames = &self.frames[set.clone()];
             let (mut wkc, mut waiting, mut complete, mut left) = (0, false, true, self.cycle + 1);
@@ -305,18 +305,18 @@ impl Exchange {
                 let pending = give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, counters);
                 self.board.post_lost(self.tally.counters.lost);
                 if pending {
-                    return domain.status(!judged);
+                    return domain.status(!evaluated);
                 }
             }
-            judged = true;
+            evaluated = true;
             if saved && complete {
                 self.tally.disturbed().saved += 1;
             }
             domain.count_tries(was_sent, complete);
-            if !domain.judge(wkc, complete, left) {
+            if !domain.evaluate(wkc, complete, left) {
                 let returned = outcome::has_returned(set.clone(), &self.frames, &self.again);
-                let judgement = (wkc, complete, returned);
-                note_change(id, domain, judgement, &self.board, self.tally.disturbed(), &mut self.events);
+                let result = (wkc, complete, returned);
+                note_change(id, domain, result, &self.board, self.tally.disturbed(), &mut self.events);
                 for (index, frame) in set.clone().zip(&self.frames[set.clone()]) {
                     self.shares.post(frame, self.again.get(index).and_then(Option::as_ref), &self.board);
                 }

@@ -5,6 +5,7 @@
 //! busy: it may change target, timeout and data, and start it. The acyclic half executes the request and returns it
 //! with a result. One file per kind; the common part is in `slot`.
 
+mod errors;
 mod register;
 mod sdo;
 mod slot;

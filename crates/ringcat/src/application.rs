@@ -91,7 +91,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.wait_for_frames()
     }
 
-    /// The short way of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. Returns
+    /// The fast path of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. Returns
     /// the departure of the frame if it came back. Ends early if the acyclic half shares the links and has work.
     #[inline(always)]
     fn wait_for_only_frame(&mut self) -> Option<Instant> {

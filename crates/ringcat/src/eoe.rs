@@ -24,7 +24,7 @@ use crate::error::Error;
 use crate::supervisor_thread::SupervisorThread;
 
 /// Interval of the search for new SubDevices and of the update of statistics.
-const LOOK: Duration = Duration::from_millis(20);
+const REFRESH: Duration = Duration::from_millis(20);
 /// Maximum number of frames of one interface in one turn, so that other interfaces and the bus are served too.
 const BURST: usize = 64;
 /// Maximum number of news that are kept until they are taken.
@@ -165,20 +165,20 @@ pub struct EthernetInterface {
 #[derive(Debug)]
 struct Shared {
     ended: AtomicBool,
-    told: Mutex<Told>,
+    published: Mutex<Published>,
     /// Wakes the supervisor's thread.
     waker: Waker,
 }
 
 #[derive(Debug, Default)]
-struct Told {
+struct Published {
     interfaces: Vec<EthernetInterface>,
     news: Vec<EthernetNews>,
 }
 
 impl Shared {
-    fn told(&self) -> std::sync::MutexGuard<'_, Told> {
-        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    fn published(&self) -> std::sync::MutexGuard<'_, Published> {
+        self.published.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -189,12 +189,12 @@ pub struct Ethernet(Arc<Shared>);
 impl Ethernet {
     /// The present interfaces with their counters, some milliseconds old.
     pub fn interfaces(&self) -> Vec<EthernetInterface> {
-        self.0.told().interfaces.clone()
+        self.0.published().interfaces.clone()
     }
 
     /// News since the last call.
     pub fn take_news(&self) -> Vec<EthernetNews> {
-        std::mem::take(&mut self.0.told().news)
+        std::mem::take(&mut self.0.published().news)
     }
 }
 
@@ -259,14 +259,14 @@ struct Switch {
     ends: Vec<End>,
     /// SubDevices with an interface that cannot be created.
     refused: Vec<EthernetSubDevice>,
-    look_at: Instant,
+    refresh_at: Instant,
 }
 
 impl Switch {
     fn new(options: EthernetOptions, make: MakeInterface, waker: Waker) -> (Ethernet, Switch) {
-        let shared = Arc::new(Shared { ended: AtomicBool::new(false), told: Mutex::default(), waker });
-        let (ends, refused, look_at) = (Vec::new(), Vec::new(), Instant(0));
-        (Ethernet(shared.clone()), Switch { options, make, shared, ends, refused, look_at })
+        let shared = Arc::new(Shared { ended: AtomicBool::new(false), published: Mutex::default(), waker });
+        let (ends, refused, refresh_at) = (Vec::new(), Vec::new(), Instant(0));
+        (Ethernet(shared.clone()), Switch { options, make, shared, ends, refused, refresh_at })
     }
 
     /// Moves frames between interfaces and mailboxes; true when the interfaces are dropped.
@@ -275,27 +275,27 @@ impl Switch {
             self.ends.clear();
             return true;
         }
-        if now >= self.look_at {
-            self.look_at = now + LOOK;
-            self.look(engine);
+        if now >= self.refresh_at {
+            self.refresh_at = now + REFRESH;
+            self.refresh(engine);
         }
         for end in &mut self.ends {
             if let Some(up) = end.pass(engine) {
                 end.interface.set_carrier(up);
                 end.carrier = up;
-                tell(&self.shared, EthernetNews::Carrier { name: end.name.clone(), carrier: up });
+                publish(&self.shared, EthernetNews::Carrier { name: end.name.clone(), carrier: up });
             }
         }
         false
     }
 
     /// Creates interfaces for new SubDevices; removes those of a stopped MainDevice.
-    fn look(&mut self, engine: &mut Engine) {
+    fn refresh(&mut self, engine: &mut Engine) {
         let found = engine.ethernet_subdevices();
         self.ends.retain_mut(|end| {
             let removed = !end.interface.exists();
             if removed {
-                tell(&self.shared, EthernetNews::Removed { name: end.name.clone() });
+                publish(&self.shared, EthernetNews::Removed { name: end.name.clone() });
             }
             // A declaration with this SubDevice may have begun or ended.
             let now = found.iter().find(|it| it.is_at_place_of(&end.subdevice));
@@ -311,12 +311,12 @@ impl Switch {
             match self.make(subdevice) {
                 Ok(end) => {
                     let name = end.name.clone();
-                    tell(&self.shared, EthernetNews::Made { name, subdevice: subdevice.subdevice });
+                    publish(&self.shared, EthernetNews::Made { name, subdevice: subdevice.subdevice });
                     self.ends.push(end);
                 }
                 Err(error) => {
                     self.refused.push(subdevice);
-                    tell(&self.shared, EthernetNews::Refused(error));
+                    publish(&self.shared, EthernetNews::Refused(error));
                 }
             }
         }
@@ -328,7 +328,7 @@ impl Switch {
         let interfaces: Vec<EthernetInterface> = interfaces.collect();
         // The last counters are kept when the interfaces are removed.
         if !interfaces.is_empty() {
-            self.shared.told().interfaces = interfaces;
+            self.shared.published().interfaces = interfaces;
         }
     }
 
@@ -343,10 +343,10 @@ impl Switch {
     }
 }
 
-fn tell(shared: &Shared, news: EthernetNews) {
-    let told = &mut shared.told().news;
-    if told.len() < NEWS {
-        told.push(news);
+fn publish(shared: &Shared, news: EthernetNews) {
+    let unread = &mut shared.published().news;
+    if unread.len() < NEWS {
+        unread.push(news);
     }
 }
 

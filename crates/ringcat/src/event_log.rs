@@ -42,8 +42,8 @@ pub struct EventLog {
     begin: Instant,
     names: Names,
     /// Changes of domain states, and the text of the last one.
-    judgements: Crowd,
-    judged: String,
+    state_changes: Crowd,
+    last_change: String,
     /// Cycles whose frames were still out when the next one was due.
     still_out: Crowd,
     /// Cycles that were left out because this machine was late, and the number that the log has counted.
@@ -58,12 +58,12 @@ pub struct EventLog {
 impl EventLog {
     /// An empty log; times count from `begin`.
     pub fn new(begin: Instant, names: Names) -> EventLog {
-        let [judgements, still_out, left_out, foreign] = Default::default();
+        let [state_changes, still_out, left_out, foreign] = Default::default();
         EventLog {
             begin,
             names,
-            judgements,
-            judged: String::new(),
+            state_changes,
+            last_change: String::new(),
             still_out,
             left_out,
             left_out_before: 0,
@@ -73,7 +73,7 @@ impl EventLog {
     }
 
     /// Sets whether each event has a line, without condensing.
-    pub fn one_by_one(self, one_by_one: bool) -> EventLog {
+    pub fn with_every_event(self, one_by_one: bool) -> EventLog {
         EventLog { one_by_one, ..self }
     }
 
@@ -92,8 +92,8 @@ impl EventLog {
         let words = describe(event, &self.names);
         let crowd = match &event.event {
             Event::Domain { .. } => {
-                self.judged.clone_from(&words);
-                Some(&mut self.judgements)
+                self.last_change.clone_from(&words);
+                Some(&mut self.state_changes)
             }
             Event::Skipped { .. } => Some(&mut self.still_out),
             Event::ForeignFrame { .. } => Some(&mut self.foreign),
@@ -113,7 +113,7 @@ impl EventLog {
 
     /// The due lines with numbers of counted events. To be called regularly.
     pub fn counts(&mut self, now: Instant) -> Vec<String> {
-        let judged = &self.judged;
+        let last_change = &self.last_change;
         let words = [
             self.left_out
                 .count(now)
@@ -121,8 +121,8 @@ impl EventLog {
             self.still_out.count(now).map(|(count, within)| {
                 format!("process data: {count} cycles skipped within {within:.0?}, frames were still out")
             }),
-            self.judgements.count(now).map(|(count, within)| {
-                format!("process data: state changed {count} times within {within:.0?}, now {judged}")
+            self.state_changes.count(now).map(|(count, within)| {
+                format!("process data: state changed {count} times within {within:.0?}, now {last_change}")
             }),
             self.foreign
                 .count(now)
@@ -239,7 +239,7 @@ mod tests {
     // covers: run
     #[test]
     fn one_by_one_nothing_is_condensed() {
-        let mut log = EventLog::new(Instant(0), Names::default()).one_by_one(true);
+        let mut log = EventLog::new(Instant(0), Names::default()).with_every_event(true);
         assert!((0..1_000).all(|ms| log.event(&at(ms, foreign())).is_some()));
         assert_eq!(log.counts(Instant(9_000_000_000)), Vec::<String>::new());
         assert!((1..100).all(|cycle| log.left_out(cycle, Instant(cycle)).is_some()));

@@ -14,7 +14,7 @@ const DEFAULT_BYTES: usize = 1 << 20;
 /// use std::time::Duration;
 /// use ringcat::TransferLimits;
 ///
-/// let patient = TransferLimits::default().answer(Duration::from_secs(10)).bytes(64);
+/// let patient = TransferLimits::default().with_answer(Duration::from_secs(10)).with_bytes(64);
 /// assert_eq!((patient.request, patient.bytes), (Duration::from_millis(100), 64));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,21 +43,21 @@ impl TransferLimits {
 
     /// Sets [`TransferLimits::request`].
     #[must_use]
-    pub const fn request(mut self, limit: Duration) -> TransferLimits {
+    pub const fn with_request(mut self, limit: Duration) -> TransferLimits {
         self.request = limit;
         self
     }
 
     /// Sets [`TransferLimits::answer`].
     #[must_use]
-    pub const fn answer(mut self, limit: Duration) -> TransferLimits {
+    pub const fn with_answer(mut self, limit: Duration) -> TransferLimits {
         self.answer = limit;
         self
     }
 
     /// Sets [`TransferLimits::bytes`].
     #[must_use]
-    pub const fn bytes(mut self, limit: usize) -> TransferLimits {
+    pub const fn with_bytes(mut self, limit: usize) -> TransferLimits {
         self.bytes = limit;
         self
     }

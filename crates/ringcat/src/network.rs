@@ -2,6 +2,33 @@
 //!
 //! `ringcat-config` reads the file; [`EniImage`](crate::eni::EniImage) is its process image at run time, as for an ENI.
 //! The format is described in `docs/network-file.md`.
+//!
+//! ```
+//! use std::time::Duration;
+//! use ringcat::eni::EniImage;
+//! use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
+//! use ringcat::simulated::SimulatedSegment;
+//! use ringcat::{MainDevice, Options};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let links = SimulatedSegment::from_toml("[segment]\n[[device]]\ntype = \"digital-output-8\"\n")?;
+//! let mut main_device = MainDevice::request(links, &Options::default());
+//! let scan = main_device.scan()?;
+//! let options = ScanOptions::new("lamps", Duration::from_millis(1));
+//! let text = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options).to_text();
+//!
+//! let network = LoadedNetwork::from_bytes("lamps.toml", text.as_bytes())?;
+//! let mut application = main_device.activate(network.declaration())?;
+//! let mut image = EniImage::new(&network.configuration, application.directory())?;
+//! let lamp = image.variable("digital-output-8.Channel 3.Output").cloned().ok_or("no such variable")?;
+//! application.wait_until_op(Duration::from_secs(10))?;
+//! image.write(&lamp, 1);
+//! for _ in 0..10 {
+//!     application.cycle(|data| image.give_outputs(data));
+//! }
+//! # Ok(())
+//! # }
+//! ```
 
 use std::fmt;
 use std::fs::File;

@@ -66,7 +66,7 @@ impl Failures {
     /// Evaluates an event, and logs it. Each event passes here once, before the application takes it.
     pub fn observe(&mut self, timed: &TimedEvent) {
         #[cfg(feature = "tracing")]
-        crate::trace::tell(timed);
+        crate::trace::record(timed);
         match &timed.event {
             Event::ConfigurationFailed { subdevice: SubDeviceId(index), reason } => {
                 if self.0.len() <= *index {

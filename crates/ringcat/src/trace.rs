@@ -11,8 +11,8 @@ use crate::text::{Names, describe};
 
 const TARGET: &str = "ringcat";
 
-/// Reports an event.
-pub(crate) fn tell(timed: &TimedEvent) {
+/// Records an event.
+pub(crate) fn record(timed: &TimedEvent) {
     match level(&timed.event) {
         Level::WARN if enabled!(target: TARGET, Level::WARN) => {
             event!(target: TARGET, Level::WARN, at_ns = timed.at.0, "{}", describe(timed, &Names::default()));

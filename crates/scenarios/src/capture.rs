@@ -1,7 +1,7 @@
 //! Checks of captures: recomputes from a file alone whether a MainDevice followed the rules on the wire.
 //!
-//! In goes a pcapng file with both directions of one or two links (main link first), out comes a [`Verdict`]. It has
-//! its own parsers for pcapng, Ethernet and EtherCAT: no code of the engine or of `ringcat-wire` is used, so that a
+//! Input: a pcapng file with both directions of one or two links, main link first. Output: a [`Verdict`]. It has
+//! parsers of its own for pcapng, Ethernet and EtherCAT: no code of the engine or of `ringcat-wire` is used, so that a
 //! common misreading is detected. Constants are those of protocol 1.1 to 1.4 and 9.7.
 //!
 //! Checks of every sent frame:
@@ -47,15 +47,15 @@ pub use verdict::Verdict;
 ///
 /// # Errors
 /// The file is not a pcapng capture of one or two Ethernet interfaces with directions.
-pub fn judge(bytes: &[u8], cycle: Option<Duration>) -> Result<Verdict, String> {
-    judge_frames(&Capture::parse(bytes)?, cycle)
+pub fn evaluate(bytes: &[u8], cycle: Option<Duration>) -> Result<Verdict, String> {
+    evaluate_frames(&Capture::parse(bytes)?, cycle)
 }
 
-/// As [`judge`], for the contents of a file.
+/// As [`evaluate`], for the contents of a file.
 ///
 /// # Errors
 /// The number of interfaces is not one or two.
-pub fn judge_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdict, String> {
+pub fn evaluate_frames(capture: &Capture, cycle: Option<Duration>) -> Result<Verdict, String> {
     let links = capture.interfaces.len();
     if !(1..=2).contains(&links) {
         return Err(format!("{links} interfaces, expected one or two"));

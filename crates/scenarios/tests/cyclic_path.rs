@@ -325,7 +325,7 @@ fn typed_process_data_does_not_allocate_in_a_cycle() {
 
 // covers: threads, no-allocation
 #[test]
-fn the_live_status_is_read_and_posted_without_memory() {
+fn the_live_status_is_read_and_posted_without_allocation() {
     let world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
     let live = world.application().live_status();
     let mut operational = 0;

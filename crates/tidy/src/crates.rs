@@ -1,6 +1,6 @@
 //! Allowed arrows between crates.
 //!
-//! Input: the manifests `crates/*/Cargo.toml`. Output: a finding for every dependency that `ROOMS` does not list.
+//! Input: the manifests `crates/*/Cargo.toml`. Output: a finding for every dependency that `RULES` does not list.
 //! Normal, build and development dependencies are treated equally: a test must not depend on crates that its crate must
 //! not depend on.
 
@@ -10,7 +10,7 @@ use crate::Finding;
 use crate::tree::{File, Tree};
 
 /// Allowed dependencies of one crate.
-struct Room {
+struct CrateRule {
     /// Directory below `crates/`.
     directory: &'static str,
     /// Crates of this repository.
@@ -30,26 +30,30 @@ enum External {
 }
 
 /// The map of `docs/ARCHITECTURE.md`; a new crate gets a line here and there.
-const ROOMS: &[Room] = &[
-    Room { directory: "wire", internal: Internal::Only(&[]), external: External::Only(&[]) },
-    Room { directory: "engine", internal: Internal::Only(&["ringcat-wire"]), external: External::Only(&["serde"]) },
-    Room {
+const RULES: &[CrateRule] = &[
+    CrateRule { directory: "wire", internal: Internal::Only(&[]), external: External::Only(&[]) },
+    CrateRule {
+        directory: "engine",
+        internal: Internal::Only(&["ringcat-wire"]),
+        external: External::Only(&["serde"]),
+    },
+    CrateRule {
         directory: "config",
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
         external: External::Only(&["encoding_rs", "roxmltree", "serde", "sha2", "toml"]),
     },
-    Room {
+    CrateRule {
         directory: "sim",
         internal: Internal::Only(&["ringcat-wire"]),
         external: External::Only(&["serde", "smoltcp", "toml"]),
     },
-    Room {
+    CrateRule {
         directory: "gateway",
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
         external: External::Only(&["mio"]),
     },
-    Room { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
-    Room {
+    CrateRule { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
+    CrateRule {
         directory: "ringcat",
         // The crate itself: tests and examples enable all features.
         internal: Internal::Only(&[
@@ -64,13 +68,13 @@ const ROOMS: &[Room] = &[
         // Disabled unless an application enables its feature.
         external: External::Only(&["tracing"]),
     },
-    Room {
+    CrateRule {
         directory: "cli",
         internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link"]),
         external: External::Any,
     },
-    Room { directory: "scenarios", internal: Internal::Any, external: External::Any },
-    Room {
+    CrateRule { directory: "scenarios", internal: Internal::Any, external: External::Any },
+    CrateRule {
         directory: "tidy",
         internal: Internal::Only(&[]),
         external: External::Only(&["proc-macro2", "serde_json", "syn", "toml"]),
@@ -84,10 +88,10 @@ const TABLES: [&str; 3] = ["dependencies", "build-dependencies", "dev-dependenci
 pub fn forbidden_arrows(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (directory, file) in manifests(tree) {
-        match (ROOMS.iter().find(|room| room.directory == directory), file.text.parse::<Table>()) {
-            (None, _) => findings.push(Finding::new(&file.path, 0, "no room in crates/tidy/src/crates.rs: add it")),
+        match (RULES.iter().find(|rule| rule.directory == directory), file.text.parse::<Table>()) {
+            (None, _) => findings.push(Finding::new(&file.path, 0, "no rule in crates/tidy/src/crates.rs: add it")),
             (_, Err(error)) => findings.push(Finding::new(&file.path, 0, format!("cannot be read: {error}"))),
-            (Some(room), Ok(manifest)) => check(room, &file.path, &manifest, &internal_names(tree), &mut findings),
+            (Some(rule), Ok(manifest)) => check(rule, &file.path, &manifest, &internal_names(tree), &mut findings),
         }
     }
     findings
@@ -108,15 +112,15 @@ fn internal_names(tree: &Tree) -> Vec<String> {
     manifests(tree).filter_map(|(_, file)| name(file)).collect()
 }
 
-fn check(room: &Room, path: &str, manifest: &Table, internal: &[String], findings: &mut Vec<Finding>) {
+fn check(rule: &CrateRule, path: &str, manifest: &Table, internal: &[String], findings: &mut Vec<Finding>) {
     for (table, name) in dependencies(manifest) {
         let allowed = if internal.contains(&name) {
-            match room.internal {
+            match rule.internal {
                 Internal::Only(names) => names.contains(&name.as_str()),
                 Internal::Any => true,
             }
         } else {
-            match room.external {
+            match rule.external {
                 External::Only(names) => table == "dev-dependencies" || names.contains(&name.as_str()),
                 External::Any => true,
             }
@@ -175,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crate_without_a_room_is_found() {
+    fn a_crate_without_a_rule_is_found() {
         let tree = Tree { files: vec![File::new("crates/new/Cargo.toml", "")] };
         assert_eq!(forbidden_arrows(&tree).len(), 1);
     }

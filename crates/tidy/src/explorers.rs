@@ -1,7 +1,7 @@
 //! The list of random scenarios is complete: `ci/explorers.toml` names tests that exist, and every test that takes its
 //! seeds from the environment is in it.
 //!
-//! In goes a tree, out come findings.
+//! Input: a tree. Output: findings.
 
 use std::collections::BTreeSet;
 

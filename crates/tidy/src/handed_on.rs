@@ -1,6 +1,6 @@
 //! Items of lower crates that the library `ringcat` re-exports by name, with their members.
 //!
-//! In go the lines of [`crate::interface`] for a lower crate, out come those of the types that the sources of `ringcat`
+//! Input: the lines of [`crate::interface`] for a lower crate. Output: those of the types that the sources of `ringcat`
 //! name in a `pub use`: fields, variants, functions, implemented traits, and what macros make of them. A crate that is
 //! re-exported as a whole (`wire`, `sim`, `config`) is one line here: it has a public interface of its own.
 

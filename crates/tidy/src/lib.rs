@@ -7,6 +7,7 @@
 //! * [`crates`]: allowed arrows between crates;
 //! * [`dependencies`]: crates that an application gets with the library; examples and the program use only the library;
 //! * [`interface`], [`handed_on`]: the list of public items of the library is kept in the repository;
+//! * [`errors`]: public error types of the library implement `Error`;
 //! * [`non_exhaustive`]: public types may grow without a break of the interface, or are closed for a reason;
 //! * [`modules`]: allowed arrows between the modules of the engine;
 //! * [`publishing`]: manifests of crates that are published;
@@ -39,6 +40,7 @@ pub mod covers;
 pub mod crates;
 pub mod deny;
 pub mod dependencies;
+pub mod errors;
 pub mod evidence;
 pub mod explorers;
 pub mod features;

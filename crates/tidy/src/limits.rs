@@ -18,17 +18,25 @@ pub const COLUMNS: usize = 120;
 
 /// Functions with more than [`FUNCTION_LINES`] lines, with their lengths; tests are included.
 pub fn long_functions(tree: &Tree) -> Result<Counts, Finding> {
-    let mut long = Counts::new();
+    Ok(functions(tree)?.into_iter().filter(|(_, lines)| *lines > FUNCTION_LINES).collect())
+}
+
+/// The longest function, with its length; tests are included.
+pub fn longest_function(tree: &Tree) -> Result<Option<(String, usize)>, Finding> {
+    Ok(functions(tree)?.into_iter().max_by_key(|(_, lines)| *lines))
+}
+
+/// All functions with their lengths.
+fn functions(tree: &Tree) -> Result<Vec<(String, usize)>, Finding> {
+    let mut all = Vec::new();
     for file in tree.rust() {
         let syntax = syn::parse_file(&file.text)
             .map_err(|error| Finding::new(&file.path, error.span().start().line, format!("does not parse: {error}")))?;
         let mut lengths = Lengths(Vec::new());
         lengths.visit_file(&syntax);
-        for (name, lines) in lengths.0.into_iter().filter(|(_, lines)| *lines > FUNCTION_LINES) {
-            long.insert(format!("{}: {name}", file.path), lines);
-        }
+        all.extend(lengths.0.into_iter().map(|(name, lines)| (format!("{}: {name}", file.path), lines)));
     }
-    Ok(long)
+    Ok(all)
 }
 
 /// Name and lines of each function.
@@ -62,8 +70,18 @@ impl<'ast> Visit<'ast> for Lengths {
 
 /// Sources with more than [`FILE_LINES`] lines.
 pub fn long_files(tree: &Tree) -> Counts {
+    files(tree).filter(|(_, lines)| *lines > FILE_LINES).collect()
+}
+
+/// The longest source, with its lines.
+pub fn longest_file(tree: &Tree) -> Option<(String, usize)> {
+    files(tree).max_by_key(|(_, lines)| *lines)
+}
+
+/// Sources with their lines, except tests.
+fn files(tree: &Tree) -> impl Iterator<Item = (String, usize)> {
     let lines = |file: &File| (file.path.clone(), file.text.lines().count());
-    tree.rust().filter(|file| !is_test(&file.path)).map(lines).filter(|(_, lines)| *lines > FILE_LINES).collect()
+    tree.rust().filter(|file| !is_test(&file.path)).map(lines)
 }
 
 /// Whether a file has nothing but tests.
@@ -108,12 +126,16 @@ mod tests {
         let long = long_functions(&tree("a.rs", &text)).expect("parses");
         let expected = [("a.rs: a", 62), ("a.rs: i", 61), ("a.rs: o", 61), ("a.rs: t", 61)];
         assert_eq!(long, expected.map(|(name, lines)| (name.to_owned(), lines)).into());
+        let longest = longest_function(&tree("a.rs", &text)).expect("parses");
+        assert_eq!(longest, Some(("a.rs: a".to_owned(), 62)));
     }
 
     #[test]
     fn files_of_tests_may_be_longer() {
         assert_eq!(long_files(&tree("a/src/b.rs", &"\n".repeat(501))).len(), 1);
         assert!(long_files(&tree("a/src/b.rs", &"\n".repeat(500))).is_empty());
+        assert_eq!(longest_file(&tree("a/src/b.rs", "\n\n")), Some(("a/src/b.rs".to_owned(), 2)));
+        assert_eq!(longest_file(&tree("a/tests/b.rs", "\n\n")), None);
         for path in ["a/src/tests.rs", "a/tests/b.rs", "a/b.md"] {
             assert!(long_files(&tree(path, &"\n".repeat(501))).is_empty(), "{path}");
         }

@@ -1,6 +1,6 @@
 //! Manifests of crates that are published have what the registry requires, and one version.
 //!
-//! In goes a tree, out come findings; `ci/package` builds the packages themselves.
+//! Input: a tree. Output: findings; `ci/package` builds the packages themselves.
 
 use toml::{Table, Value};
 

@@ -30,7 +30,7 @@ pub fn misplaced(tree: &Tree) -> Vec<Finding> {
 }
 
 fn allowed(path: &str) -> bool {
-    ALLOWED.iter().any(|(room, _)| path == *room || (room.ends_with('/') && path.starts_with(room)))
+    ALLOWED.iter().any(|(place, _)| path == *place || (place.ends_with('/') && path.starts_with(place)))
 }
 
 /// Pure crates that do not forbid `unsafe`.
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn unsafe_code_is_found_outside_its_rooms_only() {
+    fn unsafe_code_is_found_outside_of_its_files_only() {
         assert_eq!(misplaced(&tree("crates/engine/src/a.rs", "fn f() { unsafe { g() } }")).len(), 1);
         assert!(misplaced(&tree("crates/link/src/a.rs", "fn f() { unsafe { g() } }")).is_empty());
         assert!(

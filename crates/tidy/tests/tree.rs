@@ -4,8 +4,8 @@ use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
-    Finding, coverage, covers, crates, deny, dependencies, evidence, explorers, features, files, handed_on, interface,
-    modules, non_exhaustive, paths, protocol, publishing, safety, toolchain, words,
+    Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
+    interface, modules, non_exhaustive, paths, protocol, publishing, safety, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -150,6 +150,19 @@ fn only_what_is_known(name: &str) {
     let found = (rule.count)(&tree).unwrap_or_else(|finding| panic!("{finding}"));
     println!("{name}: {} of {} known", found.values().sum::<usize>(), known.total(name));
     none(known.compare(name, &found, rule.mended));
+}
+
+#[test]
+fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
+    let tree = tree();
+    let page = tree.file("docs/performance.md").expect("the page exists");
+    assert!(page.text.contains("\n## Before and after issue 15\n"));
+}
+
+// covers: api
+#[test]
+fn public_error_types_implement_error() {
+    none(errors::without_trait(&tree()));
 }
 
 #[test]

@@ -113,7 +113,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn a_line_says_what_is_known_of_a_clock() {
+    fn a_line_shows_what_is_known_of_a_clock() {
         let signals = [Some(SyncSignals::sync0(1_000_000, 250_000))];
         let lines = lines(&[clock()], &Names(vec!["servo".to_owned()]), &signals);
         let words: Vec<&str> = lines[1].split_whitespace().collect();

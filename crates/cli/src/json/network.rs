@@ -42,7 +42,7 @@ pub struct Difference {
     /// Its position on the bus, from 0; null for one that was not found
     pub position: Option<u16>,
     /// The network cannot reach OP with this difference
-    pub is_grave: bool,
+    pub prevents_op: bool,
     /// The difference in words
     pub text: String,
 }

@@ -159,7 +159,7 @@ impl ConfiguredNetwork {
         for difference in &differences {
             warn(difference);
         }
-        if differences.iter().any(|difference| difference.is_grave) {
+        if differences.iter().any(|difference| difference.prevents_op) {
             return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
         }
         Ok(match &self.file {

@@ -21,7 +21,7 @@ use crate::times::in_words;
 /// From OP to complete process data at the most, before incomplete process data is reported.
 const COMPLETE_LIMIT: Duration = Duration::from_secs(1);
 /// Pause between two checks of the threads.
-const LOOK: Duration = Duration::from_millis(1);
+const CHECK_PAUSE: Duration = Duration::from_millis(1);
 
 /// Cycles that run, and what is printed about them.
 pub struct Run {
@@ -40,7 +40,7 @@ pub struct Run {
 
 impl Run {
     /// Prints what has happened since the last call.
-    fn look(&mut self) {
+    fn report_news(&mut self) {
         self.log.news(&self.cycles, now(), |shown| {
             self.live.clear();
             print(shown);
@@ -79,20 +79,20 @@ impl Run {
                 return Err("the cycles ended before all SubDevices were in OP".to_owned());
             }
             if !in_op && now() >= until {
-                self.look();
+                self.report_news();
                 self.live.clear();
                 self.print_states(limit);
                 return Err(self.what_is_missing(limit));
             }
-            self.look();
+            self.report_news();
             if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
                 (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
             }
             self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
-            sleep(LOOK);
+            sleep(CHECK_PAUSE);
         }
         let reached = now();
-        self.look();
+        self.report_news();
         self.live.clear();
         print(self.log.words(reached, "all SubDevices are in OP"));
         for words in self.incomplete() {
@@ -157,11 +157,11 @@ impl Run {
     pub fn exchange(&mut self, until: Instant, end: &EndRequest) {
         end.limit(until);
         while now() < until && !end.is_asked() && !self.cycles.has_ended() {
-            self.look();
+            self.report_news();
             self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
-            sleep(LOOK.min(until.since(now())));
+            sleep(CHECK_PAUSE.min(until.since(now())));
         }
-        self.look();
+        self.report_news();
         self.live.clear();
     }
 }

@@ -76,10 +76,10 @@ fn table(
 ) -> Vec<String> {
     let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)).unwrap_or_default());
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
-    let judgement = status.in_words();
+    let state = status.in_words();
     let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
     let mut lines = vec![
-        format!("{} cycles   wkc {} of {}, {judgement}", pace.cycles, status.wkc, status.expected),
+        format!("{} cycles   wkc {} of {}, {state}", pace.cycles, status.wkc, status.expected),
         format!(
             "the wire      {} frames missing, {} too late, {} damaged",
             counters.missing(),

@@ -89,5 +89,5 @@ pub struct RunArguments {
     ///
     /// Without it, frequent events of one kind are counted after the first twenty.
     #[arg(long, help_heading = "Output")]
-    pub tell_all: bool,
+    pub all_events: bool,
 }

@@ -87,7 +87,7 @@ fn the_demonstration_holds_on_devices_made_of_real_images() {
 
 /// Nothing was compared: that is said, as no failure and not as a comparison that held.
 #[test]
-fn the_demonstration_says_that_nothing_was_compared_without_process_data() {
+fn without_process_data_the_demo_reports_that_nothing_was_compared() {
     let path = std::env::temp_dir().join(format!("ringcat-couplers-{}.toml", std::process::id()));
     let couplers = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"coupler\"\n";
     std::fs::write(&path, couplers).expect("writable");

@@ -79,7 +79,7 @@ pub(super) fn compare(
             subdevice: Some(SubDeviceId(config)),
             position: Some(Position(node as u16)),
             kind: DifferenceKind::Cable,
-            is_grave: false,
+            prevents_op: false,
             text,
         });
     }

@@ -30,7 +30,7 @@ impl Both<'_> {
         if self.identity(differences) {
             return;
         }
-        let mut add = |kind, is_grave, text: String| differences.push(self.difference(kind, is_grave, text));
+        let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));
         if let Some(expected) = mailbox(declared, stated) {
             let got =
                 info.mailbox.as_ref().map(|it| [(it.receive_offset, it.receive_size), (it.send_offset, it.send_size)]);
@@ -81,12 +81,12 @@ impl Both<'_> {
         false
     }
 
-    fn difference(&self, kind: DifferenceKind, is_grave: bool, text: String) -> Difference {
+    fn difference(&self, kind: DifferenceKind, prevents_op: bool, text: String) -> Difference {
         Difference {
             subdevice: Some(SubDeviceId(self.config)),
             position: Some(self.info.position),
             kind,
-            is_grave,
+            prevents_op,
             text: format!("position {} \"{}\": {text}", self.info.position, self.name),
         }
     }

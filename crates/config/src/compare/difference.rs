@@ -19,7 +19,7 @@ pub struct Difference {
     /// The kind.
     pub kind: DifferenceKind,
     /// The network cannot be activated with this difference.
-    pub is_grave: bool,
+    pub prevents_op: bool,
     /// The difference, as text for the operator.
     pub text: String,
 }

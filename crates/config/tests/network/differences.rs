@@ -56,7 +56,7 @@ fn one_missing_or_additional_subdevice_is_one_difference() {
 
 // covers: network-file
 #[test]
-fn revisions_and_serial_numbers_differ_without_another_place() {
+fn another_revision_or_serial_number_is_no_change_of_place() {
     let found = bus(&[1, 2, 3]);
     let mut file = file_of(&found);
     let mut other = found.clone();

@@ -55,7 +55,7 @@ impl TimeWords {
         if self.first.load(Ordering::Relaxed) == 0 && time != 0 {
             self.first_epoch.store(time.wrapping_sub(now), Ordering::Relaxed);
             self.first.store(time, Ordering::Release);
-            self.tell();
+            self.wake_supervisor();
         }
     }
 
@@ -104,7 +104,7 @@ impl TimeWords {
     }
 
     /// Wakes the supervisor: the application's time is far from that of the reference.
-    pub fn tell(&self) {
+    pub fn wake_supervisor(&self) {
         let news = self.news.load(Ordering::Relaxed);
         self.news.store(news.wrapping_add(1), Ordering::Release);
     }
@@ -117,7 +117,7 @@ impl TimeWords {
     /// The exchange has taken over the references with this number: later frames distribute no others.
     pub fn take(&self, references: u32) {
         self.taken.store(references, Ordering::Relaxed);
-        self.tell();
+        self.wake_supervisor();
     }
 
     /// Number of the references that the exchange has taken over.

@@ -140,7 +140,7 @@ impl ClockWords {
     }
 
     /// Whether some difference shows the jitter of the host, so that the OR of all differences carries no information.
-    pub(crate) fn is_host_told(&self) -> bool {
+    pub(crate) fn shows_host_jitter(&self) -> bool {
         self.is_reference_led() || self.are_some_in_front.load(Ordering::Relaxed)
     }
 

@@ -243,7 +243,7 @@ mod tests {
 
     // covers: threads
     #[test]
-    fn one_lost_supervision_frame_is_no_silence_two_in_a_row_are() {
+    fn two_supervision_frames_lost_in_a_row_are_a_silence_and_one_is_not() {
         let words = words();
         assert!(!words.is_silent(0));
         words.post_silence(5);

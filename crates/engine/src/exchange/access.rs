@@ -44,12 +44,12 @@ impl Exchange {
     /// zero where it did not answer. `None` before the first cycle, and where its frames do not show it
     /// ([`crate::layout::Witness`]).
     pub fn al_status(&self, subdevice: usize) -> Option<u8> {
-        let judged = |frame: &&CyclicFrame| {
-            let judged = self.domains.get(frame.domain()).map_or(0, Domain::judged);
-            (1..=judged).contains(&frame.left())
+        let evaluated = |frame: &&CyclicFrame| {
+            let evaluated = self.domains.get(frame.domain()).map_or(0, Domain::evaluated);
+            (1..=evaluated).contains(&frame.left())
         };
         let tries = self.again.iter().flatten().map(|again| &again.frame);
-        let shown = self.frames.iter().chain(tries).filter(judged);
+        let shown = self.frames.iter().chain(tries).filter(evaluated);
         let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice)?)));
         let newest = newest.max_by_key(|(left, status)| (*left, *status != 0));
         newest.map(|(_, status)| status)

@@ -339,11 +339,11 @@ impl Clocks {
         let time = self.written_time(time, leader, board, now)?;
         self.led = Some(ReferenceTime { time, sent_at: now });
         let behind = self.behind.filter(|behind| behind.is_fresh(now));
-        let told = match (self.times[leader.index()], behind.and_then(|behind| behind.steering_ns())) {
+        let written = match (self.times[leader.index()], behind.and_then(|behind| behind.steering_ns())) {
             (Some(own), Some(too_much)) => own.at(now).wrapping_sub(too_much as u64),
             _ => time,
         };
-        Some((station, told as u32))
+        Some((station, written as u32))
     }
 
     /// The system time for an application time; `None` if it is far from that of the reference.
@@ -357,7 +357,7 @@ impl Clocks {
         let own = self.times[leader.index()];
         let is_far = own.is_some_and(|own| is_far(own.at(now).wrapping_sub(time) as i64));
         if is_far && !self.is_far {
-            board.clocks.times.tell();
+            board.clocks.times.wake_supervisor();
         }
         self.is_far = is_far;
         (!is_far).then_some(time)
@@ -386,8 +386,8 @@ impl Clocks {
         let ports_changed = EcatEvent::from_bits(seen.events).dl_status;
         // A ring that has closed, or a change of cables, changes the delays.
         let mut is_held = board.clocks.is_held();
-        let is_told = is_held || board.clocks.references().1 != self.changes;
-        if (is_closed && !is_told) || (ports_changed && !self.ports_changed && board.clocks.are_ports_guarded()) {
+        let is_known = is_held || board.clocks.references().1 != self.changes;
+        if (is_closed && !is_known) || (ports_changed && !self.ports_changed && board.clocks.are_ports_guarded()) {
             board.clocks.hold();
             is_held = true;
         }
@@ -396,9 +396,9 @@ impl Clocks {
             // While no time is distributed, differences come from a frame on another path. A steered reference and the
             // clocks in front of a reference show the jitter of the host; the supervisor checks each of the other
             // clocks then.
-            let is_steered = self.references.leader().1.is_some() || board.clocks.is_host_told();
-            let is_meant = !is_held && !is_steered;
-            self.judge_spread(seen.spread, is_meant, board, events);
+            let is_steered = self.references.leader().1.is_some() || board.clocks.shows_host_jitter();
+            let is_conclusive = !is_held && !is_steered;
+            self.evaluate_spread(seen.spread, is_conclusive, board, events);
         }
     }
 
@@ -445,11 +445,11 @@ impl Clocks {
         self.behind = Some(behind.map_or(Lead::behind_host(sent_at), |behind| behind.go_on(difference, sent_at)));
     }
 
-    fn judge_spread(&mut self, spread_ns: u32, is_meant: bool, board: &Board, events: &mut Producer) {
+    fn evaluate_spread(&mut self, spread_ns: u32, is_conclusive: bool, board: &Board, events: &mut Producer) {
         self.spread_ns = Some(spread_ns);
         board.clocks.post_spread(spread_ns);
         let inside = spread_ns <= self.setup.sync_window_ns;
-        if !is_meant || !board.clocks.is_window_watched() {
+        if !is_conclusive || !board.clocks.is_window_watched() {
             self.window.skip();
         } else if self.window.take(inside) {
             events.push(CyclicEvent::SyncWindow { inside, spread_ns }.pack());

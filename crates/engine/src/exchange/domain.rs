@@ -53,20 +53,20 @@ pub struct Domain {
     period_ns: u64,
     members: Vec<Member>,
     status: DomainStatus,
-    told: Told,
+    reported: Reported,
     /// Departure of the last evaluated flight, as a cycle plus one.
-    judged: u64,
+    evaluated: u64,
     /// Incomplete cycles in a row in which frames were sent again.
     fruitless: u8,
 }
 
 /// Last reported state of a domain.
 #[derive(Clone, Copy, Debug)]
-enum Told {
+enum Reported {
     /// None: no SubDevice has answered so far. Cycles evaluated since SubDevices take part.
     Nothing { silent: u8 },
     /// At least one state was reported.
-    Something,
+    State,
 }
 
 impl Domain {
@@ -94,8 +94,8 @@ impl Domain {
             period_ns: whole_ns(planned.period),
             members: subdevices.into_iter().map(member).collect(),
             status: DomainStatus { expected, ..DomainStatus::default() },
-            told: Told::Nothing { silent: 0 },
-            judged: 0,
+            reported: Reported::Nothing { silent: 0 },
+            evaluated: 0,
             fruitless: 0,
         }
     }
@@ -132,10 +132,10 @@ impl Domain {
     /// Evaluates the only cycle on the wire if it is complete like the previous one. False, and nothing is evaluated,
     /// if the previous one was incomplete or no SubDevice answered.
     #[inline]
-    pub(crate) fn judge_again(&mut self, wkc: u32, left: u64) -> bool {
+    pub(crate) fn evaluate_repeated(&mut self, wkc: u32, left: u64) -> bool {
         let is_again = left >= self.image.usual_from;
         if is_again {
-            self.judge(wkc, true, left);
+            self.evaluate(wkc, true, left);
         }
         is_again
     }
@@ -143,11 +143,11 @@ impl Domain {
     /// Evaluates the only cycle on the wire, of a domain with one set, if it is complete with the working counter of
     /// the one before, so that its status stays the same. False, and nothing is evaluated, otherwise.
     #[inline(always)]
-    pub(crate) fn judge_unchanged(&mut self, wkc: u32, left: u64) -> bool {
+    pub(crate) fn evaluate_unchanged(&mut self, wkc: u32, left: u64) -> bool {
         let is_same = self.out == 1 && left >= self.image.usual_from && self.status.wkc == wkc;
         if is_same {
             self.out = 0;
-            self.judged = left;
+            self.evaluated = left;
         }
         is_same
     }
@@ -193,7 +193,7 @@ impl Domain {
         (self.out == 1 && !self.unsent).then(|| self.oldest..self.oldest + self.set)
     }
 
-    /// A cycle was judged: `was_sent`: frames of it were sent again.
+    /// A cycle was evaluated. `was_sent`: frames of it were sent again.
     #[inline]
     pub(crate) fn count_tries(&mut self, was_sent: bool, complete: bool) {
         if was_sent {
@@ -288,11 +288,11 @@ impl Domain {
     /// Evaluates the oldest cycle on the wire, which left in cycle `left` minus one: the sum of its working counters,
     /// and whether each datagram has exactly the expected one. True where it was complete with the results of the one
     /// before; otherwise [`Domain::change_state`] follows.
-    pub(crate) fn judge(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
+    pub(crate) fn evaluate(&mut self, wkc: u32, complete: bool, left: u64) -> bool {
         self.status.wkc = wkc;
         self.oldest = self.after(self.oldest);
         self.out -= 1;
-        self.judged = left;
+        self.evaluated = left;
         complete && left >= self.image.usual_from
     }
 
@@ -308,13 +308,13 @@ impl Domain {
         let is_another = core::mem::replace(&mut self.status.state, state) != state;
         // A domain without process data has no working counter that shows a return.
         self.image.set_complete(state == DomainState::Complete && wkc > 0);
-        match &mut self.told {
-            Told::Something => is_another,
-            Told::Nothing { silent } => {
+        match &mut self.reported {
+            Reported::State => is_another,
+            Reported::Nothing { silent } => {
                 *silent = silent.saturating_add(u8::from(is_awaited));
                 let is_due = is_another || *silent >= SILENT_CYCLES;
                 if is_due {
-                    self.told = Told::Something;
+                    self.reported = Reported::State;
                 }
                 is_due
             }
@@ -332,8 +332,8 @@ impl Domain {
     }
 
     /// Departure of the last evaluated flight, as a cycle plus one.
-    pub(crate) fn judged(&self) -> u64 {
-        self.judged
+    pub(crate) fn evaluated(&self) -> u64 {
+        self.evaluated
     }
 
     pub(crate) fn freshness(&self, subdevice: usize) -> Freshness {
@@ -342,8 +342,8 @@ impl Domain {
         // Departure of the oldest of its inputs, as a cycle plus one.
         match member.inputs.iter().map(|input| self.image.moment(*input).left).min().unwrap_or(0) {
             0 => Freshness::Never,
-            left if left >= self.judged => Freshness::Fresh,
-            left => Freshness::Stale { cycles: self.judged - left },
+            left if left >= self.evaluated => Freshness::Fresh,
+            left => Freshness::Stale { cycles: self.evaluated - left },
         }
     }
 }

@@ -109,7 +109,7 @@ struct Shown {
 #[derive(Clone, Copy, Debug, Default)]
 struct Views {
     /// The copies were evaluated since the last change on the board.
-    looked: [bool; 2],
+    evaluated: [bool; 2],
     /// The copy alone is complete.
     is_enough: [bool; 2],
     /// Both copies together are complete.
@@ -220,7 +220,7 @@ impl CyclicFrame {
     #[cold]
     fn forget_missing(&mut self) {
         for link in Link::ALL.into_iter().filter(|link| self.shown.arrivals.arrived & link.bit() == 0) {
-            if core::mem::take(&mut self.views.looked[link.index()])
+            if core::mem::take(&mut self.views.evaluated[link.index()])
                 && let Some(presence) = &mut self.presence
             {
                 presence.forget(link.index());
@@ -397,8 +397,8 @@ impl CyclicFrame {
     #[cold]
     fn count(&mut self, sent_on: Link, bytes: &[u8], image: &mut Image) {
         let link = sent_on.index();
-        let mut as_seen =
-            self.views.looked[link] && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
+        let mut as_seen = self.views.evaluated[link]
+            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
         let mut sum = 0;
         for place in &self.places {
             let wkc = u16_at(bytes, place.wkc_at);
@@ -406,7 +406,7 @@ impl CyclicFrame {
             as_seen &= place.is_as_seen(link, wkc);
         }
         if !as_seen {
-            self.look(link, bytes);
+            self.evaluate_copy(link, bytes);
             image.note_change(self.left);
         }
         let supervision = self.supervision_at.map_or(0, |at| supervision_at(bytes, at, sent_on));
@@ -417,14 +417,14 @@ impl CyclicFrame {
 
     /// Evaluates the datagrams of a copy that differ from the copy before.
     #[cold]
-    fn look(&mut self, link: usize, bytes: &[u8]) {
-        let once = self.presence.as_mut().is_some_and(|presence| presence.look(link, bytes));
+    fn evaluate_copy(&mut self, link: usize, bytes: &[u8]) {
+        let once = self.presence.as_mut().is_some_and(|presence| presence.evaluate(link, bytes));
         for place in &mut self.places {
             let wkc = Wkc(u16_at(bytes, place.wkc_at));
-            place.look(link, wkc, self.presence.as_ref(), once);
+            place.evaluate(link, wkc, self.presence.as_ref(), once);
         }
         let only = [link == 0, link == 1];
-        self.views.looked[link] = true;
+        self.views.evaluated[link] = true;
         self.views.is_enough[link] = self.places.iter().all(|place| place.is_complete(only));
         self.views.are_enough = self.places.iter().all(|place| place.is_complete([true; 2]));
         self.views.are_doubled = self.places.iter().any(Place::is_doubled);

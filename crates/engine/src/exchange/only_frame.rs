@@ -1,4 +1,4 @@
-//! The short way of a cycle with one frame: one domain with one cycle of one frame on the wire, on one link, without
+//! The fast path of a cycle with one frame: one domain with one cycle of one frame on the wire, on one link, without
 //! clocks, copies or further tries. Nearly all cycles of such an application take it (decision 0055).
 //!
 //! A step that returns false has changed nothing, and the general step follows: [`Exchange::process`],
@@ -10,7 +10,7 @@ use crate::link::LinkSet;
 use crate::time::Instant;
 
 impl Exchange {
-    /// Determines whether this way exists. It depends on the layout, the table of copies and the rules for lost frames
+    /// Determines whether this path exists. It depends on the layout, the table of copies and the rules for lost frames
     /// only.
     pub(super) fn find_only_frame(&mut self) {
         let has_clocks = |frame: &CyclicFrame| frame.clocks().is_some();
@@ -30,7 +30,7 @@ impl Exchange {
     #[inline(always)]
     pub fn process_unchanged(&mut self) -> bool {
         let (Some(domain), Some(frame)) = (self.domains.first_mut(), self.frames.first()) else { return false };
-        self.has_only_frame && frame.is_home() && domain.judge_unchanged(frame.wkc(), frame.left())
+        self.has_only_frame && frame.is_home() && domain.evaluate_unchanged(frame.wkc(), frame.left())
     }
 
     /// Copies the outputs of the only domain into its frame. [`Exchange::send_only_frame`] has to follow.

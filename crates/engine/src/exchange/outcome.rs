@@ -33,7 +33,7 @@ pub(super) fn outcome(first: &CyclicFrame, again: Option<&Option<Again>>) -> Out
     Outcome { waiting: waiting && !saved, complete: saved, wkc: again.wkc(), saved, was_sent: true }
 }
 
-/// Counts the wrong working counters of a judged cycle.
+/// Counts the wrong working counters of an evaluated cycle.
 #[cold]
 pub(super) fn count_errors(set: Range<usize>, frames: &[CyclicFrame], again: &[Option<Again>], board: &Board) {
     for index in set {

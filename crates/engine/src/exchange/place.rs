@@ -60,9 +60,9 @@ struct Contribution {
     /// another SubDevice.
     is_mapped: bool,
     /// By link: the copy brought its inputs.
-    met: [bool; 2],
+    delivered: [bool; 2],
     /// By link: it processed the copy completely, in any state.
-    did: [bool; 2],
+    processed: [bool; 2],
 }
 
 /// Result of a copy, by the link on which it was sent.
@@ -199,7 +199,7 @@ impl Place {
 
     /// Evaluates a copy: which inputs are in it, and which SubDevices processed it. `once`: no SubDevice processed it
     /// more than once.
-    pub fn look(&mut self, link: usize, wkc: Wkc, presence: Option<&Presence>, once: bool) {
+    pub fn evaluate(&mut self, link: usize, wkc: Wkc, presence: Option<&Presence>, once: bool) {
         self.views[link].wkc = wkc;
         self.views[link].is_sure = match &mut self.contributions[..] {
             // The datagram was not in the frame: no SubDevice can have processed it.
@@ -207,9 +207,9 @@ impl Place {
                 all.iter_mut().for_each(|it| it.forget(link));
                 true
             }
-            [alone] => alone.meet_alone(link, wkc, self.command),
+            [alone] => alone.match_alone(link, wkc, self.command),
             all if all.iter().all(|it| it.witness.is_some()) => {
-                once && presence.is_some_and(|presence| meet(all, link, wkc, presence))
+                once && presence.is_some_and(|presence| match_all(all, link, wkc, presence))
             }
             // Outputs of SubDevices without a presence byte: the sum over both copies counts.
             all => {
@@ -230,7 +230,7 @@ impl Place {
         view.runs.clear();
         view.share = 0;
         let mut count = 0;
-        for segment in segments.iter().filter(|segment| contributions[segment.contribution].met[link]) {
+        for segment in segments.iter().filter(|segment| contributions[segment.contribution].delivered[link]) {
             count += 1;
             match view.runs.last_mut() {
                 Some(run) if run.reaches(&segment.span) => run.length += segment.span.length,
@@ -257,17 +257,17 @@ impl Place {
         }
         // Inputs of a SubDevice below SAFEOP, or not yet seen to deliver them, are not fresh.
         let brings = |it: &Contribution| {
-            !it.required || !it.has_inputs || it.met.iter().zip(links).any(|(met, arrived)| *met && arrived)
+            !it.required || !it.has_inputs || it.delivered.iter().zip(links).any(|(came, arrived)| *came && arrived)
         };
         if let [alone] = &self.contributions[..] {
             let wkc = u32::from(alone.wkc.0);
             return (sum == wkc && brings(alone)) || (!alone.required && sum < wkc);
         }
-        let is_met = |it: &Contribution| {
-            let copies = it.did.iter().zip(links).filter(|(did, arrived)| **did && *arrived).count();
+        let is_exact = |it: &Contribution| {
+            let copies = it.processed.iter().zip(links).filter(|(processed, arrived)| **processed && *arrived).count();
             (copies == 1 && brings(it)) || (copies == 0 && !it.required)
         };
-        arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_met)
+        arrived().all(|view| view.is_sure) && self.contributions.iter().all(is_exact)
     }
 
     /// Sum of the working counters of copies on these links, as last evaluated.
@@ -278,7 +278,7 @@ impl Place {
 
     /// Whether any SubDevice processed the copies on both links, as last evaluated.
     pub fn is_doubled(&self) -> bool {
-        self.contributions.iter().any(|it| it.did == [true; 2])
+        self.contributions.iter().any(|it| it.processed == [true; 2])
     }
 
     /// Whether only the sum over both copies shows which SubDevices processed it.
@@ -292,7 +292,9 @@ impl Place {
             return;
         }
         let is_summed = self.is_summed();
-        let processed = |it: &Contribution| it.did.iter().zip(links).filter(|(did, arrived)| **did && *arrived).count();
+        let processed = |it: &Contribution| {
+            it.processed.iter().zip(links).filter(|(processed, arrived)| **processed && *arrived).count()
+        };
         let expected = self.contributions.iter().filter(|it| it.is_proven);
         expected.filter(|it| is_summed || processed(it) != 1).for_each(|it| board.count_wkc_error(it.subdevice));
     }
@@ -322,8 +324,8 @@ impl Place {
                 *whole = moment;
             }
         } else if !image.note_share(self.datagram, link, view.share, moment) {
-            let is_met = |part: usize| self.contributions[self.segments[part].contribution].met[link];
-            self.views[link].share = image.take_share(self.datagram, link, is_met, moment);
+            let has_arrived = |part: usize| self.contributions[self.segments[part].contribution].delivered[link];
+            self.views[link].share = image.take_share(self.datagram, link, has_arrived, moment);
         }
     }
 
@@ -333,7 +335,7 @@ impl Place {
     pub fn deliver_singly(&self, link: usize, bytes: &[u8], image: &mut Image, moment: Moment) -> bool {
         let mut newest = true;
         for (number, segment) in self.segments.iter().enumerate() {
-            if !self.contributions[segment.contribution].met[link] {
+            if !self.contributions[segment.contribution].delivered[link] {
                 continue;
             }
             let input = self.number_of(number);
@@ -407,21 +409,21 @@ impl Contribution {
             is_proven: false,
             required: true,
             is_mapped: false,
-            met: [false; 2],
-            did: [false; 2],
+            delivered: [false; 2],
+            processed: [false; 2],
         }
     }
 
     fn forget(&mut self, link: usize) {
-        (self.met[link], self.did[link]) = (false, false);
+        (self.delivered[link], self.processed[link]) = (false, false);
     }
 
     /// The only SubDevice of a datagram. False where it processed a copy twice.
-    fn meet_alone(&mut self, link: usize, wkc: Wkc, command: Command) -> bool {
+    fn match_alone(&mut self, link: usize, wkc: Wkc, command: Command) -> bool {
         let has_both = command == Command::Lrw && self.wkc == Wkc(3);
-        self.did[link] = wkc == self.wkc;
+        self.processed[link] = wkc == self.wkc;
         // Below SAFEOP its inputs are undefined memory content.
-        self.met[link] = self.is_proven && (wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW));
+        self.delivered[link] = self.is_proven && (wkc == self.wkc || (has_both && wkc == INPUTS_OF_LRW));
         wkc.0 <= self.wkc.0
     }
 }
@@ -429,12 +431,12 @@ impl Contribution {
 /// Determines which of several SubDevices processed a copy: those that take part and are in a state in which they
 /// deliver inputs. The working counter must contain their increments, and at most the increments that the others
 /// present can have added. False where it does not.
-fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) -> bool {
+fn match_all(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) -> bool {
     let (mut sure, mut others) = (0, 0);
     for contribution in all.iter_mut() {
         let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
-        contribution.met[link] = passed == Passed::Delivering && contribution.is_proven;
-        contribution.did[link] = contribution.met[link];
+        contribution.delivered[link] = passed == Passed::Delivering && contribution.is_proven;
+        contribution.processed[link] = contribution.delivered[link];
         match passed {
             Passed::Not => {}
             Passed::Delivering if contribution.is_proven => sure += u32::from(contribution.wkc.0),
@@ -446,8 +448,8 @@ fn meet(all: &mut [Contribution], link: usize, wkc: Wkc, presence: &Presence) ->
         // Every SubDevice present added its full increment. Below SAFEOP inputs are undefined memory content.
         for contribution in all.iter_mut() {
             let passed = contribution.witness.map_or(Passed::Not, |place| presence.passed(link, place));
-            contribution.met[link] = passed == Passed::Delivering;
-            contribution.did[link] = passed != Passed::Not;
+            contribution.delivered[link] = passed == Passed::Delivering;
+            contribution.processed[link] = passed != Passed::Not;
         }
     }
     (sure..=sure + others).contains(&wkc)

@@ -54,7 +54,7 @@ impl Presence {
 
     /// Evaluates a copy. False where SubDevices processed it more than once: its working counter is not the number of
     /// bytes.
-    pub fn look(&mut self, link: usize, frame: &[u8]) -> bool {
+    pub fn evaluate(&mut self, link: usize, frame: &[u8]) -> bool {
         let length = self.seen[link].len();
         let Some(now) = frame.get(self.at..self.at + length) else { return false };
         self.seen[link].copy_from_slice(now);

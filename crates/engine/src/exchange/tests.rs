@@ -80,7 +80,7 @@ impl Ring {
     }
 
     /// Lets the cycle pass and evaluates.
-    fn judge(&mut self) -> DomainStatus {
+    fn evaluate(&mut self) -> DomainStatus {
         self.now += PERIOD;
         self.exchange.process(DOMAIN, self.now)
     }
@@ -95,7 +95,7 @@ impl Ring {
 }
 
 /// Answer of these SubDevices to a frame; their inputs are `base` plus their number.
-fn meet(frame: &mut [u8], subdevices: &[usize], base: u8) {
+fn process(frame: &mut [u8], subdevices: &[usize], base: u8) {
     frame[6] |= 0x02;
     for subdevice in subdevices {
         frame[INPUTS_AT + subdevice] |= base + *subdevice as u8;
@@ -114,11 +114,11 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
     ring.exchange.image_mut(DOMAIN)[..3].copy_from_slice(&[7, 8, 9]);
     let [mut main, redundant] = ring.send();
     assert_eq!(main[OUTPUTS_AT..OUTPUTS_AT + 3], [7, 8, 9]);
-    meet(&mut main, &[0, 1, 2], 0x40);
+    process(&mut main, &[0, 1, 2], 0x40);
     assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
     assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
     assert_eq!(ring.receive(Link::Main, &redundant), Received::Taken);
-    let status = ring.judge();
+    let status = ring.evaluate();
     assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Complete));
     assert_eq!(ring.exchange.ring(), RingState::Closed);
     assert_eq!(ring.freshness(), [Freshness::Fresh; 3]);
@@ -133,12 +133,12 @@ fn inputs_of_the_first_copy_stay_where_a_second_one_was_processed_again() {
     let mut ring = Ring::new();
     for again in [false, true] {
         let [mut main, mut redundant] = ring.send();
-        meet(&mut main, &[0, 1, 2], 0x40);
-        meet(&mut redundant, if again { &[2] } else { &[] }, 0x50);
+        process(&mut main, &[0, 1, 2], 0x40);
+        process(&mut redundant, if again { &[2] } else { &[] }, 0x50);
         assert_eq!(ring.receive(Link::Redundant, &main), Received::Taken);
         assert_eq!(ring.receive(Link::Redundant, &redundant), Received::Taken);
         assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
-        let status = ring.judge();
+        let status = ring.evaluate();
         assert_eq!(status.state, if again { DomainState::Incomplete } else { DomainState::Complete });
         assert_eq!(status.wkc, 6 + 2 * u32::from(again));
         assert_eq!(ring.freshness(), [Freshness::Fresh; 3]);
@@ -149,12 +149,12 @@ fn inputs_of_the_first_copy_stay_where_a_second_one_was_processed_again() {
 fn a_zero_copy_that_comes_first_does_not_hide_the_complete_one() {
     let mut ring = Ring::new();
     let [mut main, redundant] = ring.send();
-    meet(&mut main, &[0, 1, 2], 0x40);
+    process(&mut main, &[0, 1, 2], 0x40);
     ring.receive(Link::Main, &redundant);
     assert_eq!(ring.inputs(), [0; 3]);
     ring.receive(Link::Redundant, &main);
     assert_eq!(ring.inputs(), [0x40, 0x41, 0x42]);
-    assert_eq!(ring.judge().state, DomainState::Complete);
+    assert_eq!(ring.evaluate().state, DomainState::Complete);
 }
 
 #[test]
@@ -163,11 +163,11 @@ fn in_a_cut_ring_both_copies_make_one_answer() {
         let mut ring = Ring::new();
         let [mut main, mut redundant] = ring.send();
         let (near, far) = [0, 1, 2].split_at(before);
-        meet(&mut main, near, 0x40);
-        meet(&mut redundant, far, 0x40);
+        process(&mut main, near, 0x40);
+        process(&mut redundant, far, 0x40);
         ring.receive(Link::Main, &main);
         ring.receive(Link::Redundant, &redundant);
-        let status = ring.judge();
+        let status = ring.evaluate();
         assert_eq!((ring.inputs(), status.state), (&[0x40, 0x41, 0x42][..], DomainState::Complete), "cut at {before}");
         assert_eq!((status.wkc, ring.exchange.ring()), (6, RingState::Open));
         let (_, seen) = ring.board.supervision().unwrap();
@@ -181,10 +181,10 @@ fn a_missing_subdevice_keeps_its_last_inputs_and_the_others_are_new_at_once() {
     let mut ring = Ring::new();
     for (answering, base) in [(&[0, 1, 2][..], 0x10), (&[0, 2][..], 0x20)] {
         let [mut main, redundant] = ring.send();
-        meet(&mut main, answering, base);
+        process(&mut main, answering, base);
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
-        ring.judge();
+        ring.evaluate();
     }
     assert_eq!(
         (ring.inputs(), ring.exchange.status(DOMAIN).unwrap().state),
@@ -202,10 +202,10 @@ fn inputs_of_those_that_take_part_are_new_and_the_missing_one_keeps_its_last() {
         for (answering, base) in [(&[0, 1, 2][..], 0x10), (&there, 0x20)] {
             ring.board.set_taking_part(missing, answering.len() == 3);
             let [mut main, redundant] = ring.send();
-            meet(&mut main, answering, base);
+            process(&mut main, answering, base);
             ring.receive(Link::Redundant, &main);
             ring.receive(Link::Main, &redundant);
-            ring.judge();
+            ring.evaluate();
         }
         let mut inputs = [0x20, 0x21, 0x22];
         inputs[missing] -= 0x10;
@@ -225,10 +225,10 @@ fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
         // The engine still assumes that 2 is absent and 1 present.
         ring.board.set_taking_part(2, answering.len() == 3);
         let [mut main, redundant] = ring.send();
-        meet(&mut main, answering, base);
+        process(&mut main, answering, base);
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
-        ring.judge();
+        ring.evaluate();
     }
     assert_eq!(ring.inputs(), [0x20, 0x11, 0x22]);
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Stale { cycles: 1 }, Freshness::Fresh]);
@@ -240,11 +240,11 @@ fn a_sum_that_fits_by_chance_makes_no_inputs_fresh() {
 fn a_subdevice_that_processed_both_copies_does_not_stand_for_one_that_is_gone() {
     let mut ring = Ring::new();
     let [mut main, mut redundant] = ring.send();
-    meet(&mut main, &[0, 1], 0x10);
-    meet(&mut redundant, &[1], 0x40);
+    process(&mut main, &[0, 1], 0x10);
+    process(&mut redundant, &[1], 0x40);
     ring.receive(Link::Main, &main);
     ring.receive(Link::Redundant, &redundant);
-    let status = ring.judge();
+    let status = ring.evaluate();
     assert_eq!((status.wkc, status.expected, status.state), (6, 6, DomainState::Incomplete));
     assert_eq!(ring.inputs(), [0x10, 0x11, 0]);
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Fresh, Freshness::Never]);
@@ -259,11 +259,11 @@ fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_not_fresh() {
         ring.board.set_taking_part(1, false);
         ring.board.set_unproven(1, true);
         let [mut main, redundant] = ring.send();
-        meet(&mut main, &[0, 2], 0x10);
+        process(&mut main, &[0, 2], 0x10);
         frame_of_one_in_preop(&mut main, 1, gives);
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
-        ring.judge();
+        ring.evaluate();
         let expected = [Freshness::Fresh, Freshness::Never, Freshness::Fresh];
         assert_eq!(ring.freshness(), expected, "gives inputs: {gives}");
         assert_eq!(ring.exchange.al_status(1), Some(2));
@@ -287,11 +287,11 @@ fn frame_of_one_in_preop(frame: &mut [u8], subdevice: usize, gives_inputs: bool)
 fn a_copy_that_a_subdevice_processed_twice_makes_nothing_fresh() {
     let mut ring = Ring::new();
     let [mut main, redundant] = ring.send();
-    meet(&mut main, &[0, 1], 0x10);
-    meet(&mut main, &[1], 0x10);
+    process(&mut main, &[0, 1], 0x10);
+    process(&mut main, &[1], 0x10);
     ring.receive(Link::Redundant, &main);
     ring.receive(Link::Main, &redundant);
-    ring.judge();
+    ring.evaluate();
     assert_eq!((ring.inputs(), ring.freshness()), (&[0; 3][..], [Freshness::Never; 3]));
 }
 
@@ -300,12 +300,12 @@ fn a_copy_that_a_subdevice_processed_twice_makes_nothing_fresh() {
 fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
     let mut ring = Ring::new();
     let [mut main, _] = ring.send();
-    meet(&mut main, &[0, 1, 2], 0x10);
+    process(&mut main, &[0, 1, 2], 0x10);
     ring.receive(Link::Redundant, &main);
-    assert_eq!(ring.judge().state, DomainState::Complete);
+    assert_eq!(ring.evaluate().state, DomainState::Complete);
     ring.send();
     assert_eq!(ring.exchange.counters().copies_lost, 1);
-    assert_eq!(ring.judge().state, DomainState::Zero);
+    assert_eq!(ring.evaluate().state, DomainState::Zero);
     assert_eq!((ring.exchange.counters().lost, ring.inputs()), (1, &[0x10, 0x11, 0x12][..]));
 }
 
@@ -313,11 +313,11 @@ fn one_lost_copy_of_a_closed_ring_costs_nothing_and_both_lost_cost_a_cycle() {
 fn a_copy_that_is_not_complete_is_given_up_at_the_deadline_and_its_inputs_are_new() {
     let mut ring = Ring::new();
     let [mut main, _] = ring.send();
-    meet(&mut main, &[0], 0x10);
+    process(&mut main, &[0], 0x10);
     ring.receive(Link::Main, &main);
     let early = ring.exchange.process(DOMAIN, ring.now + PERIOD / 2);
     assert!(early.pending && !ring.exchange.queue(DOMAIN, ring.now + PERIOD / 2));
-    let status = ring.judge();
+    let status = ring.evaluate();
     assert_eq!((status.wkc, status.state, status.skipped), (2, DomainState::Incomplete, 1));
     assert_eq!((ring.exchange.counters().half, ring.inputs()), (1, &[0x10, 0, 0][..]));
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Never, Freshness::Never]);
@@ -327,11 +327,11 @@ fn a_copy_that_is_not_complete_is_given_up_at_the_deadline_and_its_inputs_are_ne
 fn a_copy_that_met_a_subdevice_twice_is_incomplete_though_it_was_delivered() {
     let mut ring = Ring::new();
     let [mut main, mut redundant] = ring.send();
-    meet(&mut main, &[0, 1, 2], 0x10);
-    meet(&mut redundant, &[2], 0x10);
+    process(&mut main, &[0, 1, 2], 0x10);
+    process(&mut redundant, &[2], 0x10);
     ring.receive(Link::Redundant, &main);
     ring.receive(Link::Main, &redundant);
-    let status = ring.judge();
+    let status = ring.evaluate();
     assert_eq!((status.wkc, status.state), (8, DomainState::Incomplete));
 }
 
@@ -341,15 +341,15 @@ fn a_domain_is_complete_without_its_optional_subdevice_but_no_other() {
     for (missing, state) in [(1, DomainState::Complete), (2, DomainState::Incomplete)] {
         let mut ring = Ring::with_optional(vec![false, true, false]);
         ring.board.set_taking_part(missing, false);
-        let judged = [0, 1].map(|_| {
+        let evaluated = [0, 1].map(|_| {
             let [mut main, redundant] = ring.send();
             let present: Vec<usize> = (0..3).filter(|subdevice| *subdevice != missing).collect();
-            meet(&mut main, &present, 0x40);
+            process(&mut main, &present, 0x40);
             ring.receive(Link::Redundant, &main);
             ring.receive(Link::Main, &redundant);
-            ring.judge().state
+            ring.evaluate().state
         });
-        assert_eq!(judged[1], state, "without {missing}");
+        assert_eq!(evaluated[1], state, "without {missing}");
         assert_eq!(ring.freshness()[0], Freshness::Fresh);
     }
 }

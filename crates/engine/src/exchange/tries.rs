@@ -356,7 +356,7 @@ enum Next {
     Never,
 }
 
-/// When a cycle of a domain is judged: frames must be back before.
+/// When a cycle of a domain is evaluated: frames must be back before.
 fn end_of_cycle(domain: &Domain, first: &CyclicFrame, cycle: u64, base_ns: u64, next_at: Instant) -> Instant {
     let period_ns = domain.period_ns();
     let begun = sent_at(first, domain.timeout_ns());

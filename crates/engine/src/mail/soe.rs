@@ -73,8 +73,13 @@ pub enum SoeFailure {
 
 impl fmt::Display for SoeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SoE {}: ", self.address)?;
-        match &self.cause {
+        write!(f, "SoE {}: {}", self.address, self.cause)
+    }
+}
+
+impl fmt::Display for SoeFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             SoeFailure::Mailbox(error) => error.fmt(f),
             SoeFailure::Refused(code) => write!(f, "refused by the drive: {code}"),
             SoeFailure::Drive => write!(f, "drives are numbered from 0 to {}", DRIVES - 1),
@@ -87,6 +92,8 @@ impl fmt::Display for SoeError {
 }
 
 impl core::error::Error for SoeError {}
+
+impl core::error::Error for SoeFailure {}
 
 impl From<MailboxError> for SoeFailure {
     fn from(error: MailboxError) -> SoeFailure {

@@ -115,16 +115,16 @@ struct Watched {
     /// Since the last reading.
     fresh: CableErrors,
     /// Since its last report.
-    untold: CableErrors,
+    unreported: CableErrors,
     /// There were damaged frames at the previous reading too.
     continues: bool,
-    told_at: Option<Instant>,
+    reported_at: Option<Instant>,
 }
 
 impl Watched {
     fn new(cable: Cable) -> Watched {
-        let (fresh, untold) = Default::default();
-        Watched { cable, fresh, untold, continues: false, told_at: None }
+        let (fresh, unreported) = Default::default();
+        Watched { cable, fresh, unreported, continues: false, reported_at: None }
     }
 
     /// Adds the counters of a SubDevice, if it is at one of the ends.
@@ -139,15 +139,15 @@ impl Watched {
     /// Ends a reading: returns the new errors, and an event if they are to be reported.
     fn close(&mut self, now: Instant) -> (CableErrors, Option<Event>) {
         let fresh = core::mem::take(&mut self.fresh);
-        self.untold = self.untold.plus(fresh);
+        self.unreported = self.unreported.plus(fresh);
         let came = fresh.invalid_frames;
         let is_worth_it = came >= MANY || (came > 0 && self.continues);
         self.continues = came > 0;
-        if !is_worth_it || self.told_at.is_some_and(|at| now.since(at) < AGAIN) {
+        if !is_worth_it || self.reported_at.is_some_and(|at| now.since(at) < AGAIN) {
             return (fresh, None);
         }
-        self.told_at = Some(now);
-        let errors = core::mem::take(&mut self.untold);
+        self.reported_at = Some(now);
+        let errors = core::mem::take(&mut self.unreported);
         (fresh, Some(Event::CableErrors { cable: self.cable, errors }))
     }
 }

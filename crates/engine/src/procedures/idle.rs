@@ -106,7 +106,7 @@ impl Watch {
             self.counts = None;
             return;
         }
-        let Some(seen) = self.look().await else { return };
+        let Some(seen) = self.broadcast().await else { return };
         // The application may have begun a scan meanwhile.
         if self.segment.view().is_scanning() {
             self.counts = None;
@@ -179,7 +179,7 @@ impl Watch {
     }
 
     /// One broadcast; `None` if a lost frame is no evidence yet.
-    async fn look(&mut self) -> Option<Seen> {
+    async fn broadcast(&mut self) -> Option<Seen> {
         if self.is_unplugged() {
             return Some(Seen::default());
         }

@@ -25,7 +25,7 @@ const PAUSE: Duration = Duration::from_millis(3);
 /// A latched frame; no other frame is latched until this is dropped.
 pub(super) struct Latches {
     /// Number of SubDevices that latched it.
-    pub met: Wkc,
+    pub answered: Wkc,
     /// Blocks other procedures.
     _turn: Turn,
 }
@@ -40,18 +40,18 @@ pub(super) enum Pauses {
 /// Latches a frame that is alone on the wire in all clocks. Copies on the link `no_return` do not return.
 pub(super) async fn latch(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
-    let met = send(bus, pauses, no_return).await?;
-    Ok(Latches { met, _turn })
+    let answered = send(bus, pauses, no_return).await?;
+    Ok(Latches { answered, _turn })
 }
 
 /// The same, alone if possible; otherwise other frames may falsify some receive times.
 pub(super) async fn latch_anyway(bus: &Bus) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
-    let met = match send(bus, Pauses::Forbidden, None).await {
+    let answered = match send(bus, Pauses::Forbidden, None).await {
         Err(BusError::Busy { .. } | BusError::Disturbed { .. }) => bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?.wkc(),
         other => other?,
     };
-    Ok(Latches { met, _turn })
+    Ok(Latches { answered, _turn })
 }
 
 async fn send(bus: &Bus, pauses: Pauses, no_return: Option<Link>) -> Result<Wkc, BusError> {

@@ -58,7 +58,7 @@ impl Damper {
     }
 
     /// Counts a report. True if from now on the state changes too often to be reported each time.
-    pub(crate) fn tell(&mut self, now: Instant) -> bool {
+    pub(crate) fn count_report(&mut self, now: Instant) -> bool {
         let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
         if refills > 0 {
             self.budget = BUDGET.min(self.budget.saturating_add(u32::try_from(refills).unwrap_or(BUDGET)));
@@ -94,7 +94,7 @@ mod tests {
             if reported_state != flips % 2 && damper.may_report(now) {
                 reported_state = flips % 2;
                 reported += 1;
-                unsteady += u32::from(damper.tell(now));
+                unsteady += u32::from(damper.count_report(now));
             }
         }
         (reported, unsteady)
@@ -131,14 +131,14 @@ mod tests {
             now += Duration::from_millis(30);
             damper.changed(now);
             if damper.may_report(now) {
-                became += u32::from(damper.tell(now));
+                became += u32::from(damper.count_report(now));
             }
         }
         assert_eq!(became, 1);
         assert!(damper.is_unsteady(now) && !damper.may_report(now + Duration::from_millis(999)));
         now += STEADY;
         assert!(!damper.is_unsteady(now) && damper.may_report(now));
-        assert!(!damper.tell(now), "some are reported again");
+        assert!(!damper.count_report(now), "some are reported again");
         damper.changed(now + STEADY);
         assert!(damper.may_report(now + STEADY));
     }

@@ -152,7 +152,7 @@ impl Ring {
                 Some(true) if before == Some(false) => effects.report(Event::LinkUp { link }),
                 Some(true) | None => continue,
             }
-            self.cables[at].tell(now);
+            self.cables[at].count_report(now);
         }
         again
     }
@@ -202,7 +202,7 @@ impl Ring {
         effects.report(event);
         effects.0.push(Effect::MainCount(main));
         self.place_at_host(word, (main, redundant), cabled, effects);
-        if self.damper.tell(now) {
+        if self.damper.count_report(now) {
             effects.report(Event::RingUnsteady { changes: word.changes });
         }
         false
@@ -303,7 +303,7 @@ impl Ring {
             }
         }
         if by_way {
-            self.ways.tell(now);
+            self.ways.count_report(now);
         }
         true
     }

@@ -53,8 +53,13 @@ pub enum LoadFailure {
 
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.path.display())?;
-        match &self.cause {
+        write!(f, "{}: {}", self.path.display(), self.cause)
+    }
+}
+
+impl fmt::Display for LoadFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             LoadFailure::Read(error) => write!(f, "cannot be read: {error}"),
             LoadFailure::TooLarge => write!(f, "expected at most {MAX_BYTES} bytes, got more"),
             LoadFailure::Eni(error) => error.fmt(f),
@@ -63,6 +68,8 @@ impl fmt::Display for LoadError {
 }
 
 impl std::error::Error for LoadError {}
+
+impl std::error::Error for LoadFailure {}
 
 impl EniFile {
     /// Reads a file.

@@ -120,6 +120,8 @@ impl fmt::Display for SubDeviceFailure {
 
 impl StdError for SubDeviceError {}
 
+impl StdError for SubDeviceFailure {}
+
 macro_rules! failures {
     ($($variant:ident($error:ty),)*) => {$(
         impl From<$error> for SubDeviceFailure {

@@ -178,7 +178,7 @@ fn interfaces_of_idle_operation_stay_while_an_application_begins() -> Result<(),
 
 // covers: eoe-interfaces
 #[test]
-fn an_interface_that_must_not_be_made_is_told_once_and_everything_else_goes_on() -> Result<(), Error> {
+fn an_interface_that_cannot_be_created_is_reported_once_and_all_else_continues() -> Result<(), Error> {
     let (supervisor, cyclic) = start()?;
     let make = |name: &str, _| Err(TapError::Permission { name: name.to_owned() });
     let ethernet = supervisor.start_ethernet_on(OPTIONS, Box::new(make))?;

@@ -270,7 +270,7 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
         });
         for round in 0..5 {
             bench.own_traffic(0x5A00 + round);
-            let speaker = bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.bytes(200_000));
+            let speaker = bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.with_bytes(200_000));
             let large = speaker.sdo_read::<Vec<u8>>(LARGE, 0);
             assert_eq!(large.expect("no other message is in this transfer").len(), 100_000);
         }

@@ -93,7 +93,7 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
 fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     let (supervisor, _cyclic) = supervisor()?;
     supervisor.scan()?;
-    let speaker = supervisor.background().subdevice(Position(1)).limits(TRANSFER.bytes(200_000));
+    let speaker = supervisor.background().subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
     let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
 
     let mut limited = start();
@@ -130,7 +130,7 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
         std::thread::sleep(Duration::from_millis(1));
     }
     let supervisor = cycles.supervisor().clone();
-    let speaker = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.bytes(200_000));
+    let speaker = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.with_bytes(200_000));
     let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
     start().abort()?;
     drop(start());

@@ -114,7 +114,7 @@ fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_
 
 // covers: junctions
 #[test]
-fn breaks_of_rings_behind_junctions_are_told_in_the_words_of_seed_001() {
+fn breaks_of_rings_behind_junctions_are_described_in_words() {
     let names = Names(vec!["head".into(), "junction".into(), "first".into(), "second".into()]);
     let port = |node, port| PortOf::new(Position(node as u16), port);
     let words = |event| describe(&TimedEvent::new(Instant(0), event), &names);

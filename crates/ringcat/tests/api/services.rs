@@ -40,7 +40,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     // Before activation, in PREOP.
-    let speaker = supervisor.subdevice(Position(1)).limits(TRANSFER.bytes(200_000));
+    let speaker = supervisor.subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
     assert_eq!(speaker.sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
     let mut request = supervisor.create_sdo_request(SPEAKER, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;

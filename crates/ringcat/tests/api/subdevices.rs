@@ -84,7 +84,7 @@ fn objects_files_idns_and_registers_before_activation_by_position() -> Result<()
     assert!(refused.to_string().contains("0x06020000"), "{refused}");
     let Error::SubDevice(refused) = refused else { panic!("{refused:?}") };
     assert!(matches!(refused.failure, SubDeviceFailure::Sdo(_)), "{refused:?}");
-    let short = TransferLimits::default().bytes(10);
+    let short = TransferLimits::default().with_bytes(10);
     let long = main_device.subdevice(SPEAKER).limits(short).sdo_read::<Vec<u8>>(0x2002, 0);
     assert!(matches!(failure(long), SubDeviceFailure::Sdo(_)));
 
@@ -164,7 +164,7 @@ fn any_thread_uses_a_subdevice_while_cycles_run() -> Result<(), Box<dyn StdError
     let cycles = supervisor.activate(declaration, cyclic)?.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     cycles.supervisor().wait_until_op(LIMIT)?;
     assert_eq!(failure(cycles.supervisor().subdevice(SPEAKER).sdo_info()), SubDeviceFailure::Active);
-    let patient = TransferLimits::default().request(LIMIT).answer(LIMIT);
+    let patient = TransferLimits::default().with_request(LIMIT).with_answer(LIMIT);
     thread::scope(|scope| {
         let threads = [speaker, drive].map(|subdevice| {
             let supervisor = cycles.supervisor().clone();

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     };
     let cycle = arguments.next().and_then(|text| text.parse().ok()).map(Duration::from_micros);
     let read = std::fs::read(&path).map_err(|error| error.to_string());
-    match read.and_then(|bytes| scenarios::capture::judge(&bytes, cycle)) {
+    match read.and_then(|bytes| scenarios::capture::evaluate(&bytes, cycle)) {
         Ok(verdict) => {
             print!("{verdict}");
             if verdict.broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }

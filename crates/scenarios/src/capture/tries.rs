@@ -1,6 +1,6 @@
 //! Frames that are sent again within their cycle: check 10 of [`crate::capture`].
 //!
-//! In go the sent cyclic frames of one link, in the order of time. A cycle begins with a frame that carries a datagram
+//! Input: the sent cyclic frames of one link, in the order of time. A cycle begins with a frame that carries a datagram
 //! with a physical address (supervision, clocks). A later frame of the cycle with process data alone is a further try
 //! if all of it lies in logical addresses that the cycle has addressed before with the same command, or with LRW.
 

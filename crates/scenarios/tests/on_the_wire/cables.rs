@@ -140,7 +140,7 @@ pub fn left_out(lines: &[String]) -> usize {
 fn cuts_of_16_on_interfaces_cost_only_detection_time_and_stalls() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
-    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--tell-all"]);
+    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--all-events"]);
     await_op(&bench, 16);
     std::thread::sleep(PAUSE);
     let mut edges = Vec::new();

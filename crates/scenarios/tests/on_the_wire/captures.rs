@@ -11,7 +11,7 @@ use std::process::{Child, Command, Output};
 use std::time::Duration;
 
 use scenarios::capture::pcapng::Capture;
-use scenarios::capture::{Verdict, judge};
+use scenarios::capture::{Verdict, evaluate};
 
 use crate::bench::{Bench, await_op, finish, program};
 use crate::{PLANTS, RING_OF_16, said};
@@ -52,7 +52,7 @@ impl CaptureFile {
     /// Checks the frames, but not their times, with [`scenarios::capture`] and tshark. `unread` are protocols that
     /// tshark does not decode.
     pub fn check_frames(&self, title: &str, unread: &[&str]) -> Verdict {
-        let verdict = judge(&self.bytes(), Some(Duration::from_millis(1))).expect("a capture");
+        let verdict = evaluate(&self.bytes(), Some(Duration::from_millis(1))).expect("a capture");
         println!("{title}:\n{verdict}");
         assert_eq!(verdict.broken, 0, "{title}");
         check_with_tshark(&self.0, verdict.sent.iter().sum::<u64>() + verdict.received.iter().sum::<u64>(), unread);

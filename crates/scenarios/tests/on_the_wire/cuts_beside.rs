@@ -30,7 +30,8 @@ fn schedule(bench: &Bench) {
 /// The schedule during a run of RingCAT; prints what it cost.
 fn ours(bench: &mut Bench, resend: &str) {
     bench.simulate(&RING_OF_10.segment(), true);
-    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--tell-all", "--resend", resend]);
+    let run =
+        bench.run_ringcat(&["run", "--main", "main0", "--redundant", "main1", "--all-events", "--resend", resend]);
     await_op(bench, 10);
     let begin = Instant::now();
     schedule(bench);

@@ -164,7 +164,7 @@ fn written(capture: &Capture) -> Vec<Vec<(usize, usize)>> {
     mails
 }
 
-// covers: 6.1, mail-judge
+// covers: 6.1, mail-check
 #[test]
 fn a_hundred_power_cycles_give_the_same_list_and_right_counters() {
     if !has_tshark() {
@@ -178,7 +178,7 @@ fn a_hundred_power_cycles_give_the_same_list_and_right_counters() {
     std::fs::remove_file(&path).expect("it was written");
 }
 
-// covers: mail-judge
+// covers: mail-check
 #[test]
 fn a_subdevice_that_sends_its_mail_twice_is_found() {
     if !has_tshark() {
@@ -191,7 +191,7 @@ fn a_subdevice_that_sends_its_mail_twice_is_found() {
     std::fs::remove_file(&path).expect("it was written");
 }
 
-// covers: mail-judge
+// covers: mail-check
 #[test]
 fn modified_mail_is_found() {
     if !has_tshark() {

@@ -16,7 +16,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::map;
 use scenarios::capture::ethercat::Frame;
 use scenarios::capture::pcapng::{Capture, Packet};
-use scenarios::capture::{Verdict, judge, judge_frames};
+use scenarios::capture::{Verdict, evaluate, evaluate_frames};
 use scenarios::dice::Dice;
 use scenarios::segments::{descriptions, line, ring_of_16};
 
@@ -113,7 +113,7 @@ fn lossy() -> (Vec<u8>, u64) {
 #[test]
 fn a_capture_of_frames_that_are_sent_again_has_no_findings() {
     let (bytes, sent_again) = lossy();
-    let verdict = judge(&bytes, None).expect("a capture");
+    let verdict = evaluate(&bytes, None).expect("a capture");
     println!("{verdict}");
     assert_eq!(verdict.broken, 0, "{verdict}");
     assert!(verdict.again == sent_again && sent_again > 20, "{sent_again}: {verdict}");
@@ -134,7 +134,7 @@ fn a_capture_of_frames_that_are_sent_again_has_no_findings() {
             break;
         }
     }
-    let verdict = judge_frames(&capture, None).expect("a capture");
+    let verdict = evaluate_frames(&capture, None).expect("a capture");
     assert!(is_again && verdict.findings.iter().any(|it| it.contains("sent again with other outputs")), "{verdict}");
 }
 
@@ -145,7 +145,7 @@ fn read(bytes: &[u8]) -> Capture {
 // covers: capture
 #[test]
 fn a_capture_on_one_link_has_no_findings() {
-    let verdict = judge(&short(), Some(CYCLE)).expect("a capture");
+    let verdict = evaluate(&short(), Some(CYCLE)).expect("a capture");
     assert_eq!(verdict.broken, 0, "{verdict}");
     assert!(verdict.reads > 50 && verdict.missing == 0 && verdict.pairs == 0, "{verdict}");
     assert_eq!(verdict.returned, verdict.sent[0]);
@@ -154,7 +154,7 @@ fn a_capture_on_one_link_has_no_findings() {
 // covers: CR-01, CR-04, CR-24, CR-25, SM-01, SM-02, capture
 #[test]
 fn a_capture_of_a_ring_that_breaks_and_closes_has_no_findings() {
-    let verdict = judge(&eventful(), None).expect("a capture");
+    let verdict = evaluate(&eventful(), None).expect("a capture");
     println!("{verdict}");
     assert_eq!(verdict.broken, 0, "{verdict}");
     assert_eq!(verdict.pairs, verdict.sent[0]);
@@ -185,7 +185,7 @@ fn the_return_of_a_whole_segment_delays_no_cycle() {
         settle(run);
         cycles(run, 50);
     });
-    let verdict = judge(&file, Some(CYCLE)).expect("a capture");
+    let verdict = evaluate(&file, Some(CYCLE)).expect("a capture");
     println!("{verdict}");
     assert_eq!(verdict.broken, 0, "{verdict}");
     let windows = &verdict.windows[0];
@@ -210,7 +210,7 @@ fn a_tee_changes_nothing_and_records_each_link_and_direction() {
 fn tampered(capture: &Capture, tamper: impl FnOnce(&mut Vec<Packet>)) -> Verdict {
     let mut capture = capture.clone();
     tamper(&mut capture.packets);
-    judge_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
+    evaluate_frames(&capture, Some(CYCLE)).expect("one or two interfaces")
 }
 
 /// The first sent frame of process data in the second half with such a datagram, and the offset of the datagram. (On
@@ -343,7 +343,7 @@ fn damaged_capture_files_never_cause_a_panic() {
         }
         bytes.truncate(bytes.len() - if dice.below(2) == 0 { dice.below(100) as usize } else { 0 });
         // With any result, it ends.
-        let _ = judge(&bytes, None);
+        let _ = evaluate(&bytes, None);
     }
     let frame = [0xFF; 70];
     assert!((0..70).all(|length| Frame::parse(&frame[..length]).is_err()));

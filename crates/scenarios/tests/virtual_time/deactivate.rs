@@ -216,7 +216,7 @@ fn refusals(application: &mut Application<Tap>) -> usize {
 
 // covers: stop
 #[test]
-fn a_failed_configuration_waits_for_a_request_where_the_policy_says_so() {
+fn a_failed_configuration_waits_for_a_request_with_that_policy() {
     for network in networks() {
         let mut application = refusing(network, Retries::OnRequest, 2);
         cycles(&mut application, 3_000);

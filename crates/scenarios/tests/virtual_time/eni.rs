@@ -374,7 +374,7 @@ fn a_network_that_differs_from_the_file_is_reported_per_subdevice() {
     assert!(
         file.compare(&found[..4])
             .iter()
-            .any(|difference| difference.is_grave && difference.subdevice == Some(SubDeviceId(DRIVE)))
+            .any(|difference| difference.prevents_op && difference.subdevice == Some(SubDeviceId(DRIVE)))
     );
 }
 

@@ -21,7 +21,7 @@ const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-output-8"];
 type Device<'a> = ringcat::SubDevice<&'a mut MainDevice<Tap>>;
 
 fn device(main_device: &mut MainDevice<Tap>, position: u16) -> Device<'_> {
-    main_device.subdevice(Position(position)).limits(TRANSFER.bytes(200_000))
+    main_device.subdevice(Position(position)).limits(TRANSFER.with_bytes(200_000))
 }
 
 // covers: jobs, sdo

@@ -41,7 +41,7 @@ fn run(name: &str, target: Target, bytes: &[u8]) {
     target(bytes);
 }
 
-// covers: mail-judge
+// covers: mail-check
 #[test]
 fn corpora_contain_encoder_output_and_each_target_accepts_it() {
     for (name, target) in TARGETS {
@@ -60,7 +60,7 @@ fn corpora_contain_encoder_output_and_each_target_accepts_it() {
     }
 }
 
-// covers: mail-judge
+// covers: mail-check
 #[test]
 fn mutants_of_the_corpora_never_panic_and_re_encode_to_the_same_value() {
     let corpora = TARGETS.map(|(name, target)| (name, target, read(name)));
@@ -132,7 +132,7 @@ fn mutants_of_a_network_file_are_networks_with_a_canonical_text_or_errors() {
     }
 }
 
-// covers: mail-judge
+// covers: mail-check
 #[test]
 fn a_target_with_a_faulty_decoder_is_found() {
     let broken: Target = |bytes| assert!(bytes.get(5) != Some(&0xFF), "a decoder that cannot bear this");

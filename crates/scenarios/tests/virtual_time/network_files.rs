@@ -62,7 +62,7 @@ fn a_network_from_a_scan_reaches_op_on_the_same_bus_with_its_variables() {
 
 // covers: network-file
 #[test]
-fn on_another_bus_the_file_names_what_differs() {
+fn differences_between_the_file_and_another_bus_are_named() {
     let (_, scan) = scanned(&segment(3, 2));
     let network = LoadedNetwork::from_bytes("machine.toml", text_of(&scan).as_bytes()).expect("the file is valid");
     let on = |text: &str| {

@@ -146,7 +146,7 @@ fn with_image(kind: &str, number: usize, image: &[u8]) -> DeviceDescription {
 
 // covers: scan, odd-sii
 #[test]
-fn of_a_damaged_sii_operation_knows_the_same_with_and_without_names() {
+fn a_damaged_sii_gives_the_same_for_operation_with_and_without_names() {
     let (mut odd, mut warned) = (0, 0);
     for seed in 0..120 {
         let dice = &mut Dice::new(seed);

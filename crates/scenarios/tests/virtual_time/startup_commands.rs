@@ -140,7 +140,7 @@ fn a_subdevice_that_loses_op_gets_the_commands_of_the_way_back() {
 
 // covers: 6.6, startup-commands
 #[test]
-fn a_refused_idn_is_told_with_its_number_and_code() {
+fn a_refused_idn_is_reported_with_its_number_and_code() {
     let mut world = world(segment(|_| ()), |config| {
         config.sdo(0x2001, 1, [1, 1]).idn_at(Transition::So, 0, Idn::standard(0, 1), [0xF4, 1])
     });

@@ -4,6 +4,7 @@
 mod any_frames;
 mod clocks;
 mod determinism;
+mod devices_page;
 mod examples;
 mod fast_path;
 mod faults;

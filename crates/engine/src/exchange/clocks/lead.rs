@@ -174,9 +174,9 @@ impl Lead {
         let change_ppb = (self.change_ppb + change).clamp(-MOST_PPB, MOST_PPB);
         let Law { outlier_ns, far_ns, settled_ns, share, .. } = self.law;
         let mean = self.slow >> self.depth;
-        let told = seen.clamp(mean - self.outlier(outlier_ns), mean + self.outlier(outlier_ns));
-        let Lead { noise, depth, slow, .. } = self.hear(seen - mean);
-        let slow = slow + told - (slow >> depth);
+        let limited = seen.clamp(mean - self.outlier(outlier_ns), mean + self.outlier(outlier_ns));
+        let Lead { noise, depth, slow, .. } = self.widen(seen - mean);
+        let slow = slow + limited - (slow >> depth);
         let is_noisy = depth > self.law.slow_depth;
         let expected = self.calm_ahead + self.calm_change;
         let calm_seen = ((seen.clamp(-MOST_NOISE_NS, MOST_NOISE_NS) << CHANGE_FRACTION) - expected) >> CALM_DEPTH;
@@ -210,11 +210,11 @@ impl Lead {
             return Lead { gap, sum, noise, cycles, seen_at, ..self };
         }
         let known = Lead { gap, sum, cycles: MOST_GAP_CYCLES, noise: mean << NOISE_DEPTH, seen_at, ..self };
-        known.hear(mean)
+        known.widen(mean)
     }
 
     /// Takes the size of the jitter: the more there is, the longer means have to be. They never get shorter.
-    fn hear(self, jitter: i64) -> Lead {
+    fn widen(self, jitter: i64) -> Lead {
         if self.law.share.is_some() || self.mode == Mode::Far {
             return self;
         }
@@ -234,7 +234,7 @@ impl Lead {
     /// Difference to write, as nanoseconds ahead; `None`: nothing is written.
     pub fn steering_ns(&self) -> Option<i64> {
         let ahead = self.ahead >> FRACTION;
-        let told = match (self.mode, self.law.share) {
+        let correction = match (self.mode, self.law.share) {
             (Mode::Free, _) => return None,
             (Mode::Near, Some(share)) => self.slow / (1 << (self.depth + share)),
             (Mode::Near, None) if self.depth > self.law.slow_depth => {
@@ -243,7 +243,7 @@ impl Lead {
             (Mode::Near, None) => ahead,
             (Mode::Far, _) => ahead + self.change_ppb * (FORESIGHT_NS / 1_000) / 1_000_000,
         };
-        Some(told.clamp(-MOST_NS, MOST_NS))
+        Some(correction.clamp(-MOST_NS, MOST_NS))
     }
 }
 
@@ -282,37 +282,37 @@ mod tests {
     }
 
     #[test]
-    fn one_that_strays_is_told_of_a_mean_and_left_alone_when_it_is_back() {
+    fn a_clock_that_drifts_is_steered_by_a_mean_until_it_is_back() {
         let strayed = after(Lead::begin(0, true, Instant(0)), [0; 20].into_iter().chain([1_500; 200]));
         assert_eq!(strayed.mode, Mode::Near);
-        let told = strayed.steering_ns().expect("it strayed");
-        assert!((1_400..=1_500).contains(&told), "{told}");
+        let written = strayed.steering_ns().expect("it strayed");
+        assert!((1_400..=1_500).contains(&written), "{written}");
         let back = after(strayed, [0; 1_500]);
         assert_eq!(back.steering_ns(), None);
     }
 
     // covers: 7.4
     #[test]
-    fn one_that_follows_the_host_is_told_of_a_small_part_of_a_long_mean() {
+    fn a_clock_that_follows_the_host_is_steered_by_a_small_part_of_a_long_mean() {
         // Up to 50 us of jitter around a difference of 4 us.
         let late = |count: i64| (0..count).map(|number| 4_000 + (number * 7_919) % 50_001 - 25_000);
         let lead = after(Lead::behind_host(Instant(0)), late(5_000));
         assert_eq!(lead.mode, Mode::Near);
-        let told = lead.steering_ns().expect("it is told in every cycle");
-        assert!((150..=350).contains(&told), "{told}");
+        let written = lead.steering_ns().expect("it is steered in every cycle");
+        assert!((150..=350).contains(&written), "{written}");
         let stray = after(lead, [40_000; 200]);
         assert_eq!(stray.mode, Mode::Far);
-        assert!(stray.steering_ns().is_some_and(|told| told > 30_000), "{stray:?}");
+        assert!(stray.steering_ns().is_some_and(|written| written > 30_000), "{stray:?}");
         assert!(stray.is_fresh(Instant(stray.seen_at.0 + FRESH_NS)));
         assert!(!stray.is_fresh(Instant(stray.seen_at.0 + FRESH_NS + 1)));
     }
 
     #[test]
-    fn one_that_is_far_away_is_told_where_it_will_be() {
+    fn a_clock_that_is_far_away_is_steered_by_its_predicted_difference() {
         // 100 ppm fast, observed from the beginning.
         let lead = after(Lead::begin(0, true, Instant(0)), (1..400).map(|cycle| cycle * 100));
         assert_eq!(lead.mode, Mode::Far);
-        let told = lead.steering_ns().expect("it is far away");
-        assert!(told > 39_000, "{told}");
+        let written = lead.steering_ns().expect("it is far away");
+        assert!(written > 39_000, "{written}");
     }
 }

@@ -13,8 +13,9 @@ impl Place {
     pub fn increments(&self, links: [bool; 2]) -> impl Iterator<Item = (usize, Option<u16>)> {
         let (sum, is_summed) = (self.sum(links), self.is_summed());
         let all = u32::from(self.expected.0);
-        let did = move |seen: &[bool; 2]| seen.iter().zip(links).any(|(did, arrived)| *did && arrived);
-        let known = self.contributions.iter().filter(|it| did(&it.did)).map(|it| u32::from(it.wkc.0)).sum();
+        let processed =
+            move |seen: &[bool; 2]| seen.iter().zip(links).any(|(processed, arrived)| *processed && arrived);
+        let known = self.contributions.iter().filter(|it| processed(&it.processed)).map(|it| u32::from(it.wkc.0)).sum();
         let is_alone = self.contributions.len() == 1;
         self.contributions.iter().map(move |it| {
             let full = it.wkc.0;
@@ -22,7 +23,7 @@ impl Place {
                 0 => Some(0),
                 _ if is_alone => Some(sum.min(full.into()) as u16),
                 _ if is_summed => (sum == all).then_some(full),
-                _ if did(&it.did) => Some(full),
+                _ if processed(&it.processed) => Some(full),
                 // What is left was added by SubDevices that did not process the copy completely.
                 _ => (sum == known).then_some(0),
             };

@@ -40,7 +40,7 @@ impl Place {
             // A sum without an optional SubDevice proves nothing about that one.
             self.is_complete(links) && (it.required || self.sum(links) == u32::from(self.expected.0))
         } else {
-            on_any(&it.did) && (!it.has_inputs || on_any(&it.met))
+            on_any(&it.processed) && (!it.has_inputs || on_any(&it.delivered))
         };
         if is_proved { self.proof_of(it) } else { Proved::default() }
     }

@@ -135,11 +135,11 @@ fn while_the_home_domain_is_on_the_wire_nothing_else_supervises() {
 fn a_domain_that_is_processed_twice_keeps_its_result() {
     let mut ring = Ring::new();
     let [mut main, redundant] = ring.send();
-    meet(&mut main, &[0, 1, 2], 0x40);
+    process(&mut main, &[0, 1, 2], 0x40);
     ring.receive(Link::Redundant, &main);
     ring.receive(Link::Main, &redundant);
-    let first = ring.judge();
-    assert_eq!((first, first.state), (ring.judge(), DomainState::Complete));
+    let first = ring.evaluate();
+    assert_eq!((first, first.state), (ring.evaluate(), DomainState::Complete));
 }
 
 // covers: cycles
@@ -159,7 +159,7 @@ fn the_cyclic_half_may_move_to_another_thread() {
     let mut ring = Ring::new();
     moves(&ring.exchange);
     let [mut main, redundant] = ring.send();
-    meet(&mut main, &[0, 1, 2], 0x40);
+    process(&mut main, &[0, 1, 2], 0x40);
     let mut ring = std::thread::spawn(move || {
         ring.receive(Link::Redundant, &main);
         ring.receive(Link::Main, &redundant);
@@ -167,5 +167,5 @@ fn the_cyclic_half_may_move_to_another_thread() {
     })
     .join()
     .unwrap();
-    assert_eq!(ring.judge().state, DomainState::Complete);
+    assert_eq!(ring.evaluate().state, DomainState::Complete);
 }

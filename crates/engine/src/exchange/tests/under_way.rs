@@ -13,14 +13,14 @@ fn with_under_way(cycles: u8) -> Ring {
 
 /// The copies of a flight as they come back through a closed ring.
 fn closed([mut main, redundant]: [Vec<u8>; 2], base: u8) -> [(Link, Vec<u8>); 2] {
-    meet(&mut main, &ALL, base);
+    process(&mut main, &ALL, base);
     [(Link::Redundant, main), (Link::Main, redundant)]
 }
 
 /// As they come back where the first of the SubDevices are on the main side of a break.
 fn cut([mut main, mut redundant]: [Vec<u8>; 2], before: usize, base: u8) -> [(Link, Vec<u8>); 2] {
-    meet(&mut main, &ALL[..before], base);
-    meet(&mut redundant, &ALL[before..], base);
+    process(&mut main, &ALL[..before], base);
+    process(&mut redundant, &ALL[before..], base);
     [(Link::Main, main), (Link::Redundant, redundant)]
 }
 
@@ -199,7 +199,7 @@ proptest! {
                 Way::Cut(before) => cut(sent, before, base),
                 Way::Without(missing) => {
                     let [mut main, redundant] = sent;
-                    meet(&mut main, &[(missing + 1) % 3, (missing + 2) % 3], base);
+                    process(&mut main, &[(missing + 1) % 3, (missing + 2) % 3], base);
                     [(Link::Redundant, main), (Link::Main, redundant)]
                 }
             };

@@ -52,8 +52,13 @@ pub enum SdoFailure {
 
 impl fmt::Display for SdoError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SDO {}: ", self.object)?;
-        match &self.cause {
+        write!(f, "SDO {}: {}", self.object, self.cause)
+    }
+}
+
+impl fmt::Display for SdoFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             SdoFailure::Mailbox(error) => error.fmt(f),
             SdoFailure::Aborted(code) => write!(f, "aborted by the SubDevice: {code}"),
             SdoFailure::Toggle => f.write_str("the SubDevice did not alternate the toggle bit"),
@@ -73,3 +78,5 @@ impl fmt::Display for SdoError {
 }
 
 impl core::error::Error for SdoError {}
+
+impl core::error::Error for SdoFailure {}

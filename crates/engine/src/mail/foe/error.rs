@@ -76,6 +76,8 @@ impl fmt::Display for FoeFailure {
 
 impl core::error::Error for FoeError {}
 
+impl core::error::Error for FoeFailure {}
+
 impl From<MailboxError> for FoeFailure {
     fn from(error: MailboxError) -> FoeFailure {
         FoeFailure::Mailbox(error)

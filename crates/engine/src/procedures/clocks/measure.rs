@@ -127,8 +127,8 @@ async fn measure_open(
     wiring.open(branches);
     // An end of a ring in a closed branch needs no command, and could not receive the command that restores it.
     let links = if survey.is_closed { 1 } else { TREES };
-    let met: Vec<usize> = (0..links).flat_map(|link| wiring.path(link)).map(|arrival| arrival.at.node).collect();
-    let is_reached = |at: &&PortOf| branches.is_empty() || met.contains(&at.node);
+    let passed: Vec<usize> = (0..links).flat_map(|link| wiring.path(link)).map(|arrival| arrival.at.node).collect();
+    let is_reached = |at: &&PortOf| branches.is_empty() || passed.contains(&at.node);
     let all: Vec<PortOf> = rings.iter().chain(branches).filter(is_reached).copied().collect();
     let ports: Vec<(StationAddress, u8)> = all.iter().map(|at| (survey.stations[at.node], at.port)).collect();
     let text = |error: BusError| error.to_string();
@@ -391,9 +391,9 @@ pub(super) async fn latch(
     let read: Vec<Option<Latched>> = read.await.into_iter().collect::<Result<_, _>>()?;
     // A SubDevice that the frame has not passed still has the times of an earlier frame.
     let answered = Wkc(read.iter().flatten().count() as u16);
-    if latches.met.0 < answered.0 {
+    if latches.answered.0 < answered.0 {
         let target = Target::Broadcast(map::DC_RECEIVE_TIME);
-        return Err(BusError::Wkc { target, expected: answered, got: latches.met });
+        return Err(BusError::Wkc { target, expected: answered, got: latches.answered });
     }
     Ok(read)
 }

@@ -43,6 +43,8 @@ impl fmt::Display for NotLocked {
     }
 }
 
+impl core::error::Error for NotLocked {}
+
 /// Why SYNC signals were not started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::procedures) enum SignalsError {

@@ -72,7 +72,7 @@ impl Segment {
         if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
             let reason = format!(
                 "the SubDevice at position {} may be this one or another one of its kind that is missed: no cable \
-                 tells which, and it has no serial number",
+                 shows which, and it has no serial number",
                 it.position.0
             );
             effects.failed(index, reason);

@@ -104,7 +104,7 @@ fn loaded_registers(subdevice: &SubDevice, device: &mut DeviceDescription) {
 }
 
 /// Appends the station address to names that several devices have.
-pub(super) fn tell_apart(eni: &Eni, devices: &mut [DeviceDescription]) {
+pub(super) fn make_names_unique(eni: &Eni, devices: &mut [DeviceDescription]) {
     let mut names = BTreeSet::new();
     for (number, device) in devices.iter_mut().enumerate() {
         if names.insert(device.name.clone()) && !device.name.is_empty() {

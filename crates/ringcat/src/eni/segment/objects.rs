@@ -53,7 +53,9 @@ pub(super) fn objects(
 ) -> Vec<Object> {
     let commands = subdevice.mailbox.iter().flat_map(|mailbox| &mailbox.coe);
     let mut written: BTreeMap<u16, BTreeMap<u8, Entry>> = BTreeMap::new();
-    for command in commands.filter(|command| command.index >= OF_PROFILE || is_lonely(command.index, pdos, declared)) {
+    for command in
+        commands.filter(|command| command.index >= OF_PROFILE || is_created_here(command.index, pdos, declared))
+    {
         let entries = written.entry(command.index).or_default();
         if command.complete_access {
             let data = if command.sub_index == 0 { command.data.get(2..).unwrap_or_default() } else { &command.data };
@@ -88,7 +90,7 @@ pub(super) fn objects(
 
 /// Communication objects that no other part of the device creates: neither assignment nor mapping of a known PDO nor
 /// identity.
-fn is_lonely(index: u16, pdos: &[PdoDescription], declared: &[SyncManagerDescription]) -> bool {
+fn is_created_here(index: u16, pdos: &[PdoDescription], declared: &[SyncManagerDescription]) -> bool {
     let number = usize::from(index.saturating_sub(ASSIGNMENT_BASE));
     let exchanges = |sm: &SyncManagerDescription| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs);
     let assignment = (ASSIGNMENT_BASE..ASSIGNMENT_BASE + 0x20).contains(&index);

@@ -118,7 +118,7 @@ const MISTAKES: &[(&str, &str)] = &[
 
 // covers: sim-files
 #[test]
-fn mistakes_are_told_in_terms_of_toml_with_key_line_and_what_is_allowed() {
+fn errors_are_in_terms_of_toml_with_key_line_and_what_is_allowed() {
     for (text, expected) in MISTAKES {
         assert_eq!(refused(text), *expected, "{text}");
     }

@@ -48,7 +48,7 @@ impl Segment {
             largest = largest.max(magnitude);
         }
         // While a reference is steered, the exchange does not see the differences of the others from their reference.
-        let is_steered = references.iter().all(Option::is_some) || self.board.clocks.is_host_told();
+        let is_steered = references.iter().all(Option::is_some) || self.board.clocks.shows_host_jitter();
         self.observe_window(largest, is_steered, effects);
         self.observe_lock(all, largest, is_steered, effects);
     }
