@@ -7,6 +7,7 @@
 mod beside;
 mod configured;
 mod exchange;
+mod jobs;
 mod junction;
 mod live;
 mod options;
@@ -23,8 +24,8 @@ use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    Application, CyclicThread, Declaration, Event, Instant, JunctionConnection, JunctionMode, LastOutputs, Links,
-    Options, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread, SyncSignals, automatic,
+    Application, CyclicThread, Declaration, Event, Instant, JobProbe, JunctionConnection, JunctionMode, LastOutputs,
+    Links, Options, ProcessData, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread, SyncSignals, automatic,
 };
 
 use crate::access::AccessArguments;
@@ -40,6 +41,7 @@ use crate::times::in_words;
 use crate::verdict::{Report, Verdict};
 use configured::{ConfiguredNetwork, Watched};
 use exchange::Run;
+use jobs::Jobs;
 use live::Live;
 pub use options::RunArguments;
 use pace::Seen;
@@ -51,8 +53,8 @@ const STOP_LIMIT: Duration = Duration::from_secs(5);
 
 /// The application of this command, with a possible recording of all frames.
 type Recorded = Application<Tee<PacketLinks>, SupervisorThread>;
-/// The cycles, the variables of the ENI that are printed, the SubDevices of [`sent_once`].
-type Started = (CyclicThread<Tee<PacketLinks>>, Watched, Vec<SentOnce>);
+/// The cycles, the variables of the ENI that are printed, the SubDevices of [`sent_once`], times of jobs.
+type Started = (CyclicThread<Tee<PacketLinks>>, Watched, Vec<SentOnce>, Jobs);
 
 /// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
 pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
@@ -84,7 +86,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
     let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
-    let (cycles, watched, sent_once) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
+    let (cycles, watched, sent_once, jobs) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
     let log = RunLog::new(begin, EventLog::new(begin, names).with_every_event(arguments.all_events), surroundings);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
@@ -109,7 +111,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     if undeclared > 0 {
         reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
     }
-    let data = finish(run, &mut at_end, &interfaces.links, &mut reasons);
+    let data = finish(run, &mut at_end, &jobs, &interfaces.links, &mut reasons);
     let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
     let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
     let verdict = Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete"));
@@ -211,27 +213,32 @@ fn start_cycles(
         None => (None, Watched::default()),
     };
     let (thread, asked) = (arguments.access.thread, end.clone());
-    let cycles = application.start_cycles(
-        move || thread.prepare_cycles(),
-        move |data| {
-            if let Some(work) = &mut work {
-                work.cycle(data);
-            }
-            // Here too: this thread runs where others get no processor time.
-            if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        },
-    )?;
-    Ok((cycles, watched, sent_once))
+    let prepare = move || thread.prepare_cycles();
+    let work = move |data: &mut ProcessData<'_>| {
+        if let Some(work) = &mut work {
+            work.cycle(data);
+        }
+        // Here too: this thread runs where others get no processor time.
+        if asked.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let probe = arguments.jobs.then(JobProbe::default);
+    let jobs = Jobs(probe.as_ref().map(|probe| probe.times().clone()));
+    let cycles = match probe {
+        Some(probe) => application.start_cycles_probed(probe, prepare, work)?,
+        None => application.start_cycles(prepare, work)?,
+    };
+    Ok((cycles, watched, sent_once, jobs))
 }
 
 /// Ends the cycles, prints the summary, and stops all SubDevices. What of that fails is a reason.
-fn finish(run: Run, end: &mut End, links: &LinkNames, reasons: &mut Vec<String>) -> Data {
+fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut Vec<String>) -> Data {
     let application = run.cycles.end().unwrap_or_else(|panicked| {
         reasons.push(panicked.to_string());
         panicked.application
     });
     let names = run.log.events().names();
     summary(&application, run.log.surroundings());
+    jobs.account();
     if run.clocks {
         clock_account(end.exchanged.clocks(), application.news(), names);
     }
@@ -241,6 +248,7 @@ fn finish(run: Run, end: &mut End, links: &LinkNames, reasons: &mut Vec<String>)
     json.ethernet = run.beside.json_ethernet();
     json.gateway = run.beside.json_gateway();
     json.variables = run.watched.json();
+    json.jobs = jobs.json();
     match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
         Ok((supervisor, mut tee)) => {
             json.interfaces = final_account(&mut tee, &supervisor, links);

@@ -64,7 +64,7 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use leaving::{Leaving, send_twice};
-use missed::{Missed, give_up_overdue, note_missing};
+use missed::{Missed, give_up, give_up_overdue, note_missing};
 use service::Service;
 use shares::Shares;
 
@@ -300,6 +300,11 @@ impl Exchange {
                 wkc += outcome.wkc;
                 left = frame.left();
             }
+            let is_unsent = domain.has_not_left(&set);
+            if is_unsent && domain.evaluated() == left {
+                // It was evaluated without an answer, and is evaluated again when it has left.
+                return domain.status(false);
+            }
             if waiting {
                 let (missed, counters) = (&mut self.missed, self.tally.disturbed());
                 let pending = give_up_overdue(domain, &mut self.frames, set.clone(), now, missed, counters);
@@ -320,9 +325,13 @@ impl Exchange {
                 for (index, frame) in set.clone().zip(&self.frames[set.clone()]) {
                     self.shares.post(frame, self.again.get(index).and_then(Option::as_ref), &self.board);
                 }
-                if !complete {
+                if !complete && !is_unsent {
                     outcome::count_errors(set, &self.frames, &self.again, &self.board);
                 }
+            }
+            if is_unsent {
+                domain.await_departure();
+                break;
             }
         }
         domain.status(false)
@@ -380,6 +389,10 @@ impl Exchange {
             return false;
         }
         for frame in frames.iter_mut().filter(|frame| frame.is_open()) {
+            if frame.is_waiting() {
+                give_up(frame, &mut self.missed, self.tally.disturbed());
+                self.board.post_lost(self.tally.counters.lost);
+            }
             if frame.is_delivered() {
                 self.tally.disturbed().copies_lost += 1;
             }

@@ -18,10 +18,12 @@ mod found;
 mod function;
 mod gateway;
 mod idle;
+mod image_memory;
 mod live_status;
 mod loaded;
 mod lrw;
 mod mail;
+mod memories;
 mod options;
 mod pending;
 mod prepare;
@@ -30,6 +32,7 @@ mod registered;
 mod registered_area;
 mod registration;
 mod repeats;
+mod sampling;
 mod sent_once;
 mod services;
 pub mod snapshot;
@@ -57,6 +60,7 @@ pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use function::{Function, Permission};
+pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
@@ -92,6 +96,7 @@ use crate::segment::{Choices, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
+use memories::Memories;
 
 /// Unfetched events at which those of the cyclic half wait in their queue, unless clients have queues of their own: a
 /// quarter of the log.
@@ -128,6 +133,8 @@ pub struct MainDevice {
     loaded: Option<Loaded>,
     /// Ethernet of SubDevices whose port was requested.
     ports: BTreeMap<Address, EthernetPort>,
+    /// Memory of the loaded declaration.
+    memories: Memories,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
@@ -164,6 +171,7 @@ impl MainDevice {
             statistics: None,
             statistics_period: None,
             loaded: None,
+            memories: Memories::default(),
             ports: BTreeMap::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),
@@ -448,6 +456,7 @@ fn choices(options: &Options) -> Choices {
     Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
+        idle_operation: options.idle_operation,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

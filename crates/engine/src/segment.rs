@@ -8,6 +8,7 @@
 //! A scan takes time, and the segment changes meanwhile. So results contain the versions at their start ([`Versions`],
 //! the number of an attempt), and outdated results are refused.
 
+mod addressed;
 mod addresses;
 mod attention;
 mod breaks;
@@ -47,6 +48,7 @@ pub mod unassigned;
 mod versions;
 pub mod view;
 
+pub use addressed::Addressed;
 pub use cabling::{Cabling, stations_by_position};
 pub use choices::Choices;
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};

@@ -29,7 +29,7 @@ enum Reason {
 use Reason::{Cyclic, Pace, Register, Retry, Settle, Turn};
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 34] = [
+const WAITS: [(&str, &[Reason]); 35] = [
     ("mail/reader.rs", &[Register]),
     ("mail/writer.rs", &[Register]),
     ("procedures/al_state.rs", &[Register, Register, Register]),
@@ -50,6 +50,7 @@ const WAITS: [(&str, &[Reason]); 34] = [
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
     ("procedures/recover.rs", &[Retry, Retry]),
+    ("procedures/sample.rs", &[Cyclic]),
     ("procedures/scan.rs", &[Register]),
     ("procedures/scan/count.rs", &[Register, Register]),
     ("procedures/services/ports.rs", &[Register]),

@@ -11,7 +11,7 @@ use ringcat_engine::time::Instant;
 use crate::error::Error;
 use crate::links::Links;
 use crate::not_ready::{KeptEvents, Reason};
-use crate::subdevice::{SubDeviceName, info};
+use crate::subdevice::SubDeviceName;
 use crate::window::{Half, Window};
 
 /// Functions of the acyclic half for an application, in either thread.
@@ -46,6 +46,9 @@ pub trait AcyclicHalf {
 
     /// Its counters. Not for the cyclic path.
     fn counters(&self) -> AcyclicCounters;
+
+    /// Calls a function with the time and its counters now and each second until the application ends.
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static);
 
     /// Data of the scan about a declared SubDevice. Not for the cyclic path.
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo>;
@@ -118,8 +121,12 @@ impl AcyclicHalf for Inline {
         self.engine.counters()
     }
 
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static) {
+        self.engine.sample_each_second(take);
+    }
+
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        info(&self.engine, subdevice.0)
+        self.engine.info(subdevice)
     }
 
     fn keep_events(&mut self, now: Instant) {

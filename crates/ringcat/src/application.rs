@@ -34,6 +34,7 @@ use crate::histogram::Histogram;
 use crate::links::Links;
 use crate::news::News;
 use crate::pace::{Pace, Trigger};
+use crate::probe::{CycleJob, CycleProbe, Lap};
 use crate::process_data::ProcessData;
 use crate::window::Window;
 
@@ -61,25 +62,38 @@ pub struct Application<L, H = Inline> {
 }
 
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
-    pub(crate) fn new(links: L, acyclic: H, active: Active, window: Arc<Window>) -> Application<L, H> {
+    pub(crate) fn new(links: L, mut acyclic: H, active: Active, window: Arc<Window>) -> Application<L, H> {
         let live_status = active.live_status.clone();
         let cyclic = Cyclic::new(active, window.clone(), links.now());
+        let samples = cyclic.observed.samples();
+        acyclic.sample_each_second(move |now, counters| samples.take(now, counters));
         Application { links, cyclic, acyclic, window, live_status }
     }
 
     /// Waits for the next cycle, evaluates the domains that are due, runs `work`, sends.
+    #[inline(always)]
     pub fn cycle<R>(&mut self, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
-        let (now, looked_at) = self.wait_for_cycle();
+        self.cycle_probed(&mut (), work)
+    }
+
+    /// As [`Application::cycle`], with a probe for its steps: [`JobProbe`](crate::JobProbe) records the time of each
+    /// job, [`FramesIn`](crate::FramesIn) reports the return of the last frame.
+    #[inline(always)]
+    pub fn cycle_probed<P: CycleProbe, R>(&mut self, probe: &mut P, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
+        let (now, looked_at) = self.wait_for_cycle(probe);
+        let mut lap = Lap::begin::<P>(|| self.links.now());
         self.cyclic.begin(now, looked_at);
+        lap.done(probe, CycleJob::Process, || self.links.now());
         let result = work(&mut self.cyclic.data(now));
-        self.cyclic.end(now, &mut self.links);
+        lap.done(probe, CycleJob::Work, || self.links.now());
+        self.cyclic.end(now, &mut self.links, probe, lap);
         result
     }
 
     /// Waits until the cycle begins. Returns the time, and the time at which the last check for frames began.
     #[inline(always)]
-    fn wait_for_cycle(&mut self) -> (Instant, Instant) {
-        let left_at = self.wait_for_only_frame();
+    fn wait_for_cycle(&mut self, probe: &mut impl CycleProbe) -> (Instant, Instant) {
+        let left_at = self.wait_for_only_frame(probe);
         let now = self.links.now();
         if let Some(left_at) = left_at {
             self.note_round_trip(left_at, now);
@@ -88,13 +102,13 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         if is_idle && self.cyclic.begins(now) {
             return (now, now);
         }
-        self.wait_for_frames()
+        self.wait_for_frames(probe)
     }
 
     /// The fast path of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. Returns
     /// the departure of the frame if it came back. Ends early if the acyclic half shares the links and has work.
     #[inline(always)]
-    fn wait_for_only_frame(&mut self) -> Option<Instant> {
+    fn wait_for_only_frame<P: CycleProbe>(&mut self, probe: &mut P) -> Option<Instant> {
         let Application { links, cyclic, acyclic, .. } = self;
         if !cyclic.exchange.awaits_only_frame() || !links.knows_arrivals() {
             return None;
@@ -110,7 +124,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         if H::SHARES_LINKS {
             now = links.now();
         }
-        let mut is_back = false;
+        let (mut is_back, mut lap) = (false, Lap::begin::<P>(|| links.now()));
         links.receive(&mut |link, frame| {
             if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
                 acyclic.receive(link, frame, now);
@@ -120,6 +134,10 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         });
         if !is_back {
             return None;
+        }
+        lap.done(probe, CycleJob::Receive, || links.now());
+        if P::AWAITS_FRAMES && !cyclic.exchange.awaits_frames() {
+            probe.frames_are_in(links.now());
         }
         if cyclic.may_begin_early() {
             return Some(left_at);
@@ -138,11 +156,11 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Receives frames, and runs the acyclic half if it shares the links, until the cycle begins. Returns the time, and
     /// the time at which the last check for frames began.
     #[inline(never)]
-    fn wait_for_frames(&mut self) -> (Instant, Instant) {
+    fn wait_for_frames(&mut self, probe: &mut impl CycleProbe) -> (Instant, Instant) {
         loop {
             // Read once per wait.
             let looked_at = self.links.now();
-            self.take_in(looked_at);
+            self.take_in(looked_at, probe);
             // Before the acyclic half, for which the wire is not kept free any longer if nothing is sent again.
             let decide_at = match self.cyclic.exchange.sends_again() {
                 true => self.cyclic.decide_if_due(looked_at, &mut self.links),
@@ -172,8 +190,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// if this is called when frames usually are back, at [`Application::receive_again_at`], and once more before
     /// [`Application::process`].
     pub fn receive(&mut self) {
+        self.receive_probed(&mut ());
+    }
+
+    pub(crate) fn receive_probed(&mut self, probe: &mut impl CycleProbe) {
         let now = self.links.now();
-        self.take_in(now);
+        self.take_in(now, probe);
         self.cyclic.decide_if_due(now, &mut self.links);
         self.work_if_due(now);
     }
@@ -187,8 +209,10 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// Takes all frames that have arrived.
     #[inline(always)]
-    fn take_in(&mut self, now: Instant) {
+    fn take_in<P: CycleProbe>(&mut self, now: Instant, probe: &mut P) {
+        let mut awaits_frames = P::AWAITS_FRAMES && self.cyclic.exchange.awaits_frames();
         loop {
+            let mut lap = Lap::begin::<P>(|| self.links.now());
             let Application { links, acyclic, cyclic, .. } = self;
             let mut left_at = None;
             let any = links.receive(&mut |link, frame| {
@@ -203,6 +227,11 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             }
             if let Some(left_at) = left_at {
                 self.note_round_trip(left_at, now);
+            }
+            lap.done(probe, CycleJob::Receive, || self.links.now());
+            if awaits_frames && !self.cyclic.exchange.awaits_frames() {
+                awaits_frames = false;
+                probe.frames_are_in(self.links.now());
             }
         }
     }

@@ -15,7 +15,9 @@ use ringcat_engine::time::Instant;
 
 use crate::links::Links;
 use crate::news::News;
+use crate::observer::Observed;
 use crate::pace::{PaceNs, Trigger};
+use crate::probe::{CycleJob, CycleProbe, Lap};
 use crate::process_data::{ProcessData, Rate};
 use crate::window::{Half, SHORTEST, Window};
 
@@ -26,12 +28,24 @@ const PAUSE_LOOK: Duration = Duration::from_micros(20);
 /// Period of an application without a domain that has one.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
 
+/// What is published of the states of the domains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum States {
+    /// They are evaluated and published in each cycle.
+    Changing,
+    /// The news include them; there is one domain, and none of its frames is expected.
+    Settled,
+    /// As changing, and the next evaluation takes a snapshot.
+    Wanted,
+}
+
 #[derive(Debug)]
 pub(crate) struct Cyclic {
     pub exchange: Exchange,
     pub directory: Directory,
     pub pace: PaceNs,
     pub news: Arc<News>,
+    pub observed: Arc<Observed>,
     rates: Vec<Rate>,
     period_ns: u64,
     /// A cycle is late when its delay reaches this time.
@@ -59,8 +73,7 @@ pub(crate) struct Cyclic {
     window: Arc<Window>,
     /// Number of disturbances that the news include.
     published: u64,
-    /// The news include the states of all domains; there is one, and none of its frames is expected.
-    is_settled: bool,
+    states: States,
 }
 
 impl Cyclic {
@@ -72,11 +85,14 @@ impl Cyclic {
         let next_cycle = now + period;
         let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         window.expect_cycle(next_cycle);
+        let news = Arc::new(News::new(periods.len()));
+        let observed = Observed::new(news.clone(), active.live_status, &active.exchange, &active.directory);
         Cyclic {
             exchange: active.exchange,
             directory: active.directory,
             pace: PaceNs::default(),
-            news: Arc::new(News::new(periods.len())),
+            news,
+            observed: Arc::new(observed),
             rates: periods.iter().map(rate).collect(),
             period_ns,
             late_ns: period_ns / LATE_FRACTION,
@@ -86,7 +102,7 @@ impl Cyclic {
             followed: Instant::NEVER,
             begun_at: now,
             left_at: Instant::NEVER,
-            is_settled: false,
+            states: States::Changing,
             next_cycle,
             earliest: next_cycle,
             cycle: 0,
@@ -188,8 +204,10 @@ impl Cyclic {
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
         self.keep_pace(now);
-        if !(self.is_settled && self.exchange.process_unchanged()) {
-            self.process_due(looked_at);
+        match self.states {
+            States::Settled if self.exchange.process_unchanged() => {}
+            States::Wanted => self.process_and_show(looked_at),
+            States::Settled | States::Changing => self.process_due(looked_at),
         }
     }
 
@@ -204,11 +222,19 @@ impl Cyclic {
         self.note_states();
     }
 
+    /// Evaluates the due domains, and takes a snapshot.
+    #[cold]
+    fn process_and_show(&mut self, looked_at: Instant) {
+        self.process_due(looked_at);
+        self.observed.fill(self.cycle, self.begun_at, &self.exchange, &self.rates);
+    }
+
     /// Publishes the states of the domains after any was evaluated.
     fn note_states(&mut self) {
         self.news.publish_rates(&self.rates);
         self.news.publish_ring(self.exchange.ring());
-        self.is_settled = matches!(&self.rates[..], [alone] if !alone.status.pending);
+        let is_settled = matches!(&self.rates[..], [alone] if !alone.status.pending);
+        self.states = if is_settled { States::Settled } else { States::Changing };
     }
 
     /// Records the delay of the cycle, and sets the time of the next one.
@@ -309,7 +335,7 @@ impl Cyclic {
 
     /// Ends the cycle: sends the due domains.
     #[inline(always)]
-    pub fn end(&mut self, now: Instant, links: &mut impl Links) {
+    pub fn end<P: CycleProbe>(&mut self, now: Instant, links: &mut impl Links, probe: &mut P, mut lap: Lap) {
         let is_alone = self.exchange.load_only_frame();
         if !is_alone {
             self.queue_due(now);
@@ -317,6 +343,7 @@ impl Cyclic {
         // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not
         // from the beginning of the work.
         let now = links.now();
+        lap.done(probe, CycleJob::Queue, || now);
         let next = match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => self.next_cycle,
             Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,
@@ -335,6 +362,10 @@ impl Cyclic {
             self.send(now, next, links);
         }
         self.publish();
+        lap.done(probe, CycleJob::Send, || links.now());
+        if P::TIMES_JOBS {
+            probe.cycle_ended();
+        }
     }
 
     /// Copies the outputs of the due domains into their frames.
@@ -393,12 +424,21 @@ impl Cyclic {
         if let Some(rate) = self.rates.get_mut(domain.0) {
             rate.status = status;
         }
+        let is_wanted = self.states == States::Wanted;
         self.note_states();
+        if is_wanted {
+            self.observed.fill(self.cycle, now, &self.exchange, &self.rates);
+        }
         status
     }
 
     /// Sends the queued frames, for an application with its own loop: the next cycle is expected one period later.
     pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
+        if self.states == States::Wanted {
+            // No domain was processed since the request.
+            self.states = States::Changing;
+            self.observed.fill(self.cycle, now, &self.exchange, &self.rates);
+        }
         self.pace.cycles += 1;
         self.next_cycle = Instant(now.0.saturating_add(self.period_ns));
         self.earliest = self.next_cycle;
@@ -410,9 +450,17 @@ impl Cyclic {
     fn publish(&mut self) {
         self.news.publish_cycle(&self.pace, self.exchange.counters());
         let disturbances = self.exchange.disturbances() + self.pace.disturbances;
-        if disturbances != self.published || self.news.is_restart_wanted() {
-            self.published = disturbances;
-            self.news.publish_rest(&self.pace, self.exchange.counters());
+        if disturbances != self.published || self.news.is_any_wanted() {
+            self.publish_rest(disturbances);
+        }
+    }
+
+    /// Publishes what changes only in disturbed cycles, and carries out what readers want.
+    #[cold]
+    fn publish_rest(&mut self, disturbances: u64) {
+        self.published = disturbances;
+        if self.news.publish_rest(&self.pace, self.exchange.counters()) {
+            self.states = States::Wanted;
         }
     }
 

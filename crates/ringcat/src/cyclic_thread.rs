@@ -18,6 +18,7 @@ use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
 use crate::news::News;
+use crate::probe::CycleProbe;
 use crate::process_data::ProcessData;
 use crate::supervisor_thread::SupervisorThread;
 
@@ -81,7 +82,20 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
     /// # Errors
     /// The system cannot start a thread.
     pub fn start_cycles(
+        self,
+        prepare: impl FnOnce() + Send + 'static,
+        work: impl FnMut(&mut ProcessData<'_>) -> ControlFlow<()> + Send + 'static,
+    ) -> Result<CyclicThread<L>, Error> {
+        self.start_cycles_probed((), prepare, work)
+    }
+
+    /// As [`Application::start_cycles`], with a probe for the steps of each cycle.
+    ///
+    /// # Errors
+    /// The system cannot start a thread.
+    pub fn start_cycles_probed(
         mut self,
+        mut probe: impl CycleProbe + Send + 'static,
         prepare: impl FnOnce() + Send + 'static,
         mut work: impl FnMut(&mut ProcessData<'_>) -> ControlFlow<()> + Send + 'static,
     ) -> Result<CyclicThread<L>, Error> {
@@ -94,7 +108,7 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
             while !ended.load(Ordering::Relaxed) {
                 // The closure is not called again after a panic. Only the image may be half written, and its outputs
                 // are set to zero.
-                match catch_unwind(AssertUnwindSafe(|| self.cycle(&mut work))) {
+                match catch_unwind(AssertUnwindSafe(|| self.cycle_probed(&mut probe, &mut work))) {
                     Ok(ControlFlow::Continue(())) => self.cyclic.publish_foreign(),
                     Ok(ControlFlow::Break(())) => break,
                     Err(payload) => {

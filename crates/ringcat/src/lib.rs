@@ -31,6 +31,7 @@
 //! | cycles in a thread of their own | [`SupervisorThread`], [`CyclicThread`] |
 //! | distributed clocks | [`ClockConfig`], [`SyncSignals`], [`Trigger`] |
 //! | state of SubDevices and links in real-time threads | [`LiveStatus`], [`LiveSubDevice`] |
+//! | process data and rates of links in other threads | [`Observer`] |
 //! | what happened | [`Event`], [`event_log`] |
 //!
 //! The module `guide` leads from here to a drive with clocks.
@@ -72,6 +73,7 @@ pub mod guide;
 pub mod histogram;
 mod job;
 mod limits;
+mod link_figures;
 pub mod links;
 mod live;
 pub mod main_device;
@@ -82,9 +84,12 @@ pub mod network;
 pub mod news;
 mod no_domain;
 mod not_ready;
+mod observer;
 mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
+mod parts;
+mod probe;
 mod process_data;
 mod readiness;
 pub mod services;
@@ -104,6 +109,7 @@ pub mod text;
 mod trace;
 mod value;
 pub mod window;
+mod words;
 
 pub use acyclic::{AcyclicHalf, Inline};
 pub use application::{Application, LastOutputs};
@@ -111,13 +117,17 @@ pub use cyclic_thread::{CyclicThread, Panicked};
 pub use error::Error;
 pub use job::Job;
 pub use limits::TransferLimits;
+pub use link_figures::{LinkFigures, LinkRate};
 pub use links::Links;
 pub use live::LiveSubDevice;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, ObjectOf, Output, OutputBits, Wanted, WriteError};
 pub use no_domain::NoDomain;
 pub use not_ready::{NotReady, Reason};
+pub use observer::{DomainFmmu, DomainSnapshot, NoSnapshot, Observer, ProcessDataSnapshot, SnapshotRequest};
 pub use pace::{Pace, Trigger};
+pub use parts::ProbedParts;
+pub use probe::{CycleJob, CycleProbe, FramesIn, JobProbe, JobTime, JobTimes};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
 pub use stop::Deactivated;
@@ -155,9 +165,9 @@ pub use ringcat_engine::main_device::snapshot::{
 };
 pub use ringcat_engine::main_device::{
     ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, Function,
-    GroupId, GroupState, HiddenDelay, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY, MainDevicePhase, Pending,
-    Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus, SentOnce, SubDeviceId,
-    SubDeviceState, SubDeviceStatus, WkcShare,
+    GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY,
+    MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
+    SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;

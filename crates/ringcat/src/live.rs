@@ -4,6 +4,7 @@ use ringcat_engine::main_device::{Address, LiveStatus, SubDeviceId, SubDeviceSta
 
 use crate::application::Application;
 use crate::links::Links;
+use crate::observer::Observer;
 use crate::services::Services;
 use crate::subdevice::SubDevice;
 
@@ -54,6 +55,11 @@ impl<L: Links, H> Application<L, H> {
     /// ```
     pub fn live_status(&self) -> LiveStatus {
         self.live_status.clone()
+    }
+
+    /// A handle for other threads: snapshots of the process data, FMMUs, figures of the links.
+    pub fn observer(&self) -> Observer {
+        Observer::new(self.cyclic.observed.clone())
     }
 }
 

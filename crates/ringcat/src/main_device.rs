@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
 use ringcat_engine::junction::{JunctionConnection, JunctionMode};
@@ -323,7 +324,7 @@ impl<L: Links> MainDevice<L> {
 
     /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
     pub fn mailbox(&self, position: Position) -> Option<Mailbox> {
-        self.engine.mailbox(position.0.into())
+        self.engine.mailbox(position)
     }
 
     /// Runs an async function of the engine to its end.
@@ -390,6 +391,11 @@ impl<L: Links> MainDevice<L> {
             Ok(active) => Ok(Application::new(self.links, Inline::new(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
         }
+    }
+
+    /// Gives back the memory for the image of a domain after a failed activation ([`Declaration::place_image`]).
+    pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
+        self.engine.unused_memory(domain)
     }
 
     pub(crate) fn from_parts(links: L, engine: Engine, acyclic_bytes: usize) -> MainDevice<L> {

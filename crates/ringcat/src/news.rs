@@ -3,7 +3,7 @@
 //!
 //! Each number is consistent by itself; two numbers may be from adjacent cycles.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Duration;
 
 use ringcat_engine::domain::{DomainId, DomainState, DomainStatus};
@@ -41,12 +41,17 @@ pub struct News {
     phase: AtomicU64,
     /// Spread of the clocks plus one; zero before it was read.
     spread: AtomicU64,
-    restart: AtomicBool,
+    /// What readers want, a bit each.
+    wanted: AtomicU8,
     /// Source address of the last frame of another MainDevice, and the link it arrived on, plus one.
     foreign: AtomicU64,
     ring: AtomicU64,
 }
 
+/// Bit of [`News::restart_histograms`].
+const RESTART: u8 = 1;
+/// Bit of [`News::want_snapshot`].
+const SNAPSHOT: u8 = 2;
 /// Fields of [`CyclicCounters`].
 const COUNTERS: usize = CyclicCounters::COUNT;
 
@@ -80,7 +85,7 @@ impl News {
             phase_errors: Histogram::default(),
             phase: AtomicU64::new(0),
             spread: AtomicU64::new(0),
-            restart: AtomicBool::new(false),
+            wanted: AtomicU8::new(0),
             foreign: AtomicU64::new(0),
             ring: AtomicU64::new(0),
         }
@@ -105,15 +110,7 @@ impl News {
     pub fn status(&self, domain: DomainId) -> Result<DomainStatus, NoDomain> {
         let declared = self.domains.len();
         let words = self.domains.get(domain.0).ok_or(NoDomain { domain, declared })?;
-        let [counted, state] = load(words);
-        let states = [DomainState::Zero, DomainState::Incomplete, DomainState::Complete];
-        let mut status = DomainStatus::default();
-        status.wkc = counted as u32;
-        status.expected = (counted >> 32) as u32;
-        status.state = states[(state as usize & 0x7F).min(2)];
-        status.returned = state >> 7 & 1 != 0;
-        status.skipped = state >> 8;
-        Ok(status)
+        Ok(unpack_status(load(words)))
     }
 
     /// Times from the sending of a cycle's frames to the arrival of each of their copies at the interface.
@@ -146,7 +143,7 @@ impl News {
 
     /// Clears the histograms with the next cycle.
     pub fn restart_histograms(&self) {
-        self.restart.store(true, Ordering::Relaxed);
+        self.wanted.fetch_or(RESTART, Ordering::Release);
     }
 
     /// State of the ring as process data shows it.
@@ -209,36 +206,62 @@ impl News {
         set(received, counters.received);
     }
 
-    /// Whether the histograms are to be cleared.
-    #[inline(always)]
-    pub(crate) fn is_restart_wanted(&self) -> bool {
-        self.restart.load(Ordering::Relaxed)
+    /// Wants a snapshot ([`crate::observer`]).
+    pub(crate) fn want_snapshot(&self) {
+        self.wanted.fetch_or(SNAPSHOT, Ordering::Release);
     }
 
-    /// Publishes the figures that change only when a cycle was disturbed.
+    /// Whether a reader wants anything.
+    #[inline(always)]
+    pub(crate) fn is_any_wanted(&self) -> bool {
+        self.wanted.load(Ordering::Relaxed) != 0
+    }
+
+    /// Publishes the figures that change only when a cycle was disturbed. Returns whether a snapshot is wanted.
     #[cold]
-    pub(crate) fn publish_rest(&self, pace: &PaceNs, counters: &CyclicCounters) {
+    pub(crate) fn publish_rest(&self, pace: &PaceNs, counters: &CyclicCounters) -> bool {
         let PaceNs { cycles, late, skipped, paused, last_delay, longest_delay, disturbances: _ } = *pace;
         store(&self.pace, &[cycles, late, skipped, paused, last_delay, longest_delay]);
         store(&self.counters, &counters.to_words());
-        if self.is_restart_wanted() {
-            self.restart.store(false, Ordering::Relaxed);
+        let wanted = if self.is_any_wanted() { self.wanted.swap(0, Ordering::Acquire) } else { 0 };
+        if wanted & RESTART != 0 {
             self.round_trips.clear();
             self.wake_ups.clear();
             self.phase_errors.clear();
         }
+        wanted & SNAPSHOT != 0
     }
 
     #[inline(always)]
     pub(crate) fn publish_rates(&self, rates: &[Rate]) {
         for ([sum, state], rate) in self.domains.iter().zip(rates) {
-            let kind = match rate.status.state {
-                DomainState::Zero => 0,
-                DomainState::Incomplete => 1,
-                DomainState::Complete => 2,
-            };
-            set(sum, u64::from(rate.status.wkc) | u64::from(rate.status.expected) << 32);
-            set(state, kind | u64::from(rate.status.returned) << 7 | rate.status.skipped << 8);
+            let [counted, kind] = pack_status(&rate.status);
+            set(sum, counted);
+            set(state, kind);
         }
     }
+}
+
+/// A status in two words, [`DomainStatus::pending`] excepted.
+#[inline(always)]
+pub(crate) fn pack_status(status: &DomainStatus) -> [u64; 2] {
+    let kind = match status.state {
+        DomainState::Zero => 0,
+        DomainState::Incomplete => 1,
+        DomainState::Complete => 2,
+    };
+    let counted = u64::from(status.wkc) | u64::from(status.expected) << 32;
+    [counted, kind | u64::from(status.returned) << 7 | status.skipped << 8]
+}
+
+/// The status of [`pack_status`].
+pub(crate) fn unpack_status([counted, state]: [u64; 2]) -> DomainStatus {
+    let states = [DomainState::Zero, DomainState::Incomplete, DomainState::Complete];
+    let mut status = DomainStatus::default();
+    status.wkc = counted as u32;
+    status.expected = (counted >> 32) as u32;
+    status.state = states[(state as usize & 0x7F).min(2)];
+    status.returned = state >> 7 & 1 != 0;
+    status.skipped = state >> 8;
+    status
 }

@@ -87,9 +87,9 @@ impl Failures {
 
     /// SubDevices that are not in their states, with the reasons.
     pub fn explain(&self, engine: &Engine) -> Vec<(SubDeviceName, Reason)> {
-        let explain = |(index, state): (usize, SubDeviceState)| {
-            let name = SubDeviceName::of(engine, Address::Declared(SubDeviceId(index)));
-            let failed = self.0.get(index).cloned().flatten();
+        let explain = |(subdevice, state): (SubDeviceId, SubDeviceState)| {
+            let name = SubDeviceName::of(engine, Address::Declared(subdevice));
+            let failed = self.0.get(subdevice.0).cloned().flatten();
             let reason = match state {
                 SubDeviceState::Absent => Reason::Absent,
                 _ => Reason::Configuring { failed },

@@ -16,7 +16,7 @@ use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, Subjects};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
-    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram, SubDeviceId,
+    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram,
 };
 use ringcat_engine::procedures::request_states::{StateScope, StatesError};
 use ringcat_engine::procedures::services::ServiceError;
@@ -119,8 +119,9 @@ pub trait Services: Sized {
 
     /// The error counters of a declared SubDevice as they were last read. `None` before activation, and where the
     /// declaration has no such SubDevice.
-    fn statistics(self, subdevice: SubDeviceId) -> Self::Immediate<Option<Statistics>> {
-        self.immediately(move |engine| engine.statistics(subdevice.0))
+    fn statistics(self, subdevice: impl Into<Address>) -> Self::Immediate<Option<Statistics>> {
+        let subdevice = subdevice.into();
+        self.immediately(move |engine| engine.statistics(subdevice))
     }
 
     /// The events from a number on ([`TimedEvent::number`](crate::TimedEvent)), also those that were fetched: for a
@@ -165,13 +166,7 @@ pub trait Services: Sized {
     /// Repeats the failed configuration of a SubDevice now, or of all, without a further pause. The result is false if
     /// there is no such SubDevice.
     fn retry(self, subdevice: Option<Address>) -> Self::Immediate<bool> {
-        self.immediately(move |engine| {
-            let number = subdevice.map(|subdevice| engine.number(subdevice));
-            if number != Some(None) {
-                engine.retry(number.flatten());
-            }
-            number != Some(None)
-        })
+        self.immediately(move |engine| engine.retry(subdevice))
     }
 
     /// Brings all SubDevices to INIT, PREOP, SAFEOP or OP and waits until they are there: while an application is
@@ -197,25 +192,30 @@ pub trait Services: Sized {
         self.immediately(|engine| engine.snapshot())
     }
 
-    /// Creates a request for objects of a declared SubDevice of up to `size` bytes, for use in the cyclic thread. It
-    /// may be created before or after activation.
-    fn create_sdo_request(self, subdevice: SubDeviceId, size: usize) -> Self::Immediate<SdoRequest> {
-        self.immediately(move |engine| engine.create_sdo_request(subdevice.0, size))
+    /// Creates a request for objects of a SubDevice of up to `size` bytes, for use in the cyclic thread. It may be
+    /// created before or after activation. A SubDevice without a declaration has a position, and answers with
+    /// [`Options::idle_operation`](crate::Options) only.
+    fn create_sdo_request(self, subdevice: impl Into<Address>, size: usize) -> Self::Immediate<SdoRequest> {
+        let subdevice = subdevice.into();
+        self.immediately(move |engine| engine.create_sdo_request(subdevice, size))
     }
 
-    /// Creates a request for registers of a declared SubDevice; as [`Services::create_sdo_request`].
-    fn create_register_request(self, subdevice: SubDeviceId, size: usize) -> Self::Immediate<RegisterRequest> {
-        self.immediately(move |engine| engine.create_register_request(subdevice.0, size))
+    /// Creates a request for registers of a SubDevice; as [`Services::create_sdo_request`].
+    fn create_register_request(self, subdevice: impl Into<Address>, size: usize) -> Self::Immediate<RegisterRequest> {
+        let subdevice = subdevice.into();
+        self.immediately(move |engine| engine.create_register_request(subdevice, size))
     }
 
-    /// Creates a request for IDNs of a declared SubDevice; as [`Services::create_sdo_request`].
-    fn create_soe_request(self, subdevice: SubDeviceId, size: usize) -> Self::Immediate<SoeRequest> {
-        self.immediately(move |engine| engine.create_soe_request(subdevice.0, size))
+    /// Creates a request for IDNs of a SubDevice; as [`Services::create_sdo_request`].
+    fn create_soe_request(self, subdevice: impl Into<Address>, size: usize) -> Self::Immediate<SoeRequest> {
+        let subdevice = subdevice.into();
+        self.immediately(move |engine| engine.create_soe_request(subdevice, size))
     }
 
-    /// Creates a handler of vendor messages of a declared SubDevice; as [`Services::create_sdo_request`].
-    fn create_voe_handler(self, subdevice: SubDeviceId, size: usize) -> Self::Immediate<VoeHandler> {
-        self.immediately(move |engine| engine.create_voe_handler(subdevice.0, size))
+    /// Creates a handler of vendor messages of a SubDevice; as [`Services::create_sdo_request`].
+    fn create_voe_handler(self, subdevice: impl Into<Address>, size: usize) -> Self::Immediate<VoeHandler> {
+        let subdevice = subdevice.into();
+        self.immediately(move |engine| engine.create_voe_handler(subdevice, size))
     }
 }
 

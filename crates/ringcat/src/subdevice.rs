@@ -31,8 +31,7 @@ use ringcat_wire::address::Position;
 
 pub use error::{SubDeviceError, SubDeviceFailure};
 pub use name::SubDeviceName;
-pub(crate) use resolve::info;
-use start::{Opening, start, start_with_mailbox};
+use start::{start, start_with_mailbox};
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -93,15 +92,18 @@ impl<S: Services> SubDevice<S> {
         (self.address, self.services)
     }
 
-    /// Starts a service in the engine; `number` is the SubDevice's number there.
-    fn ask<T, E, W>(self, work: impl FnOnce(&mut Engine, usize) -> W + Send + 'static) -> S::Outcome<T, SubDeviceError>
+    /// Starts a service in the engine.
+    fn ask<T, E, W>(
+        self,
+        work: impl FnOnce(&mut Engine, Address) -> W + Send + 'static,
+    ) -> S::Outcome<T, SubDeviceError>
     where
         T: Send + 'static,
         SubDeviceFailure: From<E>,
         W: Future<Output = Result<T, E>> + 'static,
     {
         let SubDevice { services, address, within, .. } = self;
-        services.call(move |engine| start(engine, address, within, work))
+        services.call(move |engine| start(engine, address, within, move |engine| work(engine, address)))
     }
 
     /// Starts a service of the SubDevice's mailbox. Before activation, a SubDevice in INIT is brought to PREOP.
@@ -112,8 +114,7 @@ impl<S: Services> SubDevice<S> {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let SubDevice { services, address, within, .. } = self;
-        let opening = Opening::of(address);
-        services.call(move |engine| start_with_mailbox(engine, address, opening, within, work))
+        services.call(move |engine| start_with_mailbox(engine, address, within, work))
     }
 }
 

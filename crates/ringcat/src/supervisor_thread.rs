@@ -15,6 +15,7 @@ use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::junction::JunctionConnection;
@@ -37,7 +38,7 @@ use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
 use crate::not_ready::Reason;
-use crate::subdevice::{SubDeviceName, info};
+use crate::subdevice::SubDeviceName;
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
@@ -246,6 +247,11 @@ impl SupervisorThread {
         Ok(self.with(move |engine| engine.load(declaration))??)
     }
 
+    /// Gives back the memory for the image of a domain after a failed activation ([`Declaration::place_image`]).
+    pub fn unused_memory(&self, domain: DomainId) -> Option<&'static mut [u8]> {
+        self.with(move |engine| engine.unused_memory(domain)).ok().flatten()
+    }
+
     /// Second step, as [`crate::MainDevice::add_junction_connection`].
     ///
     /// # Errors
@@ -410,8 +416,16 @@ impl AcyclicHalf for SupervisorThread {
         SupervisorThread::counters(self)
     }
 
+    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static) {
+        // If the thread has ended there is nothing to sample.
+        let _ = self.begin(move |engine, _| {
+            engine.sample_each_second(take);
+            Box::new(|_, _| true)
+        });
+    }
+
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        self.with(move |engine| info(engine, subdevice.0)).ok().flatten()
+        self.with(move |engine| engine.info(subdevice)).ok().flatten()
     }
 
     fn keep_events(&mut self, _now: Instant) {}

@@ -26,6 +26,7 @@ pub mod mailbox_users;
 pub mod namespaces;
 pub mod odd_images;
 pub mod once;
+pub mod parts;
 pub mod phases;
 pub mod pulses;
 pub mod ring_matrix;

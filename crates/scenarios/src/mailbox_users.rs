@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use ringcat::{RequestState, SdoRequest};
+use ringcat::{RequestState, SdoRequest, SubDeviceId};
 use ringcat_wire::mailbox::sdo::{SdoRequest as Request, SdoResponse};
 use ringcat_wire::mailbox::{Header, Message, Protocol, gateway};
 
@@ -48,7 +48,7 @@ impl MailboxUsers {
     pub fn new(world: &mut World, devices: &[usize]) -> MailboxUsers {
         let users = devices.iter().map(|device| Users {
             station: world.station_of(*device),
-            request: world.application_mut().engine_mut().create_sdo_request(*device, 8),
+            request: world.application_mut().engine_mut().create_sdo_request(SubDeviceId(*device), 8),
             asked: FIRST,
             client: 100 + *device as u64,
             counter: 0,

@@ -4,7 +4,7 @@
 use std::cell::Cell;
 use std::time::Duration;
 
-use ringcat::{DomainId, Event, Options, Redundancy, RingState, automatic};
+use ringcat::{DomainId, Event, Options, Redundancy, RingState, SubDeviceId, automatic};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::mail::foe::{self, FoeOptions};
@@ -397,7 +397,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
         let state = [AlState::PreOp, AlState::Op][at];
         let speaker = speaker(case.count);
         let asked = (case.phase == Phase::StateRequest)
-            .then(|| pair.cut.application_mut().engine_mut().start_state_request(speaker, state));
+            .then(|| pair.cut.application_mut().engine_mut().start_state_request(SubDeviceId(speaker), state));
         pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
         pair.cycles(case, wait(case.detection));
         if let Some(asked) = asked {

@@ -251,7 +251,7 @@ impl World {
     /// # Panics
     /// When no SubDevice is declared there.
     pub fn mailbox(&self, subdevice: usize) -> Mailbox {
-        self.application.engine().mailbox(subdevice).expect("it is declared")
+        self.application.engine().mailbox(SubDeviceId(subdevice)).expect("it is declared")
     }
 
     /// Starts work in the acyclic half.

@@ -1,10 +1,12 @@
 //! After activation the cyclic path neither allocates nor frees memory, for any received frames (issue 2).
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use ringcat::eni::{EniFile, EniImage};
 use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
+use ringcat::shared_segment::SharedSegment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
 use ringcat_engine::domain::{DomainId, Freshness};
@@ -181,8 +183,10 @@ fn copying_does_not_allocate() {
 fn requests_do_not_allocate_in_the_cyclic_thread() {
     let options = Options::new(MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]), None);
     let mut engine = MainDevice::new(options, Instant(0));
-    let (mut object, mut register) = (engine.create_sdo_request(0, 100), engine.create_register_request(0, 100));
-    let (mut idn, mut vendor) = (engine.create_soe_request(0, 100), engine.create_voe_handler(0, 100));
+    let (mut object, mut register) =
+        (engine.create_sdo_request(SubDeviceId(0), 100), engine.create_register_request(SubDeviceId(0), 100));
+    let (mut idn, mut vendor) =
+        (engine.create_soe_request(SubDeviceId(0), 100), engine.create_voe_handler(SubDeviceId(0), 100));
     let mut out = [0; 100];
     let used = counted(|| {
         for _ in 0..CYCLES {
@@ -199,6 +203,81 @@ fn requests_do_not_allocate_in_the_cyclic_thread() {
         }
     });
     assert_eq!(used, (0, 0));
+}
+
+/// Links that know what memory they use themselves.
+struct Apart {
+    links: SharedSegment,
+    own: Cell<(u64, u64)>,
+}
+
+impl Apart {
+    fn apart<R>(own: &Cell<(u64, u64)>, work: impl FnOnce() -> R) -> R {
+        let mut result = None;
+        let used = counted(|| result = Some(work()));
+        own.set((own.get().0 + used.0, own.get().1 + used.1));
+        result.expect("it ran")
+    }
+}
+
+impl Links for Apart {
+    fn now(&self) -> Instant {
+        self.links.now()
+    }
+
+    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+        self.links.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        Apart::apart(&self.own, || self.links.send(link, frame));
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        // The work of the exchange within this is counted twice: as its own and as that of the links.
+        let mut inner = (0, 0);
+        let any = Apart::apart(&self.own, || {
+            self.links.receive(&mut |link, frame| {
+                let used = counted(|| take(link, frame));
+                inner = (inner.0 + used.0, inner.1 + used.1);
+            })
+        });
+        self.own.set((self.own.get().0 - inner.0, self.own.get().1 - inner.1));
+        any
+    }
+
+    fn wait(&mut self, until: Instant) {
+        Apart::apart(&self.own, || self.links.wait(until));
+    }
+}
+
+// covers: threads, cycles, no-allocation
+#[test]
+fn snapshots_and_probes_take_no_memory_in_the_cyclic_thread() {
+    let (cyclic, acyclic) = SharedSegment::halves(ring_of_16(Duration::from_micros(10)));
+    let supervisor = ringcat::SupervisorThread::start(acyclic, &ringcat::Options::default(), || ()).expect("a thread");
+    let scan = supervisor.scan().expect("a scan");
+    let declaration = ringcat::automatic(&scan.subdevices, Duration::from_millis(2));
+    let links = Apart { links: cyclic, own: Cell::new((0, 0)) };
+    let mut application = supervisor.activate(declaration, links).map_err(|refused| refused.error).expect("it fits");
+    let observer = application.observer();
+    let (returns, mut taken) = (Cell::new(0), 0);
+    let mut probe = (ringcat::JobProbe::default(), ringcat::FramesIn::new(|_| returns.set(returns.get() + 1)));
+    for _ in 0..200 {
+        let before = application.links().own.get();
+        let mut request = None;
+        let (allocated, freed) = counted(|| {
+            request = Some(observer.request());
+            for _ in 0..2 {
+                application.cycle_probed(&mut probe, |data| data.fill_outputs(1));
+            }
+        });
+        let own = application.links().own.get();
+        assert_eq!((allocated, freed), (own.0 - before.0, own.1 - before.1));
+        taken += u64::from(request.and_then(|request| observer.take(request)).is_some());
+    }
+    assert_eq!(taken, 200);
+    assert!(returns.get() > 100 && probe.0.times().of(ringcat::CycleJob::Send).histogram().count() == 400);
 }
 
 /// Changes the responses, in a different way for each of ten cycles.

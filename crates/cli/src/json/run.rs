@@ -29,6 +29,8 @@ pub struct Run {
     pub round_trips: Option<Times>,
     /// Begins of cycles behind their time; null without a cycle since OP was reached
     pub wake_ups: Option<Times>,
+    /// Jobs of the cycles with their times, in the order of a cycle (--jobs)
+    pub jobs: Vec<Job>,
     /// The distributed clocks; null where they are not in use
     pub clocks: Option<Clocks>,
     /// What the interfaces have carried for process data; empty where the stop failed
@@ -41,6 +43,18 @@ pub struct Run {
     pub variables: Vec<Variable>,
     /// Whether all SubDevices were stopped: outputs zero, then INIT
     pub stopped: bool,
+}
+
+/// Times of a job of the cycles.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Job {
+    /// `receive`, `process`, `work`, `queue` or `send`
+    pub job: &'static str,
+    /// Mean, in nanoseconds
+    pub mean_ns: u64,
+    /// Their distribution; null where it never ran
+    pub times: Option<Times>,
 }
 
 /// Cycles.

@@ -85,6 +85,11 @@ pub struct RunArguments {
     pub clock_options: ClockOptions,
     #[command(flatten)]
     pub beside: BesideArguments,
+    /// Take the time of each job of a cycle: receive, process, work, queue, send
+    ///
+    /// The clock is read before and after each job, which takes some time itself. Times count from the first cycle.
+    #[arg(long, help_heading = "Output")]
+    pub jobs: bool,
     /// Print every event, however often it comes
     ///
     /// Without it, frequent events of one kind are counted after the first twenty.

@@ -74,6 +74,7 @@ pub fn json(
         acyclic: application.acyclic_counters().into(),
         round_trips: Times::of(application.round_trips()),
         wake_ups: Times::of(news.wake_ups()),
+        jobs: Vec::new(),
         clocks: clocks_in_use
             .then(|| clocks::json(exchanged.clocks(), names, &end.signals, locked, news.phase_errors())),
         interfaces: Vec::new(),

@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use super::copy::Copies;
+use super::outcome::outcome;
 use super::{
     ClockDatagrams, ClockSetup, CopyError, CopyRule, CyclicCounters, CyclicFrame, Domain, Entry, Exchange,
     ForeignFrame, ReferenceTime,
@@ -25,6 +26,30 @@ impl Exchange {
     /// Image of a domain, to write outputs. Writes to inputs are overwritten by the next delivery.
     pub fn image_mut(&mut self, id: DomainId) -> &mut [u8] {
         self.domains.get_mut(id.0).map_or(&mut [], Domain::image_mut)
+    }
+
+    /// Puts the image of a domain into memory of the caller, with the content that it has there: outputs in it leave
+    /// with the next cycle. The image is the beginning of the memory. Not for the cyclic path. False, and nothing has
+    /// changed, if the memory is shorter than the image or there is no such domain.
+    pub fn use_memory(&mut self, id: DomainId, memory: &'static mut [u8]) -> bool {
+        self.domains.get_mut(id.0).is_some_and(|domain| domain.inputs_mut().use_memory(memory))
+    }
+
+    /// Gives back the memory of the caller that holds the image of a domain, as long as the image. The image continues
+    /// in own memory. Not for the cyclic path: this allocates. `None` where the image is in own memory.
+    pub fn give_memory_back(&mut self, id: DomainId) -> Option<&'static mut [u8]> {
+        self.domains.get_mut(id.0)?.inputs_mut().bytes.give_back()
+    }
+
+    /// Working counters of a domain's last evaluated cycle by the link on which copies were sent, for readers beside
+    /// the application: what the first try of each frame has shown. `None` before the first evaluation and as soon as
+    /// the domain is queued again.
+    pub fn wkc_by_link(&self, id: DomainId) -> Option<[u32; 2]> {
+        let domain = self.domains.get(id.0)?;
+        let evaluated = domain.evaluated();
+        let of_cycle =
+            self.frames.get(domain.frames())?.iter().filter(|frame| evaluated > 0 && frame.left() == evaluated);
+        of_cycle.map(CyclicFrame::wkc_by_link).reduce(|sum, more| [sum[0] + more[0], sum[1] + more[1]])
     }
 
     /// The last state of a domain; `None` if it is not declared.
@@ -106,6 +131,13 @@ impl Exchange {
     /// Whether frames are on the wire that have not returned as expected. Overdue frames count until they are given up.
     pub fn in_flight(&self) -> bool {
         self.frames.iter().any(CyclicFrame::is_waiting)
+    }
+
+    /// Whether frames of the oldest cycle under way of any domain have not returned as expected, whatever their try.
+    /// Domains that are queued and have not left await nothing.
+    pub fn awaits_frames(&self) -> bool {
+        let mut oldest = self.domains.iter().filter_map(Domain::oldest).flatten();
+        oldest.any(|at| self.frames.get(at).is_some_and(|frame| outcome(frame, self.again.get(at)).waiting))
     }
 
     /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered.

@@ -228,9 +228,6 @@ impl Domain {
             frame.load(&self.image.bytes, cycle);
         }
         if self.unsent {
-            if self.out == 0 {
-                (self.oldest, self.out) = (self.newest, 1);
-            }
             return;
         }
         self.note_loaded(next);
@@ -259,6 +256,16 @@ impl Domain {
     #[inline(always)]
     pub(crate) fn is_queued(&self) -> bool {
         self.unsent
+    }
+
+    /// Whether a set is queued and has not left.
+    pub(crate) fn has_not_left(&self, set: &Range<usize>) -> bool {
+        self.unsent && set.start == self.newest
+    }
+
+    /// The newest set was evaluated though it has not left: it is evaluated again when it has.
+    pub(crate) fn await_departure(&mut self) {
+        (self.oldest, self.out) = (self.newest, 1);
     }
 
     /// Number of the set that was queued last, and its first frame.

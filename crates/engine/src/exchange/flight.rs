@@ -234,6 +234,15 @@ impl CyclicFrame {
         self.shown.wkc
     }
 
+    /// The same by the link on which the copies were sent.
+    pub(crate) fn wkc_by_link(&self) -> [u32; 2] {
+        // A copy that has arrived was noted with the sum of its working counters, or showed the noted one again.
+        Link::ALL.map(|link| match self.shown.arrivals.arrived & link.bit() {
+            0 => 0,
+            _ => self.usual[link.index()].wkc,
+        })
+    }
+
     /// Whether every process data datagram of the flight has exactly the expected working counter. A sum over datagrams
     /// could hide a shortfall of one behind an excess of another.
     pub(crate) fn is_complete(&self) -> bool {

@@ -3,9 +3,13 @@
 //! With several cycles on the wire, flights of the same datagram share this: inputs of an older cycle never overwrite
 //! those of a newer one.
 
+mod bytes;
+
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+
+pub(crate) use bytes::Bytes;
 
 /// Times of inputs. Cycles count from 1 here, so that zero means never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +33,7 @@ pub(crate) struct InputNumber {
 /// did, and by part.
 #[derive(Debug)]
 pub(crate) struct Image {
-    pub bytes: Box<[u8]>,
+    pub bytes: Bytes,
     pub datagrams: Box<[Moment]>,
     pub parts: Box<[Moment]>,
     shares: Box<[[Share; 2]]>,
@@ -69,7 +73,7 @@ impl Image {
             first += count;
         }
         Image {
-            bytes: vec![0; bytes].into_boxed_slice(),
+            bytes: Bytes::Own(vec![0; bytes].into_boxed_slice()),
             datagrams: vec![Moment::default(); shares.len()].into_boxed_slice(),
             parts: vec![Moment::default(); first].into_boxed_slice(),
             shares: shares.into_boxed_slice(),
@@ -78,6 +82,14 @@ impl Image {
             usual_from: u64::MAX,
             newest: 0,
         }
+    }
+
+    /// Uses memory of the caller, of which the image is the beginning, with the content that it has. False, and nothing
+    /// has changed, if it is too short.
+    pub fn use_memory(&mut self, memory: &'static mut [u8]) -> bool {
+        let Some(used) = memory.get_mut(..self.bytes.len()) else { return false };
+        self.bytes = Bytes::Given(used);
+        true
     }
 
     /// A flight that left then, as a cycle plus one, has other results than the one before.

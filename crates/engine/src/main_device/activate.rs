@@ -34,7 +34,7 @@ use crate::procedures::services::statistics::collect;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::procedures::supervise::supervise;
 use crate::procedures::verify::verify;
-use crate::queue::queue;
+use crate::queue::{Producer, queue};
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
 use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position};
@@ -69,7 +69,7 @@ impl MainDevice {
         let addresses = subdevices.members().map(|member| member.station).collect();
         let board = Arc::new(Board::new(count).with_optional(optional).with_stations(addresses));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
-        let mut exchange = Exchange::new(self.identity, self.options.links(), &layout, board.clone(), producer);
+        let mut exchange = self.exchange(&layout, board.clone(), producer);
         let repeats = repeats::rules(&repeats);
         exchange.send_lost_frames_again(&layout, &repeats, |domain| sends_again.get(domain.0) == Some(&true));
         if let Some(config) = &clock_config {
@@ -125,7 +125,17 @@ impl MainDevice {
         if declaration.clocks.is_some() {
             layout.add_clocks().map_err(ActivateError::Layout)?;
         }
+        self.memories.check(&layout)?;
         Ok((specs, layout))
+    }
+
+    /// The cyclic half, with images in memory of the application where it is declared.
+    fn exchange(&mut self, layout: &Layout, board: Arc<Board>, events: Producer) -> Exchange {
+        let mut exchange = Exchange::new(self.identity, self.options.links(), layout, board, events);
+        for (domain, memory) in self.memories.take() {
+            exchange.use_memory(domain, memory);
+        }
+        exchange
     }
 
     /// Starts configuration, supervision and all other procedures of an active MainDevice.

@@ -70,6 +70,20 @@ pub enum ActivateError {
         /// Number of the domain.
         domain: DomainId,
     },
+    /// Memory that was given for an image is shorter than the image.
+    MemoryTooShort {
+        /// Number of the domain.
+        domain: DomainId,
+        /// Bytes of the image.
+        needed: usize,
+        /// Bytes of the memory.
+        got: usize,
+    },
+    /// A copy of the declaration has the memory for an image, too.
+    MemoryShared {
+        /// Number of the domain.
+        domain: DomainId,
+    },
     /// Process data has another size or direction than when its place was registered.
     Registered {
         /// Number of the domain.
@@ -167,6 +181,7 @@ impl fmt::Display for ActivateError {
             ActivateError::MixedPlaces { domain } => {
                 write!(f, "domain {domain} has members and registered areas: register all of its process data, or none")
             }
+            ActivateError::MemoryTooShort { .. } | ActivateError::MemoryShared { .. } => self.fmt_memory(f),
             ActivateError::Registered { .. } => self.fmt_registered(f),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
@@ -177,18 +192,7 @@ impl fmt::Display for ActivateError {
             ActivateError::UnderWay { domain, under_way } => {
                 write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
             }
-            ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
-                f,
-                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
-                 {:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice",
-                list(subdevices)
-            ),
-            ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
-                f,
-                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {:?} cannot \
-                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice",
-                list(subdevices)
-            ),
+            ActivateError::LrwOnTwoLinks { .. } | ActivateError::NamedLrwOnTwoLinks(_) => self.fmt_two_links(f),
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW is configured, but declaration {subdevice} does not support it")
             }
@@ -207,6 +211,39 @@ impl fmt::Display for ActivateError {
 }
 
 impl ActivateError {
+    fn fmt_memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ActivateError::MemoryTooShort { domain, needed, got } => {
+                write!(f, "domain {domain}: its image has {needed} bytes, the memory for it {got}")
+            }
+            ActivateError::MemoryShared { domain } => {
+                write!(
+                    f,
+                    "domain {domain}: a copy of the declaration has the memory for its image, too: drop it before"
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn fmt_two_links(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
+                f,
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
+                 {:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice",
+                list(subdevices)
+            ),
+            ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
+                f,
+                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {:?} cannot \
+                 be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice",
+                list(subdevices)
+            ),
+            _ => Ok(()),
+        }
+    }
+
     fn fmt_registered(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ActivateError::Registered { domain, subdevice, sync_manager, expected: (direction, bytes), got } = self
         else {

@@ -6,6 +6,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::LogicalAddress;
 
+use super::image_memory::ImageMemory;
 use super::registered_area::RegisteredArea;
 use crate::config::{ClockConfig, Group, SubDeviceConfig};
 use crate::declared::{GroupId, SubDeviceId};
@@ -34,6 +35,8 @@ pub struct DomainConfig {
     /// Process data with places of its own, in the order of registration, instead of members
     /// ([`Declaration::register_entry`]).
     pub registered: Vec<RegisteredArea>,
+    /// Memory of the application for its image; `None` for own memory.
+    pub memory: Option<ImageMemory>,
 }
 
 impl DomainConfig {
@@ -46,7 +49,7 @@ impl DomainConfig {
 
     /// A domain with one cycle under way.
     pub const fn new(period: Duration, members: Vec<DomainMember>) -> DomainConfig {
-        DomainConfig { period, under_way: 1, sends_again: false, members, registered: Vec::new() }
+        DomainConfig { period, under_way: 1, sends_again: false, members, registered: Vec::new(), memory: None }
     }
 
     /// Sets [`DomainConfig::sends_again`].

@@ -7,10 +7,10 @@ use ringcat_wire::address::Position;
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
-use super::idle::Place;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::mail::eoe::EthernetPort;
+use crate::segment::Addressed;
 
 /// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,11 +68,11 @@ impl MainDevice {
     /// mailbox, which is when a declaration with it begins or ends, or until the MainDevice stops. `None` if the
     /// SubDevice has no mailbox, or if this mailbox has another port.
     pub fn ethernet_port(&mut self, subdevice: impl Into<Address>) -> Option<&EthernetPort> {
-        let number = self.number(subdevice)?;
-        let mailbox = self.mailbox(number)?;
-        let address = match self.place(number) {
-            Place::Member(index) => SubDeviceId(index).into(),
-            Place::Undeclared(position) => Address::Scanned(position),
+        let subdevice = self.find(subdevice).ok()?;
+        let mailbox = self.segment.mailbox_of(subdevice)?;
+        let address = match subdevice {
+            Addressed::Member(index) => SubDeviceId(index).into(),
+            Addressed::Undeclared(key) => Address::Scanned(self.segment.view().unassigned(key)?.position),
         };
         let is_current = self.ports.get(&address).is_some_and(|port| port.is_of(&mailbox));
         if !is_current {

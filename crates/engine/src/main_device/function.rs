@@ -23,7 +23,8 @@ macro_rules! functions {
 }
 
 functions! {
-    /// SDO transfers of a SubDevice, in calls and in requests of a cyclic thread.
+    /// SDO transfers of a SubDevice, in calls, and while active in requests of a cyclic thread. Both reach SubDevices
+    /// without a declaration, with idle operation.
     SdoTransfer,
     /// SDO information: object lists and descriptions.
     ObjectDictionary,

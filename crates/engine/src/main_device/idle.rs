@@ -1,29 +1,18 @@
-//! The MainDevice without an application: phases, idle operation, the way back to it, and SubDevices by position.
+//! The MainDevice without an application: phases, idle operation, the way back to it, and SubDevices by
+//! address.
 
-use alloc::rc::Rc;
 use core::time::Duration;
-
-use ringcat_wire::address::Position;
 
 use super::MainDevice;
 use super::states::MainDevicePhase;
-use crate::declared::{Address, SubDeviceId};
-use crate::info::SubDeviceInfo;
+use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::undeclared::{follow_unassigned, keep, watch_undeclared_mail, without_declaration};
+use crate::segment::Addressed;
 use crate::time::Instant;
-
-/// The SubDevice with a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
-    /// A declared one, by its index in the declaration.
-    Member(usize),
-    /// One without a declaration, by its position.
-    Undeclared(Position),
-}
 
 impl MainDevice {
     /// What the MainDevice does as a whole. A link that does not report a carrier counts as connected.
@@ -37,31 +26,9 @@ impl MainDevice {
         }
     }
 
-    /// The number of a SubDevice in functions that take one: its index in the declaration; before activation its
-    /// position; for a SubDevice without a declaration, while one is active and with idle operation, its position
-    /// behind all indices. A declared SubDevice has a position, too. `None` if there is no such SubDevice.
-    pub fn number(&self, address: impl Into<Address>) -> Option<usize> {
-        let view = self.segment.view();
-        let members = view.subdevices().member_count();
-        match address.into() {
-            Address::Declared(SubDeviceId(index)) => (index < members).then_some(index),
-            Address::Scanned(position) if !view.is_active() => {
-                let scanned = view.found()?.subdevices.len();
-                (usize::from(position.0) < scanned).then_some(position.0.into())
-            }
-            Address::Scanned(position) => {
-                if self.segment.undeclared.info(position).is_some() {
-                    return Some(members + usize::from(position.0));
-                }
-                let station = *view.cabling().stations.get(usize::from(position.0))?;
-                view.subdevices().member_of(station).filter(|_| self.options.idle_operation)
-            }
-        }
-    }
-
-    /// Whether a number is that of a declared SubDevice.
-    pub fn is_declared(&self, subdevice: usize) -> bool {
-        matches!(self.place(subdevice), Place::Member(_))
+    /// Whether an address names a declared SubDevice.
+    pub fn is_declared(&self, subdevice: impl Into<Address>) -> bool {
+        matches!(self.segment.view().find(subdevice), Some(Addressed::Member(_)))
     }
 
     /// Whether the MainDevice keeps SubDevices without a declaration in their states.
@@ -69,23 +36,20 @@ impl MainDevice {
         self.options.idle_operation
     }
 
-    pub(super) fn place(&self, subdevice: usize) -> Place {
-        let view = self.segment.view();
-        let position = |number: usize| Place::Undeclared(Position(u16::try_from(number).unwrap_or(u16::MAX)));
-        match subdevice.checked_sub(view.subdevices().member_count()) {
-            Some(number) if !view.is_active() || self.segment.undeclared.is_kept() => position(number),
-            _ if !view.is_active() => position(subdevice),
-            _ => Place::Member(subdevice),
-        }
+    /// The SubDevice with an address.
+    pub(super) fn find(&self, subdevice: impl Into<Address>) -> Result<Addressed, ServiceError> {
+        let subdevice = subdevice.into();
+        self.segment.view().find(subdevice).ok_or(ServiceError::NoSubDevice { subdevice })
     }
 
-    /// Data of a SubDevice without a declaration.
-    pub(super) fn info_of(&self, position: Position) -> Option<Rc<SubDeviceInfo>> {
-        let view = self.segment.view();
-        if view.is_active() {
-            return self.segment.undeclared.info(position);
+    /// Index in the declaration of the SubDevice with an address.
+    pub(super) fn find_member(&self, subdevice: impl Into<Address>) -> Result<usize, ServiceError> {
+        self.active().ok_or(ServiceError::NotActive)?;
+        let subdevice = subdevice.into();
+        match self.find(subdevice)? {
+            Addressed::Member(index) => Ok(index),
+            Addressed::Undeclared(_) => Err(ServiceError::NoSubDevice { subdevice }),
         }
-        view.found()?.subdevices.get(usize::from(position.0)).cloned()
     }
 
     /// Starts the procedures of idle operation, if it is requested and they do not run.
@@ -140,15 +104,17 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Repeats the failed configuration of a SubDevice now, by its number ([`MainDevice::number`]), or of all.
-    pub fn retry(&mut self, subdevice: Option<usize>) {
-        match subdevice.map(|subdevice| self.place(subdevice)) {
+    /// Repeats the failed configuration of a SubDevice now, or of all. False if there is no such SubDevice.
+    pub fn retry(&mut self, subdevice: Option<Address>) -> bool {
+        match subdevice.map(|subdevice| self.find(subdevice)) {
             None => {
                 self.segment.undeclared.retry(None);
                 self.segment.retry(None);
             }
-            Some(Place::Undeclared(position)) => self.segment.undeclared.retry(Some(position)),
-            Some(Place::Member(index)) => self.segment.retry(Some(index)),
+            Some(Ok(Addressed::Undeclared(key))) => self.segment.undeclared.retry(Some(key.station)),
+            Some(Ok(Addressed::Member(index))) => self.segment.retry(Some(index)),
+            Some(Err(_)) => return false,
         }
+        true
     }
 }

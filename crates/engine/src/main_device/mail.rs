@@ -6,91 +6,83 @@ use core::future::Future;
 use ringcat_wire::al::AlState;
 
 use super::MainDevice;
-use super::idle::Place;
 use super::pending::Pending;
-use crate::declared::Address;
+use crate::declared::{Address, SubDeviceId};
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::{EmergencyRing, Limits, Mailbox, MailboxError};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
-use crate::segment::Observation;
+use crate::segment::{Addressed, Observation};
 
 impl MainDevice {
-    /// Mailbox of a SubDevice, by its number ([`MainDevice::number`]). That of a SubDevice without a declaration is in
-    /// use after [`MainDevice::start_visit`] or idle operation has brought it to PREOP. `None` if there is no such
+    /// Mailbox of a SubDevice. That of a SubDevice without a declaration is in use after
+    /// [`MainDevice::start_state_request`] or idle operation has brought it to PREOP. `None` if there is no such
     /// SubDevice.
-    pub fn mailbox(&self, subdevice: usize) -> Option<Mailbox> {
-        match self.place(subdevice) {
-            Place::Member(index) => self.segment.mailbox(index),
-            Place::Undeclared(position) => self.segment.undeclared.mailbox(position),
+    pub fn mailbox(&self, subdevice: impl Into<Address>) -> Option<Mailbox> {
+        let subdevice = self.segment.view().find(subdevice)?;
+        self.segment.mailbox_of(subdevice)
+    }
+
+    /// Starts to bring one SubDevice to a state while all others continue.
+    ///
+    /// A declared one may be brought to any state, BOOT included. Its whole configuration is written again on the way
+    /// up. The state is kept: a SubDevice that loses its power is brought back to it, an absent SubDevice is brought to
+    /// it when it comes. If it refuses, it is brought back to the previous state. Without process data its working
+    /// counters are not expected, and its inputs are not fresh.
+    ///
+    /// One without a declaration goes through INIT: to PREOP or BOOT, where its mailbox can be used, to INIT, or to
+    /// SAFEOP or OP with the defaults of its SII and without process data. With idle operation it is kept there.
+    pub fn start_state_request(
+        &mut self,
+        subdevice: impl Into<Address>,
+        state: AlState,
+    ) -> Pending<Result<(), ConfigureError>> {
+        let bus = self.supervisor.bus();
+        match self.find(subdevice) {
+            Ok(Addressed::Member(index)) => self.start(request_state(&bus, &self.segment, index, state)),
+            Ok(Addressed::Undeclared(key)) => {
+                self.segment.observe(Observation::Visited);
+                let known = self
+                    .segment
+                    .view()
+                    .unassigned(key)
+                    .and_then(|it| Some((it.position, it.knowledge.info()?.clone())));
+                let work = known.map(|(position, info)| request(&bus, &self.segment, (position, &info), state));
+                self.start(async move { work.ok_or(ConfigureError::NoSetup)?.await })
+            }
+            Err(_) => self.start(async { Err(ConfigureError::NoSetup) }),
         }
     }
 
-    /// Starts to bring a SubDevice without a declaration to a state, by its number ([`MainDevice::number`]), through
-    /// INIT: PREOP or BOOT, where its mailbox can be used, INIT, or SAFEOP or OP with the defaults of its SII and
-    /// without process data. With idle operation it is kept there.
-    pub fn start_visit(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
-        let bus = self.supervisor.bus();
-        let work = match self.place(subdevice) {
-            Place::Undeclared(position) => self.info_of(position).map(|info| {
-                self.segment.observe(Observation::Visited);
-                request(&bus, &self.segment, (position, &info), state)
-            }),
-            Place::Member(_) => None,
-        };
-        self.start(async move {
-            match work {
-                Some(work) => work.await,
-                None => Err(ConfigureError::NoSetup),
-            }
-        })
-    }
-
-    /// Once active: starts to bring one SubDevice to a state, BOOT included, while process data of the others
-    /// continues. Its whole configuration is written again on the way up. The state is kept: a SubDevice that loses its
-    /// power is brought back to it, an absent SubDevice is brought to it when it comes. If it refuses, it is brought
-    /// back to the previous state.
-    ///
-    /// Without process data its working counters are not expected, and its inputs are not fresh.
-    pub fn start_state_request(&mut self, subdevice: usize, state: AlState) -> Pending<Result<(), ConfigureError>> {
-        let bus = self.supervisor.bus();
-        let work = self.active().map(|segment| request_state(&bus, segment, subdevice, state));
-        self.start(async move {
-            match work {
-                Some(work) => work.await,
-                None => Err(ConfigureError::NoSetup),
-            }
-        })
-    }
-
-    /// A request for objects of a declared SubDevice of up to `size` bytes, to be made from the cyclic thread once the
-    /// MainDevice is active. It may be created before or after activation; it ends when it is dropped.
-    pub fn create_sdo_request(&mut self, subdevice: usize, size: usize) -> SdoRequest {
-        let (request, served) = SdoRequest::new(subdevice, size, self.requests.bell());
+    /// A request for objects of a SubDevice of up to `size` bytes, to be made from the cyclic thread once the MainDevice
+    /// is active. It may be created before or after activation, and its address is resolved at each use; it ends when
+    /// it is dropped.
+    pub fn create_sdo_request(&mut self, subdevice: impl Into<Address>, size: usize) -> SdoRequest {
+        let (request, served) = SdoRequest::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
         request
     }
 
-    /// A request for registers of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
-    pub fn create_register_request(&mut self, subdevice: usize, size: usize) -> RegisterRequest {
-        let (request, served) = RegisterRequest::new(subdevice, size, self.requests.bell());
+    /// A request for registers of a SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
+    pub fn create_register_request(&mut self, subdevice: impl Into<Address>, size: usize) -> RegisterRequest {
+        let (request, served) = RegisterRequest::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
         request
     }
 
-    /// A request for IDNs of a declared SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
-    pub fn create_soe_request(&mut self, subdevice: usize, size: usize) -> SoeRequest {
-        let (request, served) = SoeRequest::new(subdevice, size, self.requests.bell());
+    /// A request for IDNs of a SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
+    pub fn create_soe_request(&mut self, subdevice: impl Into<Address>, size: usize) -> SoeRequest {
+        let (request, served) = SoeRequest::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
         request
     }
 
-    /// A handler of vendor messages of a declared SubDevice of up to `size` bytes; as
+    /// A handler of vendor messages of a SubDevice of up to `size` bytes; as
     /// [`MainDevice::create_sdo_request`].
-    pub fn create_voe_handler(&mut self, subdevice: usize, size: usize) -> VoeHandler {
-        let (handler, served) = VoeHandler::new(subdevice, size, self.requests.bell());
+    pub fn create_voe_handler(&mut self, subdevice: impl Into<Address>, size: usize) -> VoeHandler {
+        let (handler, served) = VoeHandler::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
         handler
     }
@@ -100,22 +92,29 @@ impl MainDevice {
     /// idle operation only.
     ///
     /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
-    pub fn emergencies(&mut self, subdevice: Address) -> EmergencyRing {
+    pub fn emergencies(&mut self, subdevice: impl Into<Address>) -> EmergencyRing {
+        let subdevice = self.declared_or(subdevice);
         self.emergencies.borrow_mut().of(subdevice)
     }
 
     /// Keeps further emergencies of a SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]. With
     /// a size of 0 they are only counted, and reported as events.
-    pub fn create_emergency_ring(&mut self, subdevice: Address, size: usize) -> EmergencyRing {
+    pub fn create_emergency_ring(&mut self, subdevice: impl Into<Address>, size: usize) -> EmergencyRing {
+        let subdevice = self.declared_or(subdevice);
         let ring = self.emergencies.borrow_mut().create(subdevice, size);
-        let mailbox = match subdevice {
-            Address::Declared(subdevice) => self.segment.mailbox(subdevice.0),
-            Address::Scanned(position) => self.segment.undeclared.mailbox(position),
-        };
-        if let Some(mailbox) = mailbox {
+        if let Some(mailbox) = self.mailbox(subdevice) {
             mailbox.keep_emergencies_in(ring.clone());
         }
         ring
+    }
+
+    /// The index of a declared SubDevice, also if it is named by its position; otherwise the address as it is.
+    fn declared_or(&self, subdevice: impl Into<Address>) -> Address {
+        let subdevice = subdevice.into();
+        match self.segment.view().find(subdevice) {
+            Some(Addressed::Member(index)) => Address::Declared(SubDeviceId(index)),
+            Some(Addressed::Undeclared(_)) | None => subdevice,
+        }
     }
 
     /// A mailbox that is not in use yet, with the ring of its SubDevice.
@@ -134,7 +133,7 @@ impl MainDevice {
     /// Starts a read of an object of at most `limit` bytes.
     pub fn start_sdo_upload(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         object: SdoAddress,
         limits: Limits,
         limit: usize,
@@ -151,7 +150,7 @@ impl MainDevice {
     /// Starts a write of an object.
     pub fn start_sdo_download(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         object: SdoAddress,
         data: Vec<u8>,
         limits: Limits,

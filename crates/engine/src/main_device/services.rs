@@ -1,7 +1,6 @@
 //! Services of the MainDevice besides the mailbox protocols. Each starts a procedure; its result is fetched later.
 //!
-//! SubDevices are named by their number ([`MainDevice::number`]): their index in the declaration, before activation
-//! their position.
+//! SubDevices are named by their [`Address`]: the index in the declaration, or the position on the bus.
 
 use alloc::vec::Vec;
 use core::future::Future;
@@ -11,32 +10,44 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
-use super::idle::Place;
 use super::pending::Pending;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::procedures::complete_siis::complete;
+use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
 use crate::procedures::unassigned::rescan::{Rescan, rescan};
-use crate::segment::Observation;
+use crate::segment::{Addressed, Observation};
 use crate::supervisor::Bus;
 
 impl MainDevice {
     /// Station address of a SubDevice.
-    pub fn station(&self, subdevice: usize) -> Option<StationAddress> {
-        match self.place(subdevice) {
-            Place::Member(index) => self.segment.view().member(index).map(|member| member.station),
-            Place::Undeclared(position) => self.info_of(position).map(|info| info.station),
-        }
+    pub fn station(&self, subdevice: impl Into<Address>) -> Option<StationAddress> {
+        let view = self.segment.view();
+        view.station(view.find(subdevice)?)
+    }
+
+    /// Identity and features of a SubDevice as the scan found them, or as they were read when it came later; `None` if
+    /// it was absent.
+    pub fn info(&self, subdevice: impl Into<Address>) -> Option<SubDeviceInfo> {
+        let view = self.segment.view();
+        let info = match view.find(subdevice)? {
+            Addressed::Undeclared(key) => view.unassigned(key)?.knowledge.info(),
+            Addressed::Member(index) => {
+                let station = view.member(index)?.station;
+                view.found()?.subdevices.iter().find(|info| info.station == station)
+            }
+        };
+        info.map(|info| (**info).clone())
     }
 
     /// Starts a procedure on one SubDevice.
-    fn start_on<T, E, W>(
+    pub(super) fn start_on<T, E, W>(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         work: impl FnOnce(Bus, StationAddress) -> W,
     ) -> Pending<Result<T, ServiceError>>
     where
@@ -44,23 +55,16 @@ impl MainDevice {
         ServiceError: From<E>,
         W: Future<Output = Result<T, E>> + 'static,
     {
-        let work = self.station(subdevice).map(|station| work(self.bus(), station));
-        let address = match self.place(subdevice) {
-            Place::Member(index) => Address::Declared(SubDeviceId(index)),
-            Place::Undeclared(position) => Address::Scanned(position),
-        };
-        self.start(async move {
-            match work {
-                Some(work) => Ok(work.await?),
-                None => Err(ServiceError::NoSubDevice { subdevice: address }),
-            }
-        })
+        let subdevice = subdevice.into();
+        let station = self.station(subdevice).ok_or(ServiceError::NoSubDevice { subdevice });
+        let work = station.map(|station| work(self.bus(), station));
+        self.start(async move { Ok(work?.await?) })
     }
 
     /// Starts a read of `length` bytes of registers or memory.
     pub fn start_register_read(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         address: RegisterAddress,
         length: usize,
     ) -> Pending<Result<Vec<u8>, ServiceError>> {
@@ -74,7 +78,7 @@ impl MainDevice {
     /// twice.
     pub fn start_register_write(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
@@ -85,14 +89,18 @@ impl MainDevice {
     }
 
     /// Starts a read of the loop control of a port.
-    pub fn start_port_read(&mut self, subdevice: usize, port: u8) -> Pending<Result<LoopControl, ServiceError>> {
+    pub fn start_port_read(
+        &mut self,
+        subdevice: impl Into<Address>,
+        port: u8,
+    ) -> Pending<Result<LoopControl, ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
     }
 
     /// Starts to open or close a port. SubDevices behind a closed one are out of reach.
     pub fn start_port_set(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         port: u8,
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
@@ -104,12 +112,9 @@ impl MainDevice {
 
     /// Starts to cut off a declared SubDevice, by closing the ports of its neighbours. In a line the SubDevices behind
     /// it are cut off too.
-    pub fn start_block(&mut self, subdevice: usize) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.active().cloned());
-        self.start(async move {
-            let segment = segment.ok_or(ServiceError::NotActive)?;
-            ports::block(&bus, &segment, subdevice).await
-        })
+    pub fn start_block(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
+        let (bus, segment, index) = (self.bus(), self.segment.clone(), self.find_member(subdevice));
+        self.start(async move { ports::block(&bus, &segment, index?).await })
     }
 
     /// Starts to open all ports that were closed to cut SubDevices off.
@@ -122,7 +127,7 @@ impl MainDevice {
     }
 
     /// Starts a reset of a SubDevice controller. A declared SubDevice is lost, found again and configured again.
-    pub fn start_reset(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
+    pub fn start_reset(&mut self, subdevice: impl Into<Address>) -> Pending<Result<(), ServiceError>> {
         self.start_on(subdevice, move |bus, station| async move { reset::reset_controller(&bus, station).await })
     }
 
@@ -155,7 +160,7 @@ impl MainDevice {
     }
 
     /// Starts a read of a whole EEPROM; the SII contains its size.
-    pub fn start_sii_read(&mut self, subdevice: usize) -> Pending<Result<Vec<u8>, ServiceError>> {
+    pub fn start_sii_read(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<u8>, ServiceError>> {
         let eeproms = self.segment.eeproms.clone();
         self.start_on(subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
@@ -167,7 +172,7 @@ impl MainDevice {
     /// is accepted. The SubDevice uses it after its next start or [`MainDevice::start_sii_reload`].
     pub fn start_sii_write(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         image: Vec<u8>,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
@@ -184,7 +189,7 @@ impl MainDevice {
     /// only with `force`. The alias is valid from the next start of the SubDevice on.
     pub fn start_alias_write(
         &mut self,
-        subdevice: usize,
+        subdevice: impl Into<Address>,
         alias: u16,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
@@ -198,7 +203,7 @@ impl MainDevice {
     }
 
     /// Starts a reload of a controller's configuration from the EEPROM.
-    pub fn start_sii_reload(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
+    pub fn start_sii_reload(&mut self, subdevice: impl Into<Address>) -> Pending<Result<(), ServiceError>> {
         let eeproms = self.segment.eeproms.clone();
         self.start_on(subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
@@ -216,25 +221,42 @@ impl MainDevice {
     }
 
     /// Error counts of a declared SubDevice as of the last reading. `None` before activation.
-    pub fn statistics(&self, subdevice: usize) -> Option<Statistics> {
-        self.statistics.as_ref()?.find(subdevice)
+    pub fn statistics(&self, subdevice: impl Into<Address>) -> Option<Statistics> {
+        self.statistics.as_ref()?.find(self.find_member(subdevice).ok()?)
     }
 
     /// Starts a read of the error counters of a declared SubDevice.
-    pub fn start_statistics_read(&mut self, subdevice: usize) -> Pending<Result<Statistics, ServiceError>> {
-        let book = self.statistics.clone();
-        self.start_on(subdevice, move |bus, station| async move {
-            let book = book.ok_or(ServiceError::NotActive)?;
-            statistics::read(&bus, &book, subdevice, station).await
+    pub fn start_statistics_read(
+        &mut self,
+        subdevice: impl Into<Address>,
+    ) -> Pending<Result<Statistics, ServiceError>> {
+        self.start_statistics(subdevice, |bus, book, index, station| async move {
+            statistics::read(&bus, &book, index, station).await
         })
     }
 
     /// Starts to clear the error counters of a declared SubDevice, and their totals.
-    pub fn start_statistics_clear(&mut self, subdevice: usize) -> Pending<Result<(), ServiceError>> {
-        let book = self.statistics.clone();
-        self.start_on(subdevice, move |bus, station| async move {
-            let book = book.ok_or(ServiceError::NotActive)?;
-            statistics::clear(&bus, &book, subdevice, station).await
+    pub fn start_statistics_clear(&mut self, subdevice: impl Into<Address>) -> Pending<Result<(), ServiceError>> {
+        self.start_statistics(subdevice, |bus, book, index, station| async move {
+            statistics::clear(&bus, &book, index, station).await
         })
+    }
+
+    /// Starts a procedure on a declared SubDevice and its error counts.
+    fn start_statistics<T, W>(
+        &mut self,
+        subdevice: impl Into<Address>,
+        work: impl FnOnce(Bus, ErrorStatistics, usize, StationAddress) -> W,
+    ) -> Pending<Result<T, ServiceError>>
+    where
+        T: 'static,
+        W: Future<Output = Result<T, ServiceError>> + 'static,
+    {
+        let work = self.find_member(subdevice).and_then(|index| {
+            let book = self.statistics.clone().ok_or(ServiceError::NotActive)?;
+            let station = self.station(SubDeviceId(index)).ok_or(ServiceError::NotActive)?;
+            Ok(work(self.bus(), book, index, station))
+        });
+        self.start(async move { work?.await })
     }
 }

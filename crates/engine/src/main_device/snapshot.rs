@@ -8,6 +8,8 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use ringcat_wire::address::Position;
+
 use super::{MainDevice, SubDeviceState};
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
@@ -286,9 +288,7 @@ impl MainDevice {
     fn with_mail(&mut self, subdevice: SubDeviceSnapshot) -> SubDeviceSnapshot {
         let (address, mailbox) = match (self.active(), subdevice.declared, subdevice.position) {
             (Some(segment), Some(index), _) => (Address::Declared(SubDeviceId(index)), segment.mailbox(index)),
-            (None, _, Some(position)) => {
-                (Address::Scanned(ringcat_wire::address::Position(position)), self.mailbox(position.into()))
-            }
+            (None, _, Some(position)) => (Address::Scanned(Position(position)), self.mailbox(Position(position))),
             _ => return subdevice,
         };
         let MailCounters { written, read, unclaimed, .. } =

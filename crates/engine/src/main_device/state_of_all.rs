@@ -11,7 +11,7 @@ use crate::procedures::request_states::{StateScope, StatesError, request_states}
 impl MainDevice {
     /// Starts to bring all SubDevices to INIT, PREOP, SAFEOP or OP: while active the declared ones, each at most to its
     /// declared state; otherwise those of the scan, with the defaults of their SIIs. The state is kept, as one that was
-    /// requested of a single SubDevice ([`MainDevice::start_state_request`], [`MainDevice::start_visit`]).
+    /// requested of a single SubDevice ([`MainDevice::start_state_request`]).
     ///
     /// The result is there when all that count by `scope` have followed or refused, at the latest at `limit`. Those
     /// that lose frames or power meanwhile have time until the limit. Requests that are late then continue.

@@ -10,9 +10,11 @@ use super::activate_error::ActivateError;
 use super::active::Active;
 use super::declaration::Declaration;
 use super::loaded::{Loaded, closing};
+use super::memories::Memories;
 use super::pending::Pending;
 use super::prepare::check;
 use crate::config::{Resolution, resolve};
+use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::junction::refute;
@@ -24,13 +26,19 @@ impl MainDevice {
     ///
     /// # Errors
     /// [`ActivateError::Active`], and errors in the declaration alone.
-    pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
+    pub fn load(&mut self, mut declaration: Declaration) -> Result<(), ActivateError> {
         if self.active().is_some() {
             return Err(ActivateError::Active);
         }
         check(&declaration)?;
+        self.memories = Memories::of(&mut declaration)?;
         self.loaded = Some(Loaded { declaration, connections: Vec::new() });
         Ok(())
+    }
+
+    /// Gives back the memory of a declaration that was loaded and not activated: after a failed activation.
+    pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
+        self.memories.0.get_mut(domain.0)?.take()
     }
 
     /// Second step, as often as needed: adds the connection of a local ring. The mode is then strict, whatever the

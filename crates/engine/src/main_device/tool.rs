@@ -2,24 +2,19 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use super::MainDevice;
-use super::idle::Place;
 use super::pending::Pending;
 use crate::declared::Address;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
 use crate::procedures::services::forced_state::{Acknowledge, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
 use crate::procedures::services::{ServiceError, registers};
-use crate::segment::Observation;
+use crate::segment::{Addressed, Observation};
 
 impl MainDevice {
-    fn station_of(&self, subdevice: Address) -> Option<StationAddress> {
-        self.station(self.number(subdevice)?)
-    }
-
     /// Starts a read of the ports of all SubDevices by position: links, neighbours, delays, receive times, error
     /// counters, with and without an application. Empty before a scan.
     pub fn start_port_report(&mut self) -> Pending<Result<Vec<SubDevicePorts>, ServiceError>> {
@@ -35,11 +30,8 @@ impl MainDevice {
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
-        let subdevice = subdevice.into();
-        let station = self.station_of(subdevice);
-        let (bus, segment) = (self.bus(), self.active().cloned());
-        self.start(async move {
-            let station = station.ok_or(ServiceError::NoSubDevice { subdevice })?;
+        let segment = self.active().cloned();
+        self.start_on(subdevice, move |bus, station| async move {
             registers::write_urgently(&bus, segment.as_ref(), station, address, &data).await
         })
     }
@@ -59,16 +51,11 @@ impl MainDevice {
         acknowledge: Acknowledge,
     ) -> Pending<Result<(AlStatus, AlStatusCode), ServiceError>> {
         let subdevice = subdevice.into();
-        let station = self.station_of(subdevice);
-        if let Some(Place::Undeclared(position)) = self.number(subdevice).map(|number| self.place(number)) {
+        if let Ok(Addressed::Undeclared(key)) = self.find(subdevice) {
             self.segment.observe(Observation::Visited);
-            self.segment.undeclared.leave(position);
+            self.segment.undeclared.leave(key.station);
         }
-        let bus = self.bus();
-        self.start(async move {
-            let station = station.ok_or(ServiceError::NoSubDevice { subdevice })?;
-            force(&bus, station, state, acknowledge).await
-        })
+        self.start_on(subdevice, move |bus, station| async move { force(&bus, station, state, acknowledge).await })
     }
 
     /// Starts a read of the owner of an EEPROM: EtherCAT or the PDI.
@@ -76,13 +63,7 @@ impl MainDevice {
         &mut self,
         subdevice: impl Into<Address>,
     ) -> Pending<Result<EepromOwnership, ServiceError>> {
-        let subdevice = subdevice.into();
-        let station = self.station_of(subdevice);
-        let bus = self.bus();
-        self.start(async move {
-            let station = station.ok_or(ServiceError::NoSubDevice { subdevice })?;
-            Ok(owner(&bus, station).await?)
-        })
+        self.start_on(subdevice, |bus, station| async move { owner(&bus, station).await })
     }
 
     /// Starts to assign an EEPROM to EtherCAT or to the PDI; the result is the owner afterwards. Functions that read or
@@ -92,11 +73,8 @@ impl MainDevice {
         subdevice: impl Into<Address>,
         assignment: EepromAssignment,
     ) -> Pending<Result<EepromOwnership, ServiceError>> {
-        let subdevice = subdevice.into();
-        let station = self.station_of(subdevice);
-        let (bus, eeproms) = (self.bus(), self.segment.eeproms.clone());
-        self.start(async move {
-            let station = station.ok_or(ServiceError::NoSubDevice { subdevice })?;
+        let eeproms = self.segment.eeproms.clone();
+        self.start_on(subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             set_owner(&bus, station, assignment).await
         })

@@ -13,6 +13,7 @@ use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 use super::services::registers;
 use super::shared_segment::SharedSegment;
 use crate::bell::Bell;
+use crate::declared::Address;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
@@ -65,9 +66,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
             cancelled.notify();
         }
         for (served, order) in requests.ordered() {
-            let station = segment.view().member(order.subdevice).map(|member| member.station);
-            let member = station.zip(segment.mailbox(order.subdevice));
-            match member {
+            match target(&segment, order.subdevice) {
                 Some(target) => {
                     bus.spawn(serve(bus.clone(), segment.clone(), served, order, target, cancelled.clone()))
                 }
@@ -76,6 +75,13 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
         }
         bus.until_posted(posted, Instant::NEVER, &rung, || false).await;
     }
+}
+
+/// The station address and the mailbox of a SubDevice.
+fn target(segment: &SharedSegment, subdevice: Address) -> Option<(StationAddress, Mailbox)> {
+    let view = segment.view();
+    let found = view.find(subdevice)?;
+    view.station(found).zip(segment.mailbox_of(found))
 }
 
 /// Result of a successful request: data of a read, and the subject of the data.

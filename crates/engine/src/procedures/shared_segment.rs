@@ -16,7 +16,7 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{MemberFinding, Observation, Segment, Words};
+use crate::segment::{Addressed, MemberFinding, Observation, Segment, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -223,6 +223,14 @@ impl SharedSegment {
             false => (!is_needed(segment)).then_some(false),
         };
         self.until(granted).await.then_some(turn)
+    }
+
+    /// The mailbox of a SubDevice.
+    pub(crate) fn mailbox_of(&self, subdevice: Addressed) -> Option<Mailbox> {
+        match subdevice {
+            Addressed::Member(index) => self.mailbox(index),
+            Addressed::Undeclared(key) => self.undeclared.mailbox(key.station),
+        }
     }
 
     /// A member's mailbox.

@@ -15,6 +15,7 @@ use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::map;
 
 use super::al_state::{ask, read_status};
+use crate::declared::SubDeviceId;
 use crate::segment::Segment;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -40,8 +41,8 @@ pub enum StopError {
     NoAnswer,
     /// Some did not reach the state in time.
     NotReached {
-        /// Index in the declaration of the first of them; `None` if it was not declared.
-        subdevice: Option<usize>,
+        /// The first of them; `None` if it was not declared.
+        subdevice: Option<SubDeviceId>,
         /// Its station address.
         station: StationAddress,
         /// The requested state.
@@ -87,12 +88,12 @@ impl From<BusError> for StopError {
 }
 
 /// A SubDevice to be stopped: its index in the declaration, if it was declared, and its station address.
-pub(crate) type ToStop = (Option<usize>, StationAddress);
+pub(crate) type ToStop = (Option<SubDeviceId>, StationAddress);
 
 /// All SubDevices with a known address, declared ones first.
 pub(crate) fn all_known(segment: &Segment) -> Vec<ToStop> {
     let all = segment.subdevices().all().iter().enumerate();
-    all.map(|(number, it)| (it.as_member().map(|_| number), it.key.station)).collect()
+    all.map(|(index, it)| (it.as_member().map(|_| SubDeviceId(index)), it.key.station)).collect()
 }
 
 /// Brings SubDevices to a state below their present one. SubDevices in a lower state stay there, and so do those in

@@ -4,6 +4,7 @@ use ringcat_wire::address::RegisterAddress;
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
+use crate::declared::Address;
 
 /// A request for registers of one SubDevice. It may be moved to the cyclic thread.
 ///
@@ -16,8 +17,8 @@ pub struct RegisterRequest {
 }
 
 impl RegisterRequest {
-    /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (RegisterRequest, AcyclicSide) {
+    /// A request of up to `size` bytes to a SubDevice, and its acyclic side.
+    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (RegisterRequest, AcyclicSide) {
         let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, bell);
         (RegisterRequest { request }, served)
     }

@@ -2,6 +2,7 @@
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
+use crate::declared::Address;
 
 /// A request for objects of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -10,8 +11,8 @@ pub struct SdoRequest {
 }
 
 impl SdoRequest {
-    /// A request of `size` bytes for an object of a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SdoRequest, AcyclicSide) {
+    /// A request of `size` bytes for an object of a SubDevice, and its acyclic side.
+    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (SdoRequest, AcyclicSide) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SdoRequest { request }, served)
@@ -41,12 +42,13 @@ mod tests {
     use ringcat_wire::mailbox::sdo::AbortCode;
 
     use super::*;
+    use crate::declared::SubDeviceId;
     use crate::request::{Access, RequestFailure, RequestState};
 
     // covers: jobs, sdo
     #[test]
     fn a_request_is_executed_by_the_acyclic_side_and_returns_the_read_data() {
-        let (mut request, served) = SdoRequest::new(3, 8, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(3).into(), 8, &Bell::default());
         assert_eq!((request.state(), served.take()), (RequestState::Unused, None));
         request.set_object(0x2000, 7, true).unwrap();
         request.set_timeout(Duration::from_millis(5)).unwrap();
@@ -54,7 +56,8 @@ mod tests {
         assert_eq!(request.state(), RequestState::Busy);
         let order = served.take().unwrap();
         assert_eq!(order.subject, Subject::Object { index: 0x2000, sub_index: 7, complete_access: true });
-        assert_eq!((order.subdevice, order.timeout, order.capacity), (3, Duration::from_millis(5), 8));
+        assert_eq!((order.timeout, order.capacity), (Duration::from_millis(5), 8));
+        assert_eq!(order.subdevice, SubDeviceId(3).into());
         assert_eq!((order.access, served.take()), (Access::Read, None));
         assert_eq!(request.set_object(1, 1, false), Err(RequestRefused::Busy));
         assert_eq!(request.read(), Err(RequestRefused::Busy));
@@ -69,7 +72,7 @@ mod tests {
 
     #[test]
     fn data_beyond_the_capacity_is_refused_and_failures_are_returned() {
-        let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &Bell::default());
         assert_eq!(request.write(&[1, 2, 3]), Err(RequestRefused::TooLong { bytes: 3, limit: 2 }));
         request.write(&[1, 2]).unwrap();
         assert_eq!(served.take().unwrap().access, Access::Write(vec![1, 2]));
@@ -89,7 +92,7 @@ mod tests {
 
     #[test]
     fn only_a_request_in_progress_is_cancelled() {
-        let (mut request, served) = SdoRequest::new(0, 2, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &Bell::default());
         request.cancel();
         assert!(!served.is_cancelled());
         request.read().unwrap();

@@ -10,6 +10,7 @@ use core::time::Duration;
 use ringcat_wire::mailbox::sdo::AbortCode;
 
 use crate::bell::Bell;
+use crate::declared::Address;
 use ringcat_wire::mailbox::soe::SoeErrorCode;
 
 const UNUSED: u8 = 0;
@@ -122,7 +123,7 @@ pub(crate) enum Access {
 /// Target and action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Order {
-    pub subdevice: usize,
+    pub subdevice: Address,
     pub subject: Subject,
     pub access: Access,
     pub timeout: Duration,
@@ -132,7 +133,7 @@ pub(crate) struct Order {
 
 #[derive(Debug)]
 struct Slot {
-    subdevice: usize,
+    subdevice: Address,
     state: AtomicU8,
     cancelled: AtomicBool,
     subject: AtomicU64,
@@ -161,8 +162,8 @@ pub(crate) struct AcyclicSide {
 /// Default time limit of a request.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A request with `size` bytes of memory to a declared SubDevice, and its acyclic side.
-pub(super) fn pair(subdevice: usize, size: usize, subject: Subject, bell: &Bell) -> (Request, AcyclicSide) {
+/// A request with `size` bytes of memory to a SubDevice, and its acyclic side.
+pub(super) fn pair(subdevice: Address, size: usize, subject: Subject, bell: &Bell) -> (Request, AcyclicSide) {
     let slot = Arc::new(Slot {
         subdevice,
         state: AtomicU8::new(UNUSED),

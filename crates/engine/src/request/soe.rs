@@ -4,6 +4,7 @@ use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
 use crate::bell::Bell;
+use crate::declared::Address;
 
 /// A request for elements of IDNs of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -12,8 +13,8 @@ pub struct SoeRequest {
 }
 
 impl SoeRequest {
-    /// A request of up to `size` bytes to a declared SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (SoeRequest, AcyclicSide) {
+    /// A request of up to `size` bytes to a SubDevice, and its acyclic side.
+    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (SoeRequest, AcyclicSide) {
         let subject = Subject::Idn { drive: 0, idn: 0, elements: SoeElements::VALUE.0 };
         let (request, served) = pair(subdevice, size, subject, bell);
         (SoeRequest { request }, served)

@@ -2,6 +2,7 @@
 
 use super::slot::{AcyclicSide, Request, RequestRefused, RequestState, Subject, pair};
 use crate::bell::Bell;
+use crate::declared::Address;
 
 /// Vendor messages to and from one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -11,7 +12,7 @@ pub struct VoeHandler {
 
 impl VoeHandler {
     /// A handler of messages of up to `size` bytes, without their header, and its acyclic side.
-    pub(crate) fn new(subdevice: usize, size: usize, bell: &Bell) -> (VoeHandler, AcyclicSide) {
+    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (VoeHandler, AcyclicSide) {
         let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, bell);
         (VoeHandler { request }, served)
     }

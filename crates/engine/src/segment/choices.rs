@@ -11,4 +11,6 @@ pub struct Choices {
     pub junctions: JunctionMode,
     /// The cabling is taken over when a hot connect group joins or leaves.
     pub follow_groups: bool,
+    /// SubDevices without a declaration are kept in their requested states.
+    pub idle_operation: bool,
 }

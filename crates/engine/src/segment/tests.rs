@@ -1,5 +1,6 @@
 //! Tests from posted words and observations to events, without a bus.
 
+mod addressed;
 mod clocks;
 mod stages;
 mod stale;
@@ -102,7 +103,12 @@ impl Ring {
             carriers: [Some(true); 2],
             board: Arc::new(Board::new(count)),
         };
-        let choices = Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false };
+        let choices = Choices {
+            enhanced_line_crossed: false,
+            junctions: JunctionMode::Disabled,
+            follow_groups: false,
+            idle_operation: false,
+        };
         let mut segment = Segment::new(choices);
         segment.observe(Observation::ScanBegun, Instant(0));
         segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));

@@ -81,6 +81,11 @@ impl UnassignedView<'_> {
         self.reported || matches!(self.knowledge, Knowledge::Unreadable(_))
     }
 
+    /// It is known, and known to be undeclared.
+    pub fn is_undeclared(&self) -> bool {
+        self.reported && self.knowledge.info().is_some()
+    }
+
     /// It is being read, and SubDevices around it should wait.
     pub(super) fn is_awaited(&self, now: Instant) -> bool {
         matches!(self.knowledge, Knowledge::Awaited(since) if now.since(*since) < HOLD)

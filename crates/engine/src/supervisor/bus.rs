@@ -19,6 +19,7 @@ use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 
+use super::counters::AcyclicCounters;
 use super::reply::{BusError, Reply};
 use super::shared::Shared;
 use super::signal::Signal;
@@ -69,6 +70,11 @@ impl Bus {
     /// The board of the exchange, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
         self.shared.borrow().board.clone()
+    }
+
+    /// Counters of the acyclic half.
+    pub(crate) fn counters(&self) -> AcyclicCounters {
+        self.shared.borrow().counters
     }
 
     /// Posts an AL status that was read, for readers of the live status.

@@ -14,6 +14,10 @@ pub struct AcyclicCounters {
     pub lost: u64,
     /// Frames of which one copy of two came back in time.
     pub half: u64,
+    /// Copies that did not come back in time, by the link on which they were sent ([`crate::link::Link::index`]).
+    pub copies_lost: [u64; 2],
+    /// Their bytes, without FCS.
+    pub bytes_lost: [u64; 2],
     /// Copies that came too late or twice.
     pub late: u64,
     /// Frames of this MainDevice that came back with other datagrams than were sent.
@@ -38,6 +42,8 @@ impl AcyclicCounters {
             received: self.received + other.received,
             lost: self.lost + other.lost,
             half: self.half + other.half,
+            copies_lost: both(self.copies_lost, other.copies_lost),
+            bytes_lost: both(self.bytes_lost, other.bytes_lost),
             late: self.late + other.late,
             corrupt: self.corrupt + other.corrupt,
             foreign: self.foreign + other.foreign,
@@ -46,4 +52,8 @@ impl AcyclicCounters {
             timed_out: self.timed_out + other.timed_out,
         }
     }
+}
+
+const fn both([a, b]: [u64; 2], [c, d]: [u64; 2]) -> [u64; 2] {
+    [a + c, b + d]
 }

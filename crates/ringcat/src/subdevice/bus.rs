@@ -10,7 +10,7 @@ use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{LoopControl, map};
 
-use super::{SubDevice, SubDeviceError, SubDeviceFailure, info};
+use super::{SubDevice, SubDeviceError, SubDeviceFailure};
 use crate::services::Services;
 use crate::value::{Number, ObjectValue};
 
@@ -25,20 +25,14 @@ impl<S: Services> SubDevice<S> {
     /// A SubDevice without a declaration goes to the state with the defaults of its SII, and exchanges no process data:
     /// its outputs are zero. With [`Options::idle_operation`](crate::Options) it is kept there.
     pub fn request_state(self, state: AlState) -> S::Outcome<(), SubDeviceError> {
-        self.ask(move |engine, number| {
-            match engine.is_declared(number) {
-                true => engine.start_state_request(number, state),
-                false => engine.start_visit(number, state),
-            }
-            .ended()
-        })
+        self.ask(move |engine, subdevice| engine.start_state_request(subdevice, state).ended())
     }
 
     /// Reads its AL status and AL status code (registers 0x0130 and 0x0134) now. After a refused state, or a change of
     /// state by itself, the error flag is set and the code gives the reason.
     pub fn state(self) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
-        self.ask(move |engine, number| {
-            let read = engine.start_register_read(number, map::AL_STATUS, STATUS_BYTES);
+        self.ask(move |engine, subdevice| {
+            let read = engine.start_register_read(subdevice, map::AL_STATUS, STATUS_BYTES);
             async move {
                 let bytes = read.ended().await?;
                 let word = |at: usize| [bytes.get(at), bytes.get(at + 1)].map(|byte| byte.copied().unwrap_or(0));
@@ -49,16 +43,16 @@ impl<S: Services> SubDevice<S> {
 
     /// Data of the scan; `None` for a declared SubDevice that the scan did not find.
     pub fn info(self) -> S::Outcome<Option<SubDeviceInfo>, SubDeviceError> {
-        self.ask(move |engine, number| {
-            let info = info(engine, number);
+        self.ask(move |engine, subdevice| {
+            let info = engine.info(subdevice);
             async move { Ok::<_, SubDeviceFailure>(info) }
         })
     }
 
     /// Reads a register, or memory, of the size of the type.
     pub fn register_read<T: Number + ObjectValue>(self, address: RegisterAddress) -> S::Outcome<T, SubDeviceError> {
-        self.ask(move |engine, number| {
-            let read = engine.start_register_read(number, address, <T as Number>::BYTES);
+        self.ask(move |engine, subdevice| {
+            let read = engine.start_register_read(subdevice, address, <T as Number>::BYTES);
             async move {
                 let bytes = read.ended().await?;
                 Ok::<T, SubDeviceFailure>(T::decode(bytes))
@@ -68,13 +62,13 @@ impl<S: Services> SubDevice<S> {
 
     /// Reads `length` bytes of registers or memory.
     pub fn register_read_bytes(self, address: RegisterAddress, length: usize) -> S::Outcome<Vec<u8>, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_register_read(number, address, length).ended())
+        self.ask(move |engine, subdevice| engine.start_register_read(subdevice, address, length).ended())
     }
 
     /// Writes a register or memory: a number or bytes. If a frame is lost, it may be written twice.
     pub fn register_write<T: ObjectValue>(self, address: RegisterAddress, value: T) -> S::Outcome<(), SubDeviceError> {
         let data = value.encode();
-        self.ask(move |engine, number| engine.start_register_write(number, address, data).ended())
+        self.ask(move |engine, subdevice| engine.start_register_write(subdevice, address, data).ended())
     }
 
     /// Writes a register or memory before all datagrams that wait, those to the same SubDevice included. If a frame is
@@ -106,44 +100,44 @@ impl<S: Services> SubDevice<S> {
 
     /// Reads the loop control of a port.
     pub fn port(self, port: u8) -> S::Outcome<LoopControl, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_port_read(number, port).ended())
+        self.ask(move |engine, subdevice| engine.start_port_read(subdevice, port).ended())
     }
 
     /// Opens or closes a port. SubDevices behind a closed port get no frames.
     pub fn set_port(self, port: u8, control: LoopControl) -> S::Outcome<(), SubDeviceError> {
-        self.ask(move |engine, number| engine.start_port_set(number, port, control).ended())
+        self.ask(move |engine, subdevice| engine.start_port_set(subdevice, port, control).ended())
     }
 
     /// Isolates the SubDevice by closing the ports of its neighbours; [`Services::open_blocked`] opens them again.
     pub fn block(self) -> S::Outcome<Vec<BlockedPort>, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_block(number).ended())
+        self.ask(move |engine, subdevice| engine.start_block(subdevice).ended())
     }
 
     /// Resets its controller. A declared SubDevice is lost, found again and configured again.
     pub fn reset_controller(self) -> S::Outcome<(), SubDeviceError> {
-        self.ask(move |engine, number| engine.start_reset(number).ended())
+        self.ask(move |engine, subdevice| engine.start_reset(subdevice).ended())
     }
 
     /// Reads its EEPROM, with the size that its header gives.
     pub fn sii_read(self) -> S::Outcome<Vec<u8>, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_sii_read(number).ended())
+        self.ask(move |engine, subdevice| engine.start_sii_read(subdevice).ended())
     }
 
     /// Writes its EEPROM: each word that differs is written and read back. Without `force` only an SII image is
     /// accepted. The SubDevice uses it after its next start.
     pub fn sii_write(self, image: Vec<u8>, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_sii_write(number, image, force).ended())
+        self.ask(move |engine, subdevice| engine.start_sii_write(subdevice, image, force).ended())
     }
 
     /// Writes its alias into the EEPROM, with the new checksum. A checksum that is wrong before is corrected only with
     /// `force`. The alias is valid from the next start of the SubDevice on.
     pub fn write_alias(self, alias: u16, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_alias_write(number, alias, force).ended())
+        self.ask(move |engine, subdevice| engine.start_alias_write(subdevice, alias, force).ended())
     }
 
     /// Reloads the configuration of its controller from the EEPROM.
     pub fn sii_reload(self) -> S::Outcome<(), SubDeviceError> {
-        self.ask(move |engine, number| engine.start_sii_reload(number).ended())
+        self.ask(move |engine, subdevice| engine.start_sii_reload(subdevice).ended())
     }
 
     /// Reads the owner of its EEPROM: EtherCAT or the PDI.
@@ -161,11 +155,11 @@ impl<S: Services> SubDevice<S> {
 
     /// Reads the error counters of a declared SubDevice now.
     pub fn read_statistics(self) -> S::Outcome<Statistics, SubDeviceError> {
-        self.ask(move |engine, number| engine.start_statistics_read(number).ended())
+        self.ask(move |engine, subdevice| engine.start_statistics_read(subdevice).ended())
     }
 
     /// Clears the error counters of a declared SubDevice, and their totals.
     pub fn clear_statistics(self) -> S::Outcome<(), SubDeviceError> {
-        self.ask(move |engine, number| engine.start_statistics_clear(number).ended())
+        self.ask(move |engine, subdevice| engine.start_statistics_clear(subdevice).ended())
     }
 }

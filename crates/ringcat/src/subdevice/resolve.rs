@@ -1,34 +1,28 @@
-//! Finds a SubDevice by its address, and its name for messages.
+//! Checks the address of a SubDevice; its name for messages.
 
-use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::{Address, MainDevice as Engine};
 
 use super::error::SubDeviceFailure;
 use super::name::SubDeviceName;
 
-/// The number of a SubDevice in the engine.
-pub(super) fn find(engine: &Engine, address: Address) -> Result<usize, SubDeviceFailure> {
+/// Why a SubDevice cannot be used by this address.
+pub(super) fn check(engine: &Engine, address: Address) -> Result<(), SubDeviceFailure> {
     let Some(scanned) = engine.scanned_count() else { return Err(SubDeviceFailure::NotScanned) };
-    let declared = engine.stations().len();
-    match address {
-        Address::Declared(_) if declared == 0 => Err(SubDeviceFailure::NotActive),
-        Address::Declared(subdevice) if subdevice.0 < declared => Ok(subdevice.0),
-        Address::Declared(_) => Err(SubDeviceFailure::NotDeclared { declared }),
-        Address::Scanned(_) if declared > 0 && !engine.has_idle_operation() => Err(SubDeviceFailure::Active),
-        Address::Scanned(_) => engine.number(address).ok_or(SubDeviceFailure::NoPosition { scanned }),
+    if engine.station(address).is_some() {
+        return Ok(());
     }
-}
-
-/// What the scan found about a SubDevice; `None` where it was absent.
-pub(crate) fn info(engine: &Engine, number: usize) -> Option<SubDeviceInfo> {
-    engine.info_at(engine.station(number)?)
+    let declared = engine.stations().len();
+    Err(match address {
+        Address::Declared(_) if declared == 0 => SubDeviceFailure::NotActive,
+        Address::Declared(_) => SubDeviceFailure::NotDeclared { declared },
+        Address::Scanned(_) if declared > 0 && !engine.has_idle_operation() => SubDeviceFailure::Active,
+        Address::Scanned(_) => SubDeviceFailure::NoPosition { scanned },
+    })
 }
 
 impl SubDeviceName {
     pub(crate) fn of(engine: &Engine, address: Address) -> SubDeviceName {
-        let number = find(engine, address).ok();
-        let info = number.and_then(|number| info(engine, number));
-        let station = number.and_then(|number| engine.station(number));
-        SubDeviceName { address, name: info.map_or_else(String::new, |info| info.name), station }
+        let name = engine.info(address).map_or_else(String::new, |info| info.name);
+        SubDeviceName { address, name, station: engine.station(address) }
     }
 }

@@ -3,7 +3,6 @@
 use ringcat_engine::mail::voe::{self, Voe};
 use ringcat_engine::mail::{EmergencyRing, Unclaimed, Unsolicited};
 
-use super::resolve::find;
 use super::{SubDevice, SubDeviceError};
 use crate::services::Services;
 
@@ -48,9 +47,6 @@ impl<S: Services> SubDevice<S> {
     /// kind.
     pub fn take_unsolicited(self, kind: Unsolicited) -> S::Immediate<Option<Unclaimed>> {
         let address = self.address;
-        self.services.immediately(move |engine| {
-            let number = find(engine, address).ok()?;
-            engine.mailbox(number)?.pop_unsolicited(kind)
-        })
+        self.services.immediately(move |engine| engine.mailbox(address)?.pop_unsolicited(kind))
     }
 }

@@ -87,7 +87,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
 /// A file written and read by functions of the engine that run in its thread.
 fn file_there_and_back(handle: &SupervisorThread) -> Result<Vec<u8>, Error> {
     let file = handle.run(|engine| {
-        let mailbox = engine.mailbox(SPEAKER.0);
+        let mailbox = engine.mailbox(SPEAKER);
         async move {
             let mailbox = mailbox.expect("it is declared");
             let options = FoeOptions::default().with_limits(LIMITS);
@@ -132,7 +132,7 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     // Jobs: one that is waited for, one that is aborted, and one that is dropped.
     let start = |object: SdoAddress| {
         handle.start_job(move |engine| {
-            let mailbox = engine.mailbox(1).expect("it is declared");
+            let mailbox = engine.mailbox(SubDeviceId(1)).expect("it is declared");
             async move { coe::read(&mailbox, object, LIMITS, 200_000).await }
         })
     };

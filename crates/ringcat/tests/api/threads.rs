@@ -9,7 +9,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{DomainId, Error, LastOutputs, Link, Links, Options, Position, SubDeviceId, SupervisorThread, automatic};
+use ringcat::{
+    CycleJob, Direction, DomainId, Error, FramesIn, JobProbe, LastOutputs, Link, Links, NoSnapshot, Options, Position,
+    SubDeviceId, SupervisorThread, automatic,
+};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::{AlState, AlStatus};
@@ -68,6 +71,65 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     });
     assert_eq!(supervisor.scan()?.subdevices.len(), 3, "a stopped MainDevice scans again");
     assert!(links.now() > ringcat::Instant(0));
+    Ok(())
+}
+
+// covers: threads, cycles
+#[test]
+fn several_threads_read_whole_snapshots_while_cycles_run() -> Result<(), Error> {
+    const SNAPSHOTS: usize = 60;
+    let (cyclic, acyclic) = SharedSegment::halves(network());
+    let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+    let scan = supervisor.scan()?;
+    let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    let observer = application.observer();
+    let none = observer.snapshot(Duration::from_millis(1)).expect_err("no cycle runs");
+    assert!(matches!(none, NoSnapshot { limit, .. } if limit == Duration::from_millis(1)));
+    let all = (0..scan.subdevices.len()).map(SubDeviceId);
+    let areas = all.flat_map(|subdevice| application.directory().areas(subdevice));
+    let outputs: Vec<usize> = areas
+        .filter(|area| area.direction == Direction::Outputs)
+        .flat_map(|area| (0..usize::from(area.placed.area.length)).map(|at| area.placed.image_offset as usize + at))
+        .collect();
+    assert!(outputs.len() > 4, "{outputs:?}");
+    let (jobs, returns) = (JobProbe::default(), Arc::new(std::sync::atomic::AtomicU64::new(0)));
+    let (times, count) = (jobs.times().clone(), returns.clone());
+    let count_return = move |_at: ringcat::Instant| {
+        count.fetch_add(1, Ordering::Relaxed);
+    };
+    let probe = (jobs, FramesIn::new(count_return));
+    let cycles = application.start_cycles_probed(
+        probe,
+        || (),
+        |data| {
+            data.fill_outputs(data.cycle() as u8);
+            ControlFlow::Continue(())
+        },
+    )?;
+    let read = |observer: ringcat::Observer, outputs: Vec<usize>| {
+        move || {
+            let mut last = 0;
+            for _ in 0..SNAPSHOTS {
+                let snapshot = observer.snapshot(LIMIT).expect("cycles run");
+                let image = &snapshot.domains[0].image;
+                assert!(outputs.iter().all(|at| image[*at] == image[outputs[0]]), "of two cycles: {image:02x?}");
+                // Outputs of the cycle before, from the second one on.
+                let wanted = snapshot.cycle.saturating_sub(1) as u8;
+                assert!(snapshot.cycle < 2 || image[outputs[0]] == wanted, "{}: {image:02x?}", snapshot.cycle);
+                assert!(snapshot.cycle >= last, "it goes back");
+                last = snapshot.cycle;
+            }
+        }
+    };
+    let readers: Vec<_> = (0..4).map(|_| std::thread::spawn(read(observer.clone(), outputs.clone()))).collect();
+    readers.into_iter().for_each(|reader| reader.join().expect("whole snapshots"));
+    until("frames of the links are counted", || observer.link(Link::Redundant).frames > 100);
+    until("frames came back", || returns.load(Ordering::Relaxed) > 10);
+    let counts = CycleJob::ALL.map(|job| times.of(job).histogram().count());
+    assert!(counts[1..].iter().all(|count| *count > 10) && counts[0] > 0, "{counts:?}");
+    cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let observed = observer.snapshot(Duration::from_millis(1));
+    assert!(observed.is_err(), "the cycles have ended");
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::window::{Half, Window};
-use ringcat::{Instant, Limits, Link, SdoAddress, automatic};
+use ringcat::{Instant, Limits, Link, SdoAddress, SubDeviceId, automatic};
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::mail::coe::SdoError;
@@ -203,7 +203,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     let mut requests: Vec<SdoRequest> = Vec::new();
     if asks == Asks::CyclicTask {
         // A request takes one or two cycles: with two request objects, one is started in each cycle.
-        requests = (0..2).map(|at| plant.engine.create_sdo_request(1 + at, 4)).collect();
+        requests = (0..2).map(|at| plant.engine.create_sdo_request(SubDeviceId(1 + at), 4)).collect();
         for request in &mut requests {
             request
                 .set_object(OBJECT.index, OBJECT.sub_index, false)
@@ -215,7 +215,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     for cycle in 0..cycles {
         if asks == Asks::AnotherThread {
             let drive = 1 + cycle as usize % DRIVES;
-            let pending = plant.engine.start_sdo_upload(drive, OBJECT, LIMITS, 4);
+            let pending = plant.engine.start_sdo_upload(SubDeviceId(drive), OBJECT, LIMITS, 4);
             plant.waiting.push_back(pending);
         }
         begin += PERIOD;

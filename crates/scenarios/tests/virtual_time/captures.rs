@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
-use ringcat::{Application, LastOutputs, MainDevice, Options, automatic};
+use ringcat::{Application, LastOutputs, MainDevice, Options, SubDeviceId, automatic};
 use ringcat_link::Recorder;
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
@@ -101,7 +101,7 @@ fn lossy() -> (Vec<u8>, u64) {
         for round in 0..40 {
             let direction = Some(Direction::AToB);
             fault(run, &Fault::Drop { cable: CableId(round % 16 + 1), direction, count: 1 });
-            let _ended = run.engine_mut().start_register_read(round % 16, map::USER_RAM, 64);
+            let _ended = run.engine_mut().start_register_read(SubDeviceId(round % 16), map::USER_RAM, 64);
             cycles(run, 5);
         }
         sent_again = run.cyclic_counters().sent_again;

@@ -183,7 +183,11 @@ fn clocks_that_leave_their_window_and_return_are_reported() {
         let mark = world.mark();
         let offset = world.application().engine().clocks()[2].offset_ns + 6_000;
         let bytes = offset.to_le_bytes().to_vec();
-        let written = world.application_mut().engine_mut().start_register_write(2, map::DC_SYSTEM_TIME_OFFSET, bytes);
+        let written = world.application_mut().engine_mut().start_register_write(
+            SubDeviceId(2),
+            map::DC_SYSTEM_TIME_OFFSET,
+            bytes,
+        );
         for inside in [false, true] {
             let told = |event: &Event| matches!(event, Event::SyncWindow { inside: of, .. } if *of == inside);
             world.until(Duration::from_secs(4), "the window", |world| world.saw(mark, told));

@@ -224,7 +224,7 @@ fn objects_are_uploaded_and_downloaded_in_op_beside_process_data() {
     let mark = world.mark();
     let outcome = Outcome::default();
     let object = SdoAddress::new;
-    let mailbox = world.application().engine().mailbox(3).expect("it is declared");
+    let mailbox = world.application().engine().mailbox(SubDeviceId(3)).expect("it is declared");
     let results = outcome.clone();
     world.application_mut().engine_mut().spawn(async move {
         for address in [object(0x1018, 1), object(0x8000, 3), object(0x8000, 1), object(0x7777, 0)] {

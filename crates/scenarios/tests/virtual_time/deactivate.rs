@@ -194,7 +194,7 @@ fn a_subdevice_that_does_not_leave_op_is_named_and_the_main_device_is_returned()
         let Error::Stop(StopError::NotReached { subdevice, others, .. }) = &refused.error else {
             panic!("{}", refused.error)
         };
-        assert_eq!((*subdevice, *others), (Some(3), 0));
+        assert_eq!((*subdevice, *others), (Some(SubDeviceId(3)), 0));
         let mut ended = refused.main_device;
         ended.links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), false));
         settle(&mut activate(ended, automatic(&scan.subdevices, CYCLE)));

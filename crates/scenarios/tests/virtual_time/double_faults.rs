@@ -316,7 +316,7 @@ impl Run {
         let state = *self.dice.pick(&STATES);
         self.all_to_op = false;
         self.world.say(format!("SubDevice {subdevice} to {state}"));
-        drop(self.world.application_mut().engine_mut().start_state_request(subdevice, state));
+        drop(self.world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), state));
     }
 
     /// Ends all faults; all SubDevices have to return to OP.
@@ -327,8 +327,9 @@ impl Run {
         let subdevices = self.counts.len();
         (0..subdevices).for_each(|device| self.world.power_on(DeviceIndex(device)));
         self.cycles(1_000);
-        (0..subdevices)
-            .for_each(|it| drop(self.world.application_mut().engine_mut().start_state_request(it, AlState::Op)));
+        (0..subdevices).for_each(|it| {
+            drop(self.world.application_mut().engine_mut().start_state_request(SubDeviceId(it), AlState::Op))
+        });
         let domains = self.images.len();
         self.world.until(Duration::from_secs(30), "all back", |world| {
             let judged = world.judged(world.beginning());

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::ServiceError;
+use ringcat::{ServiceError, SubDeviceId};
 use ringcat_engine::procedures::sii::program::{SiiProgramError, SiiWritten};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::fault::{Fault, SpoiltWrite};
@@ -25,7 +25,7 @@ fn image(world: &World) -> Vec<u8> {
 }
 
 fn write(world: &mut World, image: &[u8], force: bool) -> Result<SiiWritten, SiiProgramError> {
-    let work = world.application_mut().engine_mut().start_sii_write(DEVICE.0, image.to_vec(), force);
+    let work = world.application_mut().engine_mut().start_sii_write(SubDeviceId(DEVICE.0), image.to_vec(), force);
     world.finish(LIMIT, work).map_err(sii)
 }
 
@@ -42,7 +42,7 @@ fn an_eeprom_image_is_written_beside_process_data_and_verified() {
     let mut world = world(1);
     let mark = world.mark();
     let mut new = image(&world);
-    let read = world.application_mut().engine_mut().start_sii_read(DEVICE.0);
+    let read = world.application_mut().engine_mut().start_sii_read(SubDeviceId(DEVICE.0));
     assert_eq!(world.finish(LIMIT, read), Ok(new.clone()));
     let words = new.len() / 2;
     assert_eq!(write(&mut world, &new, false), Ok(SiiWritten::new(0, words)));
@@ -74,12 +74,12 @@ fn an_invalid_eeprom_image_is_refused_unless_forced() {
     assert_eq!(write(&mut world, &wrong, true).map(|done| done.written), Ok(1));
     assert_eq!(image(&world), wrong);
     // The controller refuses to load this, and reports the reason.
-    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    let reload = world.application_mut().engine_mut().start_sii_reload(SubDeviceId(DEVICE.0));
     let error = sii(world.finish(LIMIT, reload).expect_err("the checksum is wrong"));
     assert!(matches!(error, SiiProgramError::NotLoaded { .. }), "{error}");
     assert!(error.to_string().contains("checksum"), "{error}");
     assert!(write(&mut world, &before, false).is_ok());
-    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    let reload = world.application_mut().engine_mut().start_sii_reload(SubDeviceId(DEVICE.0));
     assert_eq!(world.finish(LIMIT, reload), Ok(()));
 }
 
@@ -121,11 +121,15 @@ fn a_slow_busy_or_protected_eeprom_is_waited_for_or_reported() {
 fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     let mut world = world(4);
     let alias = |world: &mut World, force| {
-        let work = world.application_mut().engine_mut().start_alias_write(DEVICE.0, 0x0ABC, force);
+        let work = world.application_mut().engine_mut().start_alias_write(SubDeviceId(DEVICE.0), 0x0ABC, force);
         world.finish(LIMIT, work)
     };
     // The PDI has the EEPROM, and gets it back.
-    let to_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![1]);
+    let to_pdi = world.application_mut().engine_mut().start_register_write(
+        SubDeviceId(DEVICE.0),
+        map::SII_CONFIGURATION,
+        vec![1],
+    );
     assert_eq!(world.finish(LIMIT, to_pdi), Ok(()));
     assert_eq!(alias(&mut world, false), Ok(SiiWritten::new(2, 6)));
     let register = |world: &World, at| world.network().device(DEVICE).controller.register(at, 2).to_vec();
@@ -133,9 +137,13 @@ fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     let of_image = image(&world);
     assert_eq!(of_image[8..10], [0xBC, 0x0A]);
     assert!(ringcat_wire::sii::Sii::parse(&of_image).is_ok(), "the checksum is right");
-    let from_pdi = world.application_mut().engine_mut().start_register_write(DEVICE.0, map::SII_CONFIGURATION, vec![0]);
+    let from_pdi = world.application_mut().engine_mut().start_register_write(
+        SubDeviceId(DEVICE.0),
+        map::SII_CONFIGURATION,
+        vec![0],
+    );
     assert_eq!(world.finish(LIMIT, from_pdi), Ok(()));
-    let reload = world.application_mut().engine_mut().start_sii_reload(DEVICE.0);
+    let reload = world.application_mut().engine_mut().start_sii_reload(SubDeviceId(DEVICE.0));
     assert_eq!(world.finish(LIMIT, reload), Ok(()));
     assert_eq!(register(&world, map::STATION_ALIAS), [0, 0], "a reload does not bring it");
     world.power_off(DEVICE);

@@ -9,7 +9,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use ringcat::{DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, automatic};
+use ringcat::{
+    DomainId, DomainState, Freshness, JunctionMode, LastOutputs, MainDevice, Options, SubDeviceId, automatic,
+};
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -116,10 +118,11 @@ fn a_slow_transition_to_safeop_leaves_inputs_of_others_fresh() {
         let options = NetworkOptions::default();
         let mut world = World::in_op(1, if closed { ring(described, options) } else { line(described, options) });
         for (subdevice, kind) in kinds.iter().enumerate() {
-            let request = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Init);
+            let request =
+                world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Init);
             world.finish(Duration::from_secs(5), request).expect("it goes there");
             let mark = world.mark();
-            let request = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Op);
+            let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Op);
             world.finish(Duration::from_secs(5), request).expect("it comes back");
             let stale = world.judged(mark).iter().flat_map(|judged| judged.stale.iter().filter(|it| **it != subdevice));
             assert_eq!(stale.count(), 0, "ring: {closed}, {kind} comes back");
@@ -210,7 +213,8 @@ fn a_domain_is_incomplete_while_outputs_are_not_accepted() {
             let mut world = World::in_op(1, line(described, NetworkOptions::default()));
             world.judge_latched(false);
             world.run_cycles(20);
-            let write = world.application_mut().engine_mut().start_register_write(0, map::fmmu(0), vec![0; 16]);
+            let write =
+                world.application_mut().engine_mut().start_register_write(SubDeviceId(0), map::fmmu(0), vec![0; 16]);
             world.finish(Duration::from_secs(1), write).expect("it is there");
             world.run_cycles(3);
             let mark = world.mark();
@@ -235,10 +239,10 @@ fn outputs_of_a_starting_subdevice_do_not_replace_those_of_a_lost_one() {
     }
     let mut world = World::in_op(1, line(described, NetworkOptions::default()));
     world.judge_latched(false);
-    let request = world.application_mut().engine_mut().start_state_request(0, AlState::Init);
+    let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(0), AlState::Init);
     world.finish(Duration::from_secs(5), request).expect("it goes there");
     world.run_cycles(50);
-    drop(world.application_mut().engine_mut().start_state_request(0, AlState::Op));
+    drop(world.application_mut().engine_mut().start_state_request(SubDeviceId(0), AlState::Op));
     world.until(Duration::from_secs(1), "it takes outputs", |world| {
         world.judged(world.beginning()).last().is_some_and(|it| it.status.wkc == 2)
     });

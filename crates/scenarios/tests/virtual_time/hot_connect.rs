@@ -121,14 +121,14 @@ fn a_group_joins_and_leaves_a_line_without_working_counter_errors_elsewhere() {
         world.fault_in(BETWEEN, Fault::Heal(cable));
         if round > 0 {
             for subdevice in [4, 5] {
-                let _ = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Op);
+                let _ = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Op);
             }
         }
         until_joined(&mut world);
         assert_eq!(count(&world, mark, &Event::GroupJoined { group: GroupId(0) }), 1);
         // The group is set to INIT before it is unplugged.
         for subdevice in [5, 4] {
-            let work = world.application_mut().engine_mut().start_state_request(subdevice, AlState::Init);
+            let work = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Init);
             assert_eq!(world.finish(LIMIT, work), Ok(()));
         }
         world.fault_in(BETWEEN, Fault::Cut(cable));

@@ -134,7 +134,8 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     let mut application =
         activated(MainDevice::request(Tap::new(wired_with(described, &tree)), &Options::default()), 3);
     // In processing order the branch at port D is first: the SubDevice there has the second address.
-    let mut protect = application.engine_mut().start_register_write(1, map::REGISTER_WRITE_PROTECTION, vec![1]);
+    let mut protect =
+        application.engine_mut().start_register_write(SubDeviceId(1), map::REGISTER_WRITE_PROTECTION, vec![1]);
     (0..10).for_each(|_| application.cycle(|_| ()));
     protect.take().expect("it is done").expect("it is there");
     application.links_mut().network_mut().cut(CableId(2));

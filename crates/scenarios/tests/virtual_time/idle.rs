@@ -7,8 +7,8 @@ mod sequences;
 use std::time::Duration;
 
 use ringcat::{
-    Application, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, MainDevicePhase, Options, Position,
-    RegisterAddress, Services, SubDeviceConfig, TimedEvent, automatic,
+    Address, Application, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, MainDevicePhase, Options,
+    Position, RegisterAddress, RequestState, Services, SubDeviceConfig, SubDeviceId, TimedEvent, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -274,6 +274,32 @@ fn undeclared_subdevices_have_mailbox_state_and_eeprom_while_others_are_in_op() 
         assert_eq!(statuses(&mut ended), [PREOP; MIXED.len()], "operation without an application goes on");
         apply(&mut ended, Fault::PowerOff(DeviceIndex(5)));
         assert!(noticed(&mut ended, |event| matches!(event, Event::Counted { .. })) < NOTICED);
+    }
+}
+
+// covers: states, jobs
+#[test]
+fn requests_of_the_cyclic_thread_reach_subdevices_without_a_declaration() {
+    for network in networks() {
+        let main_device = idle(network);
+        let mut application = activate(main_device, &[1, 3, 5]);
+        cycles(&mut application, 300);
+        // One without a declaration, a declared one by its position and by its index, and none.
+        let addresses: [Address; 4] =
+            [Position(0).into(), Position(3).into(), SubDeviceId(1).into(), Position(6).into()];
+        let mut requests = addresses.map(|address| Services::create_sdo_request(&mut application, address, 4));
+        for request in &mut requests {
+            request.set_object(0x1018, 1, false).and_then(|()| request.read()).expect("it is free");
+        }
+        cycles(&mut application, 100);
+        let states = requests.each_ref().map(|request| request.state());
+        let done = RequestState::Success;
+        assert_eq!(states, [done, done, done, RequestState::Error]);
+        for request in &requests[..3] {
+            let mut vendor = [0; 4];
+            assert_eq!(request.data(&mut vendor), 4);
+            assert_ne!(vendor, [0; 4]);
+        }
     }
 }
 

@@ -48,7 +48,7 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
     for (subdevice, state, register, length) in registers {
         let mut world = world();
         if state != AlState::Op {
-            let request = world.application_mut().engine_mut().start_state_request(subdevice, state);
+            let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), state);
             world.finish(Duration::from_secs(1), request).expect("it goes there");
             world.run_cycles(50);
         }
@@ -64,7 +64,11 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
         };
         let before = held(&world);
         let mark = world.mark();
-        let write = world.application_mut().engine_mut().start_register_write(subdevice, register, vec![0; length]);
+        let write = world.application_mut().engine_mut().start_register_write(
+            SubDeviceId(subdevice),
+            register,
+            vec![0; length],
+        );
         world.finish(Duration::from_secs(1), write).expect("it is there");
         world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
         // Some SubDevices detect it themselves.
@@ -87,7 +91,7 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
 #[test]
 fn outputs_for_op_only_are_not_reconfigured_in_safeop() {
     let mut world = world();
-    let request = world.application_mut().engine_mut().start_state_request(0, AlState::SafeOp);
+    let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(0), AlState::SafeOp);
     world.finish(Duration::from_secs(1), request).expect("it goes there");
     let mark = world.mark();
     world.run_cycles(3_000);

@@ -172,12 +172,12 @@ fn subdevices_that_leave_op_show_their_error_and_code_until_they_are_back() {
     let live = scene.world.application().live_status();
     // States on request.
     for state in [AlState::SafeOp, AlState::PreOp, AlState::Init] {
-        let requested = scene.world.application_mut().engine_mut().start_state_request(7, state);
+        let requested = scene.world.application_mut().engine_mut().start_state_request(SubDeviceId(7), state);
         scene.run(60, ROUND);
         drop(requested);
         let status = live.subdevice(SubDeviceId(7)).expect("declared");
         assert_eq!((status.online, status.operational, status.al_state), (true, false, Some(state)));
-        let requested = scene.world.application_mut().engine_mut().start_state_request(7, AlState::Op);
+        let requested = scene.world.application_mut().engine_mut().start_state_request(SubDeviceId(7), AlState::Op);
         scene.run_until_op();
         drop(requested);
     }

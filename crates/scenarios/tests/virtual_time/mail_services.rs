@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use ringcat::{Limits, MainDevice, Options, Position, RequestFailure, RequestState, TransferLimits, automatic};
+use ringcat::{
+    Limits, MainDevice, Options, Position, RequestFailure, RequestState, SubDeviceId, TransferLimits, automatic,
+};
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_sim::application::foe::firmware;
@@ -49,7 +51,7 @@ fn objects_are_accessible_before_activation_which_reconfigures_all() {
 #[test]
 fn requests_are_reused_from_the_cyclic_thread() {
     let mut world = World::in_op(1, ring_of_16(Duration::from_micros(10)));
-    let mut request = world.application_mut().engine_mut().create_sdo_request(3, 16);
+    let mut request = world.application_mut().engine_mut().create_sdo_request(SubDeviceId(3), 16);
     let busy = |world: &mut World, request: &ringcat::SdoRequest| {
         let mut cycles = 0;
         while request.state() == RequestState::Busy {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{ConfigureError, Event, Limits, SubDeviceState};
+use ringcat::{ConfigureError, Event, Limits, SubDeviceId, SubDeviceState};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
 use ringcat_engine::supervisor::UnderWay;
@@ -120,7 +120,7 @@ fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergen
 /// Requests a state of a device, and waits for it while its users go on. A request that meets a device without power
 /// fails, and the device reaches the state after its return.
 fn change_state(world: &mut World, beside: &mut MailboxUsers, device: usize, state: AlState) {
-    let mut request = world.application_mut().engine_mut().start_state_request(device, state);
+    let mut request = world.application_mut().engine_mut().start_state_request(SubDeviceId(device), state);
     let until = world.application().now() + END;
     let mut result = None;
     while world.application().states()[device] != SubDeviceState::Settled(state) {

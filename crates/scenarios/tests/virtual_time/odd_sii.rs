@@ -282,7 +282,7 @@ fn an_sii_repaired_in_operation_is_reported_without_a_place() {
     devices[ODD].sii_image = Some(sii_image::build(&beyond));
     let mut world = world(devices, ReadPdos::Missing);
     world.run_cycles(400);
-    let write = world.application_mut().engine_mut().start_sii_write(ODD, sound, false);
+    let write = world.application_mut().engine_mut().start_sii_write(SubDeviceId(ODD), sound, false);
     world.finish(Duration::from_secs(20), write).expect("it can be written");
     let mark = world.mark();
     world.power_off(DeviceIndex(ODD));

@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat::{RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler};
+use ringcat::{
+    RegisterRequest, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, SubDeviceId, VoeHandler,
+};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::address::RegisterAddress;
@@ -39,7 +41,7 @@ fn wait(world: &mut World, state: impl Fn() -> RequestState) -> u32 {
 #[test]
 fn registers_are_read_and_written_from_the_cyclic_thread_within_two_cycles() {
     let mut world = world(1);
-    let mut request: RegisterRequest = world.application_mut().engine_mut().create_register_request(3, 64);
+    let mut request: RegisterRequest = world.application_mut().engine_mut().create_register_request(SubDeviceId(3), 64);
     let mark = world.mark();
     for round in 0..20u8 {
         request.write(USER_RAM, &[round, 1, 2, 3]).unwrap();
@@ -61,7 +63,7 @@ fn registers_are_read_and_written_from_the_cyclic_thread_within_two_cycles() {
     request.read(map::TYPE, 2).unwrap();
     wait(&mut world, || request.state());
     assert_eq!(request.failure(), Some(RequestFailure::Failed));
-    let mut absent = world.application_mut().engine_mut().create_register_request(99, 4);
+    let mut absent = world.application_mut().engine_mut().create_register_request(SubDeviceId(99), 4);
     absent.read(map::TYPE, 1).unwrap();
     wait(&mut world, || absent.state());
     assert_eq!(absent.failure(), Some(RequestFailure::Failed));
@@ -74,14 +76,14 @@ fn registers_of_any_length_are_read_and_written_by_a_service() {
     let data: Vec<u8> = (0..4000).map(|at| (at * 7 % 251) as u8).collect();
     let engine = world.application_mut().engine_mut();
     // Three datagrams, in memory behind the SyncManagers.
-    let write = engine.start_register_write(3, RegisterAddress(0x2000), data.clone());
+    let write = engine.start_register_write(SubDeviceId(3), RegisterAddress(0x2000), data.clone());
     assert_eq!(world.finish(Duration::from_secs(1), write), Ok(()));
-    let read = world.application_mut().engine_mut().start_register_read(3, RegisterAddress(0x2000), 4000);
+    let read = world.application_mut().engine_mut().start_register_read(SubDeviceId(3), RegisterAddress(0x2000), 4000);
     assert_eq!(world.finish(Duration::from_secs(1), read), Ok(data));
-    let read = world.application_mut().engine_mut().start_register_read(3, RegisterAddress(0xFFFF), 2);
+    let read = world.application_mut().engine_mut().start_register_read(SubDeviceId(3), RegisterAddress(0xFFFF), 2);
     let error = world.finish(Duration::from_secs(1), read).expect_err("beyond the end");
     assert!(error.to_string().contains("the memory ends at 0xffff"), "{error}");
-    let read = world.application_mut().engine_mut().start_register_read(99, map::TYPE, 1);
+    let read = world.application_mut().engine_mut().start_register_read(SubDeviceId(99), map::TYPE, 1);
     let error = world.finish(Duration::from_secs(1), read).expect_err("absent");
     assert!(error.to_string().contains("there is no SubDevice 99"), "{error}");
 }
@@ -90,7 +92,7 @@ fn registers_of_any_length_are_read_and_written_by_a_service() {
 #[test]
 fn idns_are_read_and_written_from_the_cyclic_thread() {
     let mut world = world(3);
-    let mut request: SoeRequest = world.application_mut().engine_mut().create_soe_request(ALL, 8000);
+    let mut request: SoeRequest = world.application_mut().engine_mut().create_soe_request(SubDeviceId(ALL), 8000);
     request.set_idn(1, Idn::product(0, 1)).unwrap();
     request.read().unwrap();
     wait(&mut world, || request.state());
@@ -115,7 +117,7 @@ fn idns_are_read_and_written_from_the_cyclic_thread() {
 #[test]
 fn a_handler_moves_vendor_messages_with_and_without_the_mailbox_status() {
     let mut world = world(4);
-    let mut handler: VoeHandler = world.application_mut().engine_mut().create_voe_handler(ALL, 200);
+    let mut handler: VoeHandler = world.application_mut().engine_mut().create_voe_handler(SubDeviceId(ALL), 200);
     assert_eq!(handler.received_header(), None);
     let mut sent = [0; 200];
     for round in 0..20u8 {
@@ -147,7 +149,7 @@ fn a_handler_moves_vendor_messages_with_and_without_the_mailbox_status() {
 #[test]
 fn a_request_that_is_cancelled_ends_and_the_next_one_is_not_disturbed() {
     let mut world = world(5);
-    let mut request: SdoRequest = world.application_mut().engine_mut().create_sdo_request(ALL, 200_000);
+    let mut request: SdoRequest = world.application_mut().engine_mut().create_sdo_request(SubDeviceId(ALL), 200_000);
     for cycles in [0, 1, 5, 10, 20] {
         request.set_object(0x2002, 0, false).unwrap();
         request.read().unwrap();

@@ -19,7 +19,7 @@ use scenarios::world::CYCLE;
 
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "digital-input-8"];
 /// The SubDevice that is used.
-const DRIVE: usize = 1;
+const DRIVE: Position = Position(1);
 const LIMIT: Duration = Duration::from_millis(500);
 
 fn main_device() -> MainDevice<Tap> {
@@ -82,14 +82,11 @@ fn call_of_mail_and_states(engine: &mut Engine, function: Function) -> Option<Pe
             now(engine, false)
         }
         Function::Ethernet => {
-            let _ = engine.ethernet_port(Position(DRIVE as u16));
+            let _ = engine.ethernet_port(DRIVE);
             now(engine, false)
         }
         Function::SubDeviceState => {
-            let _ = match engine.is_declared(DRIVE) {
-                true => engine.start_state_request(DRIVE, AlState::PreOp),
-                false => engine.start_visit(DRIVE, AlState::PreOp),
-            };
+            let _ = engine.start_state_request(DRIVE, AlState::PreOp);
             now(engine, false)
         }
         Function::StateOfAll => {
@@ -97,7 +94,7 @@ fn call_of_mail_and_states(engine: &mut Engine, function: Function) -> Option<Pe
             now(engine, false)
         }
         Function::ForcedState => {
-            let service = engine.start_forced_state(Position(DRIVE as u16), AlState::Init, Acknowledge::No);
+            let service = engine.start_forced_state(DRIVE, AlState::Init, Acknowledge::No);
             later(engine, service)
         }
         _ => return None,
@@ -121,7 +118,7 @@ fn call_of_registers(engine: &mut Engine, function: Function) -> Option<Pending<
             later(engine, service)
         }
         Function::EepromOwner => {
-            let service = engine.start_eeprom_assignment(Position(DRIVE as u16), EepromAssignment::Force);
+            let service = engine.start_eeprom_assignment(DRIVE, EepromAssignment::Force);
             later(engine, service)
         }
         Function::ControllerReset => {

@@ -38,7 +38,7 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     let mut world = in_line(1);
     world.application_mut().engine_mut().set_statistics_period(Some(Duration::from_millis(20)));
     world.run_cycles(50);
-    let before = world.application().engine().statistics(2).expect("it is declared");
+    let before = world.application().engine().statistics(SubDeviceId(2)).expect("it is declared");
     assert!(before.is_clean() && before.readings >= 2, "{before:?}");
     // Frames on the cable before the third SubDevice, in both directions: it counts those towards it, its neighbour
     // those on the way back.
@@ -47,7 +47,8 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
         world.run_cycles(25);
     }
     let engine = world.application().engine();
-    let [here, behind, neighbour] = [2, 3, 1].map(|subdevice| engine.statistics(subdevice).expect("declared"));
+    let [here, behind, neighbour] =
+        [2, 3, 1].map(|subdevice| engine.statistics(SubDeviceId(subdevice)).expect("declared"));
     // Frames damaged on the way back are lost, so not all ten are counted in both directions.
     assert!(here.ports[0].invalid_frames >= 300, "{:?}", here.ports);
     assert_eq!(here.ports[0].forwarded, 0);
@@ -55,26 +56,26 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
     assert!(neighbour.ports[1].invalid_frames > 0, "{:?}", neighbour.ports);
     assert!(here.registers.rx[0].invalid_frames < 0xFF, "it was cleared in time");
     world.application_mut().engine_mut().set_statistics_period(None);
-    let readings = world.application().engine().statistics(2).expect("declared").readings;
+    let readings = world.application().engine().statistics(SubDeviceId(2)).expect("declared").readings;
     world.run_cycles(100);
-    assert_eq!(world.application().engine().statistics(2).expect("declared").readings, readings);
-    let read = world.application_mut().engine_mut().start_statistics_read(2);
+    assert_eq!(world.application().engine().statistics(SubDeviceId(2)).expect("declared").readings, readings);
+    let read = world.application_mut().engine_mut().start_statistics_read(SubDeviceId(2));
     let read = world.finish(LIMIT, read).expect("it answers");
     assert_eq!((read.readings, read.ports[0].invalid_frames), (readings + 1, here.ports[0].invalid_frames));
-    let clear = world.application_mut().engine_mut().start_statistics_clear(2);
+    let clear = world.application_mut().engine_mut().start_statistics_clear(SubDeviceId(2));
     assert_eq!(world.finish(LIMIT, clear), Ok(()));
-    assert!(world.application().engine().statistics(2).expect("declared").is_clean());
+    assert!(world.application().engine().statistics(SubDeviceId(2)).expect("declared").is_clean());
     assert_eq!(world.network().device(DeviceIndex(2)).controller.register(map::RX_ERROR_COUNTER, 20), [0; 20]);
     world.fault(Fault::IdleSymbolErrors { cable: CableId(2), direction: None, count: 7 });
-    let read = world.application_mut().engine_mut().start_statistics_read(2);
+    let read = world.application_mut().engine_mut().start_statistics_read(SubDeviceId(2));
     let ports = world.finish(LIMIT, read).expect("it answers").ports;
     assert_eq!(ports.map(|port| (port.rx_errors, port.invalid_frames)), [(7, 0), (0, 0), (0, 0), (0, 0)]);
     world.fault(Fault::PdiErrors { device: DeviceIndex(2), code: 0x21, count: 3 });
-    let read = world.application_mut().engine_mut().start_statistics_read(2);
+    let read = world.application_mut().engine_mut().start_statistics_read(SubDeviceId(2));
     let read = world.finish(LIMIT, read).expect("it answers");
     assert_eq!((read.pdi, read.registers.pdi_code, read.is_clean()), (3, 0x21, false));
-    let read = world.application_mut().engine_mut().start_statistics_read(99);
-    assert!(world.finish(LIMIT, read).is_err() && world.application().engine().statistics(99).is_none());
+    let read = world.application_mut().engine_mut().start_statistics_read(SubDeviceId(99));
+    assert!(world.finish(LIMIT, read).is_err() && world.application().engine().statistics(SubDeviceId(99)).is_none());
 }
 
 // covers: registers
@@ -82,7 +83,7 @@ fn error_counters_are_kept_beyond_255_on_a_period_and_read_and_cleared_on_demand
 fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
     let mut world = in_ring(2);
     let mark = world.mark();
-    let block = world.application_mut().engine_mut().start_block(2);
+    let block = world.application_mut().engine_mut().start_block(SubDeviceId(2));
     let blocked = world.finish(LIMIT, block).expect("it has neighbours");
     assert_eq!(blocked.len(), 2);
     let gone = |world: &World| world.application().states()[2] == SubDeviceState::Absent;
@@ -99,7 +100,7 @@ fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
     assert!(world.all_in_op() && world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(2) }));
     let open = world.application_mut().engine_mut().start_open_blocked();
     assert_eq!(world.finish(LIMIT, open), Ok(0));
-    let block = world.application_mut().engine_mut().start_block(0);
+    let block = world.application_mut().engine_mut().start_block(SubDeviceId(0));
     let error = world.finish(LIMIT, block).expect_err("it hangs on the link");
     assert!(error.to_string().contains("is connected to the main link"), "{error}");
 }
@@ -109,11 +110,11 @@ fn a_subdevice_blocked_in_a_ring_is_cut_off_alone_until_its_ports_open() {
 fn closing_a_port_cuts_off_subdevices_and_opening_restores_them() {
     let mut world = in_line(3);
     let set = |world: &mut World, control| {
-        let set = world.application_mut().engine_mut().start_port_set(2, 1, control);
+        let set = world.application_mut().engine_mut().start_port_set(SubDeviceId(2), 1, control);
         assert_eq!(world.finish(LIMIT, set), Ok(()));
     };
     set(&mut world, LoopControl::Closed);
-    let read = world.application_mut().engine_mut().start_port_read(2, 1);
+    let read = world.application_mut().engine_mut().start_port_read(SubDeviceId(2), 1);
     assert_eq!(world.finish(LIMIT, read), Ok(LoopControl::Closed));
     let gone = |world: &World| world.application().states()[3..] == [SubDeviceState::Absent; 2];
     world.until(LIMIT, "gone", gone);
@@ -122,13 +123,13 @@ fn closing_a_port_cuts_off_subdevices_and_opening_restores_them() {
     assert!(world.application_mut().engine_mut().force_topology_change());
     world.until(LIMIT, "back", |world| world.application().all_settled());
     // The same with the other method.
-    let block = world.application_mut().engine_mut().start_block(3);
+    let block = world.application_mut().engine_mut().start_block(SubDeviceId(3));
     assert_eq!(world.finish(LIMIT, block).map(|ports| ports.len()), Ok(1));
     world.until(LIMIT, "gone", gone);
     let open = world.application_mut().engine_mut().start_open_blocked();
     assert_eq!(world.finish(LIMIT, open), Ok(1));
     world.until(LIMIT, "back", |world| world.application().all_settled());
-    let set = world.application_mut().engine_mut().start_port_set(2, 4, LoopControl::Auto);
+    let set = world.application_mut().engine_mut().start_port_set(SubDeviceId(2), 4, LoopControl::Auto);
     assert!(world.finish(LIMIT, set).expect_err("no such port").to_string().contains("only 0 to 3"));
 }
 
@@ -144,7 +145,7 @@ fn a_controller_reset_works_also_when_frames_are_lost() {
             world.drop(CableId(3), lost);
             world.drop(CableId(4), lost);
         }
-        let reset = world.application_mut().engine_mut().start_reset(3);
+        let reset = world.application_mut().engine_mut().start_reset(SubDeviceId(3));
         assert_eq!(world.finish(LIMIT, reset), Ok(()), "{lost} frames lost");
         assert_eq!(world.network().device(DeviceIndex(3)).controller.starts(), starts + 1, "{lost} frames lost");
         world

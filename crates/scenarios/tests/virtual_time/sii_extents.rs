@@ -130,7 +130,7 @@ fn an_eeprom_that_is_written_is_not_read_in_between() {
         let mut new = image.clone();
         (0x90..0x110).for_each(|at| new[at] ^= 0x20);
         let engine = world.application_mut().engine_mut();
-        let work = engine.start_sii_write(device.0, new.clone(), true);
+        let work = engine.start_sii_write(SubDeviceId(device.0), new.clone(), true);
         let completed = world.application_mut().engine_mut().start_sii_completion();
         assert!(world.finish(LIMIT, work).is_ok(), "{delay}");
         assert!(world.finish(LIMIT, completed).is_ok(), "{delay}");

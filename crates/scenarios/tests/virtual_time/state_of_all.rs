@@ -191,7 +191,7 @@ fn optional_subdevices_count_as_long_as_they_are_there() {
 #[test]
 fn a_subdevice_in_boot_is_left_there_and_named() {
     let mut world = World::in_op(6, line(descriptions(&KINDS), NetworkOptions::default()));
-    let boot = world.application_mut().engine_mut().start_state_request(ALL, AlState::Boot);
+    let boot = world.application_mut().engine_mut().start_state_request(SubDeviceId(ALL), AlState::Boot);
     assert_eq!(world.finish(LIMIT, boot), Ok(()));
     let reasons = not_followed(request(&mut world, AlState::PreOp, StateScope::All, LIMIT));
     assert_eq!(reasons, [(SubDeviceId(ALL).into(), NotFollowedReason::InBoot)]);

@@ -31,7 +31,7 @@ const KINDS: [&str; 4] = ["coupler", "digital-output-8", "all-protocols", "digit
 const DRIVE: usize = 2;
 
 fn request(world: &mut World, subdevice: usize, state: AlState) -> Result<(), ConfigureError> {
-    let work = world.application_mut().engine_mut().start_state_request(subdevice, state);
+    let work = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), state);
     world.finish(LIMIT, work)
 }
 
@@ -304,7 +304,7 @@ fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
     assert_eq!(request(&mut world, last, AlState::PreOp), Ok(()));
     world.run_cycles(5);
     assert!(!is_missed(&world));
-    let work = world.application_mut().engine_mut().start_state_request(last, AlState::Op);
+    let work = world.application_mut().engine_mut().start_state_request(SubDeviceId(last), AlState::Op);
     world.run_cycles(1);
     world.power_off(DeviceIndex(last));
     assert!(world.finish(LIMIT, work).is_err());
@@ -321,9 +321,9 @@ fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
 #[test]
 fn a_later_request_ends_an_earlier_one() {
     let mut world = World::in_op(7, line(descriptions(&KINDS), NetworkOptions::default()));
-    let first = world.application_mut().engine_mut().start_state_request(DRIVE, AlState::Init);
+    let first = world.application_mut().engine_mut().start_state_request(SubDeviceId(DRIVE), AlState::Init);
     world.cycle();
-    let second = world.application_mut().engine_mut().start_state_request(DRIVE, AlState::Op);
+    let second = world.application_mut().engine_mut().start_state_request(SubDeviceId(DRIVE), AlState::Op);
     assert_eq!(world.finish(LIMIT, first), Err(ConfigureError::Interrupted));
     assert_eq!(world.finish(LIMIT, second), Ok(()));
     world.settle();

@@ -122,7 +122,7 @@ fn a_subdevice_that_does_not_stop_is_named_and_delays_no_other() {
         let limit = Duration::from_millis(50);
         let Err(error) = application.stop(LastOutputs::Held, AlState::PreOp, limit) else { panic!("device 3 hangs") };
         let Error::Stop(StopError::NotReached { subdevice, others, status, .. }) = &error else { panic!("{error}") };
-        assert_eq!((*subdevice, *others, status.state), (Some(2), 0, AlState::Op.code()));
+        assert_eq!((*subdevice, *others, status.state), (Some(SubDeviceId(2)), 0, AlState::Op.code()));
         let text = error.to_string();
         assert!(text.contains("SubDevice 2 (station 0x1004) did not reach PREOP within 50 ms"), "{text}");
     }
@@ -138,7 +138,7 @@ fn a_subdevice_that_refuses_is_named_with_its_code() {
         application.links_mut().network_mut().apply(refuse);
         let Err(error) = application.stop(LastOutputs::Held, to, Duration::from_millis(50)) else { panic!("refused") };
         let Error::Stop(StopError::NotReached { subdevice, code: said, .. }) = &error else { panic!("{error}") };
-        assert_eq!((*subdevice, *said), (Some(3), code), "{error}");
+        assert_eq!((*subdevice, *said), (Some(SubDeviceId(3)), code), "{error}");
         assert!(error.to_string().contains("0x8042"), "{error}");
     }
 }

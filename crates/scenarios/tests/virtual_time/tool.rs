@@ -55,7 +55,7 @@ fn cycles_until_written(world: &mut World, value: u8, urgent: bool) -> usize {
     let engine = world.application_mut().engine_mut();
     let write = match urgent {
         true => engine.start_urgent_register_write(SubDeviceId(DEVICE), USER_RAM, vec![value]),
-        false => engine.start_register_write(DEVICE, USER_RAM, vec![value]),
+        false => engine.start_register_write(SubDeviceId(DEVICE), USER_RAM, vec![value]),
     };
     let mut cycles = 0;
     while world.network().device(DeviceIndex(DEVICE)).controller.register(USER_RAM, 1) != [value] {

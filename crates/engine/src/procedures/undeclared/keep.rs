@@ -87,6 +87,6 @@ pub(crate) async fn follow_unassigned(segment: SharedSegment) {
 
 /// SubDevices that are known to be undeclared.
 pub(crate) fn without_declaration(segment: &Segment) -> Vec<(Position, Rc<SubDeviceInfo>)> {
-    let known = segment.subdevices().unassigned().filter(|it| it.reported);
+    let known = segment.subdevices().unassigned().filter(|it| it.is_undeclared());
     known.filter_map(|it| Some((it.position, it.knowledge.info()?.clone()))).collect()
 }

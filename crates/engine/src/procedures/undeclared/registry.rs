@@ -187,20 +187,15 @@ impl Undeclared {
         self.notify();
     }
 
-    /// The mailbox of the SubDevice at a position.
-    pub(crate) fn mailbox(&self, position: Position) -> Option<Mailbox> {
-        self.all.borrow().iter().find(|entry| entry.position == position).map(|entry| entry.mailbox.clone())
+    /// The mailbox of the SubDevice with a station address.
+    pub(crate) fn mailbox(&self, station: StationAddress) -> Option<Mailbox> {
+        self.all.borrow().iter().find(|entry| entry.info.station == station).map(|entry| entry.mailbox.clone())
     }
 
     /// The mailboxes in use.
     pub(crate) fn mailboxes(&self) -> Vec<Mailbox> {
         let all = self.all.borrow();
         all.iter().filter(|entry| entry.mailbox.is_open()).map(|entry| entry.mailbox.clone()).collect()
-    }
-
-    /// Data of the SubDevice at a position.
-    pub(crate) fn info(&self, position: Position) -> Option<Rc<SubDeviceInfo>> {
-        self.all.borrow().iter().find(|entry| entry.position == position).map(|entry| entry.info.clone())
     }
 
     /// All SubDevices of the list, at their positions.
@@ -215,9 +210,9 @@ impl Undeclared {
         Some((entry.info.clone(), entry.mailbox.clone()))
     }
 
-    /// Leaves the SubDevice at a position as it is until another state is requested; an attempt ends.
-    pub(crate) fn leave(&self, position: Position) {
-        if let Some(entry) = self.all.borrow_mut().iter_mut().find(|entry| entry.position == position) {
+    /// Leaves the SubDevice with a station address as it is until another state is requested; an attempt ends.
+    pub(crate) fn leave(&self, station: StationAddress) {
+        if let Some(entry) = self.all.borrow_mut().iter_mut().find(|entry| entry.info.station == station) {
             entry.attempt = entry.attempt.wrapping_add(1);
             entry.progress = Progress::Left;
         }
@@ -253,7 +248,7 @@ impl Undeclared {
     /// Requests a state of the SubDevice at a position. Returns its attempt, and whether it is a new one: the same
     /// request may be under way.
     pub(crate) fn request(&self, position: Position, info: &Rc<SubDeviceInfo>, state: AlState) -> (Attempt, bool) {
-        let place = self.all.borrow().iter().position(|entry| entry.position == position);
+        let place = self.all.borrow().iter().position(|entry| entry.info.station == info.station);
         let place = place.unwrap_or_else(|| {
             let entry = self.entry(position, info, Progress::Reached);
             self.all.borrow_mut().push(entry);
@@ -374,11 +369,11 @@ impl Undeclared {
         self.changed.until(ready).await
     }
 
-    /// Repeats failed attempts now: of the SubDevice at a position, or of all.
-    pub(crate) fn retry(&self, position: Option<Position>) {
+    /// Repeats failed attempts now: of the SubDevice with a station address, or of all.
+    pub(crate) fn retry(&self, station: Option<StationAddress>) {
         let now = self.bus.now();
         for entry in &mut *self.all.borrow_mut() {
-            let is_meant = position.is_none_or(|position| entry.position == position);
+            let is_meant = station.is_none_or(|station| entry.info.station == station);
             if is_meant && matches!(entry.progress, Progress::Due(_)) {
                 entry.progress = Progress::Due(now);
                 entry.failures = 0;

@@ -4,8 +4,13 @@ use crate::layout::Layout;
 
 use super::*;
 
-fn choices() -> Choices {
-    Choices { enhanced_line_crossed: false, junctions: JunctionMode::Disabled, follow_groups: false }
+pub(super) fn choices() -> Choices {
+    Choices {
+        enhanced_line_crossed: false,
+        junctions: JunctionMode::Disabled,
+        follow_groups: false,
+        idle_operation: false,
+    }
 }
 
 fn scan(count: usize) -> Scan {

@@ -136,6 +136,11 @@ impl Shared {
         self.monitor.observe(flight.arrivals);
         self.outbox.reads_returned(flight.reads);
         flight.mail_reads().for_each(|read| self.strays.remember(read));
+        let missing = flight.missing_links(self.links);
+        for link in Link::ALL.into_iter().filter(|link| missing & link.bit() != 0) {
+            self.counters.copies_lost[link.index()] += 1;
+            self.counters.bytes_lost[link.index()] += flight.bytes.len() as u64;
+        }
         if !flight.answered {
             if flight.arrivals.arrived == 0 {
                 self.counters.lost += 1;

@@ -166,7 +166,7 @@ fn outputs_that_a_file_enables_at_so_are_off_in_safeop() {
     let is_on = |plant: &Plant| plant.device(LAMPS).controller.register(map::sync_manager(0).offset(6), 1)[0] & 1 == 1;
     assert!(is_on(&plant));
     for (to, on) in [(AlState::SafeOp, false), (AlState::Op, true)] {
-        let mut work = plant.application.engine_mut().start_state_request(LAMPS, to);
+        let mut work = plant.application.engine_mut().start_state_request(SubDeviceId(LAMPS), to);
         while work.take().is_none() {
             plant.cycle();
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, JunctionMode, RawDatagram, SubDeviceState};
+use ringcat::{Event, JunctionMode, RawDatagram, SubDeviceId, SubDeviceState};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_wire::address::Position;
@@ -22,10 +22,10 @@ fn a_port_closed_on_purpose_stays_closed_while_rings_are_examined() {
         let mut world = in_op(43, two_rings(), (JunctionMode::Automatic, &[]));
         let engine = world.application_mut().engine_mut();
         if by_name {
-            let block = engine.start_block(6);
+            let block = engine.start_block(SubDeviceId(6));
             assert_eq!(world.finish(CYCLE * 1_000, block).map(|ports| ports.len()), Ok(1));
         } else {
-            let set = engine.start_port_set(3, 2, LoopControl::Closed);
+            let set = engine.start_port_set(SubDeviceId(3), 2, LoopControl::Closed);
             assert_eq!(world.finish(CYCLE * 1_000, set), Ok(()));
         }
         let is_gone = |world: &World| world.application().states()[6] == SubDeviceState::Absent;
@@ -59,7 +59,7 @@ fn a_port_closed_on_purpose_stays_closed_while_rings_are_examined() {
             let open = engine.start_open_blocked();
             assert_eq!(world.finish(CYCLE * 1_000, open), Ok(1));
         } else {
-            let set = engine.start_port_set(3, 2, LoopControl::Auto);
+            let set = engine.start_port_set(SubDeviceId(3), 2, LoopControl::Auto);
             assert_eq!(world.finish(CYCLE * 1_000, set), Ok(()));
         }
         world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
@@ -74,15 +74,15 @@ fn close_port(world: &mut World, way: usize) -> Box<dyn FnMut() -> Option<bool>>
     let engine = world.application_mut().engine_mut();
     match way {
         0 => {
-            let mut work = engine.start_port_set(3, 2, LoopControl::Closed);
+            let mut work = engine.start_port_set(SubDeviceId(3), 2, LoopControl::Closed);
             Box::new(move || work.take().map(|result| result.is_ok()))
         }
         1 => {
-            let mut work = engine.start_block(6);
+            let mut work = engine.start_block(SubDeviceId(6));
             Box::new(move || work.take().map(|result| result.is_ok()))
         }
         2 => {
-            let mut work = engine.start_register_write(3, register, loops);
+            let mut work = engine.start_register_write(SubDeviceId(3), register, loops);
             Box::new(move || work.take().map(|result| result.is_ok()))
         }
         _ => {

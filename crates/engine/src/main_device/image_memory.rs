@@ -1,0 +1,35 @@
+//! Memory of the application for the image of a domain.
+
+use alloc::sync::Arc;
+use core::fmt;
+
+/// Memory for the image of a domain. Copies of a declaration share it; one of them can be activated, after the others
+/// are dropped.
+#[derive(Clone)]
+pub struct ImageMemory(Arc<Given>);
+
+/// The application's memory.
+struct Given(&'static mut [u8]);
+
+impl fmt::Debug for ImageMemory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ImageMemory({} bytes)", self.0.0.len())
+    }
+}
+
+impl ImageMemory {
+    /// Memory that is at least as long as the image.
+    pub fn new(memory: &'static mut [u8]) -> ImageMemory {
+        ImageMemory(Arc::new(Given(memory)))
+    }
+
+    /// Whether no copy of the declaration has the memory, too.
+    pub(super) fn is_only(&mut self) -> bool {
+        Arc::get_mut(&mut self.0).is_some()
+    }
+
+    /// The memory; `None` if a copy of the declaration has it.
+    pub(super) fn into_inner(self) -> Option<&'static mut [u8]> {
+        Arc::into_inner(self.0).map(|given| given.0)
+    }
+}

@@ -1,0 +1,85 @@
+//! Memory of the application for the images of domains: declared with the domain, used from the activation on.
+//!
+//! The memory outlives the application: it is valid before the activation and after the end. Another process may map
+//! it, or a C program may own it.
+
+use alloc::vec::Vec;
+
+use super::activate_error::ActivateError;
+use super::declaration::{Declaration, DomainConfig};
+use super::image_memory::ImageMemory;
+use crate::domain::DomainId;
+use crate::layout::Layout;
+
+impl DomainConfig {
+    /// Puts the image of the domain into memory of the application ([`Declaration::place_image`]).
+    #[must_use]
+    pub fn with_memory(mut self, memory: &'static mut [u8]) -> DomainConfig {
+        self.memory = Some(ImageMemory::new(memory));
+        self
+    }
+}
+
+impl Declaration {
+    /// Puts the image of a domain into memory of the application, which outlives the MainDevice: leaked, static, or
+    /// mapped into several processes. The image is the beginning of the memory, with the content that it has at the
+    /// activation: outputs in it leave with the first cycle. The activation refuses memory that is shorter than the
+    /// image ([`Declaration::image_bytes`] for registered process data).
+    ///
+    /// The memory stays valid after the end of the application, with the last outputs and inputs;
+    /// [`crate::exchange::Exchange::give_memory_back`] gives it back. Without such a domain, nothing happens.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use ringcat_engine::main_device::Declaration;
+    ///
+    /// let mut declaration = Declaration::default();
+    /// let domain = declaration.add_domain(Duration::from_millis(1));
+    /// declaration.place_image(domain, Vec::leak(vec![0; 64]));
+    /// ```
+    pub fn place_image(&mut self, domain: DomainId, memory: &'static mut [u8]) {
+        if let Some(domain) = self.domains.get_mut(domain.0) {
+            domain.memory = Some(ImageMemory::new(memory));
+        }
+    }
+}
+
+/// Memory of each domain of a loaded declaration.
+#[derive(Debug, Default)]
+pub(super) struct Memories(pub Vec<Option<&'static mut [u8]>>);
+
+impl Memories {
+    /// Takes the memory out of a declaration.
+    ///
+    /// # Errors
+    /// A copy of the declaration has the memory too. The memory stays with the copy.
+    pub fn of(declaration: &mut Declaration) -> Result<Memories, ActivateError> {
+        let is_shared = |domain: &mut DomainConfig| domain.memory.as_mut().is_some_and(|memory| !memory.is_only());
+        let shared = declaration.domains.iter_mut().position(is_shared);
+        if let Some(domain) = shared {
+            return Err(ActivateError::MemoryShared { domain: DomainId(domain) });
+        }
+        let taken = declaration.domains.iter_mut().map(|domain| domain.memory.take()?.into_inner());
+        Ok(Memories(taken.collect()))
+    }
+
+    /// Checks that each image fits.
+    ///
+    /// # Errors
+    /// Memory is shorter than the image of its domain.
+    pub fn check(&self, layout: &Layout) -> Result<(), ActivateError> {
+        for (domain, (memory, planned)) in self.0.iter().zip(&layout.domains).enumerate() {
+            let needed = planned.image_len as usize;
+            if let Some(got) = memory.as_ref().map(|memory| memory.len()).filter(|got| *got < needed) {
+                return Err(ActivateError::MemoryTooShort { domain: DomainId(domain), needed, got });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes all memory.
+    pub fn take(&mut self) -> impl Iterator<Item = (DomainId, &'static mut [u8])> + use<> {
+        let all = core::mem::take(&mut self.0).into_iter().enumerate();
+        all.filter_map(|(domain, memory)| Some((DomainId(domain), memory?)))
+    }
+}
