@@ -1,8 +1,10 @@
 //! Events of both halves.
 
+mod clients;
 mod cyclic;
 pub mod history;
 mod log;
+mod subject;
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -12,8 +14,10 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
+pub use clients::{ClientEvents, ClientId};
 pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
+pub use subject::{Subject, Subjects};
 
 pub use crate::ring_status::Occupant;
 

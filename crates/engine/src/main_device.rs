@@ -8,12 +8,14 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod clients;
 mod clocks;
 mod datagrams;
 mod declaration;
 mod declare;
 mod ethernet;
 mod found;
+mod function;
 mod gateway;
 mod idle;
 mod image_memory;
@@ -34,8 +36,10 @@ mod sampling;
 mod sent_once;
 mod services;
 pub mod snapshot;
+mod state_of_all;
 mod states;
 mod steps;
+mod tool;
 mod working_counters;
 
 use alloc::collections::BTreeMap;
@@ -55,6 +59,7 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use function::{Function, Permission};
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
@@ -93,7 +98,8 @@ use crate::time::Instant;
 use loaded::Loaded;
 use memories::Memories;
 
-/// Unfetched events at which those of the cyclic half wait in their queue: a quarter of the log.
+/// Unfetched events at which those of the cyclic half wait in their queue, unless clients have queues of their own: a
+/// quarter of the log.
 const UNFETCHED: usize = 1024;
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
@@ -125,10 +131,10 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
+    /// Ethernet of SubDevices whose port was requested.
+    ports: BTreeMap<Address, EthernetPort>,
     /// Memory of the loaded declaration.
     memories: Memories,
-    /// Ethernet of declared SubDevices whose port was requested, by their indices in the declaration.
-    ports: BTreeMap<usize, EthernetPort>,
     /// Messages of a gateway's clients.
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
@@ -284,7 +290,7 @@ impl MainDevice {
     /// Takes the events of the cyclic half into the log, as long as they leave room for those of the acyclic half.
     fn number_cyclic_events(&mut self, now: Instant) {
         let Some(cyclic) = self.cyclic_events.as_mut() else { return };
-        while self.supervisor.events_unfetched() < UNFETCHED {
+        while self.supervisor.has_event_clients() || self.supervisor.events_unfetched() < UNFETCHED {
             let Some(words) = cyclic.pop() else { return };
             let lost = cyclic.dropped();
             if let Some(event) = CyclicEvent::unpack(words) {

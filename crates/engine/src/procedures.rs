@@ -24,6 +24,7 @@ mod read_again;
 pub(crate) mod reconcile;
 pub mod recover;
 pub(crate) mod request_state;
+pub mod request_states;
 pub(crate) mod sample;
 pub mod scan;
 pub mod serve_requests;

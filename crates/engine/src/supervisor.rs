@@ -206,6 +206,16 @@ impl Supervisor {
         self.shared.borrow().events.unfetched()
     }
 
+    /// Works with the log of events.
+    pub(crate) fn with_events<T>(&self, work: impl FnOnce(&mut EventLog) -> T) -> T {
+        work(&mut self.shared.borrow_mut().events)
+    }
+
+    /// Whether there are clients of events with queues of their own.
+    pub(crate) fn has_event_clients(&self) -> bool {
+        self.shared.borrow().events.has_clients()
+    }
+
     /// The kept events from a number on.
     pub fn events_since(&self, number: u64) -> EventsSince {
         self.shared.borrow().events.since(number)

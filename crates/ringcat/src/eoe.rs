@@ -1,9 +1,11 @@
 //! Ethernet over EtherCAT as network interfaces of this host: one for each SubDevice that supports EoE.
 //!
-//! [`SupervisorThread::start_ethernet`] creates an interface for each SubDevice that is found. From then on the
-//! supervisor thread moves frames between interfaces and mailboxes. It takes frames of the host while the queue of the
-//! SubDevice has room; further frames wait in the kernel. While a SubDevice is absent its interface has no carrier, but
-//! keeps its addresses, its routes and its bridge. The interfaces are removed when the MainDevice stops.
+//! [`SupervisorThread::start_ethernet`] creates an interface for each SubDevice that is found: for declared ones, and
+//! with idle operation for all others, with and without an application. From then on the supervisor thread moves frames
+//! between interfaces and mailboxes. It takes frames of the host while the queue of the SubDevice has room; further
+//! frames wait in the kernel. While a SubDevice is absent its interface has no carrier, but keeps its addresses, its
+//! routes and its bridge. An interface stays while an application begins and ends; its counters begin anew. The
+//! interfaces are removed when the MainDevice stops; one without a declaration also when its SubDevice leaves.
 //!
 //! An interface that cannot be created is reported once; all other interfaces work.
 
@@ -14,7 +16,7 @@ use std::task::Waker;
 use std::time::Duration;
 
 use ringcat_engine::mail::eoe::{EthernetStatus, MAX_FRAME, QUEUE};
-use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine, SubDeviceId};
+use ringcat_engine::main_device::{Address, EthernetSubDevice, MainDevice as Engine};
 use ringcat_engine::time::Instant;
 use ringcat_link::tap::{TapError, TapInterface};
 
@@ -113,8 +115,8 @@ pub enum EthernetNews {
     Made {
         /// Its name.
         name: String,
-        /// The SubDevice, by its index in the declaration.
-        subdevice: SubDeviceId,
+        /// The SubDevice, by its index in the declaration, or by its position if it has no declaration.
+        subdevice: Address,
     },
     /// Another program removed it. It is created again.
     Removed {
@@ -136,7 +138,7 @@ impl fmt::Display for EthernetNews {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             EthernetNews::Made { name, subdevice } => {
-                write!(f, "network interface {name} leads to SubDevice {subdevice}")
+                write!(f, "network interface {name} leads to {subdevice}")
             }
             EthernetNews::Removed { name } => write!(f, "{name}: removed by another program; it is made again"),
             EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
@@ -204,8 +206,8 @@ impl Drop for Ethernet {
 }
 
 impl SupervisorThread {
-    /// Creates a network interface for each SubDevice that supports EoE as soon as the SubDevice is known, from
-    /// activation on.
+    /// Creates a network interface for each SubDevice that supports EoE as soon as the SubDevice is known: from
+    /// activation on, or with [`Options::idle_operation`](crate::Options) from the scan on.
     ///
     /// # Errors
     /// The thread has ended.
@@ -256,7 +258,7 @@ struct Switch {
     shared: Arc<Shared>,
     ends: Vec<End>,
     /// SubDevices with an interface that cannot be created.
-    refused: Vec<SubDeviceId>,
+    refused: Vec<EthernetSubDevice>,
     refresh_at: Instant,
 }
 
@@ -290,19 +292,20 @@ impl Switch {
     /// Creates interfaces for new SubDevices; removes those of a stopped MainDevice.
     fn refresh(&mut self, engine: &mut Engine) {
         let found = engine.ethernet_subdevices();
-        self.ends.retain(|end| {
+        self.ends.retain_mut(|end| {
             let removed = !end.interface.exists();
             if removed {
                 publish(&self.shared, EthernetNews::Removed { name: end.name.clone() });
             }
-            !removed && found.contains(&end.subdevice)
+            // A declaration with this SubDevice may have begun or ended.
+            let now = found.iter().find(|it| it.is_at_place_of(&end.subdevice));
+            end.subdevice = *now.unwrap_or(&end.subdevice);
+            !removed && now.is_some()
         });
-        if found.is_empty() {
-            self.refused.clear();
-        }
+        self.refused.retain(|refused| found.iter().any(|it| it.is_at_place_of(refused)));
         for subdevice in found {
-            let known = self.ends.iter().any(|end| end.subdevice == subdevice);
-            if known || self.refused.contains(&subdevice.subdevice) {
+            let known = self.ends.iter().map(|end| &end.subdevice).chain(&self.refused);
+            if known.into_iter().any(|known| known.is_at_place_of(&subdevice)) {
                 continue;
             }
             match self.make(subdevice) {
@@ -312,7 +315,7 @@ impl Switch {
                     self.ends.push(end);
                 }
                 Err(error) => {
-                    self.refused.push(subdevice.subdevice);
+                    self.refused.push(subdevice);
                     publish(&self.shared, EthernetNews::Refused(error));
                 }
             }
@@ -377,6 +380,7 @@ impl End {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ringcat_engine::main_device::SubDeviceId;
     use ringcat_wire::address::Position;
 
     // covers: eoe-interfaces

@@ -6,6 +6,7 @@ use std::time::Duration;
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
 use ringcat_engine::procedures::configure::ConfigureError;
+use ringcat_engine::procedures::request_states::StatesError;
 use ringcat_engine::procedures::scan::ScanError;
 use ringcat_engine::procedures::services::ServiceError;
 use ringcat_engine::procedures::stop::StopError;
@@ -34,6 +35,8 @@ pub enum Error {
     Service(ServiceError),
     /// A service of one SubDevice failed.
     SubDevice(Box<SubDeviceError>),
+    /// Not all SubDevices followed a state that was requested of all.
+    States(StatesError),
     /// SubDevices did not reach their target states in time.
     NotReady(NotReady),
     /// An object is not mapped as the application expects.
@@ -79,6 +82,7 @@ impl fmt::Display for Error {
             Error::Sdo(error) => error.fmt(f),
             Error::Service(error) => error.fmt(f),
             Error::SubDevice(error) => error.fmt(f),
+            Error::States(error) => error.fmt(f),
             Error::NotReady(error) => error.fmt(f),
             Error::Map(error) => error.fmt(f),
             Error::DoesNotFit(error) => error.fmt(f),
@@ -119,6 +123,7 @@ errors! {
     Configure(ConfigureError),
     Sdo(SdoError),
     Service(ServiceError),
+    States(StatesError),
     NotReady(NotReady),
     Map(MapError),
     DoesNotFit(DoesNotFit),

@@ -6,7 +6,8 @@ use crate::error::Error;
 use crate::supervisor_thread::SupervisorThread;
 
 impl SupervisorThread {
-    /// Opens the mailbox gateway. SubDevices answer from activation on.
+    /// Opens the mailbox gateway. SubDevices answer from activation on, or with
+    /// [`Options::idle_operation`](crate::Options) as soon as they are in PREOP, declared or not.
     ///
     /// # Errors
     /// The address cannot be bound, the system cannot start a thread, or the thread of the acyclic half has ended.

@@ -143,7 +143,7 @@ pub use ringcat_engine::config::{
     Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
-pub use ringcat_engine::event::{Event, EventsSince, Occupant, TimedEvent};
+pub use ringcat_engine::event::{ClientEvents, ClientId, Event, EventsSince, Occupant, Subject, Subjects, TimedEvent};
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
@@ -164,17 +164,21 @@ pub use ringcat_engine::main_device::snapshot::{
     Snapshot, SubDeviceSnapshot,
 };
 pub use ringcat_engine::main_device::{
-    ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, GroupId,
-    GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY, MainDevicePhase,
-    Pending, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus, SentOnce, SubDeviceId,
-    SubDeviceState, SubDeviceStatus, WkcShare,
+    ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, Function,
+    GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY,
+    MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
+    SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
 pub use ringcat_engine::procedures::inspect_ring::RingInspection;
+pub use ringcat_engine::procedures::request_states::{NotFollowed, NotFollowedReason, StateScope, StatesError};
 pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use ringcat_engine::procedures::services::ServiceError;
+pub use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, EepromOwner, EepromOwnership};
+pub use ringcat_engine::procedures::services::forced_state::Acknowledge;
+pub use ringcat_engine::procedures::services::port_report::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
 pub use ringcat_engine::procedures::services::ports::BlockedPort;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::sii::program::SiiWritten;

@@ -12,15 +12,20 @@
 
 use std::time::Duration;
 
-use ringcat_engine::event::EventsSince;
+use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, Subjects};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
-use ringcat_engine::main_device::{Address, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, RawDatagram};
+use ringcat_engine::main_device::{
+    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram,
+};
+use ringcat_engine::procedures::request_states::{StateScope, StatesError};
 use ringcat_engine::procedures::services::ServiceError;
+use ringcat_engine::procedures::services::port_report::SubDevicePorts;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::unassigned::rescan::Rescan;
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 use ringcat_engine::supervisor::{BusError, Reply};
+use ringcat_wire::al::AlState;
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -126,10 +131,54 @@ pub trait Services: Sized {
         self.immediately(move |engine| engine.events_since(number))
     }
 
+    /// Registers a client of events with a queue of its own, of `size` events and with the subjects that it asks for. A
+    /// client that does not fetch loses its own oldest events only. `None` if there are 64 clients.
+    fn register_client(self, subjects: Subjects, size: usize) -> Self::Immediate<Option<ClientId>> {
+        self.immediately(move |engine| engine.register_client(subjects, size))
+    }
+
+    /// Sets the subjects of a client's further events; false if there is no such client.
+    fn set_client_subjects(self, client: ClientId, subjects: Subjects) -> Self::Immediate<bool> {
+        self.immediately(move |engine| engine.set_client_subjects(client, subjects))
+    }
+
+    /// The events of a client since it fetched last, and how many it has missed; `None` if there is no such client.
+    fn client_events(self, client: ClientId) -> Self::Immediate<Option<ClientEvents>> {
+        self.immediately(move |engine| engine.take_client_events(client))
+    }
+
+    /// Removes a client of events; false if there is no such client.
+    fn unregister_client(self, client: ClientId) -> Self::Immediate<bool> {
+        self.immediately(move |engine| engine.unregister_client(client))
+    }
+
+    /// Whether a function can be called in the present phase.
+    fn permission(self, function: Function) -> Self::Immediate<Permission> {
+        self.immediately(move |engine| engine.permission(function))
+    }
+
+    /// Reads the ports of all SubDevices, with and without an application: links, neighbours, delays, receive times,
+    /// error counters. Empty before a scan.
+    fn port_report(self) -> Self::Outcome<Vec<SubDevicePorts>, ServiceError> {
+        self.call(|engine| engine.start_port_report())
+    }
+
     /// Repeats the failed configuration of a SubDevice now, or of all, without a further pause. The result is false if
     /// there is no such SubDevice.
     fn retry(self, subdevice: Option<Address>) -> Self::Immediate<bool> {
         self.immediately(move |engine| engine.retry(subdevice))
+    }
+
+    /// Brings all SubDevices to INIT, PREOP, SAFEOP or OP and waits until they are there: while an application is
+    /// active the declared ones, each at most to its declared state; otherwise those of the scan, with the defaults of
+    /// their SIIs. The error names those that did not follow within `limit`, with their reasons. The state is kept.
+    fn request_state_of_all(
+        self,
+        state: AlState,
+        scope: StateScope,
+        limit: Duration,
+    ) -> Self::Outcome<(), StatesError> {
+        self.call(move |engine| engine.start_state_of_all(state, scope, limit))
     }
 
     /// What the MainDevice does as a whole.

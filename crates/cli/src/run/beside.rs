@@ -3,10 +3,10 @@
 use std::net::{IpAddr, SocketAddr};
 
 use clap::Args;
-use ringcat::SupervisorThread;
 use ringcat::eoe::{Ethernet, EthernetInterface, EthernetOptions};
 use ringcat::gateway::{Gateway, GatewayOptions};
 use ringcat::wire::mailbox::gateway::PORT;
+use ringcat::{Address, SubDeviceId, SupervisorThread};
 use ringcat_link::interface;
 
 use crate::failure::Failure;
@@ -89,19 +89,23 @@ impl Beside {
     /// The network interfaces for EoE, as keys of JSON.
     pub fn json_ethernet(&self) -> Vec<run::Ethernet> {
         let interfaces = self.ethernet.iter().flat_map(Ethernet::interfaces);
-        let json = |EthernetInterface { name, subdevice, status, refused, .. }: EthernetInterface| run::Ethernet {
-            interface: name,
-            subdevice: subdevice.subdevice.0,
-            sent_frames: status.counters.tx_frames,
-            sent_bytes: status.counters.tx_bytes,
-            dropped_frames: status.counters.tx_dropped,
-            received_frames: status.counters.rx_frames,
-            received_bytes: status.counters.rx_bytes,
-            incomplete_frames: status.counters.rx_lost + status.counters.malformed,
-            overrun_frames: status.counters.rx_overruns,
-            refused_frames: refused,
+        let json = |EthernetInterface { name, subdevice, status, refused, .. }: EthernetInterface| {
+            // A run declares all SubDevices.
+            let Address::Declared(SubDeviceId(subdevice)) = subdevice.subdevice else { return None };
+            Some(run::Ethernet {
+                interface: name,
+                subdevice,
+                sent_frames: status.counters.tx_frames,
+                sent_bytes: status.counters.tx_bytes,
+                dropped_frames: status.counters.tx_dropped,
+                received_frames: status.counters.rx_frames,
+                received_bytes: status.counters.rx_bytes,
+                incomplete_frames: status.counters.rx_lost + status.counters.malformed,
+                overrun_frames: status.counters.rx_overruns,
+                refused_frames: refused,
+            })
         };
-        interfaces.map(json).collect()
+        interfaces.filter_map(json).collect()
     }
 
     /// The mailbox gateway, as keys of JSON.
@@ -129,7 +133,7 @@ impl Beside {
             for EthernetInterface { name, subdevice, status, refused, .. } in interfaces {
                 let counters = status.counters;
                 say!(
-                    "  {name} (SubDevice {}): to it {} frames, {} bytes, {} dropped; from it {} frames, \
+                    "  {name} ({}): to it {} frames, {} bytes, {} dropped; from it {} frames, \
                      {} bytes; {} incomplete, {} overrun, {refused} not taken by the host",
                     subdevice.subdevice,
                     counters.tx_frames,

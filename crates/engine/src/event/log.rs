@@ -5,7 +5,9 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use super::clients::{ClientEvents, ClientId, Clients};
 use super::history::History;
+use super::subject::Subjects;
 use super::{Event, Occupant, TimedEvent};
 use ringcat_wire::address::Position;
 
@@ -43,6 +45,7 @@ pub struct EventLog {
     dropped: u64,
     history: History,
     occupants: Vec<Occupant>,
+    clients: Clients,
 }
 
 impl EventLog {
@@ -88,7 +91,34 @@ impl EventLog {
         if self.kept.len() >= KEPT {
             self.drop_oldest();
         }
-        self.kept.push_back(TimedEvent { number, at, event, occupants });
+        let event = TimedEvent { number, at, event, occupants };
+        self.clients.tell(&event);
+        self.kept.push_back(event);
+    }
+
+    /// Adds a client with a queue of its own; `None` if there are too many.
+    pub fn add_client(&mut self, subjects: Subjects, size: usize) -> Option<ClientId> {
+        self.clients.add(subjects, size)
+    }
+
+    /// Removes a client; false if there is no such client.
+    pub fn remove_client(&mut self, client: ClientId) -> bool {
+        self.clients.remove(client)
+    }
+
+    /// Sets the subjects of a client's further events; false if there is no such client.
+    pub fn set_client_subjects(&mut self, client: ClientId, subjects: Subjects) -> bool {
+        self.clients.set_subjects(client, subjects)
+    }
+
+    /// The events of a client since it fetched last; `None` if there is no such client.
+    pub fn take_of_client(&mut self, client: ClientId) -> Option<ClientEvents> {
+        self.clients.take(client)
+    }
+
+    /// Whether there is a client.
+    pub fn has_clients(&self) -> bool {
+        self.clients.is_any()
     }
 
     fn drop_oldest(&mut self) {

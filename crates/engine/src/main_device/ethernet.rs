@@ -1,5 +1,6 @@
-//! Ethernet of declared SubDevices: one port for each that supports it.
+//! Ethernet of SubDevices, declared or not: one port for each that supports it.
 
+use alloc::rc::Rc;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::Position;
@@ -7,14 +8,16 @@ use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
 use crate::declared::{Address, SubDeviceId};
+use crate::info::SubDeviceInfo;
 use crate::mail::eoe::EthernetPort;
+use crate::segment::Addressed;
 
 /// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EthernetSubDevice {
-    /// Index in the declaration.
-    pub subdevice: SubDeviceId,
+    /// Its index in the active declaration, or its position if it has no declaration.
+    pub subdevice: Address,
     /// Position in the scan's order.
     pub position: Position,
     /// Alias; 0 is none.
@@ -22,37 +25,60 @@ pub struct EthernetSubDevice {
 }
 
 impl EthernetSubDevice {
-    /// A SubDevice by its index, its position and its alias (0: none).
-    pub const fn new(subdevice: SubDeviceId, position: Position, alias: u16) -> EthernetSubDevice {
-        EthernetSubDevice { subdevice, position, alias }
+    /// A SubDevice by its address, its position and its alias (0: none).
+    pub fn new(subdevice: impl Into<Address>, position: Position, alias: u16) -> EthernetSubDevice {
+        EthernetSubDevice { subdevice: subdevice.into(), position, alias }
+    }
+
+    /// Whether it is the same SubDevice at the same position, declared or not.
+    pub fn is_at_place_of(&self, other: &EthernetSubDevice) -> bool {
+        (self.position, self.alias) == (other.position, other.alias)
     }
 }
 
 impl MainDevice {
-    /// Declared SubDevices that were seen and whose SII offers EoE, whether they answer now or not; none before
-    /// activation.
+    /// SubDevices whose SII offers EoE, whether they answer now or not: declared ones that were seen, and with idle
+    /// operation those without a declaration.
     pub fn ethernet_subdevices(&self) -> Vec<EthernetSubDevice> {
-        let Some(segment) = self.active() else { return Vec::new() };
-        let access = segment.view();
-        let members = access.members().enumerate();
-        members
-            .filter_map(|(subdevice, member)| {
-                let info = member.info?;
-                let speaks = info.protocols.0 & MailboxProtocols::EOE != 0 && info.mailbox.is_some();
-                let (position, alias) = (info.position, info.alias);
-                speaks.then_some(EthernetSubDevice { subdevice: SubDeviceId(subdevice), position, alias })
-            })
-            .collect()
+        let mut all = Vec::new();
+        let mut add = |subdevice: Address, position: Position, info: &SubDeviceInfo| {
+            if info.protocols.0 & MailboxProtocols::EOE != 0 && info.mailbox.is_some() {
+                all.push(EthernetSubDevice { subdevice, position, alias: info.alias });
+            }
+        };
+        let view = self.segment.view();
+        if view.is_active() {
+            for (index, member) in view.members().enumerate() {
+                member.info.into_iter().for_each(|info| add(SubDeviceId(index).into(), info.position, info));
+            }
+        }
+        let undeclared: Vec<(Position, Rc<SubDeviceInfo>)> = match view.found().filter(|_| !view.is_active()) {
+            _ if !self.options.idle_operation => Vec::new(),
+            // After a deactivation mailboxes open one after the other: each SubDevice stays in the list meanwhile.
+            Some(found) => (0..).map(Position).zip(found.subdevices.iter().cloned()).collect(),
+            None => self.segment.undeclared.all(),
+        };
+        for (position, info) in &undeclared {
+            add((*position).into(), *position, info);
+        }
+        all
     }
 
-    /// The Ethernet of a declared SubDevice. Its port is opened at the first call and lasts until the MainDevice stops;
-    /// `None` if no such SubDevice is declared, or this mailbox has a port already.
+    /// The Ethernet of a SubDevice. Its port is opened at the first call. It lasts until the SubDevice has another
+    /// mailbox, which is when a declaration with it begins or ends, or until the MainDevice stops. `None` if the
+    /// SubDevice has no mailbox, or if this mailbox has another port.
     pub fn ethernet_port(&mut self, subdevice: impl Into<Address>) -> Option<&EthernetPort> {
-        let index = self.find_member(subdevice).ok()?;
-        if !self.ports.contains_key(&index) {
-            let port = EthernetPort::open(&self.segment.mailbox(index)?)?;
-            self.ports.insert(index, port);
+        let subdevice = self.find(subdevice).ok()?;
+        let mailbox = self.segment.mailbox_of(subdevice)?;
+        let address = match subdevice {
+            Addressed::Member(index) => SubDeviceId(index).into(),
+            Addressed::Undeclared(key) => Address::Scanned(self.segment.view().unassigned(key)?.position),
+        };
+        let is_current = self.ports.get(&address).is_some_and(|port| port.is_of(&mailbox));
+        if !is_current {
+            self.ports.remove(&address);
+            self.ports.insert(address, EthernetPort::open(&mailbox)?);
         }
-        self.ports.get(&index)
+        self.ports.get(&address)
     }
 }

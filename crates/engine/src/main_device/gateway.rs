@@ -1,11 +1,13 @@
-//! Messages of a gateway's clients to declared SubDevices and to the MainDevice itself (protocol 10.1).
+//! Messages of a gateway's clients to SubDevices and to the MainDevice itself (protocol 10.1).
 
 use alloc::boxed::Box;
 
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::MainDevice;
+use crate::mail::Mailbox;
 use crate::mail::relay::{GatewayQueue, Recipient, RelayCounters, Relayed};
 use crate::procedures::own_objects::Seen;
 use crate::procedures::shared_segment::SharedSegment;
@@ -15,22 +17,23 @@ const OWN_ADDRESS: u16 = 0;
 
 impl MainDevice {
     /// Takes a message of a client, EtherCAT header of type 5 included; [`MainDevice::pop_relayed`] returns its
-    /// answers. Any bytes are allowed. The address is the station address of a declared SubDevice, or 0 for the objects
-    /// of the MainDevice itself (docs/mailbox-gateway.md).
+    /// answers. Any bytes are allowed. The address is the station address of a SubDevice, or 0 for the objects of the
+    /// MainDevice itself (docs/mailbox-gateway.md). A SubDevice without a declaration has an open mailbox with idle
+    /// operation, or after a visit.
     pub fn relay(&mut self, client: u64, message: &[u8]) {
         let bus = self.supervisor.bus();
-        let (segment, scan, acyclic) = (self.active().cloned(), self.segment.clone(), self.counters());
+        let (active, segment, acyclic) = (self.active().cloned(), self.segment.clone(), self.counters());
         let own_objects = self.own_objects.clone();
         let gateway_queue = self.gateway_queue.get_or_insert_with(|| GatewayQueue::new(&bus));
         gateway_queue.take(client, message, |message| {
             if message.header.address != OWN_ADDRESS {
-                return find(segment.as_ref(), message);
+                return find(&segment, message);
             }
             if message.header.protocol != Protocol::Coe {
                 return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
             }
-            let scanned = scan.view().found().map(|found| found.stations()).unwrap_or_default();
-            let (seen, payload) = (Seen { bus, segment, scanned, acyclic }, message.payload.to_vec());
+            let scanned = segment.view().found().map(|found| found.stations()).unwrap_or_default();
+            let (seen, payload) = (Seen { bus, segment: active, scanned, acyclic }, message.payload.to_vec());
             Ok(Recipient::Own(Box::pin(async move { own_objects.answer(&seen, client, &payload).await })))
         });
     }
@@ -54,14 +57,11 @@ impl MainDevice {
     }
 }
 
-fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipient, u16> {
-    let Some(segment) = segment else { return Err(ErrorReply::INVALID_HEADER) };
-    let access = segment.view();
-    let member = access.members().find(|member| member.station.0 == message.header.address);
-    let Some((member, info)) = member.and_then(|member| Some((member, member.info?))) else {
-        return Err(ErrorReply::INVALID_HEADER);
-    };
-    let announced = match message.header.protocol {
+/// The mailbox of the SubDevice at a station address, if its SII announces the protocol.
+fn find(segment: &SharedSegment, message: &Message<'_>) -> Result<Recipient, u16> {
+    let station = StationAddress(message.header.address);
+    let (announced, mailbox) = mailbox_at(segment, station).ok_or(ErrorReply::INVALID_HEADER)?;
+    let needed = match message.header.protocol {
         Protocol::Aoe => MailboxProtocols::AOE,
         Protocol::Eoe => MailboxProtocols::EOE,
         Protocol::Coe => MailboxProtocols::COE,
@@ -72,10 +72,17 @@ fn find(segment: Option<&SharedSegment>, message: &Message<'_>) -> Result<Recipi
         // The SII has no bit for other types.
         Protocol::Other(_) => u16::MAX,
     };
-    if info.protocols.0 & announced == 0 {
-        return Err(ErrorReply::UNSUPPORTED_PROTOCOL);
+    if announced.0 & needed == 0 { Err(ErrorReply::UNSUPPORTED_PROTOCOL) } else { Ok(Recipient::SubDevice(mailbox)) }
+}
+
+/// Of a declared SubDevice that was seen, or of one without a declaration.
+fn mailbox_at(segment: &SharedSegment, station: StationAddress) -> Option<(MailboxProtocols, Mailbox)> {
+    let view = segment.view();
+    if view.is_active()
+        && let Some(index) = view.subdevices().member_of(station)
+    {
+        return Some((view.member(index)?.info?.protocols, segment.mailbox(index)?));
     }
-    let index = access.subdevices().member_of(member.station);
-    let mailbox = index.and_then(|index| segment.mailbox(index));
-    mailbox.map(Recipient::SubDevice).ok_or(ErrorReply::INVALID_HEADER)
+    let (info, mailbox) = segment.undeclared.of_station(station)?;
+    Some((info.protocols, mailbox))
 }

@@ -45,7 +45,7 @@ impl MainDevice {
     }
 
     /// Starts a procedure on one SubDevice.
-    fn start_on<T, E, W>(
+    pub(super) fn start_on<T, E, W>(
         &mut self,
         subdevice: impl Into<Address>,
         work: impl FnOnce(Bus, StationAddress) -> W,

@@ -107,6 +107,11 @@ impl Watch {
             return;
         }
         let Some(seen) = self.broadcast().await else { return };
+        // The application may have begun a scan meanwhile.
+        if self.segment.view().is_scanning() {
+            self.counts = None;
+            return;
+        }
         self.report_ring(seen);
         if self.segment.view().found().is_none() {
             return self.scan_anew(seen).await;
@@ -120,8 +125,8 @@ impl Watch {
             return self.follow(seen).await;
         }
         let expected = self.segment.undeclared.expected_states();
-        if self.bus.now() >= self.next_routine || (self.segment.undeclared.are_settled() && seen.al_status != expected)
-        {
+        let is_unexpected = expected.is_some_and(|expected| seen.al_status != expected);
+        if self.bus.now() >= self.next_routine || (self.segment.undeclared.are_settled() && is_unexpected) {
             self.read_states().await;
         }
     }

@@ -1,6 +1,9 @@
 //! Services of one SubDevice besides its mailbox (Master Redundancy 10.8): registers, ports, resets, error counters,
 //! its EEPROM.
 
+pub mod eeprom_owner;
+pub mod forced_state;
+pub mod port_report;
 pub mod ports;
 pub mod registers;
 pub mod reset;

@@ -8,6 +8,7 @@
 //! Requests are sent first as long as their SubDevice has not used more than its share of the wire ([`super::turns`]):
 //! otherwise continuous requests to one SubDevice would delay the answers of all others.
 
+use alloc::collections::VecDeque;
 use core::time::Duration;
 
 use ringcat_wire::datagram::Target;
@@ -24,9 +25,11 @@ const MAX_READ_WAIT: Duration = Duration::from_millis(5);
 /// The shortest round trip may grow by this part of itself per measurement.
 const FADING_PART: u32 = 256;
 
-/// The two queues.
+/// The three queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rank {
+    /// Datagrams that are sent before all that wait, in the order of their requests.
+    Urgent,
     /// All other datagrams.
     First,
     /// Reads of mailboxes.
@@ -44,6 +47,7 @@ struct Read {
 /// The queues.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
+    urgent: VecDeque<TransferId>,
     accounts: Accounts,
     first: Turns<TransferId>,
     reads: Turns<Read>,
@@ -60,11 +64,15 @@ pub(crate) struct Outbox {
 impl Outbox {
     /// Queues a datagram that takes this number of bytes in a frame.
     pub(crate) fn push(&mut self, id: TransferId, rank: Rank, target: Target, bytes: usize, now: Instant) {
+        if rank == Rank::Urgent {
+            self.urgent.push_back(id);
+            return;
+        }
         let waiting = [self.first.front().map(|(turn, _)| turn), self.reads.front().map(|(turn, _)| turn)];
         let now_is = waiting.iter().flatten().map(|turn| turn.round).min().unwrap_or(0);
         let turn = self.accounts.turn(target, bytes, now_is);
         match rank {
-            Rank::First => self.first.push(turn, id),
+            Rank::Urgent | Rank::First => self.first.push(turn, id),
             Rank::Read => {
                 self.waiting += bytes;
                 self.reads.push(turn, Read { id, bytes, since: now });
@@ -72,8 +80,11 @@ impl Outbox {
         }
     }
 
-    /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it.
+    /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it, except urgent ones.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
+        if let Some(id) = self.urgent.front() {
+            return Some((*id, Rank::Urgent));
+        }
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
             (Some((turn, id)), waiting) => {
@@ -97,6 +108,7 @@ impl Outbox {
     /// Removes the next datagram: it was packed, or its procedure gave it up.
     pub(crate) fn pop(&mut self, rank: Rank) {
         match rank {
+            Rank::Urgent => _ = self.urgent.pop_front(),
             Rank::First => _ = self.first.pop(),
             Rank::Read => self.waiting -= self.reads.pop().map_or(0, |read| read.bytes),
         }
@@ -107,7 +119,7 @@ impl Outbox {
 
     /// Whether a waiting datagram may be sent now.
     pub(crate) fn is_ready(&self, now: Instant) -> bool {
-        !self.first.is_empty() || (!self.reads.is_empty() && self.may_read(now))
+        !self.urgent.is_empty() || !self.first.is_empty() || (!self.reads.is_empty() && self.may_read(now))
     }
 
     /// Time at which waiting reads are sent even in a short frame.
@@ -155,6 +167,7 @@ impl Outbox {
 #[cfg(test)]
 mod tests {
     use alloc::collections::BTreeMap;
+    use alloc::vec::Vec;
 
     use ringcat_wire::address::{RegisterAddress, StationAddress};
 
@@ -185,6 +198,27 @@ mod tests {
         assert_eq!(outbox.front(false, Instant(20)), None, "this frame holds no reads");
     }
 
+    // covers: registers
+    #[test]
+    fn an_urgent_datagram_is_sent_before_all_that_wait() {
+        let [a, b, c, d] = ids();
+        let mut outbox = Outbox::default();
+        outbox.push(a, Rank::Read, Target::None, READ, Instant(0));
+        outbox.push(b, Rank::First, Target::None, 40, Instant(0));
+        // The first one is next to be sent, and the read has waited for too long.
+        let late = Instant(0) + MAX_READ_WAIT;
+        assert_eq!(outbox.front(true, late), Some((a, Rank::Read)));
+        outbox.push(c, Rank::Urgent, Target::None, 40, late);
+        outbox.push(d, Rank::Urgent, Target::None, 40, late);
+        let mut sent = Vec::new();
+        while let Some((id, rank)) = outbox.front(true, late) {
+            outbox.pop(rank);
+            sent.push(id);
+        }
+        assert_eq!(sent, [c, d, a, b]);
+        assert!(!outbox.is_ready(late));
+    }
+
     /// Continuous load of a SubDevice: datagrams of this length, or a request and then the read of its answer.
     #[derive(Clone, Copy, Debug)]
     enum Load {
@@ -205,7 +239,7 @@ mod tests {
             |outbox: &mut Outbox, owners: &mut BTreeMap<_, _>, transfers: &mut Transfers, owner: usize, rank| {
                 let bytes = match (loads[owner], rank) {
                     (Load::Datagrams(bytes), _) => bytes,
-                    (Load::Mail { write, .. }, Rank::First) => write,
+                    (Load::Mail { write, .. }, Rank::Urgent | Rank::First) => write,
                     (Load::Mail { read, .. }, Rank::Read) => read,
                 };
                 let id = transfers.insert(Transfer::for_test());

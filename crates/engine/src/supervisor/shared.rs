@@ -142,7 +142,11 @@ impl Shared {
         let fits = length <= MAX_DATA;
         let stage =
             if fits { Stage::Queued } else { Stage::Done(Err(BusError::TooLong { target: request.target, length })) };
-        let rank = if request.mail.is_some() { Rank::Read } else { Rank::First };
+        let rank = match (request.urgent, request.mail) {
+            (true, _) => Rank::Urgent,
+            (false, Some(_)) => Rank::Read,
+            (false, None) => Rank::First,
+        };
         let (target, alone) = (request.target, request.alone);
         let bytes = request.bytes();
         let id = self.transfers.insert(Transfer { request, stage, task: self.current, retries: 0, abandoned: false });

@@ -30,6 +30,8 @@ pub(crate) struct Request {
     pub preceding: Option<(Command, Target, Vec<u8>)>,
     /// Set for a read of this SubDevice's mailbox: the content of every copy is kept, also of a late one.
     pub mail: Option<StationAddress>,
+    /// It is sent before all datagrams that wait.
+    pub urgent: bool,
     /// Number of further datagrams of the same kind before it, in a frame of their own.
     pub before: usize,
     /// Set if no other frame may be on the wire with it: the links on which copies are known not to return, a bit each.
@@ -52,6 +54,7 @@ impl Request {
             resend: false,
             preceding: None,
             mail: None,
+            urgent: false,
             before: 0,
             alone: None,
             time_at: None,

@@ -1,6 +1,8 @@
 //! Services without a mailbox: states, registers, ports, the EEPROM, error counters.
 
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership};
+use ringcat_engine::procedures::services::forced_state::Acknowledge;
 use ringcat_engine::procedures::services::ports::BlockedPort;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
@@ -69,6 +71,33 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, subdevice| engine.start_register_write(subdevice, address, data).ended())
     }
 
+    /// Writes a register or memory before all datagrams that wait, those to the same SubDevice included. If a frame is
+    /// lost, it may be written twice.
+    pub fn register_write_urgently<T: ObjectValue>(
+        self,
+        address: RegisterAddress,
+        value: T,
+    ) -> S::Outcome<(), SubDeviceError> {
+        let (subdevice, data) = (self.address, value.encode());
+        self.ask(move |engine, _| engine.start_urgent_register_write(subdevice, address, data).ended())
+    }
+
+    /// Writes a state to AL control once, without the steps between and without configuration, and reads what the
+    /// SubDevice shows right after. A SubDevice without a declaration is left as it is then, until another state is
+    /// requested; a declared one is brought back to its target state.
+    ///
+    /// # Danger
+    /// Outputs may switch, and the SubDevice may reach OP with a configuration that nothing has checked: for tests and
+    /// maintenance of a machine that is secured.
+    pub fn force_state(
+        self,
+        state: AlState,
+        acknowledge: Acknowledge,
+    ) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
+        let subdevice = self.address;
+        self.ask(move |engine, _| engine.start_forced_state(subdevice, state, acknowledge).ended())
+    }
+
     /// Reads the loop control of a port.
     pub fn port(self, port: u8) -> S::Outcome<LoopControl, SubDeviceError> {
         self.ask(move |engine, subdevice| engine.start_port_read(subdevice, port).ended())
@@ -109,6 +138,19 @@ impl<S: Services> SubDevice<S> {
     /// Reloads the configuration of its controller from the EEPROM.
     pub fn sii_reload(self) -> S::Outcome<(), SubDeviceError> {
         self.ask(move |engine, subdevice| engine.start_sii_reload(subdevice).ended())
+    }
+
+    /// Reads the owner of its EEPROM: EtherCAT or the PDI.
+    pub fn eeprom_owner(self) -> S::Outcome<EepromOwnership, SubDeviceError> {
+        let subdevice = self.address;
+        self.ask(move |engine, _| engine.start_eeprom_owner_read(subdevice).ended())
+    }
+
+    /// Assigns its EEPROM to EtherCAT or to the PDI; the result is the owner afterwards. Functions that read or write
+    /// the EEPROM take it by force and give it back.
+    pub fn assign_eeprom(self, assignment: EepromAssignment) -> S::Outcome<EepromOwnership, SubDeviceError> {
+        let subdevice = self.address;
+        self.ask(move |engine, _| engine.start_eeprom_assignment(subdevice, assignment).ended())
     }
 
     /// Reads the error counters of a declared SubDevice now.

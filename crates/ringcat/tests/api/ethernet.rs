@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::eoe::{EthernetNews, EthernetOptions, HostInterface};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{CyclicThread, Error, LastOutputs, Options, SubDeviceId, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Error, LastOutputs, Options, Services, SubDeviceId, SupervisorThread, automatic};
 use ringcat_link::TapError;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -123,11 +123,55 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
             })
     });
     let news = ethernet.take_news();
-    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1) });
+    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1).into() });
     assert!(news.iter().any(|news| news.to_string() == "eoe3a1000: frames can pass"), "{news:?}");
     cycles.supervisor().all_settled();
     let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     wait("the interfaces go", || cables.iter().all(|cable| Arc::strong_count(cable) == 1));
+    drop(supervisor);
+    Ok(())
+}
+
+// covers: eoe-interfaces
+#[test]
+fn interfaces_of_idle_operation_stay_while_an_application_begins() -> Result<(), Error> {
+    let segment = Segment::from_toml(SEGMENT, Path::new(".")).expect("a good segment");
+    let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment).expect("it can be built"));
+    let supervisor = SupervisorThread::start(acyclic, &Options::default().with_idle_operation(true), || ())?;
+    let made: Cables = Cables::default();
+    let cables = made.clone();
+    let make = move |name: &str, mac| {
+        let cable = Arc::new(Mutex::new(Cable { name: name.to_owned(), mac, ..Cable::default() }));
+        cables.lock().unwrap().push(cable.clone());
+        Ok(Box::new(End(cable)) as Box<dyn HostInterface>)
+    };
+    let ethernet = supervisor.start_ethernet_on(OPTIONS, Box::new(make))?;
+    let frames_return = |count: usize| {
+        made.lock().unwrap().iter().for_each(|cable| cable.lock().unwrap().to_device.push_back(vec![7; 100]));
+        wait("frames come back", || {
+            let made = made.lock().unwrap();
+            made.iter().all(|cable| cable.lock().unwrap().to_host.len() == count)
+        });
+    };
+    let have_carrier = || {
+        let made = made.lock().unwrap();
+        made.len() == 2 && made.iter().all(|cable| cable.lock().unwrap().carrier)
+    };
+    wait("both have a carrier without an application", have_carrier);
+    frames_return(1);
+    let found = Services::immediately(&supervisor, |engine| engine.subdevices())?;
+    let application = supervisor.clone().activate(automatic(&found, PERIOD), cyclic)?;
+    let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+    wait("all are in OP", || cycles.supervisor().all_settled());
+    wait("both have a carrier again", have_carrier);
+    frames_return(2);
+    assert_eq!(made.lock().unwrap().len(), 2, "none was made again");
+    let declared = |at: usize| {
+        let interfaces = ethernet.interfaces();
+        interfaces.get(at).is_some_and(|interface| interface.subdevice.subdevice == SubDeviceId(at + 1).into())
+    };
+    wait("they lead to declared SubDevices", || declared(0) && declared(1));
+    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     drop(supervisor);
     Ok(())
 }

@@ -41,6 +41,11 @@ impl EthernetPort {
         Some(EthernetPort { shared })
     }
 
+    /// Whether it is the port of this mailbox.
+    pub(crate) fn is_of(&self, mailbox: &Mailbox) -> bool {
+        Rc::ptr_eq(&self.shared, mailbox.shared())
+    }
+
     /// Whether frames can be sent and received.
     pub fn is_up(&self) -> bool {
         is_up(&self.shared)

@@ -47,6 +47,22 @@ pub async fn write(
     Ok(())
 }
 
+/// As [`write`], before all datagrams that wait. In several datagrams only if it is longer than one can be.
+pub async fn write_urgently(
+    bus: &Bus,
+    segment: Option<&SharedSegment>,
+    station: StationAddress,
+    address: RegisterAddress,
+    data: &[u8],
+) -> Result<(), ServiceError> {
+    check(address, data.len())?;
+    let _order = ordering(segment, station, address, data);
+    for (number, piece) in data.chunks(MAX_DATA).enumerate() {
+        bus.fpwr_urgently(station, address.offset((number * MAX_DATA) as u16), piece).await?;
+    }
+    Ok(())
+}
+
 fn check(address: RegisterAddress, length: usize) -> Result<(), ServiceError> {
     let fits = length <= MEMORY - usize::from(address.0);
     if fits { Ok(()) } else { Err(ServiceError::Range { address: address.0, length }) }

@@ -45,6 +45,8 @@ enum Progress {
     UnderWay,
     /// It was reached.
     Reached,
+    /// The application has forced a state: it is left as it is until another state is requested.
+    Left,
 }
 
 /// A SubDevice without a declaration.
@@ -196,26 +198,51 @@ impl Undeclared {
         all.iter().filter(|entry| entry.mailbox.is_open()).map(|entry| entry.mailbox.clone()).collect()
     }
 
-    /// Whether all are in their requested states.
-    pub(crate) fn are_settled(&self) -> bool {
-        self.all.borrow().iter().all(|entry| entry.progress == Progress::Reached)
+    /// All SubDevices of the list, at their positions.
+    pub(crate) fn all(&self) -> Vec<(Position, Rc<SubDeviceInfo>)> {
+        self.all.borrow().iter().map(|entry| (entry.position, entry.info.clone())).collect()
     }
 
-    /// The OR of the AL states of all, if each is in its requested state.
-    pub(crate) fn expected_states(&self) -> u8 {
-        self.all.borrow().iter().fold(0, |or, entry| or | entry.target.code())
+    /// The SubDevice with a station address, and its mailbox.
+    pub(crate) fn of_station(&self, station: StationAddress) -> Option<(Rc<SubDeviceInfo>, Mailbox)> {
+        let all = self.all.borrow();
+        let entry = all.iter().find(|entry| entry.info.station == station)?;
+        Some((entry.info.clone(), entry.mailbox.clone()))
+    }
+
+    /// Leaves the SubDevice with a station address as it is until another state is requested; an attempt ends.
+    pub(crate) fn leave(&self, station: StationAddress) {
+        if let Some(entry) = self.all.borrow_mut().iter_mut().find(|entry| entry.info.station == station) {
+            entry.attempt = entry.attempt.wrapping_add(1);
+            entry.progress = Progress::Left;
+        }
+        self.notify();
+    }
+
+    /// Whether all are in their requested states, or left as they are.
+    pub(crate) fn are_settled(&self) -> bool {
+        self.all.borrow().iter().all(|entry| matches!(entry.progress, Progress::Reached | Progress::Left))
+    }
+
+    /// The OR of the AL states of all, if each is in its requested state; `None` if some are left in any state.
+    pub(crate) fn expected_states(&self) -> Option<u8> {
+        let all = self.all.borrow();
+        let is_left = all.iter().any(|entry| entry.progress == Progress::Left);
+        (!is_left).then(|| all.iter().fold(0, |or, entry| or | entry.target.code()))
     }
 
     /// Station addresses of those that are not in their requested states.
     pub(crate) fn unsettled(&self) -> Vec<StationAddress> {
         let all = self.all.borrow();
-        all.iter().filter(|it| it.progress != Progress::Reached).map(|it| it.info.station).collect()
+        let is_settled = |it: &&Entry| matches!(it.progress, Progress::Reached | Progress::Left);
+        all.iter().filter(|it| !is_settled(it)).map(|it| it.info.station).collect()
     }
 
-    /// Station addresses of those in their requested states.
+    /// Station addresses of those in their requested states, or left as they are.
     pub(crate) fn settled(&self) -> Vec<StationAddress> {
         let all = self.all.borrow();
-        all.iter().filter(|it| it.progress == Progress::Reached).map(|it| it.info.station).collect()
+        let is_settled = |it: &&Entry| matches!(it.progress, Progress::Reached | Progress::Left);
+        all.iter().filter(is_settled).map(|it| it.info.station).collect()
     }
 
     /// Requests a state of the SubDevice at a position. Returns its attempt, and whether it is a new one: the same
@@ -258,7 +285,7 @@ impl Undeclared {
         let seen = self.version.get();
         let times = |entry: &Entry| match entry.progress {
             Progress::Due(at) => Some(at),
-            Progress::UnderWay | Progress::Reached => None,
+            Progress::UnderWay | Progress::Reached | Progress::Left => None,
         };
         let next = self.all.borrow().iter().filter_map(times).min().unwrap_or(Instant::NEVER);
         let changed = self.changed.until(|| (self.version.get() != seen).then_some(()));
@@ -302,6 +329,22 @@ impl Undeclared {
         drop(all);
         self.notify();
         is_news
+    }
+
+    /// Whether BOOT is requested of the SubDevice at a position.
+    pub(crate) fn is_in_boot(&self, position: Position) -> bool {
+        let all = self.all.borrow();
+        all.iter().any(|entry| entry.position == position && entry.target == AlState::Boot)
+    }
+
+    /// Waits until a SubDevice has reached a requested state (true), or another one is requested (false).
+    pub(crate) async fn until_decided(&self, station: StationAddress, state: AlState) -> bool {
+        let decided = || {
+            let all = self.all.borrow();
+            let entry = all.iter().find(|entry| entry.info.station == station)?;
+            (entry.target != state || entry.progress == Progress::Reached).then_some(entry.target == state)
+        };
+        self.changed.until(decided).await
     }
 
     /// The present position of the SubDevice of an attempt.

@@ -9,6 +9,7 @@ use ringcat_wire::datagram::Target;
 
 use super::Bus;
 use crate::supervisor::reply::{BusError, Reply};
+use crate::supervisor::transfer::Request;
 
 impl Bus {
     /// Reads registers of all SubDevices, ORed.
@@ -61,6 +62,20 @@ impl Bus {
     /// Writes registers of a SubDevice, which must answer.
     pub async fn fpwr(&self, station: StationAddress, register: RegisterAddress, data: &[u8]) -> Result<(), BusError> {
         self.one(Command::Fpwr, Target::Station(station, register), data.to_vec()).await.map(drop)
+    }
+
+    /// The same before all datagrams that wait, those of other procedures to this SubDevice included.
+    pub(crate) async fn fpwr_urgently(
+        &self,
+        station: StationAddress,
+        register: RegisterAddress,
+        data: &[u8],
+    ) -> Result<(), BusError> {
+        let (target, expected) = (Target::Station(station, register), Wkc(1));
+        let request = Request::once(Command::Fpwr, target, data.to_vec());
+        let request = Request { expected: Some(expected), resend: true, urgent: true, ..request };
+        let got = self.submit(request).await?.wkc();
+        if got == expected { Ok(()) } else { Err(BusError::Wkc { target, expected, got }) }
     }
 
     async fn one(&self, command: Command, target: Target, data: Vec<u8>) -> Result<Vec<u8>, BusError> {

@@ -176,7 +176,8 @@ impl Shared {
             transfer.stage = Stage::Queued;
             self.counters.resent += 1;
             let target = transfer.request.target;
-            self.outbox.push(id, Rank::First, target, 0, self.now);
+            let rank = if transfer.request.urgent { Rank::Urgent } else { Rank::First };
+            self.outbox.push(id, rank, target, 0, self.now);
             return;
         }
         let error = BusError::Lost { target: transfer.request.target, retries: transfer.retries };

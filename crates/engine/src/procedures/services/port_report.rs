@@ -1,0 +1,268 @@
+//! The ports of all SubDevices: links, neighbours, receive times, delays, error counters, with and without an
+//! application (protocol 2.3 to 2.5, 7.1).
+//!
+//! Without an application frames are latched for the receive times, [`SAMPLES`] for a mean: a clock counts in steps of
+//! 10 ns. While an application is active its clocks own the latches: then the times are those of the last latched
+//! frame, and the delays those that were measured.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{DcReceiveTimes, DlStatus, ErrorCounters, PortKind, map};
+
+use super::ServiceError;
+use crate::clocks::{Cables, Latched, Measurements, Wiring};
+use crate::declared::{Address, SubDeviceId};
+use crate::link::{Link, LinkSet};
+use crate::procedures::latch::latch_anyway;
+use crate::procedures::shared_segment::SharedSegment;
+use crate::ring::RingState;
+use crate::ring_status::cables;
+use crate::segment::Segment;
+use crate::supervisor::{Bus, BusError};
+use crate::topology::{PortOf, Topology};
+
+/// Frames that are latched for the delays.
+const SAMPLES: usize = 8;
+
+/// What is at the other end of the cable on a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Neighbour {
+    /// An interface of the host.
+    Interface(Link),
+    /// A port of another SubDevice. A broken cable has its ends as well.
+    SubDevice(PortOf),
+}
+
+/// One port, as its registers show it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PortRegisters {
+    /// The physical link is up (DL_STATUS, 0x0110).
+    pub link: bool,
+    /// The loop is closed: frames are not sent out of this port.
+    pub loop_closed: bool,
+    /// Communication is established.
+    pub signal: bool,
+    /// DC_RECEIVE_TIME (0x0900 and following): time at which the latched frame came in, in nanoseconds of the local
+    /// clock, modulo 2^32; `None` without a clock.
+    pub receive_time_ns: Option<u32>,
+    /// RX_ERROR_COUNTER, invalid frames (0x0300): damaged on the cable of this port. All counters end at 255.
+    pub invalid_frames: u8,
+    /// RX_ERROR_COUNTER, symbol errors (0x0301).
+    pub symbol_errors: u8,
+    /// FORWARDED_RX_ERROR_COUNTER (0x0308): damaged before.
+    pub forwarded_errors: u8,
+    /// LOST_LINK_COUNTER (0x0310).
+    pub lost_links: u8,
+}
+
+/// One port.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PortReport {
+    /// Kind of the port.
+    pub kind: PortKind,
+    /// The other end of its cable, by the last scan; `None` if nothing is connected.
+    pub neighbour: Option<Neighbour>,
+    /// Delay from this SubDevice to the neighbour in nanoseconds, processing included; `None` if one of them has no
+    /// clock, or the delay is not known.
+    pub delay_ns: Option<i64>,
+    /// Its registers; all ports of a SubDevice that does not answer have none.
+    pub registers: Option<PortRegisters>,
+}
+
+/// The ports of one SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SubDevicePorts {
+    /// Its index in the active declaration, or its position if it has no declaration.
+    pub subdevice: Address,
+    /// Its position.
+    pub position: Position,
+    /// Its station address.
+    pub station: StationAddress,
+    /// Port 0 to 3.
+    pub ports: [PortReport; 4],
+    /// Delay from the reference clock in nanoseconds; before an application is active, and without distributed clocks,
+    /// from the first SubDevice with a clock. `None` without a clock, or if it is not known: in a closed ring
+    /// before the clocks of an application have measured it.
+    pub delay_ns: Option<i64>,
+    /// EPU_ERROR_COUNTER (0x030C); `None` if it does not answer.
+    pub unit_errors: Option<u8>,
+}
+
+/// What is known before registers are read.
+struct Known {
+    stations: Vec<StationAddress>,
+    topology: Topology,
+    kinds: Vec<[PortKind; 4]>,
+    has_clock: Vec<bool>,
+    names: Vec<Address>,
+    /// While active: delays by station, if they are measured.
+    delays: Option<BTreeMap<StationAddress, i64>>,
+}
+
+impl Known {
+    fn of(segment: &Segment) -> Option<Known> {
+        let is_active = segment.is_active();
+        let (stations, topology) = match segment.found().filter(|_| !is_active) {
+            Some(found) => (found.stations(), found.topology.clone()),
+            None if is_active => (segment.cabling().stations.clone(), segment.cabling().topology.clone()),
+            None => return None,
+        };
+        let info = |station: &StationAddress| {
+            let all = segment.subdevices().all().iter();
+            let here = all.filter(|it| it.key.station == *station).find_map(|it| it.knowledge.info());
+            here.map(|info| (info.controller.ports, info.controller.features.dc)).unwrap_or_default()
+        };
+        let (kinds, has_clock) = stations.iter().map(info).unzip();
+        let name = |(position, station): (u16, &StationAddress)| {
+            let member = segment.subdevices().member_of(*station).filter(|_| is_active);
+            member.map_or(Address::Scanned(Position(position)), |index| SubDeviceId(index).into())
+        };
+        let names = (0..).zip(&stations).map(name).collect();
+        let measured = || segment.clocks().status().into_iter().filter(|it| it.hidden.is_none());
+        let delays = is_active.then(|| measured().map(|clock| (clock.station, clock.delay_ns)).collect());
+        Some(Known { stations, topology, kinds, has_clock, names, delays })
+    }
+}
+
+/// Registers of one SubDevice.
+struct Readings {
+    ports: [PortRegisters; 4],
+    dl_status: DlStatus,
+    unit_errors: u8,
+}
+
+/// Reads the ports of all SubDevices, in the order of positions.
+pub(crate) async fn read(bus: &Bus, segment: &SharedSegment) -> Result<Vec<SubDevicePorts>, ServiceError> {
+    let Some(known) = Known::of(&segment.view()) else { return Ok(Vec::new()) };
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    let mut samples = Vec::new();
+    if known.delays.is_none() && !is_closed {
+        while samples.len() < SAMPLES {
+            // Lost frames leave fewer samples; another attempt costs time without end.
+            let Ok(sample) = sample(bus, &known).await else { break };
+            samples.push(sample);
+        }
+    }
+    let each: Vec<(StationAddress, bool)> =
+        known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
+    let readings = bus.gather(each, |bus, (station, clock)| async move { one(&bus, station, clock).await.ok() }).await;
+    let delays = match &known.delays {
+        Some(delays) => known.stations.iter().map(|station| delays.get(station).copied()).collect(),
+        None => measured(&known, &readings, samples),
+    };
+    Ok(reports(&known, &readings, &delays, bus.links()))
+}
+
+/// Receive times of one frame; none of SubDevices without a clock or without an answer.
+async fn sample(bus: &Bus, known: &Known) -> Result<Vec<Option<Latched>>, BusError> {
+    let _latches = latch_anyway(bus).await?;
+    let each: Vec<(StationAddress, bool)> =
+        known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
+    let read = bus.gather(each, |bus, (station, clock)| async move {
+        let bytes = if clock { bus.fprd_array(station, map::DC_RECEIVE_TIME).await.ok()? } else { return None };
+        Some(Latched { ports: DcReceiveTimes::decode(&bytes).ports.map(|time| time.0), unit: 0 })
+    });
+    Ok(read.await)
+}
+
+async fn one(bus: &Bus, station: StationAddress, clock: bool) -> Result<Readings, BusError> {
+    let registers = [
+        (map::DL_STATUS, DlStatus::LEN),
+        (map::RX_ERROR_COUNTER, ErrorCounters::LEN),
+        (map::DC_RECEIVE_TIME, DcReceiveTimes::LEN),
+    ];
+    let count = if clock { 3 } else { 2 };
+    let read = |(register, length)| (Command::Fprd, Target::Station(station, register), vec![0; length]);
+    let replies = bus.transfer_all(registers.into_iter().take(count).map(read), Some(Wkc(1))).await?;
+    if let Some(reply) = replies.iter().find(|reply| reply.wkc() != Wkc(1)) {
+        let target = Target::Station(station, map::DL_STATUS);
+        return Err(BusError::Wkc { target, expected: Wkc(1), got: reply.wkc() });
+    }
+    let dl_status = DlStatus::decode(&bytes(replies.first().map(|reply| reply.data.as_slice())));
+    let counters = ErrorCounters::decode(&bytes(replies.get(1).map(|reply| reply.data.as_slice())));
+    let times = replies.get(2).map(|reply| DcReceiveTimes::decode(&bytes(Some(&reply.data))));
+    let port = |port: usize| PortRegisters {
+        link: dl_status.ports[port].link,
+        loop_closed: dl_status.ports[port].loop_closed,
+        signal: dl_status.ports[port].communication,
+        receive_time_ns: times.as_ref().map(|times| times.ports[port].0),
+        invalid_frames: counters.rx[port].invalid_frames,
+        symbol_errors: counters.rx[port].rx_errors,
+        forwarded_errors: counters.forwarded[port],
+        lost_links: counters.lost_link[port],
+    };
+    Ok(Readings { ports: [0, 1, 2, 3].map(port), dl_status, unit_errors: counters.epu })
+}
+
+/// The first bytes of data; zeros where it is shorter.
+fn bytes<const N: usize>(data: Option<&[u8]>) -> [u8; N] {
+    let mut array = [0; N];
+    array.iter_mut().zip(data.unwrap_or_default()).for_each(|(to, from)| *to = *from);
+    array
+}
+
+/// Delays from the first clock, by the mean of latched frames. None unless all cables are measured one by one.
+fn measured(known: &Known, readings: &[Option<Readings>], samples: Vec<Vec<Option<Latched>>>) -> Vec<Option<i64>> {
+    let is_open = |at: PortOf| {
+        let status = readings.get(at.node).and_then(Option::as_ref).map(|readings| readings.dl_status);
+        let port = status.map(|status| status.ports[usize::from(at.port & 3)]);
+        port.is_some_and(|port| port.communication && !port.loop_closed)
+    };
+    let nothing = vec![None; known.stations.len()];
+    let Some(reference) = known.has_clock.iter().position(|clock| *clock) else { return nothing };
+    let wiring = Wiring::new(&known.topology, false, is_open);
+    let mut measurements = Measurements::new(&wiring);
+    samples.into_iter().for_each(|sample| measurements.add(sample));
+    if measurements.count() == 0 || measurements.disagreement(reference).is_some() {
+        return nothing;
+    }
+    let passages = vec![Default::default(); known.stations.len()];
+    let segment = crate::clocks::Segment { wiring: &wiring, stations: &known.stations, passages: &passages };
+    let delays = segment.propagation(&measurements.mean(reference), reference, &mut Cables::default());
+    if delays.is_guessed || delays.is_implausible || delays.is_contradictory || delays.is_shared {
+        return nothing;
+    }
+    (0..known.stations.len()).map(|node| delays.between(reference, node)).collect()
+}
+
+fn reports(
+    known: &Known,
+    readings: &[Option<Readings>],
+    delays: &[Option<i64>],
+    links: LinkSet,
+) -> Vec<SubDevicePorts> {
+    let mut neighbours: BTreeMap<PortOf, Neighbour> = BTreeMap::new();
+    for cable in cables(&known.topology, links) {
+        let end = |other: Option<PortOf>, link| other.map_or(Neighbour::Interface(link), Neighbour::SubDevice);
+        cable.near.into_iter().for_each(|at| _ = neighbours.insert(at, end(cable.far, Link::Redundant)));
+        cable.far.into_iter().for_each(|at| _ = neighbours.insert(at, end(cable.near, Link::Main)));
+    }
+    let delay = |node: usize| delays.get(node).copied().flatten();
+    let port = |node: usize, port: u8| {
+        let neighbour = neighbours.get(&PortOf { node, port }).copied();
+        let delay_ns = match neighbour {
+            Some(Neighbour::SubDevice(other)) => delay(other.node).zip(delay(node)).map(|(other, own)| other - own),
+            Some(Neighbour::Interface(_)) | None => None,
+        };
+        let registers = readings[node].as_ref().map(|readings| readings.ports[usize::from(port)]);
+        PortReport { kind: known.kinds[node][usize::from(port)], neighbour, delay_ns, registers }
+    };
+    let report = |node: usize| SubDevicePorts {
+        subdevice: known.names[node],
+        position: Position(node as u16),
+        station: known.stations[node],
+        ports: [0, 1, 2, 3].map(|at| port(node, at)),
+        delay_ns: delay(node),
+        unit_errors: readings[node].as_ref().map(|readings| readings.unit_errors),
+    };
+    (0..known.stations.len()).map(report).collect()
+}
