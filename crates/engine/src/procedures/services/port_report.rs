@@ -1,7 +1,7 @@
 //! The ports of all SubDevices: links, neighbours, receive times, delays, error counters, with and without an
 //! application (protocol 2.3 to 2.5, 7.1).
 //!
-//! Without an application frames are latched for the receive times, [`SAMPLES`] for a mean: a clock counts in steps of
+//! Without an application frames are latched for the receive times, `SAMPLES` for a mean: a clock counts in steps of
 //! 10 ns. While an application is active its clocks own the latches: then the times are those of the last latched
 //! frame, and the delays those that were measured.
 

@@ -47,7 +47,7 @@ pub async fn write(
     Ok(())
 }
 
-/// As [`write`], before all datagrams that wait. In several datagrams only if it is longer than one can be.
+/// As [`write()`], before all datagrams that wait. In several datagrams only if it is longer than one can be.
 pub async fn write_urgently(
     bus: &Bus,
     segment: Option<&SharedSegment>,
