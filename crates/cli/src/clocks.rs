@@ -105,7 +105,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let mut watch = Watch { begin, log, end: &end };
     let mut course = Course::default();
     let locked = watch.until(&cycles, &mut course, now() + LOCK_LIMIT, true)?;
-    cycles.news().restart_histograms();
+    cycles.cyclic_status().restart_histograms();
     if locked {
         watch.until(&cycles, &mut course, now() + arguments.lasts, false)?;
     }
@@ -114,7 +114,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let settled = cycles.supervisor().all_settled();
     let mut reasons = reasons(&clocks, locked, settled);
     reasons.extend(end.cut_short(Some(arguments.lasts)));
-    let news = cycles.news_handle();
+    let cyclic_status = cycles.cyclic_status_handle();
     if let Some(picture) = &mut picture {
         reasons.extend(picture.draw(&plot(&course, &clocks)).err());
         say!("differences over time: {}", picture.path.display());
@@ -126,7 +126,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
     reasons.extend(recording.finish());
     let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
-    let phase_errors = news.phase_errors();
+    let phase_errors = cyclic_status.phase_errors();
     let names = watch.log.events().names();
     lines(&clocks, names, &signals).iter().for_each(|line| say!("{line}"));
     if phase_errors.count() > 0 {
@@ -212,7 +212,7 @@ impl Watch<'_> {
     ) -> Result<bool, Failure> {
         self.end.limit(until);
         loop {
-            self.log.news(cycles, now(), |shown| match shown {
+            self.log.report(cycles, now(), |shown| match shown {
                 Shown::Event { line, time, name, text } => {
                     say!("{line}");
                     write_event(time, name, &text);

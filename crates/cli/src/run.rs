@@ -91,7 +91,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let log = RunLog::new(begin, EventLog::new(begin, names).with_every_event(arguments.all_events), surroundings);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
-    let before = Seen::of(run.cycles.news());
+    let before = Seen::of(run.cycles.cyclic_status());
     if reached.is_ok() {
         let until = arguments.lasts.map_or(Instant::NEVER, |lasts| now() + lasts);
         run.exchange(until, &end);
@@ -240,7 +240,7 @@ fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut
     summary(&application, run.log.surroundings());
     jobs.account();
     if run.clocks {
-        clock_account(end.exchanged.clocks(), application.news(), names);
+        clock_account(end.exchanged.clocks(), application.cyclic_status(), names);
     }
     run.watched.account();
     run.beside.account();

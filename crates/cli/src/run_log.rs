@@ -56,9 +56,9 @@ impl RunLog {
     }
 
     /// Shows what has happened since the last call.
-    pub fn news<L: Links + Send>(&mut self, cycles: &CyclicThread<L>, now: Instant, mut show: impl FnMut(Shown)) {
+    pub fn report<L: Links + Send>(&mut self, cycles: &CyclicThread<L>, now: Instant, mut show: impl FnMut(Shown)) {
         let RunLog { begin, events, surroundings } = self;
-        if let Some((link, source)) = cycles.news().foreign() {
+        if let Some((link, source)) = cycles.cyclic_status().foreign() {
             surroundings.note_sender(link, source).map(Shown::Warning).into_iter().for_each(&mut show);
         }
         while let Some(event) = cycles.supervisor().pop_event() {
@@ -71,7 +71,7 @@ impl RunLog {
                 }
             }
         }
-        let counts = events.left_out(cycles.news().pace().skipped, now).into_iter().chain(events.counts(now));
+        let counts = events.left_out(cycles.cyclic_status().pace().skipped, now).into_iter().chain(events.counts(now));
         let before = events.line(now, "");
         for line in counts {
             let text = line.strip_prefix(&before).unwrap_or(&line).to_owned();

@@ -131,8 +131,8 @@ pub struct MainDevice {
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
     loaded: Option<Loaded>,
-    /// Ethernet of SubDevices whose port was requested.
-    ports: BTreeMap<Address, EthernetPort>,
+    /// Ethernet of SubDevices whose port was requested, by station address.
+    ports: BTreeMap<StationAddress, EthernetPort>,
     /// Memory of the loaded declaration.
     memories: Memories,
     /// Messages of a gateway's clients.

@@ -63,7 +63,7 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Box<dyn E
     if let Err(error) = cycles.supervisor().subdevice(id).sdo_read::<u32>(0x7777, 0) {
         println!("as expected: {error}");
     }
-    println!("{:?}", cycles.news().pace());
+    println!("{:?}", cycles.cyclic_status().pace());
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())
 }

@@ -59,9 +59,9 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Error> {
         }
         sleep(Duration::from_millis(10));
     }
-    let status = cycles.news().status(DomainId(0))?;
-    println!("working counter {} of {}; {:?}", status.wkc, status.expected, cycles.news().pace());
-    println!("round trips: {}", cycles.news().round_trips());
+    let status = cycles.cyclic_status().status(DomainId(0))?;
+    println!("working counter {} of {}; {:?}", status.wkc, status.expected, cycles.cyclic_status().pace());
+    println!("round trips: {}", cycles.cyclic_status().round_trips());
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, Duration::from_secs(1))?;
     Ok(())
 }

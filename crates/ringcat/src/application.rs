@@ -29,10 +29,10 @@ use ringcat_engine::time::Instant;
 
 use crate::acyclic::{AcyclicHalf, Inline};
 use crate::cyclic::Cyclic;
+use crate::cyclic_status::CyclicStatus;
 use crate::error::Error;
 use crate::histogram::Histogram;
 use crate::links::Links;
-use crate::news::News;
 use crate::pace::{Pace, Trigger};
 use crate::probe::{CycleJob, CycleProbe, Lap};
 use crate::process_data::ProcessData;
@@ -322,12 +322,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Times from the sending of a cycle's frames to the arrival of each copy at the interface, independent of when a
     /// thread reads the copy ([`Links::received_at`]).
     pub fn round_trips(&self) -> &Histogram {
-        self.cyclic.news.round_trips()
+        self.cyclic.cyclic_status.round_trips()
     }
 
     /// Figures that other threads can read while the cycles run.
-    pub fn news(&self) -> &Arc<News> {
-        &self.cyclic.news
+    pub fn cyclic_status(&self) -> &Arc<CyclicStatus> {
+        &self.cyclic.cyclic_status
     }
 
     /// Where a PDO entry of a declared SubDevice lies.

@@ -13,8 +13,8 @@ use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory};
 use ringcat_engine::time::Instant;
 
+use crate::cyclic_status::CyclicStatus;
 use crate::links::Links;
-use crate::news::News;
 use crate::observer::Observed;
 use crate::pace::{PaceNs, Trigger};
 use crate::probe::{CycleJob, CycleProbe, Lap};
@@ -33,7 +33,7 @@ const IDLE_PERIOD: Duration = Duration::from_millis(1);
 enum States {
     /// They are evaluated and published in each cycle.
     Changing,
-    /// The news include them; there is one domain, and none of its frames is expected.
+    /// The cyclic status includes them; there is one domain, and none of its frames is expected.
     Settled,
     /// As changing, and the next evaluation takes a snapshot.
     Wanted,
@@ -44,7 +44,7 @@ pub(crate) struct Cyclic {
     pub exchange: Exchange,
     pub directory: Directory,
     pub pace: PaceNs,
-    pub news: Arc<News>,
+    pub cyclic_status: Arc<CyclicStatus>,
     pub observed: Arc<Observed>,
     rates: Vec<Rate>,
     period_ns: u64,
@@ -71,7 +71,7 @@ pub(crate) struct Cyclic {
     /// A cycle is due and waits because the acyclic half requests a pause.
     held: bool,
     window: Arc<Window>,
-    /// Number of disturbances that the news include.
+    /// Number of disturbances that the cyclic status includes.
     published: u64,
     states: States,
 }
@@ -85,13 +85,13 @@ impl Cyclic {
         let next_cycle = now + period;
         let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         window.expect_cycle(next_cycle);
-        let news = Arc::new(News::new(periods.len()));
-        let observed = Observed::new(news.clone(), active.live_status, &active.exchange, &active.directory);
+        let cyclic_status = Arc::new(CyclicStatus::new(periods.len()));
+        let observed = Observed::new(cyclic_status.clone(), active.live_status, &active.exchange, &active.directory);
         Cyclic {
             exchange: active.exchange,
             directory: active.directory,
             pace: PaceNs::default(),
-            news,
+            cyclic_status,
             observed: Arc::new(observed),
             rates: periods.iter().map(rate).collect(),
             period_ns,
@@ -148,7 +148,7 @@ impl Cyclic {
     /// Records the arrival at the interface of a copy with this departure.
     #[inline(always)]
     pub fn note_round_trip(&self, left_at: Instant, received_at: Instant) {
-        self.news.round_trips().record_ns(received_at.0.saturating_sub(left_at.0));
+        self.cyclic_status.round_trips().record_ns(received_at.0.saturating_sub(left_at.0));
     }
 
     /// Whether a cycle begins now. A due cycle waits while the acyclic half requests a pause.
@@ -231,8 +231,8 @@ impl Cyclic {
 
     /// Publishes the states of the domains after any was evaluated.
     fn note_states(&mut self) {
-        self.news.publish_rates(&self.rates);
-        self.news.publish_ring(self.exchange.ring());
+        self.cyclic_status.publish_rates(&self.rates);
+        self.cyclic_status.publish_ring(self.exchange.ring());
         let is_settled = matches!(&self.rates[..], [alone] if !alone.status.pending);
         self.states = if is_settled { States::Settled } else { States::Changing };
     }
@@ -251,7 +251,7 @@ impl Cyclic {
         if delay > self.usual_delay {
             self.note_late(delay);
         }
-        self.news.wake_ups().record_ns(delay);
+        self.cyclic_status.wake_ups().record_ns(delay);
         if delay < self.period_ns && matches!(self.trigger, Trigger::Time) {
             self.next_cycle = Instant(self.next_cycle.0.saturating_add(self.period_ns));
         } else {
@@ -309,7 +309,7 @@ impl Cyclic {
         self.followed = reading.sent_at;
         let correction = follower.correction(reading.at(self.next_cycle));
         self.next_cycle = Instant(self.next_cycle.0.saturating_add_signed(correction));
-        self.news.publish_phase(follower.error_ns(), follower.is_locked());
+        self.cyclic_status.publish_phase(follower.error_ns(), follower.is_locked());
     }
 
     /// How far the next cycle was from its phase in system time, in nanoseconds.
@@ -414,8 +414,8 @@ impl Cyclic {
         }
         self.cycle += 1;
         self.window.expect_cycle(next);
-        self.news.publish_spread(self.exchange.clock_spread_ns());
-        self.news.publish_ring(self.exchange.ring());
+        self.cyclic_status.publish_spread(self.exchange.clock_spread_ns());
+        self.cyclic_status.publish_ring(self.exchange.ring());
     }
 
     /// Evaluates a domain, for an application with its own loop.
@@ -448,9 +448,9 @@ impl Cyclic {
 
     #[inline(always)]
     fn publish(&mut self) {
-        self.news.publish_cycle(&self.pace, self.exchange.counters());
+        self.cyclic_status.publish_cycle(&self.pace, self.exchange.counters());
         let disturbances = self.exchange.disturbances() + self.pace.disturbances;
-        if disturbances != self.published || self.news.is_any_wanted() {
+        if disturbances != self.published || self.cyclic_status.is_any_wanted() {
             self.publish_rest(disturbances);
         }
     }
@@ -459,7 +459,7 @@ impl Cyclic {
     #[cold]
     fn publish_rest(&mut self, disturbances: u64) {
         self.published = disturbances;
-        if self.news.publish_rest(&self.pace, self.exchange.counters()) {
+        if self.cyclic_status.publish_rest(&self.pace, self.exchange.counters()) {
             self.states = States::Wanted;
         }
     }
@@ -469,7 +469,7 @@ impl Cyclic {
         if let Some(foreign) = self.exchange.pop_foreign()
             && let Some(source) = foreign.bytes.get(6..12).and_then(|bytes| bytes.try_into().ok())
         {
-            self.news.publish_foreign(foreign.arrived_on, source);
+            self.cyclic_status.publish_foreign(foreign.arrived_on, source);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Cycles in their own thread, beside the supervisor thread.
 //!
-//! The thread runs a closure of the application in each cycle. Other threads read [`News`], and call services of the
-//! supervisor thread.
+//! The thread runs a closure of the application in each cycle. Other threads read [`CyclicStatus`], and call services of
+//! the supervisor thread.
 //!
 //! A panic of the closure does not stop the bus: cycles continue with zero outputs until [`CyclicThread::end`] returns
 //! the application and the panic message, for an orderly stop.
@@ -15,9 +15,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use crate::application::Application;
+use crate::cyclic_status::CyclicStatus;
 use crate::error::Error;
 use crate::links::Links;
-use crate::news::News;
 use crate::probe::CycleProbe;
 use crate::process_data::ProcessData;
 use crate::supervisor_thread::SupervisorThread;
@@ -26,7 +26,7 @@ use crate::supervisor_thread::SupervisorThread;
 #[derive(Debug)]
 pub struct CyclicThread<L> {
     supervisor: SupervisorThread,
-    news: Arc<News>,
+    cyclic_status: Arc<CyclicStatus>,
     end: Arc<AtomicBool>,
     panicked: Arc<AtomicBool>,
     thread: Option<JoinHandle<Ended<L>>>,
@@ -101,7 +101,7 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
     ) -> Result<CyclicThread<L>, Error> {
         let end = Arc::new(AtomicBool::new(false));
         let panicked = Arc::new(AtomicBool::new(false));
-        let (supervisor, news) = (self.acyclic.clone(), self.news().clone());
+        let (supervisor, cyclic_status) = (self.acyclic.clone(), self.cyclic_status().clone());
         let (ended, has_panicked) = (end.clone(), panicked.clone());
         let body = move || {
             prepare();
@@ -125,19 +125,19 @@ impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
             Ok(self)
         };
         let thread = std::thread::Builder::new().name("cycles".into()).spawn(body).map_err(Error::Thread)?;
-        Ok(CyclicThread { supervisor, news, end, panicked, thread: Some(thread) })
+        Ok(CyclicThread { supervisor, cyclic_status, end, panicked, thread: Some(thread) })
     }
 }
 
 impl<L> CyclicThread<L> {
     /// Figures that the cycles publish.
-    pub fn news(&self) -> &News {
-        &self.news
+    pub fn cyclic_status(&self) -> &CyclicStatus {
+        &self.cyclic_status
     }
 
     /// The same, also readable after the cycles have ended.
-    pub fn news_handle(&self) -> Arc<News> {
-        self.news.clone()
+    pub fn cyclic_status_handle(&self) -> Arc<CyclicStatus> {
+        self.cyclic_status.clone()
     }
 
     /// The acyclic half.

@@ -27,8 +27,8 @@ use crate::supervisor_thread::SupervisorThread;
 const REFRESH: Duration = Duration::from_millis(20);
 /// Maximum number of frames of one interface in one turn, so that other interfaces and the bus are served too.
 const BURST: usize = 64;
-/// Maximum number of news that are kept until they are taken.
-const NEWS: usize = 64;
+/// Maximum number of events that are kept until they are taken.
+const UNREAD_EVENTS: usize = 64;
 
 /// A network interface of the host, from the side of the MainDevice.
 pub trait HostInterface: Send {
@@ -110,7 +110,7 @@ impl EthernetOptions {
 /// A change of an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum EthernetNews {
+pub enum EthernetEvent {
     /// It was created.
     Made {
         /// Its name.
@@ -134,16 +134,16 @@ pub enum EthernetNews {
     },
 }
 
-impl fmt::Display for EthernetNews {
+impl fmt::Display for EthernetEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            EthernetNews::Made { name, subdevice } => {
+            EthernetEvent::Made { name, subdevice } => {
                 write!(f, "network interface {name} leads to {subdevice}")
             }
-            EthernetNews::Removed { name } => write!(f, "{name}: removed by another program; it is made again"),
-            EthernetNews::Refused(error) => write!(f, "EoE: {error}"),
-            EthernetNews::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
-            EthernetNews::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),
+            EthernetEvent::Removed { name } => write!(f, "{name}: removed by another program; it is made again"),
+            EthernetEvent::Refused(error) => write!(f, "EoE: {error}"),
+            EthernetEvent::Carrier { name, carrier: true } => write!(f, "{name}: frames can pass"),
+            EthernetEvent::Carrier { name, carrier: false } => write!(f, "{name}: no carrier, its SubDevice is away"),
         }
     }
 }
@@ -173,7 +173,7 @@ struct Shared {
 #[derive(Debug, Default)]
 struct Published {
     interfaces: Vec<EthernetInterface>,
-    news: Vec<EthernetNews>,
+    events: Vec<EthernetEvent>,
 }
 
 impl Shared {
@@ -192,9 +192,9 @@ impl Ethernet {
         self.0.published().interfaces.clone()
     }
 
-    /// News since the last call.
-    pub fn take_news(&self) -> Vec<EthernetNews> {
-        std::mem::take(&mut self.0.published().news)
+    /// Events since the last call.
+    pub fn take_events(&self) -> Vec<EthernetEvent> {
+        std::mem::take(&mut self.0.published().events)
     }
 }
 
@@ -283,7 +283,7 @@ impl Switch {
             if let Some(up) = end.pass(engine) {
                 end.interface.set_carrier(up);
                 end.carrier = up;
-                publish(&self.shared, EthernetNews::Carrier { name: end.name.clone(), carrier: up });
+                publish(&self.shared, EthernetEvent::Carrier { name: end.name.clone(), carrier: up });
             }
         }
         false
@@ -295,7 +295,7 @@ impl Switch {
         self.ends.retain_mut(|end| {
             let removed = !end.interface.exists();
             if removed {
-                publish(&self.shared, EthernetNews::Removed { name: end.name.clone() });
+                publish(&self.shared, EthernetEvent::Removed { name: end.name.clone() });
             }
             // A declaration with this SubDevice may have begun or ended.
             let now = found.iter().find(|it| it.is_at_place_of(&end.subdevice));
@@ -311,12 +311,12 @@ impl Switch {
             match self.make(subdevice) {
                 Ok(end) => {
                     let name = end.name.clone();
-                    publish(&self.shared, EthernetNews::Made { name, subdevice: subdevice.subdevice });
+                    publish(&self.shared, EthernetEvent::Made { name, subdevice: subdevice.subdevice });
                     self.ends.push(end);
                 }
                 Err(error) => {
                     self.refused.push(subdevice);
-                    publish(&self.shared, EthernetNews::Refused(error));
+                    publish(&self.shared, EthernetEvent::Refused(error));
                 }
             }
         }
@@ -343,10 +343,10 @@ impl Switch {
     }
 }
 
-fn publish(shared: &Shared, news: EthernetNews) {
-    let unread = &mut shared.published().news;
-    if unread.len() < NEWS {
-        unread.push(news);
+fn publish(shared: &Shared, events: EthernetEvent) {
+    let unread = &mut shared.published().events;
+    if unread.len() < UNREAD_EVENTS {
+        unread.push(events);
     }
 }
 

@@ -68,6 +68,7 @@ pub mod event_log;
 #[cfg(feature = "gateway")]
 pub mod gateway;
 // The pages of docs/guide, for rustdoc and its tests.
+pub mod cyclic_status;
 #[cfg(any(doc, doctest))]
 pub mod guide;
 pub mod histogram;
@@ -81,7 +82,6 @@ mod mapped;
 pub mod memory;
 #[cfg(feature = "network")]
 pub mod network;
-pub mod news;
 mod no_domain;
 mod not_ready;
 mod observer;
@@ -180,6 +180,7 @@ pub use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, E
 pub use ringcat_engine::procedures::services::forced_state::Acknowledge;
 pub use ringcat_engine::procedures::services::port_report::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
 pub use ringcat_engine::procedures::services::ports::BlockedPort;
+pub use ringcat_engine::procedures::services::registers::Urgency;
 pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
 pub use ringcat_engine::procedures::sii::program::SiiWritten;
 pub use ringcat_engine::procedures::stop::StopError;

@@ -11,7 +11,7 @@ use ringcat_engine::main_device::LiveStatus;
 use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
-use crate::news::News;
+use crate::cyclic_status::CyclicStatus;
 use crate::words::Words;
 
 /// Times over which rates are computed, in samples.
@@ -56,7 +56,7 @@ pub struct LinkRate {
 /// The samples.
 #[derive(Debug)]
 pub(crate) struct LinkSamples {
-    news: Arc<News>,
+    cyclic_status: Arc<CyclicStatus>,
     live: LiveStatus,
     /// Number of samples, then the newest ones in turn.
     words: Words,
@@ -73,13 +73,13 @@ struct Sample {
 }
 
 impl LinkSamples {
-    pub fn new(news: Arc<News>, live: LiveStatus) -> LinkSamples {
-        LinkSamples { news, live, words: Words::new(1 + KEPT * SAMPLE) }
+    pub fn new(cyclic_status: Arc<CyclicStatus>, live: LiveStatus) -> LinkSamples {
+        LinkSamples { cyclic_status, live, words: Words::new(1 + KEPT * SAMPLE) }
     }
 
     /// Takes a sample. For the thread of the acyclic half.
     pub fn take(&self, now: Instant, acyclic: AcyclicCounters) {
-        let cyclic = self.news.counters();
+        let cyclic = self.cyclic_status.counters();
         let [main, redundant] = Link::ALL.map(|link| {
             let (lost, at) = (self.live.lost(link), link.index());
             [lost.copies + acyclic.copies_lost[at], lost.bytes + acyclic.bytes_lost[at]]

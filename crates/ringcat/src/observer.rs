@@ -17,8 +17,8 @@ use ringcat_engine::main_device::{Directory, LiveStatus, SubDeviceId};
 use ringcat_engine::time::Instant;
 use ringcat_wire::address::LogicalAddress;
 
+use crate::cyclic_status::{CyclicStatus, pack_status, unpack_status};
 use crate::link_figures::{LinkFigures, LinkSamples};
-use crate::news::{News, pack_status, unpack_status};
 use crate::process_data::Rate;
 use crate::words::Words;
 
@@ -54,7 +54,7 @@ pub struct Observer(Arc<Observed>);
 /// What the cyclic half fills, and what does not change.
 #[derive(Debug)]
 pub(crate) struct Observed {
-    news: Arc<News>,
+    cyclic_status: Arc<CyclicStatus>,
     samples: Arc<LinkSamples>,
     words: Words,
     /// Bytes of the images.
@@ -138,7 +138,7 @@ impl Observer {
     /// Requests a snapshot; the next cycle takes it, and [`Observer::take`] returns it. Neither waits nor allocates.
     pub fn request(&self) -> SnapshotRequest {
         let request = SnapshotRequest(self.0.words.next());
-        self.0.news.want_snapshot();
+        self.0.cyclic_status.want_snapshot();
         request
     }
 
@@ -178,13 +178,18 @@ impl Observer {
 }
 
 impl Observed {
-    pub fn new(news: Arc<News>, live: LiveStatus, exchange: &Exchange, directory: &Directory) -> Observed {
+    pub fn new(
+        cyclic_status: Arc<CyclicStatus>,
+        live: LiveStatus,
+        exchange: &Exchange,
+        directory: &Directory,
+    ) -> Observed {
         let images: Box<[usize]> =
             (0..exchange.domain_count()).map(|domain| exchange.image(DomainId(domain)).len()).collect();
         let of_images: usize = images.iter().map(|bytes| DOMAIN_WORDS + bytes.div_ceil(size_of::<u64>())).sum();
         Observed {
-            samples: Arc::new(LinkSamples::new(news.clone(), live)),
-            news,
+            samples: Arc::new(LinkSamples::new(cyclic_status.clone(), live)),
+            cyclic_status,
             words: Words::new(CYCLE_WORDS + CyclicCounters::COUNT + of_images),
             images,
             fmmus: fmmus(directory),

@@ -81,9 +81,9 @@ pub struct Beside {
 
 impl Beside {
     /// What has happened since the last call.
-    pub fn news(&self) -> Vec<String> {
-        let news = self.ethernet.iter().flat_map(Ethernet::take_news);
-        news.map(|news| news.to_string()).collect()
+    pub fn lines(&self) -> Vec<String> {
+        let events = self.ethernet.iter().flat_map(Ethernet::take_events);
+        events.map(|event| event.to_string()).collect()
     }
 
     /// The network interfaces for EoE, as keys of JSON.

@@ -330,7 +330,7 @@ pub struct Watched {
 
 impl Watched {
     /// Lines for variables that have changed since the last call, at most once a second.
-    pub fn news(&mut self, now: Instant) -> Vec<String> {
+    pub fn changes(&mut self, now: Instant) -> Vec<String> {
         if now < self.next || self.watched.is_empty() {
             return Vec::new();
         }
@@ -404,9 +404,9 @@ mod tests {
             application.cycle(|data| work.cycle(data));
         }
         assert_eq!(application.links().network().device(ringcat::sim::cable::DeviceIndex(1)).outputs(), [2]);
-        assert_eq!(watched.news(Instant(1)), ["Drive.Position = -5"]);
-        assert_eq!(watched.news(Instant(2)), [""; 0], "at most once a second");
-        assert_eq!(watched.news(Instant(2_000_000_000)), [""; 0], "when it changes");
+        assert_eq!(watched.changes(Instant(1)), ["Drive.Position = -5"]);
+        assert_eq!(watched.changes(Instant(2)), [""; 0], "at most once a second");
+        assert_eq!(watched.changes(Instant(2_000_000_000)), [""; 0], "when it changes");
 
         assert!(network(&["Lamps.Channel 2=on"], &["Lamp"]).check_variables().is_err());
     }

@@ -41,15 +41,15 @@ pub struct Run {
 impl Run {
     /// Prints what has happened since the last call.
     fn report_news(&mut self) {
-        self.log.news(&self.cycles, now(), |shown| {
+        self.log.report(&self.cycles, now(), |shown| {
             self.live.clear();
             print(shown);
         });
-        for words in self.beside.news().into_iter().chain(self.recording.failure()) {
+        for words in self.beside.lines().into_iter().chain(self.recording.failure()) {
             self.live.clear();
             warn(words);
         }
-        for line in self.watched.news(now()) {
+        for line in self.watched.changes(now()) {
             self.live.clear();
             say!("{line}");
             if let Shown::Event { time, text, .. } = self.log.words(now(), &line) {
@@ -88,7 +88,7 @@ impl Run {
             if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
                 (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
             }
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            self.live.show(now(), self.cycles.cyclic_status(), self.cycles.supervisor(), self.log.events().names());
             sleep(CHECK_PAUSE);
         }
         let reached = now();
@@ -98,13 +98,13 @@ impl Run {
         for words in self.incomplete() {
             print(self.log.words(reached, &format!("process data is not exchanged as declared: {words}")));
         }
-        self.cycles.news().restart_histograms();
+        self.cycles.cyclic_status().restart_histograms();
         Ok(())
     }
 
     /// Domains whose last cycle was not complete, in words.
     pub fn incomplete(&self) -> Vec<String> {
-        let status = |domain| Some((domain, self.cycles.news().status(DomainId(domain)).ok()?));
+        let status = |domain| Some((domain, self.cycles.cyclic_status().status(DomainId(domain)).ok()?));
         let statuses = (0..self.domains).filter_map(status);
         let incomplete = statuses.filter(|(_, status)| status.state != DomainState::Complete);
         incomplete
@@ -129,7 +129,7 @@ impl Run {
         }
         let mut words = format!("{} of {} SubDevices not in OP within {limit}", late, states.len());
         // A cycle that is shorter than the round trip keeps SubDevices from OP: no frame comes back in time.
-        if let Some(pace) = Seen::of(self.cycles.news()).cycle_time_not_kept(&Seen::default()) {
+        if let Some(pace) = Seen::of(self.cycles.cyclic_status()).cycle_time_not_kept(&Seen::default()) {
             words += &format!("; {pace}");
         }
         words
@@ -158,7 +158,7 @@ impl Run {
         end.limit(until);
         while now() < until && !end.is_asked() && !self.cycles.has_ended() {
             self.report_news();
-            self.live.show(now(), self.cycles.news(), self.cycles.supervisor(), self.log.events().names());
+            self.live.show(now(), self.cycles.cyclic_status(), self.cycles.supervisor(), self.log.events().names());
             sleep(CHECK_PAUSE.min(until.since(now())));
         }
         self.report_news();

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use ringcat::news::{News, Phase};
+use ringcat::cyclic_status::{CyclicStatus, Phase};
 use ringcat::text::Names;
 use ringcat::{
     AlState, ClockStatus, DomainId, Instant, Link, Redundancy, RedundancyLoss, RingState, RingStatus, SubDeviceState,
@@ -43,7 +43,7 @@ impl Live {
     }
 
     /// Draws the table, when it is time for that.
-    pub fn show(&mut self, now: Instant, news: &News, supervisor: &SupervisorThread, names: &Names) {
+    pub fn show(&mut self, now: Instant, cyclic_status: &CyclicStatus, supervisor: &SupervisorThread, names: &Names) {
         if !self.terminal || now < self.next {
             return;
         }
@@ -51,8 +51,8 @@ impl Live {
         self.clear();
         let ring = self.ring.then(|| supervisor.ring_status());
         let clocks = if self.clocks { supervisor.clocks().ok() } else { None };
-        let clocks = clocks.map(|clocks| clock_line(&clocks, news.clock_spread_ns(), news.phase()));
-        let lines = table(news, ring.as_ref(), clocks, &supervisor.states(), names);
+        let clocks = clocks.map(|clocks| clock_line(&clocks, cyclic_status.clock_spread_ns(), cyclic_status.phase()));
+        let lines = table(cyclic_status, ring.as_ref(), clocks, &supervisor.states(), names);
         self.drawn = lines.len();
         write(format_args!("{}\n", lines.join("\n")));
     }
@@ -68,16 +68,17 @@ impl Live {
 }
 
 fn table(
-    news: &News,
+    cyclic_status: &CyclicStatus,
     ring: Option<&RingStatus>,
     clocks: Option<String>,
     states: &[SubDeviceState],
     names: &Names,
 ) -> Vec<String> {
-    let (pace, counters, status) = (news.pace(), news.counters(), news.status(DomainId(0)).unwrap_or_default());
+    let (pace, counters, status) =
+        (cyclic_status.pace(), cyclic_status.counters(), cyclic_status.status(DomainId(0)).unwrap_or_default());
     let us = |time: Duration| time.as_nanos() as f64 / 1e3;
     let state = status.in_words();
-    let (trips, wake_ups) = (news.round_trips(), news.wake_ups());
+    let (trips, wake_ups) = (cyclic_status.round_trips(), cyclic_status.wake_ups());
     let mut lines = vec![
         format!("{} cycles   wkc {} of {}, {state}", pace.cycles, status.wkc, status.expected),
         format!(

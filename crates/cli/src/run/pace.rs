@@ -1,6 +1,6 @@
 //! Counters of the cycles at a moment, and whether the cycle time was kept between two of them.
 
-use ringcat::news::News;
+use ringcat::cyclic_status::CyclicStatus;
 use ringcat::{CyclicCounters, Pace};
 
 /// The cycle time was not kept if more than one cycle in this many was left out.
@@ -15,8 +15,8 @@ pub struct Seen {
 
 impl Seen {
     /// The present ones.
-    pub fn of(news: &News) -> Seen {
-        Seen { counters: news.counters(), pace: news.pace() }
+    pub fn of(cyclic_status: &CyclicStatus) -> Seen {
+        Seen { counters: cyclic_status.counters(), pace: cyclic_status.pace() }
     }
 }
 

@@ -28,7 +28,7 @@ impl Exchanged {
         let supervisor = run.cycles.supervisor();
         Exchanged {
             before: *before,
-            after: Seen::of(run.cycles.news()),
+            after: Seen::of(run.cycles.cyclic_status()),
             incomplete: run.incomplete(),
             states: supervisor.states(),
             all_settled: supervisor.all_settled(),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::news::News;
+use ringcat::cyclic_status::CyclicStatus;
 use ringcat::packet::PacketLinks;
 use ringcat::tee::Tee;
 use ringcat::text::Names;
@@ -41,7 +41,8 @@ pub fn json(
     names: &Names,
     clocks_in_use: bool,
 ) -> run::Run {
-    let (pace, cyclic, news) = (application.pace(), application.cyclic_counters(), application.news());
+    let (pace, cyclic, cyclic_status) =
+        (application.pace(), application.cyclic_counters(), application.cyclic_status());
     let exchanged = &end.exchanged;
     let locked = exchanged.clocks().iter().all(|clock| clock.is_locked || clock.is_reference);
     run::Run {
@@ -73,10 +74,10 @@ pub fn json(
         sent_once: end.sent_once.clone(),
         acyclic: application.acyclic_counters().into(),
         round_trips: Times::of(application.round_trips()),
-        wake_ups: Times::of(news.wake_ups()),
+        wake_ups: Times::of(cyclic_status.wake_ups()),
         jobs: Vec::new(),
         clocks: clocks_in_use
-            .then(|| clocks::json(exchanged.clocks(), names, &end.signals, locked, news.phase_errors())),
+            .then(|| clocks::json(exchanged.clocks(), names, &end.signals, locked, cyclic_status.phase_errors())),
         interfaces: Vec::new(),
         ethernet: Vec::new(),
         gateway: None,
@@ -137,11 +138,11 @@ pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, su
         say!("  other MainDevices: {frames} frames, {senders}");
     }
     say!("  round trips: {}", application.round_trips());
-    say!("  wake-ups: {}", application.news().wake_ups());
+    say!("  wake-ups: {}", application.cyclic_status().wake_ups());
 }
 
 /// Prints how the clocks kept together.
-pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
+pub fn clock_account(clocks: &[ClockStatus], cyclic_status: &CyclicStatus, names: &Names) {
     let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
     say!("  clocks: {locked} of {} locked", clocks.len());
     if let Some(clock) = farthest(clocks).filter(|_| locked > 0) {
@@ -152,8 +153,8 @@ pub fn clock_account(clocks: &[ClockStatus], news: &News, names: &Names) {
             clock.worst_ns
         );
     }
-    if news.phase_errors().count() > 0 {
-        say!("  cycles from their phase: {}", news.phase_errors());
+    if cyclic_status.phase_errors().count() > 0 {
+        say!("  cycles from their phase: {}", cyclic_status.phase_errors());
     }
 }
 

@@ -1,6 +1,6 @@
 //! Clients of events: each has a queue of its own, of a size and with subjects that it chose.
 //!
-//! A client that does not fetch loses its oldest events, and is told how many; it takes nothing from other clients or
+//! A client that does not fetch loses its oldest events and gets their number; it takes nothing from other clients or
 //! from the application.
 
 use alloc::collections::VecDeque;
@@ -83,7 +83,7 @@ impl Clients {
     }
 
     /// Queues an event for each client that asked for its subject.
-    pub fn tell(&mut self, event: &TimedEvent) {
+    pub fn queue(&mut self, event: &TimedEvent) {
         let subject = event.event.subject();
         for client in self.all.iter_mut().filter(|client| client.subjects.has(subject)) {
             if client.queue.len() >= client.size {
@@ -118,15 +118,15 @@ mod tests {
         let mut clients = Clients::default();
         let all = clients.add(Subjects::ALL, 3).expect("there is room");
         let links = clients.add(Subjects::NONE.with(Subject::Links), 100).expect("there is room");
-        (0..5).for_each(|number| clients.tell(&skipped(number)));
-        clients.tell(&TimedEvent { number: 5, ..TimedEvent::new(Instant(5), Event::LinkUp { link: Link::Main }) });
+        (0..5).for_each(|number| clients.queue(&skipped(number)));
+        clients.queue(&TimedEvent { number: 5, ..TimedEvent::new(Instant(5), Event::LinkUp { link: Link::Main }) });
         let events = clients.take(all).expect("it is registered");
         assert_eq!((numbers(&events), events.missed), (alloc::vec![3, 4, 5], 3));
         assert_eq!(clients.take(all), Some(ClientEvents::default()));
         let events = clients.take(links).expect("it is registered");
         assert_eq!((numbers(&events), events.missed), (alloc::vec![5], 0));
         assert!(clients.set_subjects(links, Subjects::NONE.with(Subject::Domains)));
-        clients.tell(&skipped(6));
+        clients.queue(&skipped(6));
         assert_eq!(clients.take(links).map(|events| numbers(&events)), Some(alloc::vec![6]));
         assert!(clients.remove(all) && !clients.remove(all) && clients.take(all).is_none());
         assert!(!clients.set_subjects(all, Subjects::ALL));
@@ -137,7 +137,7 @@ mod tests {
         let mut clients = Clients::default();
         let ids: Vec<ClientId> = core::iter::from_fn(|| clients.add(Subjects::ALL, usize::MAX)).collect();
         assert_eq!(ids.len(), MOST_CLIENTS);
-        (0..LARGEST_QUEUE as u64 + 9).for_each(|number| clients.tell(&skipped(number)));
+        (0..LARGEST_QUEUE as u64 + 9).for_each(|number| clients.queue(&skipped(number)));
         let events = clients.take(ids[0]).expect("it is registered");
         assert_eq!((events.events.len(), events.missed), (LARGEST_QUEUE, 9));
         assert!(clients.remove(ids[1]) && clients.add(Subjects::ALL, 0).is_some());

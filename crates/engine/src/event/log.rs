@@ -92,7 +92,7 @@ impl EventLog {
             self.drop_oldest();
         }
         let event = TimedEvent { number, at, event, occupants };
-        self.clients.tell(&event);
+        self.clients.queue(&event);
         self.kept.push_back(event);
     }
 

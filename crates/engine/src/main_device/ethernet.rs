@@ -10,7 +10,6 @@ use super::MainDevice;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::mail::eoe::EthernetPort;
-use crate::segment::Addressed;
 
 /// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,15 +69,14 @@ impl MainDevice {
     pub fn ethernet_port(&mut self, subdevice: impl Into<Address>) -> Option<&EthernetPort> {
         let subdevice = self.find(subdevice).ok()?;
         let mailbox = self.segment.mailbox_of(subdevice)?;
-        let address = match subdevice {
-            Addressed::Member(index) => SubDeviceId(index).into(),
-            Addressed::Undeclared(key) => Address::Scanned(self.segment.view().unassigned(key)?.position),
-        };
-        let is_current = self.ports.get(&address).is_some_and(|port| port.is_of(&mailbox));
+        // The station address stays when SubDevices before this one come or go; the position does not.
+        let station = self.segment.view().station(subdevice)?;
+        let is_current = self.ports.get(&station).is_some_and(|port| port.is_of(&mailbox));
         if !is_current {
-            self.ports.remove(&address);
-            self.ports.insert(address, EthernetPort::open(&mailbox)?);
+            let view = self.segment.view();
+            self.ports.retain(|other, _| *other != station && view.has_station(*other));
+            self.ports.insert(station, EthernetPort::open(&mailbox)?);
         }
-        self.ports.get(&address)
+        self.ports.get(&station)
     }
 }

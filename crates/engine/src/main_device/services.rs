@@ -16,6 +16,7 @@ use crate::info::SubDeviceInfo;
 use crate::procedures::complete_siis::complete;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::services::ports::BlockedPort;
+use crate::procedures::services::registers::Urgency;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
@@ -82,9 +83,20 @@ impl MainDevice {
         address: RegisterAddress,
         data: Vec<u8>,
     ) -> Pending<Result<(), ServiceError>> {
+        self.start_register_write_with(subdevice, address, data, Urgency::InOrder)
+    }
+
+    /// As [`MainDevice::start_register_write`], in order or before all datagrams that wait.
+    pub fn start_register_write_with(
+        &mut self,
+        subdevice: impl Into<Address>,
+        address: RegisterAddress,
+        data: Vec<u8>,
+        urgency: Urgency,
+    ) -> Pending<Result<(), ServiceError>> {
         let segment = self.active().cloned();
         self.start_on(subdevice, move |bus, station| async move {
-            registers::write(&bus, segment.as_ref(), station, address, &data).await
+            registers::write(&bus, segment.as_ref(), station, address, &data, urgency).await
         })
     }
 

@@ -2,16 +2,15 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use super::MainDevice;
 use super::pending::Pending;
 use crate::declared::Address;
+use crate::procedures::services::ServiceError;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
 use crate::procedures::services::forced_state::{Acknowledge, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
-use crate::procedures::services::{ServiceError, registers};
 use crate::segment::{Addressed, Observation};
 
 impl MainDevice {
@@ -20,20 +19,6 @@ impl MainDevice {
     pub fn start_port_report(&mut self) -> Pending<Result<Vec<SubDevicePorts>, ServiceError>> {
         let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move { port_report::read(&bus, &segment).await })
-    }
-
-    /// Starts a write of registers or memory that is sent before all datagrams that wait, those to the same SubDevice
-    /// included; otherwise as [`MainDevice::start_register_write`]. Datagrams that are on the wire are not overtaken.
-    pub fn start_urgent_register_write(
-        &mut self,
-        subdevice: impl Into<Address>,
-        address: RegisterAddress,
-        data: Vec<u8>,
-    ) -> Pending<Result<(), ServiceError>> {
-        let segment = self.active().cloned();
-        self.start_on(subdevice, move |bus, station| async move {
-            registers::write_urgently(&bus, segment.as_ref(), station, address, &data).await
-        })
     }
 
     /// Starts to write a state to AL control of a SubDevice once, without the steps between and without its

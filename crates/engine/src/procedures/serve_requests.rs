@@ -10,7 +10,7 @@ use core::task::Poll;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
-use super::services::registers;
+use super::services::registers::{self, Urgency};
 use super::shared_segment::SharedSegment;
 use crate::bell::Bell;
 use crate::declared::Address;
@@ -159,7 +159,9 @@ async fn register(
     order: &Order,
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
     let result = match &order.access {
-        Access::Write(data) => registers::write(bus, Some(segment), station, address, data).await.map(|()| None),
+        Access::Write(data) => {
+            registers::write(bus, Some(segment), station, address, data, Urgency::InOrder).await.map(|()| None)
+        }
         Access::Read | Access::ReadDirectly => registers::read(bus, station, address, length.into()).await.map(Some),
     };
     result.map_err(|_| RequestFailure::Failed)

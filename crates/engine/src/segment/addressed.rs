@@ -42,4 +42,8 @@ impl Segment {
             Addressed::Undeclared(key) => self.unassigned(key).map(|it| it.key.station),
         }
     }
+    /// Whether a SubDevice of the list, declared or not, has this station address.
+    pub fn has_station(&self, station: StationAddress) -> bool {
+        self.subdevices.member_of(station).is_some() || self.subdevices.unassigned().any(|it| it.key.station == station)
+    }
 }

@@ -25,6 +25,9 @@ const MAX_READ_WAIT: Duration = Duration::from_millis(5);
 /// The shortest round trip may grow by this part of itself per measurement.
 const FADING_PART: u32 = 256;
 
+/// Urgent datagrams that are sent in a row while others wait.
+const URGENT_IN_A_ROW: usize = 16;
+
 /// The three queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rank {
@@ -48,6 +51,8 @@ struct Read {
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
     urgent: VecDeque<TransferId>,
+    /// Number of urgent datagrams that were packed since another one was.
+    urgent_in_a_row: usize,
     accounts: Accounts,
     first: Turns<TransferId>,
     reads: Turns<Read>,
@@ -80,11 +85,16 @@ impl Outbox {
         }
     }
 
-    /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it, except urgent ones.
+    /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it, except urgent ones, of
+    /// which [`URGENT_IN_A_ROW`] are sent for each other one that waits.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
-        if let Some(id) = self.urgent.front() {
-            return Some((*id, Rank::Urgent));
-        }
+        let urgent = self.urgent.front().map(|id| (*id, Rank::Urgent));
+        let is_others_turn = || urgent.is_none() || self.urgent_in_a_row >= URGENT_IN_A_ROW;
+        let other = is_others_turn().then(|| self.front_of_others(reads, now)).flatten();
+        other.or(urgent)
+    }
+
+    fn front_of_others(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
         let read = self.reads.front().filter(|_| reads);
         match (self.first.front(), read) {
             (Some((turn, id)), waiting) => {
@@ -112,6 +122,7 @@ impl Outbox {
             Rank::First => _ = self.first.pop(),
             Rank::Read => self.waiting -= self.reads.pop().map_or(0, |read| read.bytes),
         }
+        self.urgent_in_a_row = if rank == Rank::Urgent { self.urgent_in_a_row + 1 } else { 0 };
         if self.first.is_empty() && self.reads.is_empty() {
             self.accounts.forget();
         }
@@ -217,6 +228,26 @@ mod tests {
         }
         assert_eq!(sent, [c, d, a, b]);
         assert!(!outbox.is_ready(late));
+    }
+
+    // covers: registers
+    #[test]
+    fn others_are_sent_after_each_16_urgent_datagrams() {
+        let [a, b, c] = ids();
+        let mut outbox = Outbox::default();
+        outbox.push(a, Rank::First, Target::None, 40, Instant(0));
+        outbox.push(b, Rank::Read, Target::None, READ, Instant(0));
+        // Another urgent one always waits.
+        outbox.push(c, Rank::Urgent, Target::None, 40, Instant(0));
+        let sent = (0..60).filter_map(|_| {
+            outbox.push(c, Rank::Urgent, Target::None, 40, Instant(0));
+            let (id, rank) = outbox.front(true, Instant(0))?;
+            outbox.pop(rank);
+            Some((id, rank))
+        });
+        let others: Vec<_> = sent.enumerate().filter(|(_, (_, rank))| *rank != Rank::Urgent).collect();
+        assert_eq!(others, [(16, (a, Rank::First)), (33, (b, Rank::Read))]);
+        assert_eq!(outbox.front(false, Instant(0)), Some((c, Rank::Urgent)), "nothing else waits");
     }
 
     /// Continuous load of a SubDevice: datagrams of this length, or a request and then the read of its answer.

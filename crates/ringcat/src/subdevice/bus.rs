@@ -4,6 +4,7 @@ use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership};
 use ringcat_engine::procedures::services::forced_state::Acknowledge;
 use ringcat_engine::procedures::services::ports::BlockedPort;
+use ringcat_engine::procedures::services::registers::Urgency;
 use ringcat_engine::procedures::services::statistics::Statistics;
 use ringcat_engine::procedures::sii::program::SiiWritten;
 use ringcat_wire::address::RegisterAddress;
@@ -78,8 +79,10 @@ impl<S: Services> SubDevice<S> {
         address: RegisterAddress,
         value: T,
     ) -> S::Outcome<(), SubDeviceError> {
-        let (subdevice, data) = (self.address, value.encode());
-        self.ask(move |engine, _| engine.start_urgent_register_write(subdevice, address, data).ended())
+        let data = value.encode();
+        self.ask(move |engine, subdevice| {
+            engine.start_register_write_with(subdevice, address, data, Urgency::First).ended()
+        })
     }
 
     /// Writes a state to AL control once, without the steps between and without configuration, and reads what the

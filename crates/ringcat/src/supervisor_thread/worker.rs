@@ -170,8 +170,8 @@ impl<L: Links> Worker<L> {
         let Worker { links, engine, window, .. } = self;
         let blocked = work(engine, links, window);
         let mut asked = !self.asked.is_empty();
-        let news = self.pass_on_events();
-        self.publish(news);
+        let is_changed = self.pass_on_events();
+        self.publish(is_changed);
         asked |= self.answer();
         let now = self.links.now();
         if asked {
@@ -218,9 +218,9 @@ impl<L: Links> Worker<L> {
         any
     }
 
-    fn publish(&mut self, news: bool) {
+    fn publish(&mut self, is_changed: bool) {
         let now = self.links.now();
-        if !news && now < self.publish_at {
+        if !is_changed && now < self.publish_at {
             return;
         }
         self.publish_at = now + PUBLISH;

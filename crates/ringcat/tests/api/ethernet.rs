@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use ringcat::eoe::{EthernetNews, EthernetOptions, HostInterface};
+use ringcat::eoe::{EthernetEvent, EthernetOptions, HostInterface};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{CyclicThread, Error, LastOutputs, Options, Services, SubDeviceId, SupervisorThread, automatic};
 use ringcat_link::TapError;
@@ -122,9 +122,9 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
                 interface.status.up && (counters.tx_frames, counters.rx_frames) == (39, 39)
             })
     });
-    let news = ethernet.take_news();
-    assert_eq!(news[0], EthernetNews::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1).into() });
-    assert!(news.iter().any(|news| news.to_string() == "eoe3a1000: frames can pass"), "{news:?}");
+    let events = ethernet.take_events();
+    assert_eq!(events[0], EthernetEvent::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1).into() });
+    assert!(events.iter().any(|events| events.to_string() == "eoe3a1000: frames can pass"), "{events:?}");
     cycles.supervisor().all_settled();
     let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     wait("the interfaces go", || cables.iter().all(|cable| Arc::strong_count(cable) == 1));
@@ -185,7 +185,7 @@ fn an_interface_that_cannot_be_created_is_reported_once_and_all_else_continues()
     let cycles = cycles(&supervisor, cyclic)?;
     wait("all are in OP", || cycles.supervisor().all_settled());
     sleep(Duration::from_millis(100));
-    let told: Vec<String> = ethernet.take_news().iter().map(ToString::to_string).collect();
+    let told: Vec<String> = ethernet.take_events().iter().map(ToString::to_string).collect();
     assert_eq!(told.len(), 2, "{told:?}");
     assert!(told[0].starts_with("EoE: not permitted to make the network interface eoe3s1; run as root"), "{told:?}");
     assert_eq!(ethernet.interfaces(), []);

@@ -57,12 +57,12 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     )?;
     until("all are in OP", || cycles.supervisor().all_settled());
     until("outputs arrive", || plant.with_network(|network| outputs(network)[0] == [1]));
-    let status = cycles.news().status(DomainId(0))?;
+    let status = cycles.cyclic_status().status(DomainId(0))?;
     assert!(status.expected > 0 && status.wkc > 0, "{status:?}");
     let events: Vec<_> = std::iter::from_fn(|| cycles.supervisor().pop_event()).collect();
     assert!(events.len() >= 3, "{events:?}");
-    assert!(cycles.news().pace().cycles > 0 && cycles.news().counters().sent > 0);
-    assert!(cycles.news().round_trips().count() > 0);
+    assert!(cycles.cyclic_status().pace().cycles > 0 && cycles.cyclic_status().counters().sent > 0);
+    assert!(cycles.cyclic_status().round_trips().count() > 0);
 
     let (supervisor, links) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     plant.with_network(|network| {
@@ -225,9 +225,9 @@ fn a_panic_of_the_closure_is_an_error_of_its_own_and_the_bus_is_stopped_in_order
     until("the closure runs no more", || cycles.has_ended());
     until("outputs are zero", || plant.with_network(|network| outputs(network)[0] == [0]));
     // Longer than any watchdog: cycles go on, so the SubDevices stay in OP until they are stopped.
-    let before = cycles.news().pace().cycles;
+    let before = cycles.cyclic_status().pace().cycles;
     sleep(Duration::from_millis(300));
-    assert!(cycles.news().pace().cycles > before && cycles.supervisor().all_settled());
+    assert!(cycles.cyclic_status().pace().cycles > before && cycles.supervisor().all_settled());
 
     let panicked = cycles.end().expect_err("the closure has panicked");
     assert_eq!(panicked.message, "the recipe has no step 7");
@@ -298,10 +298,10 @@ fn second_copies_are_waited_for_and_no_round_trip_is_as_long_as_a_cycle() -> Res
         .activate(automatic(&scan.subdevices, LONG), Deaf { links: cyclic, arrived: Vec::new(), has_taken: false })?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     until("all are in OP", || cycles.supervisor().all_settled());
-    cycles.news().restart_histograms();
-    let before = cycles.news().counters().received;
-    until("frames return", || cycles.news().counters().received > before + 20);
-    let trips = cycles.news().round_trips();
+    cycles.cyclic_status().restart_histograms();
+    let before = cycles.cyclic_status().counters().received;
+    until("frames return", || cycles.cyclic_status().counters().received > before + 20);
+    let trips = cycles.cyclic_status().round_trips();
     assert!(trips.count() > 20 && trips.quantile(800_000) < LONG / 4, "{trips}");
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())

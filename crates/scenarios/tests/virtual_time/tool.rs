@@ -6,7 +6,7 @@ use std::time::Duration;
 use ringcat::{
     Acknowledge, AlState, AlStatus, AlStatusCode, EepromAssignment, EepromOwner, Error, Event, Link, MainDevice,
     Neighbour, Options, PortOf, Position, RawDatagram, RegisterAddress, Services, SubDeviceId, SubDevicePorts, Subject,
-    Subjects, TimedEvent,
+    Subjects, TimedEvent, Urgency,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::DeviceDescription;
@@ -45,7 +45,7 @@ fn status(main_device: &mut MainDevice<Tap>, device: usize) -> AlStatus {
 }
 
 /// Cycles until the user's memory of a SubDevice holds a value that is written while datagrams to it wait.
-fn cycles_until_written(world: &mut World, value: u8, urgent: bool) -> usize {
+fn cycles_until_written(world: &mut World, value: u8, urgency: Urgency) -> usize {
     const DEVICE: usize = 2;
     let station = StationAddress(world.station_of(DEVICE));
     let read = |_| RawDatagram::new(Command::Fprd, Target::Station(station, RegisterAddress(0)), vec![0; 1400]);
@@ -53,10 +53,7 @@ fn cycles_until_written(world: &mut World, value: u8, urgent: bool) -> usize {
     let waiting = engine.start_datagrams((0..400).map(read).collect());
     world.run_cycles(2);
     let engine = world.application_mut().engine_mut();
-    let write = match urgent {
-        true => engine.start_urgent_register_write(SubDeviceId(DEVICE), USER_RAM, vec![value]),
-        false => engine.start_register_write(SubDeviceId(DEVICE), USER_RAM, vec![value]),
-    };
+    let write = engine.start_register_write_with(SubDeviceId(DEVICE), USER_RAM, vec![value], urgency);
     let mut cycles = 0;
     while world.network().device(DeviceIndex(DEVICE)).controller.register(USER_RAM, 1) != [value] {
         world.cycle();
@@ -74,11 +71,16 @@ fn cycles_until_written(world: &mut World, value: u8, urgent: bool) -> usize {
 fn an_urgent_register_write_goes_ahead_of_all_that_wait() {
     for network in [line(descriptions(&KINDS), options()), ring(descriptions(&KINDS), options())] {
         let mut world = World::in_op(1, network);
-        let usual = cycles_until_written(&mut world, 0x11, false);
-        let urgent = cycles_until_written(&mut world, 0x22, true);
+        let usual = cycles_until_written(&mut world, 0x11, Urgency::InOrder);
+        let urgent = cycles_until_written(&mut world, 0x22, Urgency::First);
         println!("written after {usual} cycles, urgently after {urgent}");
         assert!(usual >= 20 && urgent <= 2, "{usual} and {urgent}");
-        let error = world.application_mut().engine_mut().start_urgent_register_write(SubDeviceId(9), USER_RAM, vec![1]);
+        let error = world.application_mut().engine_mut().start_register_write_with(
+            SubDeviceId(9),
+            USER_RAM,
+            vec![1],
+            Urgency::First,
+        );
         assert!(world.finish(LIMIT, error).is_err(), "there is no such SubDevice");
     }
 }
@@ -90,7 +92,7 @@ fn lost_urgent_writes_are_sent_again() {
     for round in 1..=20 {
         world.drop(CableId(1), 1);
         let engine = world.application_mut().engine_mut();
-        let write = engine.start_urgent_register_write(SubDeviceId(2), USER_RAM, vec![round; 8]);
+        let write = engine.start_register_write_with(SubDeviceId(2), USER_RAM, vec![round; 8], Urgency::First);
         assert_eq!(world.finish(LIMIT, write), Ok(()));
         assert_eq!(world.network().device(DeviceIndex(2)).controller.register(USER_RAM, 8), [round; 8]);
     }

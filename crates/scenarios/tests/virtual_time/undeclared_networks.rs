@@ -196,6 +196,24 @@ fn ethernet_of_an_undeclared_subdevice_ends_and_returns_with_its_power() {
     }
 }
 
+// covers: eoe-interfaces
+#[test]
+fn ethernet_of_an_undeclared_subdevice_continues_at_another_position() {
+    let [_, ring] = networks();
+    let mut main_device = idle(ring);
+    frames_return(&mut main_device, Position(ALL).into());
+    for _ in 0..3 {
+        main_device.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(usize::from(ALL) - 1)));
+        main_device.attend(FOLLOWED);
+        let moved = Position(ALL - 1);
+        assert_eq!(ethernet(&mut main_device)[1], EthernetSubDevice::new(moved, moved, 0));
+        frames_return(&mut main_device, moved.into());
+        main_device.links_mut().network_mut().apply(Fault::PowerOn(DeviceIndex(usize::from(ALL) - 1)));
+        main_device.attend(FOLLOWED);
+        frames_return(&mut main_device, Position(ALL).into());
+    }
+}
+
 // covers: 10.1, gateway
 #[test]
 fn gateway_clients_reach_undeclared_subdevices_idle_and_beside_an_application() {

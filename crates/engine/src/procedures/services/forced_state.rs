@@ -31,6 +31,6 @@ pub(crate) async fn force(
         Acknowledge::No => AlControl::new(state),
         Acknowledge::Yes => AlControl::with_acknowledge(state),
     };
-    bus.fpwr_urgently(station, map::AL_CONTROL, &control.encode()).await?;
+    bus.fpwr_first(station, map::AL_CONTROL, &control.encode()).await?;
     Ok(read_status(bus, station).await?)
 }

@@ -10,6 +10,16 @@ use crate::procedures::junction::ordering;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 
+/// When a datagram of a service is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Urgency {
+    /// In the order of requests.
+    InOrder,
+    /// Before all datagrams that wait. Only datagrams that are on the wire are not overtaken.
+    First,
+}
+
 /// Address space of a SubDevice.
 const MEMORY: usize = 1 << 16;
 
@@ -38,27 +48,16 @@ pub async fn write(
     station: StationAddress,
     address: RegisterAddress,
     data: &[u8],
+    urgency: Urgency,
 ) -> Result<(), ServiceError> {
     check(address, data.len())?;
     let _order = ordering(segment, station, address, data);
     for (number, piece) in data.chunks(MAX_DATA).enumerate() {
-        bus.fpwr(station, address.offset((number * MAX_DATA) as u16), piece).await?;
-    }
-    Ok(())
-}
-
-/// As [`write()`], before all datagrams that wait. In several datagrams only if it is longer than one can be.
-pub async fn write_urgently(
-    bus: &Bus,
-    segment: Option<&SharedSegment>,
-    station: StationAddress,
-    address: RegisterAddress,
-    data: &[u8],
-) -> Result<(), ServiceError> {
-    check(address, data.len())?;
-    let _order = ordering(segment, station, address, data);
-    for (number, piece) in data.chunks(MAX_DATA).enumerate() {
-        bus.fpwr_urgently(station, address.offset((number * MAX_DATA) as u16), piece).await?;
+        let at = address.offset((number * MAX_DATA) as u16);
+        match urgency {
+            Urgency::InOrder => bus.fpwr(station, at, piece).await?,
+            Urgency::First => bus.fpwr_first(station, at, piece).await?,
+        }
     }
     Ok(())
 }

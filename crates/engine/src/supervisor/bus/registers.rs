@@ -65,7 +65,7 @@ impl Bus {
     }
 
     /// The same before all datagrams that wait, those of other procedures to this SubDevice included.
-    pub(crate) async fn fpwr_urgently(
+    pub(crate) async fn fpwr_first(
         &self,
         station: StationAddress,
         register: RegisterAddress,

@@ -27,9 +27,9 @@ pub struct Phase {
     pub is_locked: bool,
 }
 
-/// News of the cyclic half.
+/// Status of the cyclic half.
 #[derive(Debug)]
-pub struct News {
+pub struct CyclicStatus {
     pace: [AtomicU64; 6],
     counters: [AtomicU64; COUNTERS],
     /// Working counter and expected working counter; state, and number of times that the domain was skipped.
@@ -48,9 +48,9 @@ pub struct News {
     ring: AtomicU64,
 }
 
-/// Bit of [`News::restart_histograms`].
+/// Bit of [`CyclicStatus::restart_histograms`].
 const RESTART: u8 = 1;
-/// Bit of [`News::want_snapshot`].
+/// Bit of [`CyclicStatus::want_snapshot`].
 const SNAPSHOT: u8 = 2;
 /// Fields of [`CyclicCounters`].
 const COUNTERS: usize = CyclicCounters::COUNT;
@@ -74,9 +74,9 @@ fn load<const N: usize>(from: &[AtomicU64; N]) -> [u64; N] {
     std::array::from_fn(|at| from[at].load(Ordering::Relaxed))
 }
 
-impl News {
-    pub(crate) fn new(domains: usize) -> News {
-        News {
+impl CyclicStatus {
+    pub(crate) fn new(domains: usize) -> CyclicStatus {
+        CyclicStatus {
             pace: zeros(),
             counters: zeros(),
             domains: (0..domains).map(|_| zeros()).collect(),
