@@ -20,6 +20,7 @@ mod damper;
 pub mod disturbance;
 pub mod effect;
 mod hot_connect;
+mod keeping;
 mod key;
 mod knowledge;
 mod local_rings;
@@ -45,19 +46,20 @@ pub mod start;
 mod subdevice;
 mod subdevices;
 pub mod unassigned;
+mod upkeep;
 mod versions;
 pub mod view;
 
 pub use addressed::Addressed;
 pub use cabling::{Cabling, stations_by_position};
-pub use choices::Choices;
+pub use choices::{Choices, Retries};
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use key::SubDeviceKey;
 
 pub use local_rings::is_down;
 pub use model::{Declared, Segment};
-pub use observation::{MemberFinding, Observation, ProcessDataStep};
+pub use observation::{MemberFinding, Observation, ProcessDataStep, StateRead};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
 pub use reading::Reading;
@@ -67,6 +69,7 @@ pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
+pub use upkeep::{AttemptFailure, Progress};
 pub use versions::Versions;
 
 #[cfg(test)]

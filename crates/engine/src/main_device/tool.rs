@@ -37,8 +37,7 @@ impl MainDevice {
     ) -> Pending<Result<(AlStatus, AlStatusCode), ServiceError>> {
         let subdevice = subdevice.into();
         if let Ok(Addressed::Undeclared(key)) = self.find(subdevice) {
-            self.segment.observe(Observation::Visited);
-            self.segment.undeclared.leave(key.station);
+            self.segment.observe(Observation::Forced(key));
         }
         self.start_on(subdevice, move |bus, station| async move { force(&bus, station, state, acknowledge).await })
     }

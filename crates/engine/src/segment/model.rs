@@ -15,6 +15,7 @@ use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
+use super::keeping::Keeping;
 use super::key::SubDeviceKey;
 use super::local_rings::LocalRings;
 use super::member::MemberView;
@@ -95,6 +96,7 @@ pub struct Segment {
     pub(super) attention: Attention,
     pub(super) slot: Slot,
     pub(super) addresses: Addresses,
+    pub(super) keeping: Keeping,
     /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
     /// Until this time it is not necessary to test how many datagrams a frame may hold.
@@ -121,6 +123,7 @@ impl Segment {
             attention: Attention::default(),
             slot: Slot::default(),
             addresses: Addresses::default(),
+            keeping: Keeping::default(),
             adoptions: 0,
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),

@@ -9,6 +9,7 @@ use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
+use super::addressed::Addressed;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
@@ -20,6 +21,7 @@ use super::ring::Words;
 use super::round_result::RoundResult;
 use super::scan::{Found, Scan};
 use super::seen::Seen;
+use super::upkeep::AttemptFailure;
 use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
@@ -67,6 +69,17 @@ pub enum MemberFinding<'a> {
     ReadAgain(&'a SubDeviceInfo),
 }
 
+/// The state of a SubDevice without a declaration was read.
+#[derive(Clone, Copy, Debug)]
+pub struct StateRead {
+    /// The SubDevice.
+    pub key: SubDeviceKey,
+    /// The attempt that had reached its state when the read was requested.
+    pub attempt: u32,
+    /// The result.
+    pub reading: Reading,
+}
+
 /// An observation.
 #[derive(Debug)]
 pub enum Observation<'a> {
@@ -112,8 +125,6 @@ pub enum Observation<'a> {
         /// Its data.
         read: &'a SubDeviceInfo,
     },
-    /// A SubDevice is configured for its mailbox before an application is active.
-    Visited,
     /// An application declares SubDevices.
     Activated(Box<Declared>),
     /// The application ends. The result of the scan stays.
@@ -140,13 +151,36 @@ pub enum Observation<'a> {
         /// Number of the mapping for which they were read.
         mapping: u32,
     },
-    /// The application requests a state of a member.
+    /// The application requests a state of a SubDevice.
     Requested {
-        /// The member.
-        index: usize,
+        /// The SubDevice.
+        subdevice: Addressed,
         /// The state.
         state: AlState,
     },
+
+    /// The application requests that failed attempts are repeated now: of a SubDevice, or of all.
+    Retried(Option<Addressed>),
+
+    /// SubDevices without a declaration are kept in their requested states until the application ends.
+    KeepingBegun,
+    /// Each SubDevice without a declaration and without a requested state is to go to PREOP.
+    TakenOver,
+    /// The time has come at which attempts are due.
+    AttemptsDue,
+    /// An attempt to bring a SubDevice without a declaration to its requested state has ended.
+    AttemptEnded {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// The attempt.
+        attempt: u32,
+        /// Why it has failed; `None` if the state was reached.
+        failure: Option<AttemptFailure>,
+    },
+    /// States of SubDevices without a declaration were read.
+    StatesRead(&'a [StateRead]),
+    /// The application forces a state of a SubDevice without a declaration, which then is left as it is.
+    Forced(SubDeviceKey),
 
     /// The incident counters of members are reset.
     IncidentsForgotten,
