@@ -20,7 +20,6 @@ mod damper;
 pub mod disturbance;
 pub mod effect;
 mod hot_connect;
-mod keeping;
 mod key;
 mod knowledge;
 mod local_rings;
@@ -46,7 +45,7 @@ pub mod start;
 mod subdevice;
 mod subdevices;
 pub mod unassigned;
-mod upkeep;
+mod undeclared;
 mod versions;
 pub mod view;
 
@@ -59,7 +58,7 @@ pub use key::SubDeviceKey;
 
 pub use local_rings::is_down;
 pub use model::{Declared, Segment};
-pub use observation::{MemberFinding, Observation, ProcessDataStep, StateRead};
+pub use observation::{MemberFinding, Observation, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
 pub use reading::Reading;
@@ -69,7 +68,7 @@ pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
-pub use upkeep::{AttemptFailure, Progress};
+pub use undeclared::{AttemptFailure, StateRead, UndeclaredObservation, UpkeepProgress};
 pub use versions::Versions;
 
 #[cfg(test)]

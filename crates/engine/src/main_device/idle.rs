@@ -10,7 +10,7 @@ use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::undeclared::{keep, watch_undeclared_mail};
-use crate::segment::{Addressed, Observation};
+use crate::segment::{Addressed, Observation, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -57,7 +57,7 @@ impl MainDevice {
             return;
         }
         let (bus, segment, options) = (self.supervisor.bus(), self.segment.clone(), self.scan_options());
-        segment.observe(Observation::KeepingBegun);
+        segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         self.supervisor.spawn(keep(bus.clone(), segment.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch(bus, segment, options));
@@ -78,7 +78,7 @@ impl MainDevice {
         let options = self.scan_options();
         let is_kept = self.options.idle_operation;
         if is_kept {
-            segment.observe(Observation::KeepingBegun);
+            segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         }
         self.supervisor.spawn(async move {
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;

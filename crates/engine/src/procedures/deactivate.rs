@@ -15,7 +15,7 @@ use super::shared_segment::SharedSegment;
 use super::stop::{StopError, ToStop, all_known, stop};
 use super::undeclared::settle;
 use crate::info::SubDeviceInfo;
-use crate::segment::{Observation, Segment, SubDevice};
+use crate::segment::{Observation, Segment, SubDevice, UndeclaredObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -62,7 +62,7 @@ pub(crate) async fn deactivate(
     // A SubDevice that does not leave its state must not take the time of the others.
     let stopped = stop(bus, to_stop, AlState::PreOp, limit / 2).await;
     scan_until(bus, segment, options, &known, until).await;
-    segment.observe(Observation::TakenOver);
+    segment.observe_undeclared(UndeclaredObservation::TakenOver);
     let settling = settle(bus, segment);
     let is_settled = bus.within(until.since(bus.now()), settling).await.is_ok();
     if is_settled { Ok(()) } else { late(bus, segment, &declared, limit).await.map_or(stopped, Err) }

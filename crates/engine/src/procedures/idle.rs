@@ -24,7 +24,7 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::segment::{Observation, Reading, StateRead};
+use crate::segment::{Observation, Reading, StateRead, UndeclaredObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -121,7 +121,7 @@ impl Watch {
     /// SubDevices of the last scan are kept in their states from now on.
     fn take_over(&self) {
         if self.segment.view().has_untouched() {
-            self.segment.observe(Observation::TakenOver);
+            self.segment.observe_undeclared(UndeclaredObservation::TakenOver);
         }
     }
 
@@ -248,6 +248,6 @@ impl Watch {
             .await;
         // A SubDevice without its station address has lost its power.
         self.is_stale |= readings.iter().any(|read| matches!(read.reading, Reading::Silent | Reading::Doubled));
-        self.segment.observe(Observation::StatesRead(&readings));
+        self.segment.observe_undeclared(UndeclaredObservation::StatesRead(&readings));
     }
 }

@@ -19,7 +19,7 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Addressed, MemberFinding, Observation, Segment, Words};
+use crate::segment::{Addressed, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -144,6 +144,11 @@ impl SharedSegment {
     /// Passes an observation of clocks to the model.
     pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
+    }
+
+    /// Passes an observation of SubDevices without a declaration to the model.
+    pub(crate) fn observe_undeclared(&self, seen: UndeclaredObservation<'_>) {
+        self.observe(Observation::Undeclared(seen));
     }
 
     /// The posted words, in the form that the model takes.

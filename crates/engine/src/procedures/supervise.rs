@@ -15,7 +15,7 @@ use super::junction::note_controls;
 use super::shared_segment::SharedSegment;
 use super::unassigned;
 use crate::segment::member::Phase;
-use crate::segment::{Observation, Reading, RoundResult, StateRead, SubDeviceKey};
+use crate::segment::{Observation, Reading, RoundResult, StateRead, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Pause before SubDevices that did not answer are read again.
@@ -75,7 +75,7 @@ fn observe_states(segment: &SharedSegment, settled: &[(SubDeviceKey, u32)], read
         .filter_map(|(key, attempt)| Some(StateRead { key: *key, attempt: *attempt, reading: reading(*key)? }));
     let read: Vec<StateRead> = read.collect();
     if !read.is_empty() {
-        segment.observe(Observation::StatesRead(&read));
+        segment.observe_undeclared(UndeclaredObservation::StatesRead(&read));
     }
 }
 

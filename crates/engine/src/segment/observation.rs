@@ -21,7 +21,7 @@ use super::ring::Words;
 use super::round_result::RoundResult;
 use super::scan::{Found, Scan};
 use super::seen::Seen;
-use super::upkeep::AttemptFailure;
+use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
@@ -67,17 +67,6 @@ pub enum MemberFinding<'a> {
     Refused(AlState),
     /// Its SII was read again.
     ReadAgain(&'a SubDeviceInfo),
-}
-
-/// The state of a SubDevice without a declaration was read.
-#[derive(Clone, Copy, Debug)]
-pub struct StateRead {
-    /// The SubDevice.
-    pub key: SubDeviceKey,
-    /// The attempt that had reached its state when the read was requested.
-    pub attempt: u32,
-    /// The result.
-    pub reading: Reading,
 }
 
 /// An observation.
@@ -162,25 +151,8 @@ pub enum Observation<'a> {
     /// The application requests that failed attempts are repeated now: of a SubDevice, or of all.
     Retried(Option<Addressed>),
 
-    /// SubDevices without a declaration are kept in their requested states until the application ends.
-    KeepingBegun,
-    /// Each SubDevice without a declaration and without a requested state is to go to PREOP.
-    TakenOver,
-    /// The time has come at which attempts are due.
-    AttemptsDue,
-    /// An attempt to bring a SubDevice without a declaration to its requested state has ended.
-    AttemptEnded {
-        /// The SubDevice.
-        key: SubDeviceKey,
-        /// The attempt.
-        attempt: u32,
-        /// Why it has failed; `None` if the state was reached.
-        failure: Option<AttemptFailure>,
-    },
-    /// States of SubDevices without a declaration were read.
-    StatesRead(&'a [StateRead]),
-    /// The application forces a state of a SubDevice without a declaration, which then is left as it is.
-    Forced(SubDeviceKey),
+    /// States of SubDevices without a declaration, and attempts to reach them.
+    Undeclared(UndeclaredObservation<'a>),
 
     /// The incident counters of members are reset.
     IncidentsForgotten,

@@ -14,4 +14,4 @@ mod recabling;
 mod silence;
 mod stages;
 mod unassigned;
-mod upkeep;
+mod undeclared;

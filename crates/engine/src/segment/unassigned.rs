@@ -10,7 +10,7 @@ use ringcat_wire::address::Position;
 use super::key::SubDeviceKey;
 use super::knowledge::Knowledge;
 use super::owners::Owners;
-use super::upkeep::Upkeep;
+use super::undeclared::Upkeep;
 use crate::time::Instant;
 
 /// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.

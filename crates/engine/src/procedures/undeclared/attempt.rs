@@ -9,7 +9,7 @@ use super::bring::bring;
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::recover::is_of_bus;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::{AttemptFailure, Observation, SubDeviceKey};
+use crate::segment::{AttemptFailure, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Runs an attempt as long as it is the current one of its SubDevice.
@@ -23,7 +23,7 @@ pub(in crate::procedures) async fn bring_undeclared(
     let failure =
         result.as_ref().err().map(|error| AttemptFailure { is_of_bus: is_of_bus(error), reason: error.to_string() });
     segment.undeclared.end(key, attempt, result);
-    segment.observe(Observation::AttemptEnded { key, attempt, failure });
+    segment.observe_undeclared(UndeclaredObservation::AttemptEnded { key, attempt, failure });
 }
 
 async fn run(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Result<(), ConfigureError> {

@@ -1,7 +1,7 @@
 //! Tells the model when attempts of SubDevices without a declaration are due.
 
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::{Observation, Segment};
+use crate::segment::{Segment, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Has attempts begun as they fall due. Runs until the MainDevice stops.
@@ -20,7 +20,7 @@ pub(crate) async fn settle(bus: &Bus, segment: &SharedSegment) {
 
 /// Has the attempts begun that are due, and waits until others may be.
 async fn begin_due(bus: &Bus, segment: &SharedSegment) {
-    segment.observe(Observation::AttemptsDue);
+    segment.observe_undeclared(UndeclaredObservation::AttemptsDue);
     let state = |model: &Segment| (model.next_attempt(), model.are_undeclared_settled());
     let before = state(&segment.view());
     let changed = segment.until(|model| (state(model) != before).then_some(()));

@@ -6,7 +6,7 @@ use ringcat_wire::al::AlState;
 
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::{Addressed, Observation, Progress, SubDeviceKey};
+use crate::segment::{Addressed, Observation, SubDeviceKey, UpkeepProgress};
 
 /// Brings a SubDevice to a state. The procedure continues also if its result is not awaited.
 pub(crate) fn request(
@@ -35,7 +35,7 @@ pub(crate) async fn until_decided(segment: &SharedSegment, key: SubDeviceKey, st
     segment
         .until(|model| {
             let upkeep = model.upkeep(key)?;
-            (upkeep.target != state || upkeep.progress == Progress::Reached).then_some(upkeep.target == state)
+            (upkeep.target != state || upkeep.progress == UpkeepProgress::Reached).then_some(upkeep.target == state)
         })
         .await
 }

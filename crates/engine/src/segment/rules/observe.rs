@@ -44,14 +44,7 @@ impl Segment {
             Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
             Observation::Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
             Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
-            Observation::KeepingBegun => self.keeping.is_on = true,
-            Observation::TakenOver => self.take_over(now),
-            Observation::AttemptsDue => self.begin_due(now, effects),
-            Observation::AttemptEnded { key, attempt, failure } => {
-                self.observe_attempt_end((key, attempt), failure, now, effects);
-            }
-            Observation::StatesRead(read) => self.observe_states(read, now, effects),
-            Observation::Forced(key) => self.observe_forced(key),
+            Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
             Observation::IncidentsForgotten => self.forget_incidents(),
 
             Observation::Places { versions, view } => self.observe_places(versions, view),

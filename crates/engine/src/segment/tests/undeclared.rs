@@ -2,7 +2,6 @@
 
 use alloc::string::String;
 
-use crate::segment::observation::StateRead;
 use crate::segment::view::View;
 
 use super::stages::choices;
@@ -39,9 +38,9 @@ impl Idle {
     /// All SubDevices are kept in PREOP and have reached it.
     fn kept(stations: &[(u16, u32)]) -> Idle {
         let mut idle = Idle::scanned(stations, Retries::Always);
-        idle.observe(Observation::KeepingBegun);
-        idle.observe(Observation::TakenOver);
-        for begun in attempts(&idle.observe(Observation::AttemptsDue)) {
+        idle.seen(UndeclaredObservation::KeepingBegun);
+        idle.seen(UndeclaredObservation::TakenOver);
+        for begun in attempts(&idle.seen(UndeclaredObservation::AttemptsDue)) {
             idle.end(begun, None);
         }
         assert!(idle.segment.are_undeclared_settled());
@@ -50,6 +49,10 @@ impl Idle {
 
     fn observe(&mut self, seen: Observation<'_>) -> Vec<Effect> {
         self.segment.observe(seen, self.now).0
+    }
+
+    fn seen(&mut self, seen: UndeclaredObservation<'_>) -> Vec<Effect> {
+        self.observe(Observation::Undeclared(seen))
     }
 
     fn key(&self, position: u16) -> SubDeviceKey {
@@ -63,7 +66,7 @@ impl Idle {
     }
 
     fn end(&mut self, (key, attempt): (SubDeviceKey, u32), failure: Option<AttemptFailure>) -> Vec<Effect> {
-        self.observe(Observation::AttemptEnded { key, attempt, failure })
+        self.seen(UndeclaredObservation::AttemptEnded { key, attempt, failure })
     }
 
     fn find_again(&mut self, stations: &[(u16, u32)]) -> Vec<Effect> {
@@ -72,7 +75,7 @@ impl Idle {
     }
 
     /// The state and progress of the SubDevice at a position.
-    fn progress(&self, position: u16) -> (AlState, Progress) {
+    fn progress(&self, position: u16) -> (AlState, UpkeepProgress) {
         let upkeep = self.segment.upkeep(self.key(position)).unwrap();
         (upkeep.target, upkeep.progress)
     }
@@ -127,12 +130,12 @@ const THREE: [(u16, u32); 3] = [(0x1001, 1), (0x1002, 2), (0x1003, 3)];
 fn each_subdevice_that_is_taken_over_gets_one_attempt_and_a_mailbox() {
     let mut idle = Idle::scanned(&THREE, Retries::Always);
     assert!(idle.segment.has_untouched() && idle.segment.next_attempt() == Instant::NEVER);
-    let effects = idle.observe(Observation::TakenOver);
+    let effects = idle.seen(UndeclaredObservation::TakenOver);
     assert_eq!(mailboxes(&effects), Some(vec![(0x1001, 0), (0x1002, 1), (0x1003, 2)]));
-    assert_eq!(idle.observe(Observation::TakenOver), [], "once");
-    let begun = attempts(&idle.observe(Observation::AttemptsDue));
+    assert_eq!(idle.seen(UndeclaredObservation::TakenOver), [], "once");
+    let begun = attempts(&idle.seen(UndeclaredObservation::AttemptsDue));
     assert_eq!(begun, [0, 1, 2].map(|at| (idle.key(at), 1)));
-    assert_eq!(idle.observe(Observation::AttemptsDue), [], "all are under way");
+    assert_eq!(idle.seen(UndeclaredObservation::AttemptsDue), [], "all are under way");
     for (settled, attempt) in begun.into_iter().enumerate() {
         assert_eq!(idle.segment.unsettled().len(), 3 - settled);
         assert_eq!(idle.end(attempt, None), []);
@@ -149,10 +152,10 @@ fn the_same_request_joins_the_attempt_under_way_and_another_one_replaces_it() {
     assert_eq!((first.0, first.1 + 1), second);
     for failure in [None, refusal()] {
         assert_eq!(idle.end(first, failure), [], "it is no longer the current one");
-        assert_eq!(idle.progress(1), (AlState::SafeOp, Progress::UnderWay));
+        assert_eq!(idle.progress(1), (AlState::SafeOp, UpkeepProgress::UnderWay));
     }
     idle.end(second, None);
-    assert_eq!(idle.progress(1), (AlState::SafeOp, Progress::Reached));
+    assert_eq!(idle.progress(1), (AlState::SafeOp, UpkeepProgress::Reached));
     assert_eq!(idle.end(second, refusal()), [], "it has ended");
     let begun = attempts(&idle.request(1, AlState::Op))[0];
     let task = Task::KeepOutputs { key: begun.0, attempt: begun.1 };
@@ -173,9 +176,9 @@ fn a_refused_state_is_followed_by_the_state_before_after_pauses_that_double() {
         assert_eq!(idle.segment.next_attempt(), due);
         targets.push(idle.progress(2).0);
         idle.now = Instant(due.0 - 1);
-        assert_eq!(idle.observe(Observation::AttemptsDue), [], "not due yet");
+        assert_eq!(idle.seen(UndeclaredObservation::AttemptsDue), [], "not due yet");
         idle.now = due;
-        attempt = attempts(&idle.observe(Observation::AttemptsDue))[0];
+        attempt = attempts(&idle.seen(UndeclaredObservation::AttemptsDue))[0];
     }
     assert_eq!(targets[..2], [AlState::SafeOp, PREOP]);
     assert!(targets[2..].iter().all(|target| *target == PREOP));
@@ -189,25 +192,28 @@ fn lost_frames_keep_the_requested_state_and_are_reported_once() {
         assert_eq!(reports(&idle.end(attempt, lost())).len(), reported);
         assert_eq!(idle.progress(0).0, AlState::Op);
         idle.now = idle.segment.next_attempt();
-        attempt = attempts(&idle.observe(Observation::AttemptsDue))[0];
+        attempt = attempts(&idle.seen(UndeclaredObservation::AttemptsDue))[0];
     }
 }
 
 #[test]
 fn with_retries_on_request_a_refusal_waits_and_a_lost_frame_does_not() {
     let mut idle = Idle::scanned(&THREE, Retries::OnRequest);
-    idle.observe(Observation::TakenOver);
-    let begun = attempts(&idle.observe(Observation::AttemptsDue));
+    idle.seen(UndeclaredObservation::TakenOver);
+    let begun = attempts(&idle.seen(UndeclaredObservation::AttemptsDue));
     assert_eq!(idle.end(begun[0], lost()), [], "nothing is kept, so nothing is reported");
     idle.end(begun[1], refusal());
     idle.end(begun[2], refusal());
     let pause = idle.now + Duration::from_millis(100);
-    assert_eq!([0, 1, 2].map(|at| idle.progress(at).1), [pause, Instant::NEVER, Instant::NEVER].map(Progress::Due));
+    assert_eq!(
+        [0, 1, 2].map(|at| idle.progress(at).1),
+        [pause, Instant::NEVER, Instant::NEVER].map(UpkeepProgress::Due)
+    );
     let one = Addressed::Undeclared(idle.key(1));
     idle.observe(Observation::Retried(Some(one)));
-    assert_eq!(attempts(&idle.observe(Observation::AttemptsDue)), [(idle.key(1), 2)]);
+    assert_eq!(attempts(&idle.seen(UndeclaredObservation::AttemptsDue)), [(idle.key(1), 2)]);
     idle.observe(Observation::Retried(None));
-    let all = attempts(&idle.observe(Observation::AttemptsDue));
+    let all = attempts(&idle.seen(UndeclaredObservation::AttemptsDue));
     assert_eq!(all, [(idle.key(0), 2), (idle.key(2), 2)], "the other one is under way");
 }
 
@@ -226,12 +232,16 @@ fn a_state_that_was_left_is_reported_once_and_brought_back() {
     let mut idle = Idle::kept(&THREE);
     let (key, attempt) = idle.segment.settled()[1];
     let read = |reading| [StateRead { key, attempt, reading }];
-    assert_eq!(idle.observe(Observation::StatesRead(&read(answer(PREOP)))), []);
-    assert_eq!(idle.observe(Observation::StatesRead(&read(Reading::Silent))), [], "no information about its state");
-    let effects = idle.observe(Observation::StatesRead(&read(answer(AlState::Init))));
+    assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read(answer(PREOP)))), []);
+    assert_eq!(
+        idle.seen(UndeclaredObservation::StatesRead(&read(Reading::Silent))),
+        [],
+        "no information about its state"
+    );
+    let effects = idle.seen(UndeclaredObservation::StatesRead(&read(answer(AlState::Init))));
     assert!(matches!(reports(&effects)[..], [Event::UndeclaredState { position: Position(1), .. }]));
-    assert_eq!(idle.observe(Observation::StatesRead(&read(answer(AlState::Init)))), [], "once");
-    assert_eq!(attempts(&idle.observe(Observation::AttemptsDue)), [(key, attempt + 1)]);
+    assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read(answer(AlState::Init)))), [], "once");
+    assert_eq!(attempts(&idle.seen(UndeclaredObservation::AttemptsDue)), [(key, attempt + 1)]);
 }
 
 #[test]
@@ -242,10 +252,10 @@ fn a_state_that_was_read_before_a_request_is_not_taken_for_a_lost_one() {
     idle.end(begun, None);
     // The read was requested in PREOP, and its answer is evaluated in OP.
     let early = [StateRead { key, attempt, reading: answer(PREOP) }];
-    assert_eq!(idle.observe(Observation::StatesRead(&early)), []);
-    assert_eq!(idle.progress(0), (AlState::Op, Progress::Reached));
+    assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&early)), []);
+    assert_eq!(idle.progress(0), (AlState::Op, UpkeepProgress::Reached));
     let late = [StateRead { key, attempt: begun.1, reading: answer(PREOP) }];
-    assert_eq!(reports(&idle.observe(Observation::StatesRead(&late))).len(), 1);
+    assert_eq!(reports(&idle.seen(UndeclaredObservation::StatesRead(&late))).len(), 1);
 }
 
 #[test]
@@ -253,14 +263,14 @@ fn a_forced_state_ends_the_attempt_and_stays_until_the_next_request() {
     let mut idle = Idle::kept(&THREE);
     let (key, _) = idle.segment.settled()[0];
     let begun = attempts(&idle.request(0, AlState::Op))[0];
-    idle.observe(Observation::Forced(key));
+    idle.seen(UndeclaredObservation::Forced(key));
     assert_eq!(idle.end(begun, refusal()), []);
-    assert_eq!((idle.progress(0).1, idle.segment.expected_states()), (Progress::Left, None));
+    assert_eq!((idle.progress(0).1, idle.segment.expected_states()), (UpkeepProgress::Left, None));
     let settled = idle.segment.settled();
     let read = [StateRead { key, attempt: settled[0].1, reading: answer(AlState::SafeOp) }];
-    assert_eq!(idle.observe(Observation::StatesRead(&read)), []);
+    assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read)), []);
     idle.observe(Observation::Retried(None));
-    assert_eq!(idle.observe(Observation::AttemptsDue), []);
+    assert_eq!(idle.seen(UndeclaredObservation::AttemptsDue), []);
     assert_eq!(attempts(&idle.request(0, PREOP)).len(), 1);
 }
 
@@ -276,10 +286,10 @@ fn subdevices_in_place_keep_their_attempts_when_the_segment_is_found_again() {
     assert_eq!(idle.observe(Observation::Requested { subdevice: Addressed::Undeclared(first), state: PREOP }), []);
     assert_eq!(idle.end((second, 1), None), [], "the SubDevice of this attempt has left");
     idle.end(begun, None);
-    assert_eq!(idle.progress(1), (AlState::SafeOp, Progress::Reached));
-    let effects = idle.observe(Observation::TakenOver);
+    assert_eq!(idle.progress(1), (AlState::SafeOp, UpkeepProgress::Reached));
+    let effects = idle.seen(UndeclaredObservation::TakenOver);
     assert_eq!(mailboxes(&effects), Some(vec![(0x1002, 0), (0x1003, 1), (0x1004, 2)]));
-    assert_eq!(attempts(&idle.observe(Observation::AttemptsDue)), [(idle.key(0), 1), (idle.key(2), 1)]);
+    assert_eq!(attempts(&idle.seen(UndeclaredObservation::AttemptsDue)), [(idle.key(0), 1), (idle.key(2), 1)]);
     // The address of the new one is used again for another one, without it having been seen to leave.
     let before = idle.key(2);
     idle.find_again(&[(0x1002, 7), (0x1003, 3), (0x1004, 5)]);
@@ -291,10 +301,10 @@ fn an_application_ends_attempts_of_its_subdevices_and_leaves_the_others() {
     for is_kept in [true, false] {
         let mut idle = Idle::scanned(&THREE, Retries::Always);
         if is_kept {
-            idle.observe(Observation::KeepingBegun);
+            idle.seen(UndeclaredObservation::KeepingBegun);
         }
-        idle.observe(Observation::TakenOver);
-        let begun = attempts(&idle.observe(Observation::AttemptsDue));
+        idle.seen(UndeclaredObservation::TakenOver);
+        let begun = attempts(&idle.seen(UndeclaredObservation::AttemptsDue));
         let effects = idle.activate();
         let left = if is_kept { vec![(0x1002, 1), (0x1003, 2)] } else { vec![] };
         assert_eq!(mailboxes(&effects), Some(left));
@@ -330,7 +340,7 @@ fn a_subdevice_that_is_found_beside_an_application_is_kept_as_well() {
     assert_eq!(mailboxes(&idle.observe(Observation::Read { key, read: Ok(Rc::new(info)) })), None, "may be a member");
     let effects = idle.observe(Observation::Unexpected(key));
     assert_eq!(mailboxes(&effects), Some(vec![(0x1002, 1), (0x1003, 2), (TEMPORARY.0, 3)]));
-    assert_eq!(attempts(&idle.observe(Observation::AttemptsDue)), [(key, 1)]);
+    assert_eq!(attempts(&idle.seen(UndeclaredObservation::AttemptsDue)), [(key, 1)]);
     let effects = idle.observe(Observation::Readdressing(&[TEMPORARY]));
     assert_eq!(mailboxes(&effects), Some(vec![(0x1002, 1), (0x1003, 2)]));
     assert_eq!(idle.end((key, 1), refusal()), [], "it has left");

@@ -11,9 +11,8 @@ use crate::segment::choices::Retries;
 use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
-use crate::segment::observation::StateRead;
 use crate::segment::reading::Reading;
-use crate::segment::upkeep::{AttemptFailure, Progress, Upkeep};
+use crate::segment::undeclared::{AttemptFailure, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
 use crate::time::Instant;
 
 impl Segment {
@@ -48,7 +47,7 @@ impl Segment {
 
     /// The OR of their AL states, if each is in its requested state; `None` if some are left in any state.
     pub fn expected_states(&self) -> Option<u8> {
-        let is_left = self.upkeeps().any(|(_, it)| it.progress == Progress::Left);
+        let is_left = self.upkeeps().any(|(_, it)| it.progress == UpkeepProgress::Left);
         (!is_left).then(|| self.upkeeps().fold(0, |or, (_, it)| or | it.target.code()))
     }
 
@@ -65,14 +64,33 @@ impl Segment {
     /// When the next attempt is due.
     pub fn next_attempt(&self) -> Instant {
         let due = self.upkeeps().filter_map(|(_, it)| match it.progress {
-            Progress::Due(at) => Some(at),
-            Progress::UnderWay | Progress::Reached | Progress::Left => None,
+            UpkeepProgress::Due(at) => Some(at),
+            UpkeepProgress::UnderWay | UpkeepProgress::Reached | UpkeepProgress::Left => None,
         });
         due.min().unwrap_or(Instant::NEVER)
     }
 
+    /// Processes an observation of SubDevices without a declaration.
+    pub(in crate::segment) fn observe_undeclared(
+        &mut self,
+        seen: UndeclaredObservation<'_>,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        match seen {
+            UndeclaredObservation::KeepingBegun => self.keeping.is_on = true,
+            UndeclaredObservation::TakenOver => self.take_over(now),
+            UndeclaredObservation::AttemptsDue => self.begin_due(now, effects),
+            UndeclaredObservation::AttemptEnded { key, attempt, failure } => {
+                self.end_attempt((key, attempt), failure, now, effects);
+            }
+            UndeclaredObservation::StatesRead(read) => self.observe_states(read, now, effects),
+            UndeclaredObservation::Forced(key) => self.leave(key),
+        }
+    }
+
     /// Each undeclared SubDevice without a requested state is to go to PREOP.
-    pub(in crate::segment) fn take_over(&mut self, now: Instant) {
+    fn take_over(&mut self, now: Instant) {
         self.touch();
         for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
             if it.is_untouched(knowledge) {
@@ -91,7 +109,7 @@ impl Segment {
     }
 
     /// Begins the attempts that are due.
-    pub(in crate::segment) fn begin_due(&mut self, now: Instant, effects: &mut Effects) {
+    fn begin_due(&mut self, now: Instant, effects: &mut Effects) {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(attempt) = it.upkeep.as_mut().and_then(|upkeep| upkeep.begin_if_due(now)) {
                 effects.start(Task::BringUndeclared { key, attempt });
@@ -119,14 +137,14 @@ impl Segment {
     }
 
     /// The application has forced a state: the SubDevice is left as it is until another one is requested.
-    pub(in crate::segment) fn observe_forced(&mut self, key: SubDeviceKey) {
+    fn leave(&mut self, key: SubDeviceKey) {
         self.touch();
         let upkeep = self.subdevices.unassigned_mut(key).and_then(|(_, it)| it.upkeep.as_mut());
         upkeep.into_iter().for_each(Upkeep::leave);
     }
 
     /// An attempt has ended. It is refused if it is no longer the current one.
-    pub(in crate::segment) fn observe_attempt_end(
+    fn end_attempt(
         &mut self,
         (key, attempt): (SubDeviceKey, u32),
         failure: Option<AttemptFailure>,
@@ -165,7 +183,7 @@ impl Segment {
     }
 
     /// States were read. SubDevices that left theirs without a request are brought back.
-    pub(in crate::segment) fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
+    fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
         if !self.keeping.is_on {
             return;
         }

@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::{AlState, AlStatus};
 
-use super::choices::Retries;
+use crate::segment::choices::Retries;
 use crate::time::Instant;
 
 /// Pause before the first repeated attempt; it doubles with every failure.
@@ -17,7 +17,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
 /// Progress of a SubDevice towards its requested state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
+pub enum UpkeepProgress {
     /// The next attempt is due at this time; never, if it waits for a request.
     Due(Instant),
     /// An attempt is under way.
@@ -45,7 +45,7 @@ pub struct Upkeep {
     /// The requested state before the last request.
     before: AlState,
     /// Progress towards it.
-    pub progress: Progress,
+    pub progress: UpkeepProgress,
     /// Number of the last attempt.
     pub attempt: u32,
     /// Consecutive failed attempts.
@@ -54,41 +54,41 @@ pub struct Upkeep {
 
 impl Upkeep {
     /// PREOP is requested, and the first attempt is due at this time.
-    pub(super) fn due(at: Instant) -> Upkeep {
-        let progress = Progress::Due(at);
+    pub(in crate::segment) fn due(at: Instant) -> Upkeep {
+        let progress = UpkeepProgress::Due(at);
         Upkeep { target: AlState::PreOp, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
     }
 
     /// Whether it is in its requested state, or left as it is.
     pub fn is_settled(&self) -> bool {
-        matches!(self.progress, Progress::Reached | Progress::Left)
+        matches!(self.progress, UpkeepProgress::Reached | UpkeepProgress::Left)
     }
 
     /// Whether this attempt is under way.
     pub fn is_under_way(&self, attempt: u32) -> bool {
-        self.attempt == attempt && self.progress == Progress::UnderWay
+        self.attempt == attempt && self.progress == UpkeepProgress::UnderWay
     }
 
     /// Whether this attempt has reached its state, which is still requested.
     pub fn is_reached(&self, attempt: u32) -> bool {
-        self.attempt == attempt && self.progress == Progress::Reached
+        self.attempt == attempt && self.progress == UpkeepProgress::Reached
     }
 
     /// Begins another attempt. Returns its number.
     fn begin(&mut self) -> u32 {
-        self.progress = Progress::UnderWay;
+        self.progress = UpkeepProgress::UnderWay;
         self.attempt = self.attempt.wrapping_add(1);
         self.attempt
     }
 
     /// Begins the next attempt if it is due. Returns its number.
-    pub(super) fn begin_if_due(&mut self, now: Instant) -> Option<u32> {
-        matches!(self.progress, Progress::Due(at) if at <= now).then(|| self.begin())
+    pub(in crate::segment) fn begin_if_due(&mut self, now: Instant) -> Option<u32> {
+        matches!(self.progress, UpkeepProgress::Due(at) if at <= now).then(|| self.begin())
     }
 
     /// Another state is requested. Returns the number of the new attempt; `None` if the same request is under way.
-    pub(super) fn request(&mut self, state: AlState) -> Option<u32> {
-        if self.progress == Progress::UnderWay && self.target == state {
+    pub(in crate::segment) fn request(&mut self, state: AlState) -> Option<u32> {
+        if self.progress == UpkeepProgress::UnderWay && self.target == state {
             return None;
         }
         self.before = core::mem::replace(&mut self.target, state);
@@ -97,9 +97,9 @@ impl Upkeep {
     }
 
     /// The attempt under way has ended. True if its failure is to be reported.
-    pub(super) fn end(&mut self, failure: Option<&AttemptFailure>, retries: Retries, now: Instant) -> bool {
+    pub(in crate::segment) fn end(&mut self, failure: Option<&AttemptFailure>, retries: Retries, now: Instant) -> bool {
         let Some(AttemptFailure { is_of_bus, .. }) = failure else {
-            (self.progress, self.failures) = (Progress::Reached, 0);
+            (self.progress, self.failures) = (UpkeepProgress::Reached, 0);
             return false;
         };
         let tried = self.target;
@@ -110,30 +110,30 @@ impl Upkeep {
         self.failures = self.failures.saturating_add(1);
         let pause = FIRST_PAUSE.saturating_mul(1 << (self.failures - 1).min(8)).min(LONGEST_PAUSE);
         let waits = retries == Retries::OnRequest && !is_of_bus && tried == self.target;
-        self.progress = Progress::Due(if waits { Instant::NEVER } else { now + pause });
+        self.progress = UpkeepProgress::Due(if waits { Instant::NEVER } else { now + pause });
         self.failures == 1 || !is_of_bus
     }
 
     /// It is left as it is until another state is requested; an attempt under way ends.
-    pub(super) fn leave(&mut self) {
+    pub(in crate::segment) fn leave(&mut self) {
         self.attempt = self.attempt.wrapping_add(1);
-        self.progress = Progress::Left;
+        self.progress = UpkeepProgress::Left;
     }
 
     /// A failed attempt is repeated now.
-    pub(super) fn retry(&mut self, now: Instant) {
-        if matches!(self.progress, Progress::Due(_)) {
-            (self.progress, self.failures) = (Progress::Due(now), 0);
+    pub(in crate::segment) fn retry(&mut self, now: Instant) {
+        if matches!(self.progress, UpkeepProgress::Due(_)) {
+            (self.progress, self.failures) = (UpkeepProgress::Due(now), 0);
         }
     }
 
     /// Its state was read; the read was requested after this attempt had reached its state. True if it has left the
     /// requested state since: then it is brought back.
-    pub(super) fn has_left(&mut self, attempt: u32, status: AlStatus, now: Instant) -> bool {
+    pub(in crate::segment) fn has_left(&mut self, attempt: u32, status: AlStatus, now: Instant) -> bool {
         let is_there = !status.error && status.al_state() == Some(self.target);
         let has_left = self.is_reached(attempt) && !is_there;
         if has_left {
-            (self.progress, self.before) = (Progress::Due(now), AlState::PreOp);
+            (self.progress, self.before) = (UpkeepProgress::Due(now), AlState::PreOp);
         }
         has_left
     }

@@ -4,13 +4,13 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::Position;
 
-use super::effect::{Effect, Effects};
-use super::key::SubDeviceKey;
-use super::subdevices::SubDevices;
+use crate::segment::effect::{Effect, Effects};
+use crate::segment::key::SubDeviceKey;
+use crate::segment::subdevices::SubDevices;
 
 /// Which SubDevices without a declaration have mailboxes, and whether they are kept in their requested states.
 #[derive(Debug, Default)]
-pub(super) struct Keeping {
+pub(in crate::segment) struct Keeping {
     /// They are kept in their requested states; otherwise only requests are executed.
     pub is_on: bool,
     /// Those that have mailboxes according to the last effect, at their positions.
