@@ -280,7 +280,7 @@ fn undeclared_subdevices_have_mailbox_state_and_eeprom_while_others_are_in_op() 
 // covers: states
 #[test]
 fn rounds_of_reads_during_requests_report_no_state_as_left() {
-    for (network, lost) in networks().into_iter().flat_map(|network| [(network.clone(), 0), (network, 1)]) {
+    for (network, lost) in [0, 1].into_iter().flat_map(|lost| networks().map(|network| (network, lost))) {
         let mut application = activate(idle(network), &[0, 1, 5]);
         cycles(&mut application, 300);
         while application.pop_event().is_some() {}
