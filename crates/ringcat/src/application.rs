@@ -14,18 +14,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::clocks::Follower;
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::Follower;
+use ringcat_engine::RingState;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
 use ringcat_engine::main_device::{
     Active, Directory, LiveStatus, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
 };
-use ringcat_engine::ring::RingState;
-use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{Class, class_of};
 
 use crate::acyclic::{AcyclicHalf, Inline};
 use crate::cyclic::Cyclic;

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::clocks::Follower;
+use ringcat_engine::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::{CopyError, CopyRule, Exchange, Received};
 use ringcat_engine::link::Link;
