@@ -4,6 +4,7 @@ mod clients;
 mod cyclic;
 pub mod history;
 mod log;
+mod messages;
 mod subject;
 
 use alloc::string::String;
@@ -17,6 +18,7 @@ use ringcat_wire::sii::Identity;
 pub use clients::{ClientEvents, ClientId};
 pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
+pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
 pub use subject::{Subject, Subjects};
 
 pub use crate::ring_status::Occupant;

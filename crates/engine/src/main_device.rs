@@ -24,6 +24,7 @@ mod loaded;
 mod lrw;
 mod mail;
 mod memories;
+mod messages;
 mod options;
 mod pending;
 mod prepare;

@@ -7,6 +7,7 @@
 mod alone;
 pub mod bus;
 mod counters;
+mod debug_message;
 mod executor;
 mod flight;
 mod flights;
@@ -31,9 +32,12 @@ use alloc::sync::Arc;
 use core::cell::RefCell;
 use core::future::Future;
 
+use ringcat_wire::frame::MacAddress;
+
 pub(crate) use alone::Turn;
 pub use bus::Bus;
 pub use counters::AcyclicCounters;
+pub(crate) use debug_message::MOST_WAITING as MOST_DEBUG_MESSAGES;
 pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
 pub(crate) use posted::Posted;
@@ -209,6 +213,12 @@ impl Supervisor {
     /// Works with the log of events.
     pub(crate) fn with_events<T>(&self, work: impl FnOnce(&mut EventLog) -> T) -> T {
         work(&mut self.shared.borrow_mut().events)
+    }
+
+    /// Queues an Ethernet debug message, from the addresses of the links; false if too many wait.
+    pub(crate) fn queue_debug_message(&self, sources: [Option<MacAddress>; 2], ethertype: u16, text: &[u8]) -> bool {
+        let shared = &mut *self.shared.borrow_mut();
+        shared.debug_messages.queue(sources, ethertype, text, shared.now)
     }
 
     /// Whether there are clients of events with queues of their own.

@@ -14,7 +14,7 @@ const BLOCKED: [(&str, &[Function]); 9] = [
     ("FoE", &[Function::FileTransfer]),
     ("SoE", &[Function::SoeAccess]),
     ("AoE", &[Function::AoeAccess]),
-    ("VoE", &[Function::VendorMessage, Function::RawMailbox, Function::Ethernet]),
+    ("VoE", &[Function::VendorMessage, Function::RawMailbox, Function::Ethernet, Function::DebugMessage]),
     (
         "state",
         &[

@@ -49,7 +49,7 @@
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
-//! | `tracing` | events of the acyclic half for a `tracing` subscriber |
+//! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
 
@@ -143,7 +143,10 @@ pub use ringcat_engine::config::{
     Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
-pub use ringcat_engine::event::{ClientEvents, ClientId, Event, EventsSince, Occupant, Subject, Subjects, TimedEvent};
+pub use ringcat_engine::event::{
+    ClientEvents, ClientId, Event, EventsSince, LogFilter, LogLevel, Message, MessageContent, MessagesSince, Occupant,
+    Subject, Subjects, TimedEvent,
+};
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
@@ -219,7 +222,9 @@ pub use ringcat_engine::procedures::configure::SetupError;
 pub use ringcat_engine::procedures::sii::program::SiiProgramError;
 pub use ringcat_engine::topology::Topology;
 #[cfg(feature = "packet")]
-pub use ringcat_link::recorder::Tap;
+pub use ringcat_link::pcapng::Direction as FrameDirection;
+#[cfg(feature = "packet")]
+pub use ringcat_link::recorder::{AlreadyRead, FrameNote, FrameReader, Recorded, Recorder, RecorderError, Tap, Taps};
 
 #[cfg(any(feature = "eni", feature = "esi"))]
 pub use ringcat_config as config;

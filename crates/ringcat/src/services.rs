@@ -12,7 +12,7 @@
 
 use std::time::Duration;
 
-use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, Subjects};
+use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, LogFilter, MessagesSince, Subjects};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
@@ -150,6 +150,31 @@ pub trait Services: Sized {
     /// Removes a client of events; false if there is no such client.
     fn unregister_client(self, client: ClientId) -> Self::Immediate<bool> {
         self.immediately(move |engine| engine.unregister_client(client))
+    }
+
+    /// Sets which messages of the acyclic half are reported from now on, beside the events: the level (0 to 2, as
+    /// `ethercat debug`) and the mask of subjects. It is level 0 at first, and stays over activations and stops. The
+    /// cyclic half reports no messages.
+    fn set_log_filter(self, filter: LogFilter) -> Self::Immediate<()> {
+        self.immediately(move |engine| engine.set_log_filter(filter))
+    }
+
+    /// Which messages are reported.
+    fn log_filter(self) -> Self::Immediate<LogFilter> {
+        self.immediately(|engine| engine.log_filter())
+    }
+
+    /// The messages from a number on: the last 4,096 are kept, up to 1 MiB. The number of missing ones is in the
+    /// result, and the number to continue with. [`text::message`](crate::text::message) has a line for each.
+    fn messages_since(self, number: u64) -> Self::Immediate<MessagesSince> {
+        self.immediately(move |engine| engine.messages_since(number))
+    }
+
+    /// Sends a text in an Ethernet frame on each link: a mark in captures, up to the first SubDevice, which destroys it
+    /// and counts an error; with bit 0 of DL_CONTROL cleared SubDevices pass it on, and what comes back is ignored. The
+    /// EtherType is any but that of EtherCAT; 0x88B5 is free for such uses (IEEE 802). At most 1,500 bytes.
+    fn debug_message(self, ethertype: u16, text: Vec<u8>) -> Self::Outcome<(), ServiceError> {
+        self.call(move |engine| engine.start_debug_message(ethertype, &text))
     }
 
     /// Whether a function can be called in the present phase.

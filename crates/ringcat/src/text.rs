@@ -3,6 +3,7 @@
 //! Positions are places on the bus, indices are places in the declaration; a line names which of the two it gives.
 
 mod clocks;
+mod messages;
 mod names;
 mod ring;
 mod scan;
@@ -11,6 +12,7 @@ mod subdevices;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_wire::frame::MacAddress;
 
+pub use messages::message;
 pub use names::Names;
 
 /// The source address of a frame, if it is long enough to have one.

@@ -7,6 +7,7 @@ use alloc::vec::Vec;
 
 use super::clients::{ClientEvents, ClientId, Clients};
 use super::history::History;
+use super::messages::Messages;
 use super::subject::Subjects;
 use super::{Event, Occupant, TimedEvent};
 use ringcat_wire::address::Position;
@@ -46,6 +47,7 @@ pub struct EventLog {
     history: History,
     occupants: Vec<Occupant>,
     clients: Clients,
+    messages: Messages,
 }
 
 impl EventLog {
@@ -94,6 +96,11 @@ impl EventLog {
         let event = TimedEvent { number, at, event, occupants };
         self.clients.queue(&event);
         self.kept.push_back(event);
+    }
+
+    /// Messages beside the events.
+    pub(crate) fn messages(&mut self) -> &mut Messages {
+        &mut self.messages
     }
 
     /// Adds a client with a queue of its own; `None` if there are too many.

@@ -22,11 +22,13 @@ pub enum Subject {
     Domains,
     /// Distributed clocks.
     Clocks,
+    /// Content of acyclic frames: messages of level 2 only, no event.
+    Frames,
 }
 
 impl Subject {
     /// All of them.
-    pub const ALL: [Subject; 8] = [
+    pub const ALL: [Subject; 9] = [
         Subject::Scan,
         Subject::Cabling,
         Subject::Ring,
@@ -35,6 +37,7 @@ impl Subject {
         Subject::Mail,
         Subject::Domains,
         Subject::Clocks,
+        Subject::Frames,
     ];
 }
 

@@ -50,6 +50,8 @@ functions! {
     ForcedState,
     /// Datagrams of the application.
     RawDatagrams,
+    /// Ethernet debug messages.
+    DebugMessage,
     /// Registers and memory, read and written.
     Registers,
     /// EEPROM: read, written, the alias, reloaded.
@@ -116,8 +118,8 @@ impl Function {
         match self {
             F::SdoTransfer | F::ObjectDictionary | F::PdoByMailbox | F::FileTransfer | F::SoeAccess => true,
             F::AoeAccess | F::VendorMessage | F::RawMailbox | F::Ethernet => true,
-            F::SubDeviceState | F::StateOfAll | F::ForcedState | F::RawDatagrams | F::Registers => true,
-            F::Eeprom | F::EepromOwner | F::Scan | F::Rescan | F::ForceTopologyChange => true,
+            F::SubDeviceState | F::StateOfAll | F::ForcedState | F::RawDatagrams | F::DebugMessage => true,
+            F::Registers | F::Eeprom | F::EepromOwner | F::Scan | F::Rescan | F::ForceTopologyChange => true,
             F::PortState | F::BlockedPorts | F::ControllerReset | F::PortReport | F::Statistics => true,
             F::SiiCompletion | F::Activate | F::Deactivate | F::Stop | F::SubDeviceInfo => true,
             F::Status | F::OwnObjects | F::Events | F::Settings => false,
@@ -133,8 +135,8 @@ impl Function {
         match self {
             F::SdoTransfer | F::ObjectDictionary | F::PdoByMailbox | F::FileTransfer | F::SoeAccess => ALWAYS,
             F::AoeAccess | F::VendorMessage | F::RawMailbox | F::Ethernet => ALWAYS,
-            F::SubDeviceState | F::StateOfAll | F::ForcedState | F::RawDatagrams | F::Registers => ALWAYS,
-            F::Eeprom | F::EepromOwner | F::PortState | F::ControllerReset | F::PortReport => ALWAYS,
+            F::SubDeviceState | F::StateOfAll | F::ForcedState | F::RawDatagrams | F::DebugMessage => ALWAYS,
+            F::Registers | F::Eeprom | F::EepromOwner | F::PortState | F::ControllerReset | F::PortReport => ALWAYS,
             F::SiiCompletion | F::Stop | F::SubDeviceInfo => ALWAYS,
             F::Status | F::OwnObjects | F::Events | F::Settings => ALWAYS,
             F::Scan | F::Activate => WITHOUT,

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::frame::{ETHERNET_HEADER_LEN, ETHERTYPE, ETHERTYPE_VLAN, MAX_FRAME};
 
 use super::MainDevice;
 use super::pending::Pending;
@@ -12,6 +13,12 @@ use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnershi
 use crate::procedures::services::forced_state::{Acknowledge, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
 use crate::segment::{Addressed, Observation};
+use crate::supervisor::MOST_DEBUG_MESSAGES;
+
+/// Longest text of a debug message.
+const LONGEST_TEXT: usize = MAX_FRAME - ETHERNET_HEADER_LEN;
+/// Smaller values of the EtherType are lengths (IEEE 802.3).
+const FIRST_ETHERTYPE: u16 = 0x0600;
 
 impl MainDevice {
     /// Starts a read of the ports of all SubDevices by position: links, neighbours, delays, receive times, error
@@ -41,6 +48,31 @@ impl MainDevice {
             self.segment.undeclared.leave(key.station);
         }
         self.start_on(subdevice, move |bus, station| async move { force(&bus, station, state, acknowledge).await })
+    }
+
+    /// Starts to send an Ethernet frame with a text on each link, in the window of acyclic frames: a mark in captures. It
+    /// is shown by taps, and by captures up to the first SubDevice, which destroys it and counts an error (register
+    /// 0x030C); with bit 0 of DL_CONTROL cleared SubDevices pass it on unchanged (protocol 2.6), and what comes back is
+    /// ignored. The result is there when it is queued.
+    ///
+    /// # Errors
+    /// [`ServiceError::EtherType`], [`ServiceError::TooLong`], or [`ServiceError::TooMany`] if 16 messages wait.
+    pub fn start_debug_message(&mut self, ethertype: u16, text: &[u8]) -> Pending<Result<(), ServiceError>> {
+        let result = self.queue_debug_message(ethertype, text);
+        self.start(async move { result })
+    }
+
+    fn queue_debug_message(&self, ethertype: u16, text: &[u8]) -> Result<(), ServiceError> {
+        if ethertype < FIRST_ETHERTYPE || [ETHERTYPE, ETHERTYPE_VLAN].contains(&ethertype) {
+            return Err(ServiceError::EtherType { ethertype });
+        }
+        if text.len() > LONGEST_TEXT {
+            return Err(ServiceError::TooLong { got: text.len(), limit: LONGEST_TEXT });
+        }
+        let sources = [Some(self.options.main), self.options.redundant];
+        let limit = MOST_DEBUG_MESSAGES;
+        let is_queued = self.supervisor.queue_debug_message(sources, ethertype, text);
+        if is_queued { Ok(()) } else { Err(ServiceError::TooMany { got: limit + 1, limit }) }
     }
 
     /// Starts a read of the owner of an EEPROM: EtherCAT or the PDI.

@@ -5,6 +5,7 @@
 
 mod changes;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -24,7 +25,7 @@ use super::inspect::read_subdevice;
 use super::scan::{ScanOptions, scan};
 use super::shared_segment::SharedSegment;
 use super::undeclared::report_left;
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
@@ -214,6 +215,10 @@ impl Watch {
         if self.counts != Some(seen.counts) && !self.is_stale {
             self.bus.report(Event::Counted { main: seen.counts.0.0, redundant: seen.counts.1.0 });
         }
+        self.bus.step(Subject::Scan, || {
+            let (main, redundant) = (seen.counts.0, seen.counts.1);
+            format!("the segment has changed: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+        });
         self.is_stale = true;
         // Clears the ECAT events of the ports. Changes from now on set them again.
         if seen.ports_changed && self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {

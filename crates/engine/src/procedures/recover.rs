@@ -1,6 +1,7 @@
 //! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
 //! continues.
 
+use alloc::format;
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
 use core::pin::pin;
@@ -19,7 +20,7 @@ use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
 use super::undeclared::Retries;
 use crate::declared::SubDeviceId;
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
@@ -54,6 +55,10 @@ pub(super) async fn keep_up(
     let mut disturbed = false;
     loop {
         let result = try_once(bus, segment, (index, attempt), start, &mut reported).await;
+        bus.step(Subject::States, || match &result {
+            Ok(state) => format!("SubDevice {index}: attempt {attempt} reached {state}"),
+            Err(error) => format!("SubDevice {index}: attempt {attempt} failed: {error}"),
+        });
         // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {

@@ -47,6 +47,18 @@ pub enum ServiceError {
         /// The SubDevice.
         subdevice: SubDeviceId,
     },
+    /// An EtherType that a debug message may not have: that of EtherCAT or of a VLAN tag, or a length.
+    EtherType {
+        /// The EtherType.
+        ethertype: u16,
+    },
+    /// A debug message that fits no frame, in bytes.
+    TooLong {
+        /// Its length.
+        got: usize,
+        /// The limit.
+        limit: usize,
+    },
     /// No declaration is active yet.
     NotActive,
     /// The segment was not stable for long enough.
@@ -80,6 +92,10 @@ impl fmt::Display for ServiceError {
             ServiceError::OnTheLink { subdevice } => {
                 write!(f, "SubDevice {subdevice} is connected to the main link: there is no port before it")
             }
+            ServiceError::EtherType { ethertype } => {
+                write!(f, "EtherType {ethertype:#06x} is that of EtherCAT or of a VLAN tag, or a length: take another")
+            }
+            ServiceError::TooLong { got, limit } => write!(f, "{got} bytes, at most {limit} fit"),
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
             ServiceError::Unsteady => f.write_str("the segment changes repeatedly"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),

@@ -8,6 +8,7 @@ mod wait;
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
@@ -26,7 +27,7 @@ use super::signal::Signal;
 use super::transfer::Request;
 use crate::board::Board;
 use crate::event::history::History;
-use crate::event::{Event, Occupant};
+use crate::event::{Event, Occupant, Subject};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -88,6 +89,16 @@ impl Bus {
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
+    }
+
+    /// Reports a step of a procedure as a message of level 1; `text` is called only where such messages are wanted.
+    pub(crate) fn step(&self, subject: Subject, text: impl FnOnce() -> String) {
+        if !self.shared.borrow_mut().events.messages().takes_step(subject) {
+            return;
+        }
+        let text = text();
+        let shared = &mut *self.shared.borrow_mut();
+        shared.events.messages().step(shared.now, subject, text);
     }
 
     /// Reports an event of a SubDevice.

@@ -8,6 +8,7 @@ use ringcat_wire::datagram::MAX_DATA;
 
 use super::alone::Alone;
 use super::counters::AcyclicCounters;
+use super::debug_message::DebugMessages;
 use super::flights::Flights;
 use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
@@ -35,6 +36,7 @@ pub(crate) struct Shared {
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
     pub(crate) outbox: Outbox,
+    pub(crate) debug_messages: DebugMessages,
     pub(crate) alone: Alone,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
@@ -70,6 +72,7 @@ impl Shared {
             events: EventLog::default(),
             transfers: Transfers::default(),
             outbox: Outbox::default(),
+            debug_messages: DebugMessages::default(),
             alone: Alone::default(),
             flights: Flights::new(),
             silence: Silence::default(),
@@ -132,7 +135,7 @@ impl Shared {
     pub(crate) fn wants_to_send(&self) -> bool {
         match self.alone.is_held() {
             true => self.alone.next_deadline(self.now).is_some(),
-            false => self.outbox.is_ready(self.now),
+            false => self.outbox.is_ready(self.now) || self.debug_messages.are_waiting(),
         }
     }
 

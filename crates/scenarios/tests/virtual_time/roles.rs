@@ -109,6 +109,10 @@ fn call_of_registers(engine: &mut Engine, function: Function) -> Option<Pending<
             let service = engine.start_datagrams(vec![read]);
             later(engine, service)
         }
+        Function::DebugMessage => {
+            let service = engine.start_debug_message(0x88B5, b"text");
+            later(engine, service)
+        }
         Function::Registers => {
             let service = engine.start_register_read(DRIVE, RegisterAddress(0), 1);
             later(engine, service)

@@ -21,6 +21,7 @@ impl Shared {
     /// Takes a copy of an acyclic frame.
     pub(in crate::supervisor) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
         self.silence.came_back(copy.sent_on);
+        self.events.messages().received(self.now, arrived_on, bytes);
         let slot = Flights::slot(copy.sequence);
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
             self.round_trip.was_late();
