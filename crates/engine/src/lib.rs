@@ -39,6 +39,7 @@ pub mod queue;
 pub mod request;
 pub mod ring;
 pub mod ring_status;
+pub mod role;
 pub(crate) mod segment;
 pub mod supervisor;
 pub mod time;

@@ -6,6 +6,7 @@
 
 mod alone;
 pub mod bus;
+mod command_reports;
 mod counters;
 mod debug_message;
 mod executor;
@@ -51,6 +52,7 @@ use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingState};
+use crate::role::Role;
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
@@ -88,6 +90,16 @@ impl Supervisor {
     /// Attaches the request counter of cyclic threads: procedures wake when it changes.
     pub(crate) fn attach_bell(&mut self, bell: Bell) {
         self.shared.borrow_mut().bell = bell;
+    }
+
+    /// Role of the MainDevice.
+    pub fn role(&self) -> Role {
+        self.shared.borrow().role
+    }
+
+    /// Sets the role of the MainDevice.
+    pub fn set_role(&mut self, role: Role) {
+        self.shared.borrow_mut().role = role;
     }
 
     /// Sets the largest number of datagrams in a frame.
@@ -213,6 +225,11 @@ impl Supervisor {
     /// Works with the log of events.
     pub(crate) fn with_events<T>(&self, work: impl FnOnce(&mut EventLog) -> T) -> T {
         work(&mut self.shared.borrow_mut().events)
+    }
+
+    /// Begins or ends reports of acyclic datagrams with wrong working counters.
+    pub(crate) fn set_command_reports(&self, is_on: bool) {
+        self.shared.borrow_mut().command_reports.set_on(is_on);
     }
 
     /// Queues an Ethernet debug message, from the addresses of the links; false if too many wait.

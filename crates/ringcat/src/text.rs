@@ -34,6 +34,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| ring::junction(event, names))
         .or_else(|| subdevices::describe(event, names, *occupants))
         .or_else(|| clocks::describe(event, names, *occupants))
+        .or_else(|| messages::of_command(event, names, *occupants))
         .or_else(|| of_process_data(event));
     // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))

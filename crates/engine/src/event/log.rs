@@ -10,7 +10,7 @@ use super::history::History;
 use super::messages::Messages;
 use super::subject::Subjects;
 use super::{Event, Occupant, TimedEvent};
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 
 use crate::time::Instant;
 
@@ -70,6 +70,11 @@ impl EventLog {
     /// The SubDevices at cabling positions.
     pub fn occupants(&self, positions: [Option<Position>; 2]) -> [Option<Occupant>; 2] {
         positions.map(|position| self.occupants.get(usize::from(position?.0)).copied())
+    }
+
+    /// The SubDevice with a station address, if its position is known.
+    pub(crate) fn occupant_at(&self, station: StationAddress) -> Option<Occupant> {
+        self.occupants.iter().find(|occupant| occupant.station == station).copied()
     }
 
     /// Appends an event, with the SubDevices at the cabling positions that it names.

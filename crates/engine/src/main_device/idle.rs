@@ -4,13 +4,13 @@
 use core::time::Duration;
 
 use super::MainDevice;
-use super::states::MainDevicePhase;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::undeclared::{follow_unassigned, keep, watch_undeclared_mail, without_declaration};
+use crate::role::{Function, MainDevicePhase};
 use crate::segment::Addressed;
 use crate::time::Instant;
 
@@ -80,8 +80,9 @@ impl MainDevice {
     /// send any more.
     ///
     /// # Errors
-    /// [`ServiceError::NotActive`].
+    /// [`ServiceError::NotPermitted`].
     pub fn start_deactivate(&mut self, limit: Duration, now: Instant) -> Result<(), ServiceError> {
+        self.permit(Function::Deactivate)?;
         let segment = self.active().ok_or(ServiceError::NotActive)?;
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);

@@ -14,6 +14,7 @@ use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use crate::role::Function;
 use crate::segment::{Addressed, Observation};
 
 impl MainDevice {
@@ -40,6 +41,9 @@ impl MainDevice {
         state: AlState,
     ) -> Pending<Result<(), ConfigureError>> {
         let bus = self.supervisor.bus();
+        if let Err(denied) = self.permit(Function::SubDeviceState) {
+            return self.start(async move { Err(denied.into()) });
+        }
         match self.find(subdevice) {
             Ok(Addressed::Member(index)) => self.start(request_state(&bus, &self.segment, index, state)),
             Ok(Addressed::Undeclared(key)) => {

@@ -12,6 +12,7 @@ use crate::procedures::services::ServiceError;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
 use crate::procedures::services::forced_state::{Acknowledge, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
+use crate::role::Function;
 use crate::segment::{Addressed, Observation};
 use crate::supervisor::MOST_DEBUG_MESSAGES;
 
@@ -24,8 +25,11 @@ impl MainDevice {
     /// Starts a read of the ports of all SubDevices by position: links, neighbours, delays, receive times, error
     /// counters, with and without an application. Empty before a scan.
     pub fn start_port_report(&mut self) -> Pending<Result<Vec<SubDevicePorts>, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.segment.clone());
-        self.start(async move { port_report::read(&bus, &segment).await })
+        let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::PortReport));
+        self.start(async move {
+            permitted?;
+            port_report::read(&bus, &segment).await
+        })
     }
 
     /// Starts to write a state to AL control of a SubDevice once, without the steps between and without its
@@ -43,11 +47,17 @@ impl MainDevice {
         acknowledge: Acknowledge,
     ) -> Pending<Result<(AlStatus, AlStatusCode), ServiceError>> {
         let subdevice = subdevice.into();
-        if let Ok(Addressed::Undeclared(key)) = self.find(subdevice) {
+        let permitted = self.permit(Function::ForcedState);
+        if let (Ok(()), Ok(Addressed::Undeclared(key))) = (permitted, self.find(subdevice)) {
             self.segment.observe(Observation::Visited);
             self.segment.undeclared.leave(key.station);
         }
-        self.start_on(subdevice, move |bus, station| async move { force(&bus, station, state, acknowledge).await })
+        let function = Function::ForcedState;
+        self.start_on(
+            function,
+            subdevice,
+            move |bus, station| async move { force(&bus, station, state, acknowledge).await },
+        )
     }
 
     /// Starts to send an Ethernet frame with a text on each link, in the window of acyclic frames: a mark in captures. It
@@ -63,6 +73,7 @@ impl MainDevice {
     }
 
     fn queue_debug_message(&self, ethertype: u16, text: &[u8]) -> Result<(), ServiceError> {
+        self.permit(Function::DebugMessage)?;
         if ethertype < FIRST_ETHERTYPE || [ETHERTYPE, ETHERTYPE_VLAN].contains(&ethertype) {
             return Err(ServiceError::EtherType { ethertype });
         }
@@ -80,7 +91,7 @@ impl MainDevice {
         &mut self,
         subdevice: impl Into<Address>,
     ) -> Pending<Result<EepromOwnership, ServiceError>> {
-        self.start_on(subdevice, |bus, station| async move { owner(&bus, station).await })
+        self.start_on(Function::EepromOwner, subdevice, |bus, station| async move { owner(&bus, station).await })
     }
 
     /// Starts to assign an EEPROM to EtherCAT or to the PDI; the result is the owner afterwards. Functions that read or
@@ -91,7 +102,7 @@ impl MainDevice {
         assignment: EepromAssignment,
     ) -> Pending<Result<EepromOwnership, ServiceError>> {
         let eeproms = self.segment.eeproms.clone();
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::EepromOwner, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             set_owner(&bus, station, assignment).await
         })

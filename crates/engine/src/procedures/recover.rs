@@ -116,6 +116,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         ConfigureError::Startup { error: StartupError::Value { .. }, .. }
         | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
+        | ConfigureError::NotPermitted(_)
         | ConfigureError::NoSetup
         | ConfigureError::Unfit(_)
         | ConfigureError::NoBoot

@@ -9,6 +9,7 @@ use core::cell::{Cell, Ref, RefCell};
 use core::time::Duration;
 
 use super::error_statistics::ErrorStatistics;
+use super::idle::requests::IdleRescans;
 use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::Undeclared;
 use crate::board::Board;
@@ -42,6 +43,8 @@ pub struct SharedSegment {
     pub statistics: ErrorStatistics,
     /// SubDevices without a declaration.
     pub undeclared: Undeclared,
+    /// Rescans that are requested without an application.
+    pub(crate) idle_rescans: IdleRescans,
     /// Requests for another attempt to configure a member: of all, and by member.
     retried: Rc<(Cell<u32>, RefCell<Vec<u32>>)>,
 }
@@ -102,6 +105,7 @@ impl SharedSegment {
             eeproms: EepromTurns::new(bus),
             statistics,
             undeclared,
+            idle_rescans: IdleRescans::new(bus),
             retried: Rc::default(),
         }
     }

@@ -1,11 +1,14 @@
-//! Messages of the acyclic half as lines of text.
+//! Messages of the acyclic half, and single datagrams with wrong working counters, as lines of text.
 
 use std::fmt::Write;
 
-use ringcat_engine::event::{Message, MessageContent};
+use ringcat_engine::event::{Event, Message, MessageContent};
+use ringcat_engine::ring_status::Occupant;
 use ringcat_wire::command::Addressing;
-use ringcat_wire::datagram::Datagram;
+use ringcat_wire::datagram::{Datagram, Target};
 use ringcat_wire::frame::Frame;
+
+use super::names::Names;
 
 /// Bytes of a datagram's data that a line shows.
 const SHOWN: usize = 32;
@@ -47,4 +50,33 @@ fn datagram_in_words(Datagram { header, data, wkc }: Datagram<'_>) -> String {
         line.push_str(" ...");
     }
     line
+}
+
+/// Single datagrams with wrong working counters.
+pub(super) fn of_command(event: &Event, names: &Names, [occupant, _]: [Option<Occupant>; 2]) -> Option<String> {
+    Some(match event {
+        Event::CyclicCommand { domain, command, logical, length, expected, got, cycles, subdevices } => {
+            let of: Vec<String> = subdevices.iter().map(|it| names.of(*it).to_string()).collect();
+            let of = if of.is_empty() { String::new() } else { format!(": {}", of.join(", ")) };
+            format!(
+                "domain {domain}: {command} {logical} of {length} bytes, working counter {got} instead of {expected} in \
+                 {cycles} cycles{of}"
+            )
+        }
+        Event::AcyclicCommand { command, target, expected, got, count } => {
+            let to = match target {
+                Target::None => "several addresses".to_owned(),
+                Target::Position(position, register) => format!("{}, register {register}", names.at(*position, occupant)),
+                Target::Station(station, register) => {
+                    let declared = occupant.and_then(|occupant| occupant.declared);
+                    let name = declared.map_or_else(String::new, |it| format!("{}, ", names.of(it)));
+                    format!("{name}station {station}, register {register}")
+                }
+                Target::Broadcast(register) => format!("all SubDevices, register {register}"),
+                Target::Logical(address) => format!("logical address {address}"),
+            };
+            format!("{command} to {to}: working counter {got} instead of {expected}, {count} times")
+        }
+        _ => return None,
+    })
 }

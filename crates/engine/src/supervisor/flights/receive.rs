@@ -110,9 +110,15 @@ impl Shared {
             self.transfers.remove(id);
             return;
         }
+        let wrong = match &result {
+            Ok(reply) if self.command_reports.is_on() => transfer.request.wrong_command(reply.wkc()),
+            _ => None,
+        };
         transfer.stage = Stage::Done(result);
         let task = transfer.task;
         self.wake(task);
+        let due = wrong.and_then(|wrong| self.command_reports.note(wrong, self.now));
+        due.into_iter().for_each(|wrong| self.report_command(wrong));
     }
 
     /// Gives up flights after their deadline.
