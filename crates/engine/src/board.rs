@@ -3,9 +3,9 @@
 //! The exchange posts the result of its supervision datagram and the state of the ring; the supervisor posts which
 //! SubDevices take part in process data. Readers use the latest value, so a slow reader blocks and loses nothing.
 
-pub mod commands;
 pub mod clock_times;
 pub mod clocks;
+pub mod commands;
 pub mod live;
 mod rest;
 pub mod traffic;

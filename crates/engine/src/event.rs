@@ -408,8 +408,8 @@ pub enum Event {
         /// SubDevices that did not process it as expected meanwhile, or of which that is not known.
         subdevices: Vec<SubDeviceId>,
     },
-    /// On request, too: an acyclic datagram had another working counter than expected. At most once a second per command
-    /// and address. [`TimedEvent::occupants`] names the SubDevice.
+    /// On request, too: an acyclic datagram had a wrong working counter. At most once a second per command and address.
+    /// [`TimedEvent::occupants`] names the SubDevice.
     AcyclicCommand {
         /// The command.
         command: Command,

@@ -173,9 +173,9 @@ pub trait Services: Sized {
         self.immediately(move |engine| engine.messages_since(number))
     }
 
-    /// Begins or ends events about single datagrams, cyclic and acyclic, whose working counters differ from the expected
-    /// ones: [`Event::CyclicCommand`](crate::Event) and `AcyclicCommand`, at most one a second per command and address.
-    /// They are off at first.
+    /// Begins or ends events about single datagrams, cyclic and acyclic, with wrong working counters:
+    /// [`Event::CyclicCommand`](crate::Event) and `AcyclicCommand`, at most one a second per command and address. They
+    /// are off at first.
     fn set_command_reports(self, is_on: bool) -> Self::Immediate<()> {
         self.immediately(move |engine| engine.set_command_reports(is_on))
     }

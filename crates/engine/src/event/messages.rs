@@ -1,4 +1,4 @@
-//! Messages for an operator who watches the engine at work: steps of procedures, frames of the acyclic half.
+//! Messages for an operator at the machine: steps of procedures, frames of the acyclic half.
 //!
 //! In: a level and a mask of subjects, both changed at any time, and what the acyclic half reports. Out: the last
 //! messages, numbered. At level 0, the initial one, a message costs one comparison: its text is not made. The memory is

@@ -22,7 +22,7 @@ use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, Rules, PlannedDomain};
+use crate::layout::{DomainSpec, Layout, PlannedDomain, Rules};
 use crate::procedures::clocks;
 use crate::procedures::complete_siis::complete_in_background;
 use crate::procedures::error_statistics::ErrorStatistics;

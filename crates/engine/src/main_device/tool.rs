@@ -60,9 +60,9 @@ impl MainDevice {
         )
     }
 
-    /// Starts to send an Ethernet frame with a text on each link, in the window of acyclic frames: a mark in captures. It
-    /// is shown by taps, and by captures up to the first SubDevice, which destroys it and counts an error (register
-    /// 0x030C); with bit 0 of DL_CONTROL cleared SubDevices pass it on unchanged (protocol 2.6), and what comes back is
+    /// Starts to send an Ethernet frame with a text on each link, in the window of acyclic frames: a mark in captures.
+    /// Taps show it, and captures up to the first processing unit, which destroys it and counts an error (register
+    /// 0x030C); with bit 0 of DL_CONTROL cleared SubDevices pass it on unchanged (protocol 2.6). What comes back is
     /// ignored. The result is there when it is queued.
     ///
     /// # Errors

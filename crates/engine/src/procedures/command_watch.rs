@@ -86,7 +86,8 @@ impl Counted {
             let cycles = now.cycles.wrapping_sub(*reported);
             (*reported, *last) = (now.cycles, Some(bus.now()));
             let has_errors = |index: &usize| self.subdevices.get(*index) != Some(&board.wkc_errors(*index));
-            let subdevices: Vec<usize> = datagram.contributions.iter().map(|(index, _)| *index).filter(has_errors).collect();
+            let subdevices: Vec<usize> =
+                datagram.contributions.iter().map(|(index, _)| *index).filter(has_errors).collect();
             named.extend_from_slice(&subdevices);
             events.push(Event::CyclicCommand {
                 domain: DomainId(place.0),

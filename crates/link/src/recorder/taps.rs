@@ -1,10 +1,10 @@
 //! Taps of all threads that see the frames of a MainDevice, and their one reader. The reader may come and go while the
 //! threads run.
 //!
-//! In: frames, from one [`Tap`] per thread. Out: a [`FrameReader`], in any thread. A tap without a reader costs one load
-//! per frame. The queues are allocated when the first reader comes, by the reader's thread, and kept for later readers;
-//! a tap copies a frame into its queue and returns: no allocation, lock or system call. Frames that find it full are
-//! counted.
+//! In: frames, from one [`Tap`] per thread. Out: a [`FrameReader`], in any thread. A tap without a reader costs one
+//! load per frame. The queues are allocated when the first reader comes, by the reader's thread, and kept for later
+//! readers; a tap copies a frame into its queue and returns: no allocation, lock or system call. Frames that find it
+//! full are counted.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -136,8 +136,8 @@ impl Tap {
         self.to_unix_ns = *self.shared.clock.get_or_init(|| unix_now_ns().wrapping_sub(now_ns));
     }
 
-    /// Adds a frame of the interface at this position in the list of interfaces, if there is a reader. Does not allocate
-    /// or wait.
+    /// Adds a frame of the interface at this position in the list of interfaces, if there is a reader. Does not
+    /// allocate or wait.
     #[inline]
     pub fn record(&mut self, interface: usize, direction: Direction, time_ns: u64, frame: &[u8]) {
         if self.shared.is_on.load(Ordering::Relaxed) {
@@ -201,8 +201,8 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Takes the frames that have waited since the last call, in the order of their times: by now, older frames of other
-    /// threads are in their queues too. Ends early with the first error of `take`; that frame is gone.
+    /// Takes the frames that have waited since the last call, in the order of their times: by now, older frames of
+    /// other threads are in their queues too. Ends early with the first error of `take`; that frame is gone.
     ///
     /// # Errors
     /// That of `take`.

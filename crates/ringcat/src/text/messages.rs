@@ -59,14 +59,16 @@ pub(super) fn of_command(event: &Event, names: &Names, [occupant, _]: [Option<Oc
             let of: Vec<String> = subdevices.iter().map(|it| names.of(*it).to_string()).collect();
             let of = if of.is_empty() { String::new() } else { format!(": {}", of.join(", ")) };
             format!(
-                "domain {domain}: {command} {logical} of {length} bytes, working counter {got} instead of {expected} in \
-                 {cycles} cycles{of}"
+                "domain {domain}: {command} {logical} of {length} bytes, working counter {got} instead of {expected} \
+                 in {cycles} cycles{of}"
             )
         }
         Event::AcyclicCommand { command, target, expected, got, count } => {
             let to = match target {
                 Target::None => "several addresses".to_owned(),
-                Target::Position(position, register) => format!("{}, register {register}", names.at(*position, occupant)),
+                Target::Position(position, register) => {
+                    format!("{}, register {register}", names.at(*position, occupant))
+                }
                 Target::Station(station, register) => {
                     let declared = occupant.and_then(|occupant| occupant.declared);
                     let name = declared.map_or_else(String::new, |it| format!("{}, ", names.of(it)));

@@ -144,7 +144,11 @@ fn call_of_states(engine: &mut Engine, function: Function) -> Option<Answer> {
                 return Some(now(engine, None));
             }
             engine.start(async move {
-                Ok(if let Err(ConfigureError::NotPermitted(denied)) = request.ended().await { Some(denied) } else { None })
+                Ok(if let Err(ConfigureError::NotPermitted(denied)) = request.ended().await {
+                    Some(denied)
+                } else {
+                    None
+                })
             })
         }
         Function::StateOfAll => {
