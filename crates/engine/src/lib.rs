@@ -39,6 +39,7 @@ pub(crate) mod queue;
 pub mod request;
 pub(crate) mod ring;
 pub mod ring_status;
+pub mod role;
 pub(crate) mod segment;
 pub(crate) mod supervisor;
 pub mod time;

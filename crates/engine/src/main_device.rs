@@ -10,6 +10,7 @@ mod active;
 mod areas;
 mod clients;
 mod clocks;
+mod commands;
 mod datagrams;
 mod declaration;
 mod declare;
@@ -24,6 +25,7 @@ mod loaded;
 mod lrw;
 mod mail;
 mod memories;
+mod messages;
 mod options;
 mod pending;
 mod prepare;
@@ -59,7 +61,6 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
-pub use function::{Function, Permission};
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
@@ -67,9 +68,10 @@ pub use pending::Pending;
 pub use register_error::RegisterError;
 pub use registered_area::RegisteredArea;
 pub use sent_once::SentOnce;
-pub use states::{GroupState, MainDevicePhase, SubDeviceState};
+pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
+pub use crate::role::{Denial, Function, MainDevicePhase, NotPermitted, Permission, Role};
 pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
@@ -182,9 +184,7 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        if self.active().is_some() {
-            return Err(ActivateError::Active);
-        }
+        self.permit(Function::Scan)?;
         if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
         }
@@ -227,14 +227,21 @@ impl MainDevice {
         self.segment.view().found().map(|found| Ok(found.scan()))
     }
 
-    /// SubDevices of the last scan; empty before a successful scan.
+    /// SubDevices of the last scan; empty before a successful scan, and in role INACTIVE.
     pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
+        if self.permit(Function::SubDeviceInfo).is_err() {
+            return Vec::new();
+        }
         self.segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default()
     }
 
     /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower
     /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
+        if let Err(denied) = self.permit(Function::Stop) {
+            *self.stopped.borrow_mut() = Some(Err(denied.into()));
+            return;
+        }
         let to_stop = all_known(&self.segment.view());
         self.end_application(now);
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
@@ -249,13 +256,17 @@ impl MainDevice {
         self.counted = self.counters();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
+        let (role, are_reported) = (self.role(), self.supervisor.bus().are_commands_reported());
         self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.set_role(role);
+        self.supervisor.set_command_reports(are_reported);
         self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
         self.segment.observe(Observation::Deactivated);
         self.start_reconciler();
+        self.begin_command_reports();
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
         self.ports.clear();

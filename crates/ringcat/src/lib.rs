@@ -49,7 +49,7 @@
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
-//! | `tracing` | events of the acyclic half for a `tracing` subscriber |
+//! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
 
@@ -152,7 +152,10 @@ pub use ringcat_engine::config::{
     Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
-pub use ringcat_engine::event::{ClientEvents, ClientId, Event, EventsSince, Occupant, Subject, Subjects, TimedEvent};
+pub use ringcat_engine::event::{
+    ClientEvents, ClientId, Event, EventsSince, LogFilter, LogLevel, Message, MessageContent, MessagesSince, Occupant,
+    Subject, Subjects, TimedEvent,
+};
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
@@ -177,6 +180,7 @@ pub use ringcat_engine::main_device::{
     MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
     SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
+pub use ringcat_engine::main_device::{Denial, NotPermitted, Role};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
@@ -219,7 +223,9 @@ pub use ringcat_engine::mail::{Conversation, Lane, MailCounters};
 pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice};
 pub use ringcat_engine::{PlanFault, PlanProblem, PlanWarning, SmPlan};
 #[cfg(feature = "packet")]
-pub use ringcat_link::recorder::Tap;
+pub use ringcat_link::pcapng::Direction as FrameDirection;
+#[cfg(feature = "packet")]
+pub use ringcat_link::recorder::{AlreadyRead, FrameNote, FrameReader, Recorded, Recorder, RecorderError, Tap, Taps};
 
 #[cfg(any(feature = "eni", feature = "esi"))]
 pub use ringcat_config as config;

@@ -22,7 +22,7 @@ use ringcat_engine::{RingInspection, inspect_ring};
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
-use crate::acyclic::{Inline, carry_out_link_order};
+use crate::acyclic::{Inline, carry_out_link_order, log_messages};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
@@ -283,6 +283,7 @@ impl<L: Links> MainDevice<L> {
         engine.poll(now);
         carry_out_link_order(engine, links);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
+        log_messages(engine);
     }
 
     /// Works for a time without an application: with [`Options::idle_operation`] it watches the segment meanwhile.

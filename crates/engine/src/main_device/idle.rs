@@ -4,12 +4,12 @@
 use core::time::Duration;
 
 use super::MainDevice;
-use super::states::MainDevicePhase;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::undeclared::{keep, watch_undeclared_mail};
+use crate::role::{Function, MainDevicePhase};
 use crate::segment::{Addressed, Observation, UndeclaredObservation};
 use crate::time::Instant;
 
@@ -69,8 +69,9 @@ impl MainDevice {
     /// send any more.
     ///
     /// # Errors
-    /// [`ServiceError::NotActive`].
+    /// [`ServiceError::NotPermitted`].
     pub fn start_deactivate(&mut self, limit: Duration, now: Instant) -> Result<(), ServiceError> {
+        self.permit(Function::Deactivate)?;
         let segment = self.active().ok_or(ServiceError::NotActive)?;
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);

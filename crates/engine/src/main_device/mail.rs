@@ -14,6 +14,7 @@ use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use crate::role::Function;
 use crate::segment::Addressed;
 
 impl MainDevice {
@@ -39,6 +40,9 @@ impl MainDevice {
         subdevice: impl Into<Address>,
         state: AlState,
     ) -> Pending<Result<(), ConfigureError>> {
+        if let Err(denied) = self.permit(Function::SubDeviceState) {
+            return self.start(async move { Err(denied.into()) });
+        }
         match self.find(subdevice) {
             Ok(Addressed::Member(index)) => {
                 let requested = request_state(&self.supervisor.bus(), &self.segment, index, state);

@@ -4,7 +4,10 @@
 //! whether a port has changed. Other datagrams are sent only after a change, and once a second.
 
 mod changes;
+pub(super) mod requests;
+mod rescue;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
@@ -16,12 +19,13 @@ use ringcat_wire::register::{DlStatus, EcatEvent, map};
 
 use changes::nothing;
 pub(crate) use changes::scan_again;
+use rescue::differences;
+pub(crate) use rescue::rescue;
 
 use super::inspect::read_subdevice;
 use super::scan::{ScanOptions, scan};
 use super::shared_segment::{SharedSegment, until_active};
-use crate::event::Event;
-use crate::info::SubDeviceInfo;
+use crate::event::{Event, Subject};
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::segment::{Observation, Reading, StateRead, UndeclaredObservation};
@@ -105,8 +109,9 @@ impl Watch {
         if is_first {
             self.counts = Some(self.scanned_counts());
         }
-        if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale {
-            return self.follow(seen).await;
+        let wanted = self.segment.idle_rescans.wanted();
+        if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale || wanted.is_some() {
+            return self.follow(seen, wanted).await;
         }
         let is_unexpected = {
             let view = self.segment.view();
@@ -193,30 +198,31 @@ impl Watch {
         self.counts = None;
     }
 
-    /// The segment has changed.
-    async fn follow(&mut self, seen: Seen) {
+    /// The segment has changed, or a rescan is requested.
+    async fn follow(&mut self, seen: Seen, wanted: Option<u64>) {
         if self.counts != Some(seen.counts) && !self.is_stale {
             self.bus.report(Event::Counted { main: seen.counts.0.0, redundant: seen.counts.1.0 });
         }
+        self.bus.step(Subject::Scan, || {
+            let (main, redundant) = (seen.counts.0, seen.counts.1);
+            format!("the segment has changed: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+        });
         self.is_stale = true;
         // Clears the ECAT events of the ports. Changes from now on set them again.
         if seen.ports_changed && self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
             return;
         }
         let versions = self.segment.view().versions();
-        let known = self.segment.view().found().map(|found| found.subdevices.clone()).unwrap_or_default();
+        let before = self.segment.view().found().cloned().unwrap_or_else(|| Rc::new(nothing()));
+        let known = before.subdevices.clone();
         let found = match self.is_unplugged() {
             true => Ok(Some(nothing())),
             false => scan_again(&self.bus, &self.segment, &self.options, &known).await,
         };
         match found {
             Ok(Some(found)) => {
-                let now = found.subdevices.iter();
-                let is_of = |all: &[Rc<SubDeviceInfo>], info: &SubDeviceInfo| {
-                    all.iter().any(|other| other.station == info.station)
-                };
-                let added = now.filter(|info| !is_of(&known, info)).count();
-                let removed = known.iter().filter(|info| !is_of(&found.subdevices, info)).count();
+                let differences = differences(&before, &found);
+                let (added, removed) = (differences.added.len(), differences.removed.len());
                 let subdevices = found.subdevices.len();
                 self.segment.observe(Observation::FoundAgain { versions, found: Rc::new(found) });
                 (self.is_stale, self.failures) = (false, 0);
@@ -224,6 +230,9 @@ impl Watch {
                 self.take_over();
                 if added + removed > 0 {
                     self.bus.report(Event::SegmentChanged { subdevices, added, removed });
+                }
+                if let Some(number) = wanted {
+                    self.segment.idle_rescans.end(number, differences);
                 }
             }
             Ok(None) => self.failures += 1,

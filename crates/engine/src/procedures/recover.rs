@@ -1,6 +1,7 @@
 //! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
 //! continues.
 
+use alloc::format;
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
 use core::pin::pin;
@@ -18,7 +19,7 @@ use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
 use crate::declared::SubDeviceId;
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
@@ -53,6 +54,10 @@ pub(super) async fn keep_up(
     let mut disturbed = false;
     loop {
         let result = try_once(bus, segment, (index, attempt), start, &mut reported).await;
+        bus.step(Subject::States, || match &result {
+            Ok(state) => format!("SubDevice {index}: attempt {attempt} reached {state}"),
+            Err(error) => format!("SubDevice {index}: attempt {attempt} failed: {error}"),
+        });
         // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
@@ -110,6 +115,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         ConfigureError::Startup { error: StartupError::Value { .. }, .. }
         | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
+        | ConfigureError::NotPermitted(_)
         | ConfigureError::NoSetup
         | ConfigureError::Unfit(_)
         | ConfigureError::NoBoot

@@ -12,6 +12,7 @@ use core::task::Poll;
 use core::time::Duration;
 
 use super::error_statistics::ErrorStatistics;
+use super::idle::requests::IdleRescans;
 use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
@@ -45,6 +46,8 @@ pub struct SharedSegment {
     pub statistics: ErrorStatistics,
     /// Mailboxes of SubDevices without a declaration.
     pub(crate) undeclared: UndeclaredMailboxes,
+    /// Rescans that are requested without an application.
+    pub(crate) idle_rescans: IdleRescans,
 }
 
 /// Data beside the model.
@@ -96,6 +99,7 @@ impl SharedSegment {
             eeproms: EepromTurns::new(bus),
             statistics: ErrorStatistics::new(bus, 0, None),
             undeclared,
+            idle_rescans: IdleRescans::new(bus),
         }
     }
 
