@@ -7,7 +7,7 @@ use ringcat::{
     Application, DomainId, Error, Event, Limits, LogFilter, MainDevice, Options, Position, SdoAddress, Services,
     SubDeviceId, Subject, Subjects, TimedEvent, automatic, text,
 };
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::address::{LogicalAddress, Wkc};
