@@ -17,6 +17,7 @@ mod ethernet;
 mod found;
 mod function;
 mod gateway;
+mod handover;
 mod idle;
 mod image_memory;
 mod live_status;
@@ -252,7 +253,9 @@ impl MainDevice {
         self.counted = self.counters();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
+        let sequence = self.supervisor.sequence();
         self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.go_on_from(sequence);
         self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());

@@ -75,6 +75,7 @@ impl Event {
             | Event::ScanFinished { .. }
             | Event::ScanFailed { .. }
             | Event::SegmentChanged { .. }
+            | Event::Resumed { .. }
             | Event::SiiOddity { .. }
             | Event::DuplicateAlias { .. }
             | Event::Unexpected { .. }

@@ -42,7 +42,7 @@ pub(super) async fn bring(bus: &Bus, attempt: &Attempt) -> Result<(), ConfigureE
 }
 
 /// Clears what an application has left: FMMUs and SYNC signals.
-async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
+pub(crate) async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
     let fmmus = Fmmu::LEN * usize::from(info.controller.fmmu_count);
     if fmmus > 0 {
         bus.fpwr(info.station, map::FMMU_BASE, &vec![0; fmmus]).await?;
@@ -87,7 +87,7 @@ async fn raise(bus: &Bus, info: &SubDeviceInfo, target: AlState) -> Result<(), C
 }
 
 /// Writes the outputs of a SubDevice that has reached OP, as long as it is to stay there.
-pub(super) async fn keep_outputs(bus: Bus, undeclared: Undeclared, attempt: Attempt) {
+pub(crate) async fn keep_outputs(bus: Bus, undeclared: Undeclared, attempt: Attempt) {
     let Ok(plan) = defaults(&attempt.info) else { return };
     let outputs = outputs(&plan);
     while !outputs.is_empty() && undeclared.is_reached(&attempt) {

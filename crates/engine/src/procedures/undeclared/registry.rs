@@ -4,6 +4,8 @@
 //! that are due. An attempt belongs to an entry by its number: when the SubDevice is gone, or another state is
 //! requested, the attempt is no longer current and ends.
 
+pub(super) mod handover;
+
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
