@@ -14,39 +14,41 @@ pub(super) const MOST_GROWTH: usize = 32;
 /// Bytes that are being decoded.
 pub(super) struct Input<'a> {
     bytes: &'a [u8],
-    /// Bytes before `bytes`.
-    at: usize,
+    /// Offset of the byte behind the last one.
+    end: usize,
 }
 
 impl<'a> Input<'a> {
     /// All of these bytes, the first of which has this offset.
     pub(super) fn new(bytes: &'a [u8], at: usize) -> Input<'a> {
-        Input { bytes, at }
+        Input { bytes, end: at + bytes.len() }
     }
 
     /// An error at the present place.
+    #[inline]
     pub(super) fn expected(&self, expected: &'static str) -> KnowledgeError {
-        KnowledgeError { offset: self.at, expected }
+        KnowledgeError { offset: self.end - self.bytes.len(), expected }
     }
 
     /// Bytes that are left.
+    #[inline]
     pub(super) fn left(&self) -> usize {
         self.bytes.len()
     }
 
     /// The next bytes.
+    #[inline]
     pub(super) fn bytes(&mut self, count: usize, expected: &'static str) -> Result<&'a [u8], KnowledgeError> {
         let (first, rest) = self.bytes.split_at_checked(count).ok_or(self.expected(expected))?;
         self.bytes = rest;
-        self.at += count;
         Ok(first)
     }
 
     /// The next bytes, of a known number.
+    #[inline]
     pub(super) fn array<const N: usize>(&mut self, expected: &'static str) -> Result<[u8; N], KnowledgeError> {
         let (first, rest) = self.bytes.split_first_chunk().ok_or(self.expected(expected))?;
         self.bytes = rest;
-        self.at += N;
         Ok(*first)
     }
 }
@@ -80,10 +82,12 @@ pub(super) trait Code: Sized {
 impl Code for u8 {
     const LEAST: usize = 1;
 
+    #[inline]
     fn put(&self, out: &mut Vec<u8>) {
         out.push(*self);
     }
 
+    #[inline]
     fn take(input: &mut Input<'_>) -> Result<u8, KnowledgeError> {
         let [byte] = input.array("a byte")?;
         Ok(byte)
@@ -103,10 +107,12 @@ macro_rules! numbers {
         impl Code for $kind {
             const LEAST: usize = size_of::<$kind>();
 
+            #[inline]
             fn put(&self, out: &mut Vec<u8>) {
                 out.extend_from_slice(&self.to_le_bytes());
             }
 
+            #[inline]
             fn take(input: &mut Input<'_>) -> Result<Self, KnowledgeError> {
                 Ok(<$kind>::from_le_bytes(input.array($what)?))
             }
@@ -124,10 +130,12 @@ numbers! {
 impl Code for bool {
     const LEAST: usize = 1;
 
+    #[inline]
     fn put(&self, out: &mut Vec<u8>) {
         out.push((*self).into());
     }
 
+    #[inline]
     fn take(input: &mut Input<'_>) -> Result<bool, KnowledgeError> {
         let error = input.expected("0 or 1");
         match u8::take(input)? {
@@ -142,10 +150,12 @@ impl Code for bool {
 impl Code for usize {
     const LEAST: usize = 4;
 
+    #[inline]
     fn put(&self, out: &mut Vec<u8>) {
         u32::try_from(*self).unwrap_or(u32::MAX).put(out);
     }
 
+    #[inline]
     fn take(input: &mut Input<'_>) -> Result<usize, KnowledgeError> {
         Ok(u32::take(input)? as usize)
     }
@@ -186,11 +196,13 @@ impl<T: Code> Code for Vec<T> {
 impl Code for String {
     const LEAST: usize = 4;
 
+    #[inline]
     fn put(&self, out: &mut Vec<u8>) {
         self.len().put(out);
         out.extend_from_slice(self.as_bytes());
     }
 
+    #[inline]
     fn take(input: &mut Input<'_>) -> Result<String, KnowledgeError> {
         let count = usize::take(input)?;
         let error = input.expected("text in UTF-8");

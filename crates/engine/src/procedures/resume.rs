@@ -2,8 +2,8 @@
 //!
 //! First one round of reads, before anything is written: number of SubDevices, and of each its station address, its
 //! controller, its ports, its AL status and its mailbox SyncManagers. Where all is as known, nothing else is read.
-//! Where something differs, the segment is scanned again as after a change: SubDevices that kept their station addresses stay
-//! as they are, only the others are read.
+//! Where something differs, the segment is scanned again as after a change: SubDevices that kept their station
+//! addresses stay as they are, only the others are read.
 
 mod check;
 

@@ -91,7 +91,7 @@ fn descriptors_that_are_no_ring_of_this_interface_are_refused() {
     assert_eq!(errno(adopt(fs::File::open("/dev/null").expect("it is there").into(), &handed)), libc::ENOTSOCK);
     let longer = HandedSocket { slots: 2 * handed.slots, ..handed.clone() };
     assert_eq!(errno(adopt(duplicate(), &longer)), libc::EINVAL);
-    bench.near.ip(&["link", "add", "other", "type", "dummy"]);
+    bench.near.ip(&["link", "add", "other", "type", "bridge"]);
     let elsewhere = HandedSocket { interface: "other".to_owned(), ..handed.clone() };
     assert_eq!(errno(adopt(duplicate(), &elsewhere)), libc::ENODEV);
     let none = HandedSocket { interface: "none".to_owned(), ..handed };

@@ -11,8 +11,8 @@ mod rounds;
 use std::time::Duration;
 
 use ringcat::{
-    Application, Declaration, DomainId, Error, Event, Handover, JunctionMode, Knowledge, LastOutputs, MainDevice,
-    Options, Position, automatic,
+    Application, ClockConfig, Declaration, DomainId, Error, Event, Handover, JunctionMode, Knowledge, LastOutputs,
+    MainDevice, Options, Position, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
@@ -237,6 +237,32 @@ fn a_main_device_that_scans_or_is_active_does_not_go_on_with_other_knowledge() {
     exchange_sdos(&mut main_device);
     let empty = MainDevice::request(main_device.into_links(), &options());
     assert!(empty.knowledge().is_none(), "nothing is known before a scan");
+}
+
+// covers: states, dc-lock
+#[test]
+fn offsets_of_clocks_stay_and_the_clocks_of_the_next_owner_lock() {
+    for handover in HANDOVERS {
+        for network in networks() {
+            let mut main_device = idle(network);
+            for round in 0..3 {
+                let declaration = automatic(&main_device.subdevices(), CYCLE).with_clocks(ClockConfig::default());
+                let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
+                let end = application.now() + Duration::from_secs(10);
+                while !(application.all_settled() && application.engine().clocks_locked()) {
+                    assert!(application.now() < end, "round {round}: the clocks do not lock");
+                    application.cycle(|_| ());
+                }
+                main_device = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+                let kept = kept_registers(&mut main_device);
+                let offset = |bytes: &Vec<u8>| bytes[8..16].iter().any(|byte| *byte != 0);
+                assert!(kept.iter().any(offset), "offsets were written");
+                main_device = hand_over(main_device, handover);
+                main_device.attend(Duration::from_secs(1));
+                assert_eq!(kept_registers(&mut main_device), kept);
+            }
+        }
+    }
 }
 
 // covers: states

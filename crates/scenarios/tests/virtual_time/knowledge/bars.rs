@@ -42,7 +42,11 @@ fn the_first_sdo_of_100_known_subdevices_is_answered_within_5_ms() {
 fn convert(knowledge: &Knowledge) -> (Duration, usize) {
     let mut least = Duration::MAX;
     let mut length = 0;
-    for _ in 0..20 {
+    // Other programs use the processor, too: until one conversion is not interrupted.
+    for number in 0..400 {
+        if number >= 20 && least <= TO_BYTES_AND_BACK {
+            break;
+        }
         let begun = WallClock::now();
         let bytes = knowledge.to_bytes();
         let again = Knowledge::from_bytes(&bytes);
