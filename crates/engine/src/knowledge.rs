@@ -2,8 +2,8 @@
 //!
 //! Out: [`MainDevice::knowledge`](crate::main_device::MainDevice::knowledge) and [`Knowledge::to_bytes`]. In:
 //! [`Knowledge::from_bytes`] and [`MainDevice::resume`](crate::main_device::MainDevice::resume). The bytes have a
-//! header with version and checksum (decision 0061). Any bytes are allowed: they are checked as a whole, and memory is bounded
-//! by their length. Whether the segment is still as known is left to `resume`.
+//! header with version and checksum (decision 0061). Any bytes are allowed: they are checked as a whole, and memory is
+//! bounded by their length. Whether the segment is still as known is left to `resume`.
 
 mod code;
 mod error;

@@ -54,8 +54,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
         "junction"]),
     // both together
     ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
-        "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange", "supervisor",
-        "mail", "request", "junction", "procedures"]),
+        "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
+        "supervisor", "mail", "request", "junction", "procedures"]),
 ];
 
 /// The engine's sources.

@@ -81,10 +81,10 @@ fn mutants_with_a_fitting_checksum_are_errors_or_survive_a_round_trip() {
 fn knowledge_that_is_wrong_but_valid_does_no_harm() {
     let network = || ring(descriptions(&MIXED), NetworkOptions::default());
     let bytes = to_bytes(&idle(network()));
-    let mut tried = 0;
     for seed in from_environment().unwrap_or(0..2) {
         let mut dice = Dice::new(seed);
-        while tried < 15 * (seed + 1) {
+        let mut tried = 0;
+        while tried < 15 {
             let mut content = bytes[HEADER..].to_vec();
             for _ in 0..4 {
                 let at = dice.below(content.len() as u64) as usize;

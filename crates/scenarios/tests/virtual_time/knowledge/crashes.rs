@@ -105,7 +105,7 @@ fn a_crash_during_the_reading_of_an_eeprom_leaves_it_usable() {
     }
 }
 
-// covers: states, mail-foe
+// covers: states, foe
 #[test]
 fn a_crash_in_boot_and_during_a_file_leaves_the_mailbox_usable() {
     let kinds = ["coupler", "all-protocols", "digital-output-8"];
