@@ -18,6 +18,7 @@ mod ethernet;
 mod found;
 mod function;
 mod gateway;
+mod handover;
 mod idle;
 mod image_memory;
 mod live_status;
@@ -257,9 +258,11 @@ impl MainDevice {
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
         let (role, are_reported) = (self.role(), self.supervisor.bus().are_commands_reported());
+        let sequence = self.supervisor.sequence();
         self.supervisor = supervisor(self.identity, &self.options, now);
         self.supervisor.set_role(role);
         self.supervisor.set_command_reports(are_reported);
+        self.supervisor.go_on_from(sequence);
         self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());

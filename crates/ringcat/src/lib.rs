@@ -159,6 +159,7 @@ pub use ringcat_engine::event::{
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
+pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};

@@ -11,6 +11,7 @@ use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
+use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
@@ -263,6 +264,32 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
+    /// Goes on with a segment that another process has known, without a scan ([`Engine::resume`]). Returns what was
+    /// found; nothing was read again that is as known.
+    ///
+    /// # Errors
+    /// [`Error::Scan`]: no SubDevice answers within [`Options::patience`], or the segment does not become stable.
+    pub fn resume(&mut self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.engine.resume(knowledge, handover)?;
+        loop {
+            self.work();
+            if let Some(result) = self.engine.scan_result() {
+                return Ok(result?);
+            }
+            self.wait();
+        }
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    pub fn knowledge(&self) -> Option<Knowledge> {
+        self.engine.knowledge()
+    }
+
+    /// The links, when another process goes on with the segment: this MainDevice ends without a frame.
+    pub fn into_links(self) -> L {
+        self.links
+    }
+
     /// Inspects the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
@@ -334,7 +361,8 @@ impl<L: Links> MainDevice<L> {
         self.finish(work)
     }
 
-    pub(crate) fn engine_mut(&mut self) -> &mut Engine {
+    /// The engine, for functions without a method here.
+    pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 

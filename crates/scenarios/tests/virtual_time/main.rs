@@ -42,6 +42,7 @@ mod identity;
 mod idle;
 mod image_variants;
 mod junctions;
+mod knowledge;
 mod late_writes;
 mod live_status;
 mod log_messages;
