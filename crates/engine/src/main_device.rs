@@ -73,7 +73,7 @@ pub use states::{GroupState, SubDeviceState};
 pub use crate::procedures::undeclared::Retries;
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
-pub use crate::role::{Denial, Function, MainDevicePhase, NotPermitted, Permission, Role};
+pub use crate::role::{Denial, Function, MainDevicePhase, MainDeviceRole, NotPermitted, Permission};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};

@@ -172,7 +172,7 @@ pub use ringcat_engine::main_device::{
     MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
     SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
-pub use ringcat_engine::main_device::{Denial, NotPermitted, Role};
+pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::procedures::configure::ConfigureError;
 pub use ringcat_engine::procedures::dictionary::ReadPdos;
