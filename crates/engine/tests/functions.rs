@@ -1,6 +1,6 @@
 //! The table of functions and roles against the protocol sheet.
 
-use ringcat_engine::main_device::{Denial, Function, MainDevicePhase, Permission, MainDeviceRole};
+use ringcat_engine::main_device::{Denial, Function, MainDevicePhase, MainDeviceRole, Permission};
 
 /// The sheet with the groups of functions, of the repository.
 fn sheet() -> String {
@@ -75,8 +75,10 @@ fn each_group_of_the_sheet_has_its_functions_and_each_function_its_group() {
 #[test]
 fn functions_without_the_bus_are_never_refused() {
     for phase in [MainDevicePhase::Orphaned, MainDevicePhase::Idle, MainDevicePhase::Operation] {
-        let refused =
-            FREE.iter().filter(|function| function.permission(MainDeviceRole::Active, phase) == Permission::Refused).count();
+        let refused = FREE
+            .iter()
+            .filter(|function| function.permission(MainDeviceRole::Active, phase) == Permission::Refused)
+            .count();
         assert_eq!(refused, 0, "{phase:?}");
     }
 }

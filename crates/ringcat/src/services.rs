@@ -16,7 +16,8 @@ use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, LogFilter, Mess
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
-    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram, MainDeviceRole,
+    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, MainDeviceRole, Pending, Permission,
+    RawDatagram,
 };
 use ringcat_engine::procedures::request_states::{StateScope, StatesError};
 use ringcat_engine::procedures::services::ServiceError;

@@ -2,7 +2,7 @@
 //! ([`crate::role`]).
 
 use super::MainDevice;
-use crate::role::{Function, NotPermitted, Permission, MainDeviceRole};
+use crate::role::{Function, MainDeviceRole, NotPermitted, Permission};
 
 impl MainDevice {
     /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.
