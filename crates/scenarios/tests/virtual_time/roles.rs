@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ringcat::{
     Acknowledge, ActivateError, AlState, AlStatus, Application, ConfigureError, Declaration, EepromAssignment, Error,
-    Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase, NotPermitted,
-    Options, Pending, Position, RawDatagram, RegisterAddress, MainDeviceRole, SdoAddress, SdoFailure, ServiceError, Services,
-    StateScope, StatesError, StopError, Subjects,
+    Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase, MainDeviceRole,
+    NotPermitted, Options, Pending, Position, RawDatagram, RegisterAddress, SdoAddress, SdoFailure, ServiceError,
+    Services, StateScope, StatesError, StopError, Subjects,
 };
 use ringcat_engine::mail::coe::pdo_mail::{self, PdoMailError};
 use ringcat_engine::mail::coe::{self, information};
