@@ -72,7 +72,7 @@ pub use sent_once::SentOnce;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
-pub use crate::role::{Denial, Function, MainDevicePhase, NotPermitted, Permission, Role};
+pub use crate::role::{Denial, Function, MainDevicePhase, MainDeviceRole, NotPermitted, Permission};
 pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 

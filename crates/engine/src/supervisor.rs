@@ -50,7 +50,7 @@ use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
-use crate::role::Role;
+use crate::role::MainDeviceRole;
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
@@ -106,13 +106,13 @@ impl Supervisor {
         self.shared.borrow_mut().bell = bell;
     }
 
-    /// Role of the MainDevice.
-    pub fn role(&self) -> Role {
+    /// MainDeviceRole of the MainDevice.
+    pub fn role(&self) -> MainDeviceRole {
         self.shared.borrow().role
     }
 
     /// Sets the role of the MainDevice.
-    pub fn set_role(&mut self, role: Role) {
+    pub fn set_role(&mut self, role: MainDeviceRole) {
         self.shared.borrow_mut().role = role;
     }
 

@@ -181,7 +181,7 @@ pub use ringcat_engine::main_device::{
     MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
     SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
-pub use ringcat_engine::main_device::{Denial, NotPermitted, Role};
+pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

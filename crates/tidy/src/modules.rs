@@ -50,9 +50,9 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
-    ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
-        "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail", "request",
-        "junction", "role"]),
+    ("procedures", &["declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info", "topology",
+        "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail",
+        "request", "junction", "role"]),
     // both together
     ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
         "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
