@@ -81,6 +81,7 @@ mod shared_sii;
 mod sii_extents;
 mod slow_eeprom;
 mod start_up;
+mod start_up_losses;
 mod startup_commands;
 mod state_of_all;
 mod states;
