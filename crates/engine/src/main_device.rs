@@ -75,7 +75,7 @@ pub use crate::declared::{Address, GroupId, SubDeviceId};
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
-use crate::info::SubDeviceInfo;
+use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::link::{Link, LinkSet};
 use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
@@ -184,6 +184,15 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or_default())
+    }
+
+    /// As [`MainDevice::start_scan`]; of the SIIs it reads what operation needs, unless the options name an extent.
+    pub fn start_scan_for_operation(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation))
+    }
+
+    fn begin_scan(&mut self, extent: SiiExtent) -> Result<(), ActivateError> {
         if self.active().is_some() {
             return Err(ActivateError::Active);
         }
@@ -195,7 +204,7 @@ impl MainDevice {
         self.segment.undeclared.clear();
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options();
+        let options = self.scan_options(extent);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
@@ -205,11 +214,11 @@ impl MainDevice {
         Ok(())
     }
 
-    fn scan_options(&self) -> ScanOptions {
+    fn scan_options(&self, extent: SiiExtent) -> ScanOptions {
         ScanOptions {
             settle: self.options.settle,
             patience: self.options.patience,
-            extent: self.options.sii_extent,
+            extent,
             cache: self.cache.clone(),
             junctions: self.options.junctions,
             pdos: self.options.pdos,

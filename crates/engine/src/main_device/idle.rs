@@ -57,7 +57,11 @@ impl MainDevice {
         if !self.options.idle_operation || core::mem::replace(&mut self.is_idle, true) {
             return;
         }
-        let (bus, segment, options) = (self.supervisor.bus(), self.segment.clone(), self.scan_options());
+        let (bus, segment, options) = (
+            self.supervisor.bus(),
+            self.segment.clone(),
+            self.scan_options(self.options.sii_extent.unwrap_or_default()),
+        );
         segment.undeclared.begin_keeping();
         self.supervisor.spawn(keep(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
@@ -86,7 +90,7 @@ impl MainDevice {
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
-        let options = self.scan_options();
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
         let is_kept = self.options.idle_operation;
         self.is_idle = is_kept;
         if is_kept {
