@@ -77,6 +77,7 @@ mod ring_services;
 mod roles;
 mod services;
 mod several_areas;
+mod shared_image;
 mod shared_sii;
 mod sii_extents;
 mod slow_eeprom;
