@@ -1,7 +1,7 @@
 //! From a segment that nothing is known of to a running application in one step.
 //!
-//! A scan reads whole SIIs, because its result has names. A bring-up reads what operation needs; the rest follows in the
-//! background when all SubDevices are in their target states ([`SiiExtent`](crate::SiiExtent)).
+//! A scan reads whole SIIs, because its result has names. A bring-up reads what operation needs; the rest follows in
+//! the background when all SubDevices are in their target states ([`SiiExtent`](crate::SiiExtent)).
 
 use ringcat_engine::main_device::{Declaration, MainDevice as Engine};
 use ringcat_engine::procedures::scan::Scan;
@@ -15,8 +15,8 @@ use crate::supervisor_thread::{Activated, SupervisorThread};
 impl<L: Links> MainDevice<L> {
     /// Scans, and activates what `declare` returns: the shortest way to OP, because only what operation needs is read
     /// of the SIIs before. Names and operation modes of clocks are empty in what `declare` gets, unless
-    /// [`Options::sii_extent`](crate::Options::sii_extent) asks for them. They are read in the background as soon as all
-    /// SubDevices are in their target states, and are in [`MainDevice::subdevices`] and in searches by name then;
+    /// [`Options::sii_extent`](crate::Options::sii_extent) asks for them. They are read in the background as soon as
+    /// all SubDevices are in their target states, and are in [`MainDevice::subdevices`] and in searches by name then;
     /// [`Services::complete_siis`](crate::Services::complete_siis) waits for them.
     ///
     /// ```
@@ -50,8 +50,8 @@ impl SupervisorThread {
     /// [`SupervisorThread::activate`].
     ///
     /// # Errors
-    /// As [`SupervisorThread::scan`] and [`SupervisorThread::activate`]. The error contains the handle and the links for
-    /// another attempt.
+    /// As [`SupervisorThread::scan`] and [`SupervisorThread::activate`]. The error contains the handle and the links
+    /// for another attempt.
     pub fn bring_up<C: Links>(self, declare: impl FnOnce(&Scan) -> Declaration, links: C) -> Activated<C> {
         let begun = self.with(Engine::start_scan_for_operation).and_then(|begun| Ok(begun?));
         match begun.and_then(|()| self.finish_scan(|| ())) {
