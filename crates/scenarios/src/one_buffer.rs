@@ -11,9 +11,6 @@ use ringcat_sim::description::DeviceDescription;
 use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerMode};
 use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 
-use crate::dice::Dice;
-use crate::segments::descriptions;
-
 /// Bits of the mode in a control byte, and their value for one buffer.
 const MODE: u8 = 0b11;
 const ONE_BUFFER: u8 = 0b10;
@@ -25,18 +22,6 @@ pub fn one_buffer(mut description: DeviceDescription) -> DeviceDescription {
         entry.control = entry.control & !MODE | ONE_BUFFER;
     }
     description
-}
-
-/// Descriptions of these kinds; in the segments of one seed in four about half of the devices have one buffer.
-/// Controllers that answer for an application never empty one, and keep three.
-pub fn some_with_one_buffer(kinds: &[&str], seed: u64) -> Vec<DeviceDescription> {
-    let mut dice = Dice::new(seed ^ 0x000B_0FFE);
-    let some = dice.one_in(4);
-    let chosen = |description: DeviceDescription| {
-        let is_chosen = some && !description.emulation && dice.one_in(2);
-        if is_chosen { one_buffer(description) } else { description }
-    };
-    descriptions(kinds).into_iter().map(chosen).collect()
 }
 
 /// As [`ringcat::automatic`]; SubDevices with one buffer keep it.

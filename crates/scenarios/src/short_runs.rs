@@ -4,16 +4,15 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use ringcat::{Event, Options, Redundancy, RingState, Scan};
+use ringcat::{Event, Options, Redundancy, RingState, Scan, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
 
 use crate::check::{Delivery, ring_events};
 use crate::dice::Dice;
-use crate::one_buffer::{automatic, some_with_one_buffer};
 use crate::seeds;
-use crate::segments::ring;
+use crate::segments::{descriptions, ring};
 use crate::world::{CYCLE, World};
 
 const KINDS: [&str; 7] = [
@@ -40,7 +39,7 @@ pub fn run(seed: u64) {
     let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
     let declare =
         |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed));
-    let mut world = World::with(seed, ring(some_with_one_buffer(&kinds, seed), options), &Options::default(), declare)
+    let mut world = World::with(seed, ring(descriptions(&kinds), options), &Options::default(), declare)
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     world.settle();
     // Late and duplicated frames change the devices.
