@@ -69,9 +69,8 @@ pub use registered_area::RegisteredArea;
 pub use sent_once::SentOnce;
 pub use states::{GroupState, MainDevicePhase, SubDeviceState};
 
-pub use crate::procedures::undeclared::Retries;
-
 pub use crate::declared::{Address, GroupId, SubDeviceId};
+pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
@@ -82,12 +81,13 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
+use crate::procedures::reconcile::reconcile_without_application;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
-use crate::procedures::undeclared::Undeclared;
+use crate::procedures::undeclared::UndeclaredMailboxes;
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
@@ -125,8 +125,6 @@ pub struct MainDevice {
     requests: Requests,
     /// Emergencies of all SubDevices.
     emergencies: Rc<RefCell<EmergencyRings>>,
-    /// The procedures of idle operation run.
-    is_idle: bool,
     /// Error counters, once active.
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
@@ -151,7 +149,7 @@ impl MainDevice {
         supervisor.set_events(EventLog::new(now.0));
         let cache = SiiCache::new(options.sii_cache);
         let emergencies: Rc<RefCell<EmergencyRings>> = Rc::default();
-        let undeclared = Undeclared::new(&supervisor.bus(), emergencies.clone(), options.retries);
+        let undeclared = UndeclaredMailboxes::new(&supervisor.bus(), emergencies.clone());
         let segment = Segment::new(choices(&options));
         let segment = SharedSegment::idle(&supervisor.bus(), segment, cache.clone(), undeclared);
         let mut main_device = MainDevice {
@@ -167,7 +165,6 @@ impl MainDevice {
             cyclic_events_lost: 0,
             requests: Requests::default(),
             emergencies,
-            is_idle: false,
             statistics: None,
             statistics_period: None,
             loaded: None,
@@ -178,6 +175,7 @@ impl MainDevice {
             disconnected: None,
             options,
         };
+        main_device.start_reconciler();
         main_device.begin_idle();
         main_device
     }
@@ -201,7 +199,6 @@ impl MainDevice {
         }
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
-        self.segment.undeclared.clear();
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.scan_options(extent);
@@ -267,9 +264,9 @@ impl MainDevice {
         self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
         self.segment.observe(Observation::Deactivated);
+        self.start_reconciler();
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
-        self.is_idle = false;
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
@@ -277,6 +274,12 @@ impl MainDevice {
         self.cyclic_events = None;
         self.cyclic_events_lost = 0;
         *self.stopped.borrow_mut() = None;
+    }
+
+    /// Starts procedures that the model requests without an application.
+    fn start_reconciler(&mut self) {
+        let bus = self.supervisor.bus();
+        self.supervisor.spawn(reconcile_without_application(bus, self.segment.clone()));
     }
 
     /// The result of [`MainDevice::start_stop`], once it has ended.
@@ -466,6 +469,7 @@ fn choices(options: &Options) -> Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
         idle_operation: options.idle_operation,
+        retries: options.retries,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

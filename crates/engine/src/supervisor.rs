@@ -34,13 +34,11 @@ use core::future::Future;
 pub(crate) use alone::Turn;
 pub use bus::Bus;
 pub use counters::AcyclicCounters;
-pub use group::Group;
 pub(crate) use group::{TURN, TURN_PAUSE};
 pub(crate) use posted::Posted;
 pub use received::Received;
-pub use reply::{BusError, Elapsed, Reply};
+pub use reply::{BusError, Reply};
 pub use signal::Signal;
-pub use stray::Stray;
 
 use crate::bell::Bell;
 use crate::board::Board;

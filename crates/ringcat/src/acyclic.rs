@@ -1,11 +1,11 @@
 //! Where the acyclic half runs: in the thread of the cycles, or in one of its own.
 
+use ringcat_engine::AcyclicCounters;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
 use crate::error::Error;

@@ -4,21 +4,21 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::ReadPdos;
+use ringcat_engine::Scan;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
-use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
 };
-use ringcat_engine::procedures::dictionary::ReadPdos;
-use ringcat_engine::procedures::inspect_ring::{RingInspection, inspect_ring};
-use ringcat_engine::procedures::scan::Scan;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{JunctionConnection, JunctionMode};
+use ringcat_engine::{RingInspection, inspect_ring};
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 

@@ -12,19 +12,19 @@
 
 use std::time::Duration;
 
+use ringcat_engine::Rescan;
+use ringcat_engine::ServiceError;
+use ringcat_engine::Statistics;
+use ringcat_engine::SubDevicePorts;
 use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, Subjects};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
     Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram,
 };
-use ringcat_engine::procedures::request_states::{StateScope, StatesError};
-use ringcat_engine::procedures::services::ServiceError;
-use ringcat_engine::procedures::services::port_report::SubDevicePorts;
-use ringcat_engine::procedures::services::statistics::Statistics;
-use ringcat_engine::procedures::unassigned::rescan::Rescan;
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
-use ringcat_engine::supervisor::{BusError, Reply};
+use ringcat_engine::{BusError, Reply};
+use ringcat_engine::{StateScope, StatesError};
 use ringcat_wire::al::AlState;
 
 use crate::acyclic::Inline;

@@ -142,7 +142,6 @@ impl MainDevice {
     fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
         self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
-        self.begin_keeping_undeclared(&segment);
         if with_clocks {
             // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
             // afterwards.

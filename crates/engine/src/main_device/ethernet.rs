@@ -55,7 +55,10 @@ impl MainDevice {
             _ if !self.options.idle_operation => Vec::new(),
             // After a deactivation mailboxes open one after the other: each SubDevice stays in the list meanwhile.
             Some(found) => (0..).map(Position).zip(found.subdevices.iter().cloned()).collect(),
-            None => self.segment.undeclared.all(),
+            None => {
+                let with_mailbox = view.subdevices().unassigned().filter(|it| it.upkeep.is_some());
+                with_mailbox.filter_map(|it| Some((it.position, it.knowledge.info()?.clone()))).collect()
+            }
         };
         for (position, info) in &undeclared {
             add((*position).into(), *position, info);

@@ -83,6 +83,6 @@ fn mailbox_at(segment: &SharedSegment, station: StationAddress) -> Option<(Mailb
     {
         return Some((view.member(index)?.info?.protocols, segment.mailbox(index)?));
     }
-    let (info, mailbox) = segment.undeclared.of_station(station)?;
-    Some((info.protocols, mailbox))
+    let it = view.subdevices().at(station)?.as_unassigned()?;
+    Some((it.knowledge.info()?.protocols, segment.undeclared.of(it.key)?))
 }

@@ -11,7 +11,7 @@ use crate::procedures::services::ServiceError;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
 use crate::procedures::services::forced_state::{Acknowledge, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
-use crate::segment::{Addressed, Observation};
+use crate::segment::{Addressed, UndeclaredObservation};
 
 impl MainDevice {
     /// Starts a read of the ports of all SubDevices by position: links, neighbours, delays, receive times, error
@@ -37,8 +37,7 @@ impl MainDevice {
     ) -> Pending<Result<(AlStatus, AlStatusCode), ServiceError>> {
         let subdevice = subdevice.into();
         if let Ok(Addressed::Undeclared(key)) = self.find(subdevice) {
-            self.segment.observe(Observation::Visited);
-            self.segment.undeclared.leave(key.station);
+            self.segment.observe_undeclared(UndeclaredObservation::Forced(key));
         }
         self.start_on(subdevice, move |bus, station| async move { force(&bus, station, state, acknowledge).await })
     }

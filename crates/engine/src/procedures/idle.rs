@@ -8,12 +8,9 @@ mod changes;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::future::{Future, poll_fn};
-use core::pin::pin;
-use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlStatus;
 use ringcat_wire::register::{DlStatus, EcatEvent, map};
 
@@ -22,13 +19,12 @@ pub(crate) use changes::scan_again;
 
 use super::inspect::read_subdevice;
 use super::scan::{ScanOptions, scan};
-use super::shared_segment::SharedSegment;
-use super::undeclared::report_left;
+use super::shared_segment::{SharedSegment, until_active};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::segment::{Observation, Reading, Segment};
+use crate::segment::{Observation, Reading, StateRead, UndeclaredObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -68,18 +64,6 @@ pub(crate) async fn watch(bus: Bus, segment: SharedSegment, options: ScanOptions
             watch.turn().await;
             bus.sleep(PERIOD).await;
         }
-    })
-    .await;
-}
-
-/// Runs a procedure until an application is active.
-async fn until_active(segment: &SharedSegment, procedure: impl Future<Output = ()>) {
-    let mut procedure = pin!(procedure);
-    poll_fn(|context| {
-        if segment.view().is_active() {
-            return Poll::Ready(());
-        }
-        procedure.as_mut().poll(context)
     })
     .await;
 }
@@ -124,19 +108,20 @@ impl Watch {
         if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale {
             return self.follow(seen).await;
         }
-        let expected = self.segment.undeclared.expected_states();
-        let is_unexpected = expected.is_some_and(|expected| seen.al_status != expected);
-        if self.bus.now() >= self.next_routine || (self.segment.undeclared.are_settled() && is_unexpected) {
+        let is_unexpected = {
+            let view = self.segment.view();
+            let is_other = view.expected_states().is_some_and(|expected| seen.al_status != expected);
+            is_other && view.are_undeclared_settled()
+        };
+        if self.bus.now() >= self.next_routine || is_unexpected {
             self.read_states().await;
         }
     }
 
-    /// SubDevices of the last scan become entries that are kept in their states.
+    /// SubDevices of the last scan are kept in their states from now on.
     fn take_over(&self) {
-        let present = present(&self.segment.view());
-        if !self.segment.undeclared.is_of(&present) {
-            self.segment.observe(Observation::Visited);
-            self.segment.undeclared.follow(&present);
+        if self.segment.view().has_untouched() {
+            self.segment.observe_undeclared(UndeclaredObservation::TakenOver);
         }
     }
 
@@ -203,7 +188,6 @@ impl Watch {
             return;
         }
         self.segment.observe(Observation::ScanBegun);
-        self.segment.undeclared.clear();
         let ended = scan(&self.bus, &self.options).await.map_err(|error| error.to_string());
         self.segment.observe(Observation::ScanEnded(ended));
         self.counts = None;
@@ -255,19 +239,15 @@ impl Watch {
     /// Reads the state of each SubDevice.
     async fn read_states(&mut self) {
         self.next_routine = self.bus.now() + ROUTINE;
-        let stations = self.segment.undeclared.settled();
-        let readings: Vec<(StationAddress, Reading)> = self
+        let settled = self.segment.view().settled();
+        let readings: Vec<StateRead> = self
             .bus
-            .gather(stations, |bus, station| async move { (station, read_subdevice(&bus, station).await) })
+            .gather(settled, |bus, (key, attempt)| async move {
+                StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
+            })
             .await;
         // A SubDevice without its station address has lost its power.
-        self.is_stale |= readings.iter().any(|(_, reading)| matches!(reading, Reading::Silent | Reading::Doubled));
-        report_left(&self.bus, &self.segment.undeclared, &readings);
+        self.is_stale |= readings.iter().any(|read| matches!(read.reading, Reading::Silent | Reading::Doubled));
+        self.segment.observe_undeclared(UndeclaredObservation::StatesRead(&readings));
     }
-}
-
-/// SubDevices of the last scan, at their positions.
-pub(crate) fn present(segment: &Segment) -> Vec<(Position, Rc<SubDeviceInfo>)> {
-    let found = segment.found().map(|found| found.subdevices.as_slice()).unwrap_or_default();
-    (0..).map(Position).zip(found.iter().cloned()).collect()
 }

@@ -17,7 +17,6 @@ use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
-use super::undeclared::Retries;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::mail::MailboxError;
@@ -27,7 +26,7 @@ use crate::mail::soe::SoeFailure;
 use crate::segment::effect::{Check, Shown};
 use crate::segment::member::Member;
 use crate::segment::start::Start;
-use crate::segment::{MemberFinding, ProcessDataStep};
+use crate::segment::{MemberFinding, ProcessDataStep, Retries};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first repeated attempt to configure a SubDevice; it doubles with every failure.
@@ -81,7 +80,7 @@ pub(super) async fn keep_up(
             }
             Err(error) => {
                 bus.report(failure(index, &error));
-                if segment.undeclared.retries() == Retries::OnRequest {
+                if segment.view().retries() == Retries::OnRequest {
                     segment.until_retried(index).await;
                     continue;
                 }

@@ -8,7 +8,7 @@ use ringcat::{
     ActivateError, Declaration, Error, Event, Instant, JunctionConnection, JunctionError, JunctionMode, MainDevice,
     Options, Refused, SubDeviceId, TimedEvent, automatic,
 };
-use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_engine::{Closing, PortOf};
 use ringcat_wire::address::{Position, StationAddress};
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
