@@ -3,8 +3,8 @@
 //! A scan reads whole SIIs, because its result has names. A bring-up reads what operation needs; the rest follows in
 //! the background when all SubDevices are in their target states ([`SiiExtent`](crate::SiiExtent)).
 
+use ringcat_engine::Scan;
 use ringcat_engine::main_device::{Declaration, MainDevice as Engine};
-use ringcat_engine::procedures::scan::Scan;
 
 use crate::application::Application;
 use crate::error::Error;

@@ -56,19 +56,10 @@ impl MainDevice {
         if !self.options.idle_operation || self.segment.view().keeps_undeclared() {
             return;
         }
-<<<<<<< HEAD
-        let (bus, segment, options) = (
-            self.supervisor.bus(),
-            self.segment.clone(),
-            self.scan_options(self.options.sii_extent.unwrap_or_default()),
-        );
-        segment.undeclared.begin_keeping();
-        self.supervisor.spawn(keep(bus.clone(), segment.undeclared.clone()));
-=======
-        let (bus, segment, options) = (self.supervisor.bus(), self.segment.clone(), self.scan_options());
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         self.supervisor.spawn(keep(bus.clone(), segment.clone()));
->>>>>>> 334a9c848d11766f1175491de606190a278d8271
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch(bus, segment, options));
     }
