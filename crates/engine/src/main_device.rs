@@ -77,7 +77,7 @@ pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
-use crate::info::SubDeviceInfo;
+use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::link::{Link, LinkSet};
 use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
@@ -185,6 +185,15 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or_default())
+    }
+
+    /// As [`MainDevice::start_scan`]; of the SIIs it reads what operation needs, unless the options name an extent.
+    pub fn start_scan_for_operation(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation))
+    }
+
+    fn begin_scan(&mut self, extent: SiiExtent) -> Result<(), ActivateError> {
         self.permit(Function::Scan)?;
         if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
@@ -193,7 +202,7 @@ impl MainDevice {
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options();
+        let options = self.scan_options(extent);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
@@ -203,11 +212,11 @@ impl MainDevice {
         Ok(())
     }
 
-    fn scan_options(&self) -> ScanOptions {
+    fn scan_options(&self, extent: SiiExtent) -> ScanOptions {
         ScanOptions {
             settle: self.options.settle,
             patience: self.options.patience,
-            extent: self.options.sii_extent,
+            extent,
             cache: self.cache.clone(),
             junctions: self.options.junctions,
             pdos: self.options.pdos,

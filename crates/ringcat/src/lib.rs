@@ -55,6 +55,7 @@
 
 pub mod acyclic;
 pub mod application;
+mod bring_up;
 mod cyclic;
 pub mod cyclic_thread;
 #[cfg(feature = "eni")]

@@ -43,9 +43,10 @@ use crate::window::{DEFAULT_BUDGET, Window};
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
-    /// How much of each SII a scan reads. With less than the default, SubDevices are sooner in OP; the rest is read in
-    /// the background afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
-    pub sii_extent: SiiExtent,
+    /// How much of each SII a scan reads. `None`, the default: all of it in [`MainDevice::scan`], what operation needs
+    /// in [`MainDevice::bring_up`]. The less, the sooner SubDevices are in OP; the rest is read in the background
+    /// afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
+    pub sii_extent: Option<SiiExtent>,
     /// SubDevices with dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
@@ -85,7 +86,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             sii_cache: true,
-            sii_extent: SiiExtent::default(),
+            sii_extent: None,
             pdos: ReadPdos::default(),
             supervision: true,
             source_address: MacCodec::FlagsFirst,
@@ -113,7 +114,7 @@ impl Options {
     /// Sets [`Options::sii_extent`].
     #[must_use]
     pub fn with_sii_extent(mut self, sii_extent: SiiExtent) -> Options {
-        self.sii_extent = sii_extent;
+        self.sii_extent = Some(sii_extent);
         self
     }
 
@@ -250,8 +251,13 @@ impl<L: Links> MainDevice<L> {
     ///
     /// # Errors
     /// As [`MainDevice::scan`].
-    pub fn scan_with(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
+    pub fn scan_with(&mut self, on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         self.engine.start_scan()?;
+        self.finish_scan(on_event)
+    }
+
+    /// Waits for the end of a scan that the engine has begun.
+    pub(crate) fn finish_scan(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         loop {
             self.work();
             while let Some(event) = self.engine.pop_event(self.links.now()) {

@@ -214,8 +214,13 @@ impl SupervisorThread {
     ///
     /// # Errors
     /// As [`SupervisorThread::scan`].
-    pub fn scan_while(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
+    pub fn scan_while(&self, meanwhile: impl FnMut()) -> Result<Scan, Error> {
         self.with(Engine::start_scan)??;
+        self.finish_scan(meanwhile)
+    }
+
+    /// Waits for the end of a scan that the engine has begun.
+    pub(crate) fn finish_scan(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
         let mut scan = self.ask(|engine| engine.scan_result());
         let result = loop {
             meanwhile();

@@ -94,7 +94,7 @@ impl MainDevice {
         let found = Found { subdevices: scanned, topology, main_count };
         let before = Before { all, found, handover };
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options();
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
         self.supervisor.spawn(async move {
             if let Err(error) = resume(&bus, &segment, &options, before).await {
                 let reason = slot.borrow_mut().insert(error).to_string();
