@@ -46,7 +46,7 @@ use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::future::Future;
 use core::time::Duration;
 
@@ -117,6 +117,8 @@ pub struct MainDevice {
     cache: SiiCache,
     /// Why the last scan failed.
     scan_error: Rc<RefCell<Option<ScanError>>>,
+    /// A requested scan is under way, not one of idle operation.
+    scan_requested: Rc<Cell<bool>>,
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
@@ -161,6 +163,7 @@ impl MainDevice {
             identity,
             cache,
             scan_error: Rc::default(),
+            scan_requested: Rc::default(),
             stopped: StopSlot::default(),
             segment,
             cyclic_events: None,
@@ -195,9 +198,11 @@ impl MainDevice {
         self.segment.undeclared.clear();
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options();
+        let (options, requested) = (self.scan_options(), self.scan_requested.clone());
+        requested.set(true);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
+            requested.set(false);
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
             segment.observe(Observation::ScanEnded(ended));
         });
@@ -260,6 +265,7 @@ impl MainDevice {
         self.segment.observe(Observation::Deactivated);
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
+        self.scan_requested = Rc::default();
         self.is_idle = false;
         self.ports.clear();
         self.gateway_queue = None;

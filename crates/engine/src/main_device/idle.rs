@@ -11,7 +11,7 @@ use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::undeclared::{follow_unassigned, keep, watch_undeclared_mail, without_declaration};
-use crate::segment::Addressed;
+use crate::segment::{Addressed, Observation, Scan};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -62,6 +62,15 @@ impl MainDevice {
         self.supervisor.spawn(keep(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch(bus, segment, options));
+    }
+
+    /// With idle operation an application may begin before the first scan has ended: the scan has found nothing then,
+    /// and each SubDevice is configured when it comes. A requested scan goes on.
+    pub(super) fn end_first_scan(&self) {
+        if self.options.idle_operation && self.segment.view().found().is_none() && !self.scan_requested.get() {
+            self.segment.observe(Observation::ScanBegun);
+            self.segment.observe(Observation::ScanEnded(Ok(Scan::nothing())));
+        }
     }
 
     /// An application begins: declared SubDevices are no longer kept in their states of idle operation.

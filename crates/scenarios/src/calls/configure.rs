@@ -3,10 +3,13 @@
 use std::time::Duration;
 
 use ringcat::{
-    Address, ConfigAddress, Direction, DomainId, PdoMapping, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo,
+    Address, Direction, DomainId, PdoMapping, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo,
     SyncSignals,
 };
+use ringcat_engine::config::PdoEntry;
 use ringcat_engine::exchange::Entry;
+use ringcat_sim::description::{DeviceDescription, PdoEntryDescription};
+use ringcat_wire::sii::PdoDirection;
 
 use super::errno::Errno;
 use super::master::Ecrt;
@@ -25,6 +28,22 @@ pub struct SyncInfo {
     pub direction: Direction,
     /// PDOs.
     pub pdos: Vec<PdoMapping>,
+}
+
+/// The SyncManagers and PDOs of a device, as a program names them that knows the device.
+pub fn syncs_of(device: &DeviceDescription) -> Vec<SyncInfo> {
+    let mut syncs: Vec<SyncInfo> = Vec::new();
+    for pdo in &device.pdos {
+        let Some(index) = pdo.sync_manager else { continue };
+        let direction = if pdo.direction == PdoDirection::Rx { Direction::Outputs } else { Direction::Inputs };
+        let entry = |entry: &PdoEntryDescription| PdoEntry::new(entry.index, entry.sub_index, entry.bit_length);
+        let mapping = PdoMapping::of(pdo.index, pdo.entries.iter().map(entry).collect::<Vec<_>>());
+        match syncs.iter_mut().find(|sync| sync.index == index) {
+            Some(sync) => sync.pdos.push(mapping),
+            None => syncs.push(SyncInfo { index, direction, pdos: vec![mapping] }),
+        }
+    }
+    syncs
 }
 
 impl Ecrt {
@@ -52,12 +71,8 @@ impl Ecrt {
         if let Some(at) = self.plan.keys.iter().position(same_place) {
             return if self.plan.keys[at] == key { Ok(SubDeviceId(at)) } else { Err(Errno::NoEnt) };
         }
-        let address = match alias {
-            0 => ConfigAddress::Position(position),
-            _ => SubDeviceConfig::at_alias(alias, position).address,
-        };
         self.plan.keys.push(key);
-        let config = SubDeviceConfig::at(address).expect_product(identity.0, identity.1);
+        let config = SubDeviceConfig::at_alias(alias, position).expect_product(identity.0, identity.1);
         Ok(self.plan.declaration.add_without_domain(config))
     }
 
@@ -123,6 +138,15 @@ impl Ecrt {
         let pdos = found.into_iter().flat_map(|info| info.pdos).filter(|pdo| pdo.sync_manager.is_some());
         let first = pdos.filter_map(|pdo| pdo.entries.into_iter().find(|entry| entry.index != 0));
         first.map(|entry| (entry.index, entry.sub_index)).collect()
+    }
+
+    /// The first entry of each SyncManager of a list.
+    pub fn entries_of(syncs: &[SyncInfo]) -> Vec<(u16, u8)> {
+        let first = |sync: &SyncInfo| {
+            let mut entries = sync.pdos.iter().filter_map(|pdo| pdo.entries.as_ref()).flatten();
+            entries.find(|entry| entry.index != 0).map(|entry| (entry.index, entry.sub_index))
+        };
+        syncs.iter().filter_map(first).collect()
     }
 
     /// `ecrt_domain_size`.

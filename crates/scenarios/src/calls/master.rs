@@ -26,6 +26,8 @@ const LOOK: Duration = Duration::from_millis(10);
 pub const DEACTIVATION: Duration = Duration::from_millis(300);
 /// The last cycles of an application, and a round trip.
 const LAST_CYCLES: Duration = Duration::from_millis(30);
+/// Time in which frames have left the wire.
+const ON_THE_WIRE: Duration = Duration::from_millis(1);
 /// Lines of the log that a failure prints.
 const LOGGED: usize = 200;
 
@@ -286,7 +288,11 @@ impl Ecrt {
     /// The program ends without a release, and another one begins on the segment as it is.
     pub fn killed(&mut self) {
         self.note("killed");
-        let network = self.side.links_mut().take_network();
+        let mut network = self.side.links_mut().take_network();
+        // Frames that are on the wire reach the SubDevices.
+        network.advance_by(ON_THE_WIRE);
+        let may_come = self.pulses_may_come;
+        self.witness.look(&network, may_come);
         self.requests = Requests::default();
         self.plan = Plan::default();
         self.is_reserved = false;

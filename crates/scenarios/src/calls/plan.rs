@@ -37,8 +37,7 @@ impl Plan {
 
     /// The declaration to activate: absent and wrong SubDevices are no error.
     pub fn complete(&self) -> Declaration {
-        let mut declaration = self.declaration.clone().with_required(Required::Nothing);
-        declaration.subdevices.iter_mut().for_each(|config| config.optional = true);
+        let declaration = self.declaration.clone().with_required(Required::Nothing);
         let reference = self.reference.map(ringcat::ReferenceClock::Declared).unwrap_or_default();
         let clocks = ClockConfig::default().as_igh().with_reference(reference);
         declaration.with_optional_clocks(self.clocks.then_some(clocks))

@@ -4,14 +4,14 @@ mod clocks;
 mod cycles;
 mod mailbox;
 mod orders;
+mod seeds;
 
-use ringcat::{Direction, DomainId, PdoMapping, SubDeviceId};
-use ringcat_engine::config::PdoEntry;
+use ringcat::{DomainId, SubDeviceId};
 use ringcat_sim::network::{Network, NetworkOptions};
-use scenarios::calls::configure::SyncInfo;
+use scenarios::calls::configure::syncs_of;
 use scenarios::calls::master::Ecrt;
 use scenarios::calls::witness::is_idle;
-use scenarios::segments::{descriptions, line, ring};
+use scenarios::segments::{describe, descriptions, line, ring};
 
 /// Sizes of segments.
 const SIZES: [usize; 4] = [1, 2, 5, 12];
@@ -94,16 +94,20 @@ fn assert_idle(ecrt: &mut Ecrt, text: &str) {
     ecrt.look();
 }
 
-/// The PDOs of a digital output terminal with 8 channels, and those of an input terminal, as a program names them.
-fn digital(is_output: bool) -> SyncInfo {
-    let (first, direction, object) =
-        if is_output { (0x1600, Direction::Outputs, 0x7000) } else { (0x1A00, Direction::Inputs, 0x6000) };
-    let pdo = |channel: u16| PdoMapping::of(first + channel, [PdoEntry::new(object + 0x10 * channel, 1, 1)]);
-    SyncInfo { index: 0, direction, pdos: (0..8).map(pdo).collect() }
-}
-
 /// Vendor and product of a kind.
 fn identity(kind: &str) -> (u32, u32) {
-    let description = scenarios::segments::describe(kind, kind);
+    let description = describe(kind, kind);
     (description.identity.vendor_id, description.identity.product_code)
+}
+
+/// Configures a kind at a position with the PDOs that a program names, absent or not. Outputs and inputs are in the
+/// domain.
+fn configure_named(ecrt: &mut Ecrt, position: u16, kind: &str, domain: DomainId) -> SubDeviceId {
+    let config = ecrt.slave_config(0, position, identity(kind)).expect("it is new");
+    let syncs = syncs_of(&describe(kind, kind));
+    ecrt.pdos(config, &syncs);
+    for entry in Ecrt::entries_of(&syncs) {
+        ecrt.reg_pdo_entry(config, entry, domain, Some(&mut 0)).expect("it is declared");
+    }
+    config
 }

@@ -6,9 +6,11 @@ use ringcat::{DomainState, LastOutputs};
 use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
 use scenarios::calls::errno::Errno;
-
-use super::{LIMIT, SIZES, assert_idle, configure, digital, identity, masters, networks, requested, run_all};
 use scenarios::calls::master::Ecrt;
+
+use super::{
+    KINDS, LIMIT, POSITION, SIZES, assert_idle, configure, configure_named, identity, masters, networks, requested, run_all,
+};
 
 // covers: api, states, layout
 #[test]
@@ -75,17 +77,17 @@ fn activation_before_the_link_is_up_reaches_op_when_it_comes() {
             let mut ecrt = Ecrt::new(network);
             ecrt.request().expect("it is free");
             let domain = ecrt.create_domain().expect("reserved");
-            // The first SubDevice is a drive, whose places are unknown; its outputs stay out of the domain.
-            ecrt.slave_config(0, 0, identity("servo")).expect("new");
-            if count > 1 {
-                let config = ecrt.slave_config(0, 1, identity("digital-output-8")).expect("new");
-                assert_eq!(
-                    ecrt.reg_pdo_entry(config, (0x7000, 1), domain, Some(&mut 0)),
-                    Err(Errno::NoEnt),
-                    "nothing is inherited from an absent SubDevice"
-                );
-                ecrt.pdos(config, &[digital(true)]);
-                assert_eq!(ecrt.reg_pdo_entry(config, (0x7000, 1), domain, None), Ok(0));
+            let bare = ecrt.slave_config(0, 0, identity(KINDS[0])).expect("new");
+            assert_eq!(
+                ecrt.reg_pdo_entry(bare, POSITION, domain, None),
+                Err(Errno::NoEnt),
+                "nothing is inherited from an absent SubDevice"
+            );
+            ecrt.release();
+            ecrt.request().expect("it is free");
+            let domain = ecrt.create_domain().expect("reserved");
+            for (position, kind) in (0..).zip(&KINDS[..count]) {
+                configure_named(&mut ecrt, position, kind, domain);
             }
             ecrt.activate().expect("absent SubDevices are no error");
             ecrt.cycles(200);
@@ -178,9 +180,7 @@ fn a_program_that_was_killed_leaves_a_segment_that_the_next_one_brings_to_op() {
 fn absent_and_wrong_subdevices_are_no_error_and_keep_no_other_one_from_op() {
     for (count, mut ecrt) in requested().filter(|(count, _)| *count > 1) {
         let (domain, mut configs) = configure(&mut ecrt, [0]);
-        let absent = ecrt.slave_config(0, 99, identity("digital-output-8")).expect("offline is fine");
-        ecrt.pdos(absent, &[digital(true)]);
-        ecrt.reg_pdo_entry(absent, (0x7000, 1), domain, None).expect("declared");
+        let absent = configure_named(&mut ecrt, 99, "digital-output-8", domain);
         let wrong = ecrt.slave_config(0, 1, identity("digital-input-8")).expect("it is not compared here");
         assert_eq!(ecrt.slave_config(0, 1, identity("digital-output-8")), Err(Errno::NoEnt), "another identity");
         assert_eq!(ecrt.slave_config(0, 1, identity("digital-input-8")), Ok(wrong), "the same configuration");
