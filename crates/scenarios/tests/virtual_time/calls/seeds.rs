@@ -18,6 +18,7 @@ use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::register::map;
 use scenarios::calls::configure::syncs_of;
+use scenarios::calls::errno::Errno;
 use scenarios::calls::master::Ecrt;
 use scenarios::dice::Dice;
 use scenarios::seeds;
@@ -162,8 +163,12 @@ impl Sequence {
                 request.cancel();
             }
         }
-        requests.register.iter_mut().for_each(|request| drop(request.read(map::AL_STATUS, 2)));
-        requests.soe.iter_mut().for_each(|request| drop(request.read()));
+        for request in &mut requests.register {
+            let _ = request.read(map::AL_STATUS, 2);
+        }
+        for request in &mut requests.soe {
+            let _ = request.read();
+        }
         for handler in &mut requests.voe {
             let _ = if write { handler.write(&[1, 2, 3]) } else { handler.read() };
             handler.execute();
@@ -194,7 +199,9 @@ impl Sequence {
                 self.ecrt.sync_monitor_process();
                 let configs = self.configs.clone();
                 self.ecrt.master_state();
-                configs.into_iter().for_each(|config| drop(self.ecrt.slave_config_state(config)));
+                for config in configs {
+                    let _ = self.ecrt.slave_config_state(config);
+                }
             }
             _ => self.pause(),
         }
@@ -205,7 +212,7 @@ impl Sequence {
         match self.ecrt.activate() {
             Ok(()) if !was_active => self.shown.activations += 1,
             Ok(()) => {}
-            Err(_) => self.shown.refused += 1,
+            Err(error) => self.shown.refused += u64::from(error != Errno::NoDev),
         }
     }
 
@@ -224,10 +231,10 @@ impl Sequence {
         match self.dice.below(20) {
             0 | 1 => drop(self.ecrt.request()),
             2 | 3 => self.configure_some(),
-            4 | 5 => self.activate(),
-            6 => self.use_mailbox(),
+            4..7 => self.activate(),
+            7 if self.dice.one_in(2) => self.use_mailbox(),
             7 => self.use_requests(),
-            8 if self.dice.one_in(2) => self.deactivate(),
+            8 => self.deactivate(),
             9 if self.dice.one_in(2) => {
                 self.ecrt.release();
                 self.configs.clear();
@@ -238,7 +245,11 @@ impl Sequence {
                 self.rings.clear();
             }
             11 => self.ecrt.reset(),
-            12 => self.rings.iter().for_each(|(ring, _)| drop(Ecrt::emerg_pop(ring))),
+            12 => {
+                for (ring, _) in &self.rings {
+                    let _ = Ecrt::emerg_pop(ring);
+                }
+            }
             13 | 14 => (0..self.dice.below(30)).for_each(|_| self.part()),
             15..19 if is_active => {
                 let count = *self.dice.pick(&[3, 20, 150]);
