@@ -252,10 +252,10 @@ impl Watch {
         }
     }
 
-    /// Reads the state of each SubDevice.
+    /// Reads the state of each SubDevice, also of those that have failed: they may have lost their addresses.
     async fn read_states(&mut self) {
         self.next_routine = self.bus.now() + ROUTINE;
-        let stations = self.segment.undeclared.settled();
+        let stations = self.segment.undeclared.stations();
         let readings: Vec<(StationAddress, Reading)> = self
             .bus
             .gather(stations, |bus, station| async move { (station, read_subdevice(&bus, station).await) })

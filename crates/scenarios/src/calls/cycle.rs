@@ -175,9 +175,9 @@ impl Ecrt {
         self.pause(PERIOD - BACK);
     }
 
-    /// The time that this program gives: the host's, as CLOCK_MONOTONIC.
+    /// The time that this program gives: the host's and a base.
     pub fn application_clock(&self) -> u64 {
-        self.now().0.wrapping_add(17_500_062_439_605_732_825)
+        self.now().0.wrapping_add(self.clock_base)
     }
 
     /// Some cycles of the usual loop.

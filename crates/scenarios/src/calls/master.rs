@@ -26,6 +26,8 @@ const LOOK: Duration = Duration::from_millis(10);
 pub const DEACTIVATION: Duration = Duration::from_millis(300);
 /// The last cycles of an application, and a round trip.
 const LAST_CYCLES: Duration = Duration::from_millis(30);
+/// A base as programs have it that add times in u64 without a check.
+const MONOTONIC: u64 = 17_500_062_439_605_732_825;
 /// Time in which frames have left the wire.
 const ON_THE_WIRE: Duration = Duration::from_millis(1);
 /// Lines of the log that a failure prints.
@@ -61,6 +63,8 @@ pub struct Ecrt {
     pub witness: Witness,
     /// SYNC pulses may come until all SubDevices were idle again.
     pub pulses_may_come: bool,
+    /// The application's time when the host's is zero.
+    pub clock_base: u64,
     log: VecDeque<String>,
 }
 
@@ -85,6 +89,7 @@ impl Ecrt {
             faults: Faults::default(),
             witness: Witness::default(),
             pulses_may_come: false,
+            clock_base: MONOTONIC,
             log: VecDeque::new(),
         }
     }
@@ -95,6 +100,11 @@ impl Ecrt {
             self.log.pop_front();
         }
         self.log.push_back(format!("{:>12} us: {what}", self.side.now().0 / 1_000));
+    }
+
+    /// Forgets the lines so far, before memory is measured.
+    pub fn forget_log(&mut self) {
+        self.log = VecDeque::new();
     }
 
     /// Host time.

@@ -238,11 +238,9 @@ impl Undeclared {
         all.iter().filter(|it| !is_settled(it)).map(|it| it.info.station).collect()
     }
 
-    /// Station addresses of those in their requested states, or left as they are.
-    pub(crate) fn settled(&self) -> Vec<StationAddress> {
-        let all = self.all.borrow();
-        let is_settled = |it: &&Entry| matches!(it.progress, Progress::Reached | Progress::Left);
-        all.iter().filter(is_settled).map(|it| it.info.station).collect()
+    /// Station addresses of all.
+    pub(crate) fn stations(&self) -> Vec<StationAddress> {
+        self.all.borrow().iter().map(|entry| entry.info.station).collect()
     }
 
     /// Requests a state of the SubDevice at a position. Returns its attempt, and whether it is a new one: the same

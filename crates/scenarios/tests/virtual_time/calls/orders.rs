@@ -7,9 +7,11 @@ use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
 use scenarios::calls::errno::Errno;
 use scenarios::calls::master::Ecrt;
+use scenarios::calls::witness::is_idle;
 
 use super::{
-    KINDS, LIMIT, POSITION, SIZES, assert_idle, configure, configure_named, identity, masters, networks, requested, run_all,
+    KINDS, LIMIT, POSITION, SIZES, assert_idle, configure, configure_named, identity, masters, networks, requested,
+    run_all,
 };
 
 // covers: api, states, layout
@@ -241,5 +243,28 @@ fn an_alias_names_the_subdevice_behind_it() {
         let is_operational = |ecrt: &mut Ecrt, config| ecrt.slave_config_state(config).is_some_and(|it| it.operational);
         assert!(is_operational(&mut ecrt, inputs));
         assert_ne!(is_operational(&mut ecrt, lamps), is_operational(&mut ecrt, again), "one of both is attached");
+    }
+}
+
+/// It waits for a reset, and loses its station address meanwhile.
+// covers: api, states, recovery
+#[test]
+fn a_failed_subdevice_that_restarts_unseen_is_found_and_brought_to_preop() {
+    use ringcat_sim::cable::DeviceIndex;
+    use ringcat_wire::al::{AlState, AlStatusCode};
+    for (count, mut ecrt) in requested() {
+        let (device, code) = (DeviceIndex(0), AlStatusCode(0x8042));
+        let refuse = |times| Fault::RefuseTransition { device, to: AlState::PreOp, code, times };
+        // It restarts, and refuses PREOP once it is known.
+        ecrt.network().apply(refuse(1));
+        ecrt.network().apply(Fault::PowerOff(device));
+        ecrt.network().apply(Fault::PowerOn(device));
+        ecrt.pause(Duration::from_secs(3));
+        assert!(is_idle(ecrt.network(), 0).is_err(), "{count}: it refuses PREOP and waits");
+        ecrt.network().apply(refuse(0));
+        ecrt.network().apply(Fault::PowerOff(device));
+        ecrt.network().apply(Fault::PowerOn(device));
+        ecrt.pause(Duration::from_secs(2));
+        assert_idle(&mut ecrt, "it came back by itself");
     }
 }
