@@ -80,8 +80,10 @@ fn main() -> ExitCode {
     let result = match words[..] {
         [] => measure(&["instructions", "cpu"]),
         [part @ ("instructions" | "cpu")] => measure(&[part]),
-        ["run", threads, mode, period, cycles] => run(threads, mode, period, cycles).map(|()| true),
-        _ => Err("usage: socket_cycle [instructions | cpu | run one|two MODE PERIOD_US CYCLES]".to_owned()),
+        ["run", threads, mode, period, cycles, resend] => run(threads, mode, period, cycles, resend).map(|()| true),
+        _ => {
+            Err("usage: socket_cycle [instructions | cpu | run one|two MODE PERIOD_US CYCLES never|always]".to_owned())
+        }
     };
     match result {
         Ok(met) => verdict(met),
@@ -103,8 +105,9 @@ fn receive_mode(name: &str) -> Tried<ReceiveMode> {
     }
 }
 
-/// A MainDevice on `near0` that runs this many cycles and prints its resources.
-fn run(threads: &str, mode: &str, period_us: &str, cycles: &str) -> Tried<()> {
+/// A MainDevice on `near0` that runs this many cycles and prints its resources. `resend`: whether lost frames are sent
+/// again, `never` or `always`.
+fn run(threads: &str, mode: &str, period_us: &str, cycles: &str, resend: &str) -> Tried<()> {
     let (period_us, cycles): (u64, u64) = (number(period_us)?, number(cycles)?);
     let (mode, period) = (receive_mode(mode)?, Duration::from_micros(period_us));
     let options = Options::default();
@@ -114,7 +117,7 @@ fn run(threads: &str, mode: &str, period_us: &str, cycles: &str) -> Tried<()> {
             let (cyclic, acyclic) = PacketLinks::open_halves("near0", None, mode).map_err(said)?;
             let supervisor = SupervisorThread::start(acyclic, &options, realtime::precise_timers).map_err(said)?;
             let scan = supervisor.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period);
+            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
             drop(scan);
             let mut application = supervisor.activate(declaration, cyclic).map_err(|refused| said(refused.error))?;
             exchange(&mut application, cycles)?;
@@ -124,7 +127,7 @@ fn run(threads: &str, mode: &str, period_us: &str, cycles: &str) -> Tried<()> {
             let links = PacketLinks::open("near0", None, mode).map_err(said)?;
             let mut main_device = MainDevice::request(links, &options);
             let scan = main_device.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period);
+            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
             drop(scan);
             let mut application = main_device.activate(declaration).map_err(|refused| said(refused.error))?;
             exchange(&mut application, cycles)?;
@@ -254,7 +257,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
         let hop_ns = RESIDENCE_NS / servos as u64;
         let run = || {
             let _simulator = simulate(namespaces, servos, hop_ns)?;
-            profile(namespaces, servos, threads)
+            profile(namespaces, servos, threads, "never")
         };
         let mut best = run()?;
         for _ in 1..RUNS {
@@ -276,6 +279,11 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
         if threads == "one" {
             continue;
         }
+        let again = {
+            let _simulator = simulate(namespaces, servos, hop_ns)?;
+            profile(namespaces, servos, threads, "always")?
+        };
+        figures.show("   with lost frames sent again (an option)", format!("{:.0} instructions", per_cycle(&again)));
         let _simulator = simulate(namespaces, servos, hop_ns)?;
         if let Some(per_cycle) = soem(namespaces, servos)? {
             let name = format!("{servos} servo{}, SOEM (pysoem): send and receive alone, no sleep", s(servos));
@@ -300,9 +308,9 @@ fn period_us(servos: usize, threads: &str) -> u64 {
     if servos > 1 && threads == "two" { SLOW_PERIOD_US } else { PERIOD_US }
 }
 
-fn profile(namespaces: &Namespaces, servos: usize, threads: &str) -> Tried<Profile> {
-    let period_us = period_us(servos, threads);
-    let arguments = ["run", threads, "block", &period_us.to_string(), &COUNTED.to_string()].map(str::to_owned);
+fn profile(namespaces: &Namespaces, servos: usize, threads: &str, resend: &str) -> Tried<Profile> {
+    let period_us = period_us(servos, threads).to_string();
+    let arguments = ["run", threads, "block", &period_us, &COUNTED.to_string(), resend].map(str::to_owned);
     let program = std::env::current_exe().map_err(said)?;
     profile_program_within(namespaces.near("valgrind"), &[WITHIN], &program, &arguments).map_err(said)
 }
@@ -350,7 +358,7 @@ fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
     for mode in ["block", "hybrid", "busy"] {
         let _simulator = simulate(namespaces, 50, 1_000)?;
         let mut command = namespaces.near(std::env::current_exe().map_err(said)?);
-        command.args(["run", "two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string()]);
+        command.args(["run", "two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string(), "never"]);
         let output = command.stdin(Stdio::null()).output().map_err(said)?;
         let told = String::from_utf8_lossy(&output.stdout).into_owned();
         if !output.status.success() {
