@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use ringcat::{
-    Address, Direction, DomainId, PdoMapping, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo,
-    SyncSignals,
+    Address, Direction, DomainId, PdoMapping, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo, SyncSignals,
 };
 use ringcat_engine::config::PdoEntry;
 use ringcat_engine::exchange::Entry;
@@ -104,8 +103,7 @@ impl Ecrt {
     ) -> Result<usize, Errno> {
         self.configuring()?;
         let found = self.found(config);
-        let entry: Entry =
-            self.plan.declaration.register_entry(domain, config, index, sub_index, found.as_ref())?;
+        let entry: Entry = self.plan.declaration.register_entry(domain, config, index, sub_index, found.as_ref())?;
         match bit_position {
             Some(bit) => *bit = entry.bit_position().into(),
             None if entry.bit_position() != 0 => return Err(Errno::Fault),
@@ -126,9 +124,7 @@ impl Ecrt {
         let mut bit = 0;
         list.iter()
             .take_while(|(_, index, _)| *index != 0)
-            .map(|(config, index, sub_index)| {
-                self.reg_pdo_entry(*config, (*index, *sub_index), domain, Some(&mut bit))
-            })
+            .map(|(config, index, sub_index)| self.reg_pdo_entry(*config, (*index, *sub_index), domain, Some(&mut bit)))
             .collect()
     }
 

@@ -5,8 +5,8 @@ use std::fmt::Display;
 use std::time::Duration;
 
 use ringcat::{
-    AlState, ClockDatagrams, Error, Instant, LastOutputs, MainDevicePhase, Options, RegisterRequest,
-    Retries, SdoRequest, Services, SoeRequest, StateScope, VoeHandler,
+    AlState, ClockDatagrams, Error, Instant, LastOutputs, MainDevicePhase, Options, RegisterRequest, Retries,
+    SdoRequest, Services, SoeRequest, StateScope, VoeHandler,
 };
 use ringcat_sim::network::Network;
 
@@ -326,4 +326,3 @@ impl Ecrt {
         describe(self.side.links_mut().network())
     }
 }
-

@@ -2,9 +2,9 @@
 //! the application.
 
 use ringcat_sim::cable::DeviceIndex;
-use scenarios::pulses::Pulses;
 use scenarios::calls::errno::Errno;
 use scenarios::calls::master::Ecrt;
+use scenarios::pulses::Pulses;
 
 use super::{assert_idle, configure, requested, run_all};
 
