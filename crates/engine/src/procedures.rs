@@ -5,6 +5,7 @@
 pub mod al_state;
 mod cabling;
 pub mod clocks;
+pub(crate) mod command_watch;
 pub(crate) mod complete_siis;
 pub mod configure;
 pub(crate) mod deactivate;

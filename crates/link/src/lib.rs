@@ -43,7 +43,7 @@ pub use filter::ClassFilter;
 pub use listener::{Listener, Sender};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use receive_mode::ReceiveMode;
-pub use recorder::{Recorder, RecorderError, Tap};
+pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};
 pub use signals::{HeldSignals, Signal};
 pub use sniffer::Sniffer;
 pub use tap::{TapError, TapInterface};

@@ -4,25 +4,25 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::ReadPdos;
+use ringcat_engine::Scan;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
-use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
 };
-use ringcat_engine::procedures::dictionary::ReadPdos;
-use ringcat_engine::procedures::inspect_ring::{RingInspection, inspect_ring};
-use ringcat_engine::procedures::scan::Scan;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{JunctionConnection, JunctionMode};
+use ringcat_engine::{RingInspection, inspect_ring};
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
-use crate::acyclic::{Inline, carry_out_link_order};
+use crate::acyclic::{Inline, carry_out_link_order, log_messages};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
@@ -283,6 +283,7 @@ impl<L: Links> MainDevice<L> {
         engine.poll(now);
         carry_out_link_order(engine, links);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
+        log_messages(engine);
     }
 
     /// Works for a time without an application: with [`Options::idle_operation`] it watches the segment meanwhile.

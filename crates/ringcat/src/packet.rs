@@ -17,9 +17,9 @@ pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
 use crate::links::Links;
 
 /// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on
-/// the wire at once ([`ringcat_engine::ring::MAX_IN_FLIGHT`]).
+/// the wire at once ([`ringcat_engine::MAX_IN_FLIGHT`]).
 const RING_FRAMES: u32 = 128;
-const _: () = assert!(RING_FRAMES as usize > ringcat_engine::ring::MAX_IN_FLIGHT);
+const _: () = assert!(RING_FRAMES as usize > ringcat_engine::MAX_IN_FLIGHT);
 
 /// One or two network interfaces.
 #[derive(Debug)]

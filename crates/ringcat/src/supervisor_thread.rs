@@ -15,17 +15,17 @@ use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::JunctionConnection;
+use ringcat_engine::Scan;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::junction::JunctionConnection;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
 };
-use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 #[cfg(feature = "eoe")]
 use ringcat_link::WakeUp;

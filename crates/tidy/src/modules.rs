@@ -27,6 +27,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("bell", &[]),
     ("request", &["declared", "bell"]),
     ("junction", &["declared"]),
+    ("role", &[]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
@@ -46,14 +47,15 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
-    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event"]),
-    ("mail", &["declared", "time", "config", "event", "supervisor"]),
+    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
+    ("mail", &["declared", "time", "config", "event", "supervisor", "role"]),
     ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
-        "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
+        "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction",
+        "role"]),
     // both together
     ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
         "topology", "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail",
-        "request", "junction", "procedures"]),
+        "request", "junction", "role", "procedures"]),
 ];
 
 /// The engine's sources.

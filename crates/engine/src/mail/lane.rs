@@ -9,6 +9,7 @@ use ringcat_wire::mailbox::{ErrorReply, Protocol};
 use super::answer_time::AnswerTime;
 use super::error::MailboxError;
 use super::unsolicited::Unsolicited;
+use crate::role::Function;
 use crate::time::Instant;
 
 /// Answers that may wait in a lane; a conversation takes one at a time.
@@ -47,6 +48,19 @@ pub enum Lane {
 }
 
 impl Lane {
+    /// The function that begins a conversation in it.
+    pub(super) const fn function(self) -> Function {
+        match self {
+            Lane::Coe => Function::SdoTransfer,
+            Lane::Foe => Function::FileTransfer,
+            Lane::Soe => Function::SoeAccess,
+            Lane::Aoe => Function::AoeAccess,
+            Lane::Voe => Function::VendorMessage,
+            Lane::Eoe | Lane::Frames => Function::Ethernet,
+            Lane::Other(_) => Function::RawMailbox,
+        }
+    }
+
     /// Number of lanes.
     pub(super) const COUNT: usize = 8;
 

@@ -9,14 +9,14 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 use super::al_state::read_status;
-use super::idle::{present, scan_again};
+use super::idle::scan_again;
 use super::scan::ScanOptions;
 use super::shared_segment::SharedSegment;
 use super::stop::{StopError, ToStop, all_known, stop};
-use super::undeclared::run_due;
+use super::undeclared::settle;
 use crate::info::SubDeviceInfo;
-use crate::segment::{Observation, Segment, SubDevice};
-use crate::supervisor::{Bus, Elapsed};
+use crate::segment::{Observation, Segment, SubDevice, UndeclaredObservation};
+use crate::supervisor::Bus;
 use crate::time::Instant;
 
 /// Pause before the segment is scanned again while it changes.
@@ -67,9 +67,8 @@ pub(crate) async fn deactivate(
     // A scan that loses frames must not take longer.
     let scanning = scan_until(bus, segment, options, &known, until);
     let _ = bus.within(until.since(bus.now()), scanning).await;
-    segment.undeclared.follow(&present(&segment.view()));
-    segment.observe(Observation::Visited);
-    let settling = run_due(bus, &segment.undeclared);
+    segment.observe_undeclared(UndeclaredObservation::TakenOver);
+    let settling = settle(bus, segment);
     let time = until.since(bus.now());
     // Reading the states of the late ones belongs to the limit.
     if bus.within(time.saturating_sub(REPORT), settling).await.is_ok() {
@@ -77,7 +76,7 @@ pub(crate) async fn deactivate(
     }
     match bus.within(until.since(bus.now()), late(bus, segment, &declared, limit)).await {
         Ok(Some(late)) => Err(late),
-        Ok(None) | Err(Elapsed) => stopped,
+        Ok(None) | Err(_) => stopped,
     }
 }
 
@@ -101,7 +100,7 @@ async fn scan_until(
 
 /// The first SubDevice that answers and is not in PREOP.
 async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Option<StopError> {
-    let stations: Vec<StationAddress> = segment.undeclared.unsettled();
+    let stations: Vec<StationAddress> = segment.view().unsettled();
     let states = bus.gather(stations, |bus, station| async move { (station, read_status(&bus, station).await) }).await;
     let mut late = states.into_iter().filter_map(|(station, read)| Some((station, read.ok()?)));
     let (station, (status, code)) = late.next()?;
