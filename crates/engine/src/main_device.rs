@@ -49,7 +49,7 @@ use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::future::Future;
 use core::time::Duration;
 
@@ -120,6 +120,8 @@ pub struct MainDevice {
     cache: SiiCache,
     /// Why the last scan failed.
     scan_error: Rc<RefCell<Option<ScanError>>>,
+    /// A requested scan is under way, not one of idle operation.
+    scan_requested: Rc<Cell<bool>>,
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
@@ -162,6 +164,7 @@ impl MainDevice {
             identity,
             cache,
             scan_error: Rc::default(),
+            scan_requested: Rc::default(),
             stopped: StopSlot::default(),
             segment,
             cyclic_events: None,
@@ -202,9 +205,11 @@ impl MainDevice {
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options(extent);
+        let (options, requested) = (self.scan_options(extent), self.scan_requested.clone());
+        requested.set(true);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
+            requested.set(false);
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
             segment.observe(Observation::ScanEnded(ended));
         });
@@ -281,6 +286,7 @@ impl MainDevice {
         self.begin_command_reports();
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
+        self.scan_requested = Rc::default();
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();

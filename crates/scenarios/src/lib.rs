@@ -8,6 +8,7 @@
 pub mod answering_double;
 pub mod areas;
 pub mod callgrind;
+pub mod calls;
 pub mod capture;
 pub mod check;
 pub mod clocks;

@@ -126,6 +126,10 @@ impl Application {
 
     /// The next `times` requests for `to` are refused with `code`.
     pub fn refuse(&mut self, to: AlState, code: AlStatusCode, times: u32) {
+        if times == 0 {
+            self.refusals.retain(|refusal| refusal.to != to);
+            return;
+        }
         self.refusals.push(Refusal { to, code, times });
     }
 

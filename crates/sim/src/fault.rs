@@ -136,7 +136,7 @@ pub enum Fault {
         to: AlState,
         /// The AL status code of the refusal.
         code: AlStatusCode,
-        /// Number of refusals.
+        /// Number of refusals; 0 ends those that are left.
         times: u32,
     },
     /// Accesses of the application to its controller are disturbed, as on a faulty bus: they are counted, and succeed

@@ -11,11 +11,12 @@ pub enum ConfigAddress {
     /// Position in the configured order, from 0. If an optional SubDevice is absent, the following ones are expected
     /// one position nearer to the start of the segment. Members of [groups](super::Group) are not counted.
     Position(u16),
-    /// `offset` SubDevices behind the one with this alias; alias 0 counts from the start of the segment.
+    /// `offset` SubDevices behind the one with this alias. Alias 0 is the exact position in the segment, as with IgH:
+    /// it counts every SubDevice, and neither an absent SubDevice nor a group moves it.
     Alias {
-        /// The alias.
+        /// The alias, or 0.
         alias: u16,
-        /// Number of SubDevices behind it.
+        /// Number of SubDevices behind it, or the position.
         offset: u16,
     },
     /// `offset` SubDevices behind the one with this explicit device identification (protocol 5.3).

@@ -24,7 +24,8 @@ impl SubDeviceConfig {
         SubDeviceConfig::at(ConfigAddress::Position(position))
     }
 
-    /// A SubDevice of any identity, `offset` places behind the one with an alias.
+    /// A SubDevice of any identity, `offset` places behind the one with an alias; with alias 0 exactly at the position
+    /// `offset`.
     pub fn at_alias(alias: u16, offset: u16) -> SubDeviceConfig {
         SubDeviceConfig::at(ConfigAddress::Alias { alias, offset })
     }

@@ -33,8 +33,11 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// The only SubDevice with the alias or identification of an address.
+/// The only SubDevice with the alias or identification of an address; the first of the segment for alias 0.
 pub(super) fn find_marked(address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+    if matches!(address, ConfigAddress::Alias { alias: 0, .. }) {
+        return Ok((!infos.is_empty()).then_some(0));
+    }
     let mut marked = infos.iter().enumerate().filter(|(_, info)| address.is_mark_of(info));
     match (marked.next(), marked.next()) {
         (Some((_, first)), Some((_, second))) => {

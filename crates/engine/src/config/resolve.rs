@@ -52,7 +52,7 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 ///
 /// Groups are found first, at any place; positions count the SubDevices that belong to no group. If an optional
 /// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
-/// combinations of absent optional SubDevices, that with the fewest errors is taken.
+/// combinations of absent optional SubDevices, that with the fewest errors is taken. Alias 0 counts all SubDevices.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]) -> Vec<Resolution> {
     let infos: Vec<&SubDeviceInfo> = infos.iter().map(Borrow::borrow).collect();
     let infos = &infos[..];
@@ -102,9 +102,7 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
         .enumerate()
         .filter(|(_, config)| config.group.is_none())
         .filter_map(|(index, config)| match config.address {
-            ConfigAddress::Position(position) | ConfigAddress::Alias { alias: 0, offset: position } => {
-                Some((usize::from(position), index))
-            }
+            ConfigAddress::Position(position) => Some((usize::from(position), index)),
             ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
         })
         .collect();
@@ -151,7 +149,7 @@ impl AbsenceCosts {
     }
 }
 
-/// Finds a SubDevice by alias or identification.
+/// Finds a SubDevice by alias or identification, or by its exact position with alias 0.
 fn by_mark(configs: &[SubDeviceConfig], infos: &[&SubDeviceInfo], config: usize) -> Resolution {
     let address = configs[config].address;
     match find_marked(address, infos) {

@@ -95,6 +95,17 @@ fn an_alias_counts_from_its_subdevice_and_alias_0_from_the_start() {
     assert_eq!(resolutions[0], Resolution::Failed { config: 0, error });
 }
 
+// covers: declaration
+#[test]
+fn alias_0_is_the_exact_position_whatever_else_is_absent() {
+    let exact = |position, product| SubDeviceConfig::at_alias(0, position).expect_product(2, product);
+    let configs = [config(0, 9).optional(), exact(1, 11), exact(2, 11), exact(9, 12)];
+    let resolutions = resolve(&configs, &infos(&[10, 11, 12]));
+    assert_eq!(resolutions[1], found(1, 1), "an absent one before it moves nothing");
+    assert!(matches!(resolutions[2], Resolution::Failed { error: ConfigError::Mismatch { .. }, .. }));
+    assert!(matches!(resolutions[3], Resolution::Failed { error: ConfigError::Missing { .. }, .. }));
+}
+
 #[test]
 fn two_subdevices_with_the_same_alias_are_an_ambiguous_address() {
     let mut infos = infos(&[10, 11, 12, 13]);

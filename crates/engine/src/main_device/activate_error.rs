@@ -21,7 +21,7 @@ use crate::segment::setup::SetupError;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ActivateError {
-    /// There is no scan result.
+    /// There is no scan result, or a requested scan is under way.
     NoScan,
     /// It is refused in the present role, or while the MainDevice is active.
     NotPermitted(NotPermitted),

@@ -10,7 +10,7 @@ use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::undeclared::{keep, watch_undeclared_mail};
 use crate::role::{Function, MainDevicePhase};
-use crate::segment::{Addressed, Observation, UndeclaredObservation};
+use crate::segment::{Addressed, Observation, Scan, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -62,6 +62,15 @@ impl MainDevice {
         self.supervisor.spawn(keep(bus.clone(), segment.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch(bus, segment, options));
+    }
+
+    /// With idle operation an application may begin before the first scan has ended: the scan has found nothing then,
+    /// and each SubDevice is configured when it comes. A requested scan goes on.
+    pub(super) fn end_first_scan(&self) {
+        if self.options.idle_operation && self.segment.view().found().is_none() && !self.scan_requested.get() {
+            self.segment.observe(Observation::ScanBegun);
+            self.segment.observe(Observation::ScanEnded(Ok(Scan::nothing())));
+        }
     }
 
     /// Ends the application: process data, supervision and all other procedures end, and every SubDevice goes to PREOP

@@ -22,6 +22,9 @@ use crate::time::Instant;
 /// Pause before the segment is scanned again while it changes.
 const PAUSE: Duration = Duration::from_millis(2);
 
+/// Part of the limit in which the states of SubDevices that are late are read.
+const REPORT: Duration = Duration::from_millis(10);
+
 /// What was known of the SubDevices when the application ended.
 pub(crate) struct Remainder {
     to_stop: Vec<ToStop>,
@@ -61,11 +64,20 @@ pub(crate) async fn deactivate(
     let declared = to_stop.clone();
     // A SubDevice that does not leave its state must not take the time of the others.
     let stopped = stop(bus, to_stop, AlState::PreOp, limit / 2).await;
-    scan_until(bus, segment, options, &known, until).await;
+    // A scan that loses frames must not take longer.
+    let scanning = scan_until(bus, segment, options, &known, until);
+    let _ = bus.within(until.since(bus.now()), scanning).await;
     segment.observe_undeclared(UndeclaredObservation::TakenOver);
     let settling = settle(bus, segment);
-    let is_settled = bus.within(until.since(bus.now()), settling).await.is_ok();
-    if is_settled { Ok(()) } else { late(bus, segment, &declared, limit).await.map_or(stopped, Err) }
+    let time = until.since(bus.now());
+    // Reading the states of the late ones belongs to the limit.
+    if bus.within(time.saturating_sub(REPORT), settling).await.is_ok() {
+        return Ok(());
+    }
+    match bus.within(until.since(bus.now()), late(bus, segment, &declared, limit)).await {
+        Ok(Some(late)) => Err(late),
+        Ok(None) | Err(_) => stopped,
+    }
 }
 
 /// The scan as it is now, without an EEPROM of known SubDevices. If the segment does not become stable, the last scan

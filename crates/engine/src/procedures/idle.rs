@@ -245,13 +245,13 @@ impl Watch {
         }
     }
 
-    /// Reads the state of each SubDevice.
+    /// Reads the state of each SubDevice, also of those that have failed: they may have lost their addresses.
     async fn read_states(&mut self) {
         self.next_routine = self.bus.now() + ROUTINE;
-        let settled = self.segment.view().settled();
+        let kept = self.segment.view().kept();
         let readings: Vec<StateRead> = self
             .bus
-            .gather(settled, |bus, (key, attempt)| async move {
+            .gather(kept, |bus, (key, attempt)| async move {
                 StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
             })
             .await;

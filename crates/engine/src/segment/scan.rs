@@ -22,6 +22,13 @@ pub struct Scan {
     pub redundant_count: usize,
 }
 
+impl Scan {
+    /// Of a segment that does not answer.
+    pub(crate) fn nothing() -> Scan {
+        Scan { subdevices: Vec::new(), topology: Topology::build(&[], 0), main_count: 0, redundant_count: 0 }
+    }
+}
+
 /// The SubDevices that the last scan found. Members and SubDevices without a declaration share their data with it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]

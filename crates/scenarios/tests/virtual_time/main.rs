@@ -4,6 +4,7 @@
 
 mod break_places;
 mod broken_ring;
+mod calls;
 mod calm;
 mod captures;
 mod clock_captures;

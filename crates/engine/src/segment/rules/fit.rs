@@ -11,8 +11,10 @@ pub(super) fn fit(segment: &Segment, it: UnassignedView<'_>, index: usize) -> Fi
     let Some(info) = it.knowledge.info() else { return Fit::Unreadable };
     let identity = &info.identity;
     let mark_fits = match member.config.address {
+        // One that was here before is known by its identity, wherever positions are counted from meanwhile.
+        ConfigAddress::Alias { alias: 0, offset } => member.info.is_some() || it.position.0 == offset,
         address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
-            matches!(address, ConfigAddress::Alias { alias: 0, .. }) || address.is_mark_of(info)
+            address.is_mark_of(info)
         }
         ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => true,
     };

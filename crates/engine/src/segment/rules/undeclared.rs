@@ -61,6 +61,11 @@ impl Segment {
         self.upkeeps().filter(|(_, it)| it.is_settled()).map(|(key, it)| (key, it.attempt)).collect()
     }
 
+    /// All with a requested state, reached or not, with the numbers of their last attempts.
+    pub fn kept(&self) -> Vec<(SubDeviceKey, u32)> {
+        self.upkeeps().map(|(key, it)| (key, it.attempt)).collect()
+    }
+
     /// Station addresses of the others.
     pub fn unsettled(&self) -> Vec<StationAddress> {
         self.upkeeps().filter(|(_, it)| !it.is_settled()).map(|(key, _)| key.station).collect()

@@ -1,0 +1,117 @@
+//! Calls of distributed clocks: times given before activation, in the cycle, late or never; SYNC signals that end with
+//! the application.
+
+use ringcat_sim::cable::DeviceIndex;
+use scenarios::calls::errno::Errno;
+use scenarios::calls::master::Ecrt;
+use scenarios::pulses::Pulses;
+
+use super::{assert_idle, configure, requested, run_all};
+
+/// Longest start with clocks: 5 s without a lock, as with IgH.
+const WITH_CLOCKS: std::time::Duration = std::time::Duration::from_secs(12);
+const CYCLE_NS: u32 = 1_000_000;
+const ASSIGN: u16 = 0x0300;
+
+/// SYNC0 pulses of the first device so far.
+fn pulses(ecrt: &mut Ecrt) -> u64 {
+    let network = ecrt.network();
+    network.device(DeviceIndex(0)).controller.sync0_pulses(network.now())
+}
+
+// covers: api, dc-sync, dc-reference
+#[test]
+fn sync_pulses_run_with_the_application_and_end_with_it() {
+    for (count, mut ecrt) in requested() {
+        for (given_before, loops_first) in [(true, 0), (false, 0), (false, 300)] {
+            let (_, configs) = configure(&mut ecrt, 0..count);
+            ecrt.dc(configs[0], ASSIGN, CYCLE_NS, 250_000);
+            if given_before {
+                let time = ecrt.application_clock();
+                ecrt.application_time(time);
+            }
+            ecrt.activate().expect("it fits");
+            // Without any time for a while, then in each cycle.
+            for _ in 0..loops_first {
+                ecrt.receive();
+                ecrt.send();
+                ecrt.pause(scenarios::calls::cycle::PERIOD);
+            }
+            let time = ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{count}: {error}"));
+            let before = pulses(&mut ecrt);
+            ecrt.cycles(100);
+            let text = format!("{count}: given before {given_before}, {loops_first} cycles without, OP after {time:?}");
+            assert!(pulses(&mut ecrt) >= before + 99, "{text}");
+            assert!(ecrt.reference_clock_time().is_ok(), "{text}");
+            ecrt.sync_monitor_queue().expect("there are clocks");
+            assert_eq!(ecrt.sync_monitor_process(), u32::MAX, "no answer yet");
+            ecrt.cycle();
+            assert_ne!(ecrt.sync_monitor_process(), u32::MAX, "{text}");
+            println!("{text}");
+            ecrt.deactivate().expect("all follow");
+            assert_idle(&mut ecrt, &text);
+            let before = pulses(&mut ecrt);
+            ecrt.pause(std::time::Duration::from_millis(50));
+            assert!(pulses(&mut ecrt) <= before, "{text}");
+        }
+        // Without clocks in the configuration.
+        run_all(&mut ecrt, count);
+        assert_eq!(ecrt.sync_reference_clock(), Err(Errno::NxIo));
+        assert_eq!(ecrt.sync_slave_clocks(), Err(Errno::NxIo));
+        assert_eq!(ecrt.reference_clock_time(), Err(Errno::NxIo));
+        ecrt.deactivate().expect("all follow");
+        assert_idle(&mut ecrt, "without clocks");
+    }
+}
+
+/// Seconds from 2000 to 2026: CLOCK_REALTIME instead of CLOCK_MONOTONIC.
+const FAR_NS: u64 = 820_000_000_000_377_123;
+/// Time in which pulses are at their phase again: half a cycle at 200 ppm, and 2.5 s.
+const PHASE: usize = 5_000;
+
+/// The program gives another clock from one cycle to the next. No pulse is missing, all stay in OP, and after 5 s the
+/// pulses are at their phase in the new time.
+// covers: 7.3, api, dc-reference, dc-sync
+#[test]
+fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_5_s() {
+    for (count, mut ecrt) in requested().filter(|(count, _)| [1, 12].contains(count)) {
+        for jump in [FAR_NS, FAR_NS.wrapping_neg(), 499_000] {
+            let (_, configs) = configure(&mut ecrt, 0..count);
+            let synced: Vec<usize> = (0..count).filter(|at| [0, 7].contains(at)).collect();
+            synced.iter().for_each(|at| ecrt.dc(configs[*at], ASSIGN, CYCLE_NS, 250_000));
+            let time = ecrt.application_clock();
+            ecrt.application_time(time);
+            ecrt.activate().expect("it fits");
+            ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{count}: {error}"));
+            ecrt.cycles(8_000);
+            let mut pulses = Pulses::new(ecrt.network(), synced, CYCLE_NS.into());
+            let phase = |pulses: &Pulses, base: u64| {
+                let next = pulses.devices()[0].next.expect("it pulses").0;
+                next.wrapping_add(base) as i64 - time as i64
+            };
+            let cycle = i64::from(CYCLE_NS);
+            let before = phase(&pulses, ecrt.clock_base);
+            ecrt.clock_base = ecrt.clock_base.wrapping_add(jump);
+            let (mut apart, mut off) = (0, 0);
+            for number in 0..PHASE + 500 {
+                ecrt.cycle();
+                pulses.observe(ecrt.network());
+                apart = apart.max(pulses.apart_ns().expect("all pulse"));
+                if number >= PHASE {
+                    let now = phase(&pulses, ecrt.clock_base).wrapping_sub(before).rem_euclid(cycle);
+                    off = off.max(now.min(cycle - now));
+                }
+            }
+            let (worst, fewest) = (pulses.worst_ns(), pulses.fewest());
+            let text = format!("{count}, jump of {} ns", jump as i64);
+            println!("{text}: {off} ns from the phase, {worst} ns from the cycle, {apart} ns apart, {fewest} pulses");
+            assert!(off <= 20_000, "{text}: {off} ns from the phase");
+            // The control loop of the reference runs at its limit meanwhile.
+            assert!(worst <= 2_000 && apart <= 80_000, "{text}: {worst} ns, {apart} ns");
+            assert!(fewest >= PHASE as u64 + 495, "{text}: {fewest} pulses");
+            assert!(ecrt.is_running(), "{text}: {}", ecrt.describe());
+            ecrt.deactivate().expect("all follow");
+            assert_idle(&mut ecrt, &text);
+        }
+    }
+}
