@@ -6,6 +6,7 @@ pub mod history;
 mod log;
 mod messages;
 mod subject;
+mod timed;
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -22,6 +23,7 @@ pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
 pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
 pub use subject::{Subject, Subjects};
+pub use timed::TimedEvent;
 
 pub use crate::ring_status::Occupant;
 
@@ -32,38 +34,7 @@ use crate::info::IdentityField;
 use crate::link::Link;
 use crate::ring::FrameLimit;
 use crate::ring_status::{Cable, CableErrors, RedundancyLoss};
-use crate::time::Instant;
 use crate::topology::{Closing, PortOf};
-
-/// An event with its time.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct TimedEvent {
-    /// Its number: events are numbered from 0 in the order in which the engine reports them. A jump means that events
-    /// in between were not kept.
-    pub number: u64,
-    /// The `now` of the call in which the engine detected it.
-    pub at: Instant,
-    /// What happened.
-    pub event: Event,
-    /// The SubDevices at the cabling positions that the event names, if known, at that time; for a cable: at its near
-    /// end, and at its far end.
-    pub occupants: [Option<Occupant>; 2],
-}
-
-impl TimedEvent {
-    /// An event without SubDevices at cabling positions, with number 0.
-    pub const fn new(at: Instant, event: Event) -> TimedEvent {
-        TimedEvent { number: 0, at, event, occupants: [None; 2] }
-    }
-
-    /// The same event with the SubDevices at its cabling positions.
-    #[must_use]
-    pub const fn with_occupants(mut self, occupants: [Option<Occupant>; 2]) -> TimedEvent {
-        self.occupants = occupants;
-        self
-    }
-}
 
 /// All events. Declared SubDevices are named by their index in the declaration, others by position.
 #[derive(Clone, Debug, PartialEq)]

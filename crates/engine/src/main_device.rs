@@ -36,6 +36,7 @@ mod registered_area;
 mod registration;
 mod repeats;
 mod sampling;
+mod scanning;
 mod sent_once;
 mod services;
 pub mod snapshot;
@@ -47,7 +48,6 @@ mod working_counters;
 
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
-use alloc::string::ToString;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::future::Future;
@@ -77,7 +77,6 @@ pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
-use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::link::{Link, LinkSet};
 use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
@@ -85,7 +84,7 @@ use crate::mail::relay::GatewayQueue;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::reconcile_without_application;
-use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
+use crate::procedures::scan::ScanError;
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
@@ -186,68 +185,9 @@ impl MainDevice {
         main_device
     }
 
-    /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
-    pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        self.begin_scan(self.options.sii_extent.unwrap_or_default())
-    }
-
-    /// As [`MainDevice::start_scan`]; of the SIIs it reads what operation needs, unless the options name an extent.
-    pub fn start_scan_for_operation(&mut self) -> Result<(), ActivateError> {
-        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation))
-    }
-
-    fn begin_scan(&mut self, extent: SiiExtent) -> Result<(), ActivateError> {
-        self.permit(Function::Scan)?;
-        if self.segment.view().is_scanning() {
-            return Err(ActivateError::Scanning);
-        }
-        self.segment.observe(Observation::ScanBegun);
-        *self.scan_error.borrow_mut() = None;
-        self.emergencies.borrow_mut().forget_positions();
-        let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let (options, requested) = (self.scan_options(extent), self.scan_requested.clone());
-        requested.set(true);
-        self.supervisor.spawn(async move {
-            let result = scan(&bus, &options).await;
-            requested.set(false);
-            let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
-            segment.observe(Observation::ScanEnded(ended));
-        });
-        self.begin_idle();
-        Ok(())
-    }
-
-    fn scan_options(&self, extent: SiiExtent) -> ScanOptions {
-        ScanOptions {
-            settle: self.options.settle,
-            patience: self.options.patience,
-            extent,
-            cache: self.cache.clone(),
-            junctions: self.options.junctions,
-            pdos: self.options.pdos,
-            enhanced_line_crossed: self.options.enhanced_line_crossed,
-        }
-    }
-
     /// The shared model, while an application is active.
     fn active(&self) -> Option<&SharedSegment> {
         self.segment.view().is_active().then_some(&self.segment)
-    }
-
-    /// The result of the last scan, once it has ended.
-    pub fn scan_result(&self) -> Option<Result<Scan, ScanError>> {
-        if let Some(error) = *self.scan_error.borrow() {
-            return Some(Err(error));
-        }
-        self.segment.view().found().map(|found| Ok(found.scan()))
-    }
-
-    /// SubDevices of the last scan; empty before a successful scan, and in role INACTIVE.
-    pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
-        if self.permit(Function::SubDeviceInfo).is_err() {
-            return Vec::new();
-        }
-        self.segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default()
     }
 
     /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower

@@ -75,11 +75,8 @@ impl MainDevice {
         let repeats = repeats::rules(&repeats);
         exchange.send_lost_frames_again(&layout, &repeats, |domain| sends_again.get(domain.0) == Some(&true));
         if let Some(config) = &clock_config {
-            exchange.set_up_clocks(ClockSetup {
-                epoch: config.epoch,
-                bus_shift: config.bus_shift,
-                sync_window_ns: config.sync_window_ns,
-            });
+            let ClockConfig { epoch, bus_shift, sync_window_ns, .. } = *config;
+            exchange.set_up_clocks(ClockSetup { epoch, bus_shift, sync_window_ns });
         }
         let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
         let closings = loaded.closings(&topology, &subdevices, &stations);

@@ -67,7 +67,6 @@ impl Segment {
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
             Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
-
             Observation::Wanted(wanted) => self.slot.want(wanted),
             Observation::Undisturbed(number) => self.slot.end(number),
             Observation::Isolated { versions, found, words } => {

@@ -36,8 +36,8 @@ pub enum UndeclaredObservation<'a> {
     KeepingBegun,
     /// Each of them without a requested state is to go to PREOP.
     TakenOver,
-    /// Another process has kept some of them in their states: this one goes on with these. The others are to go to PREOP
-    /// if SubDevices are kept in their requested states.
+    /// Another process has kept some of them in their states: this one goes on with these. The others are to go to
+    /// PREOP if SubDevices are kept in their requested states.
     HandedOver(&'a [KeptState]),
     /// The time has come at which attempts are due.
     AttemptsDue,
