@@ -30,6 +30,7 @@ pub enum UpkeepProgress {
 
 /// Why an attempt has failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AttemptFailure {
     /// Frames were lost: the SubDevice has not refused anything.
     pub is_of_bus: bool,
