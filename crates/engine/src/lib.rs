@@ -48,7 +48,7 @@ pub(crate) mod topology;
 
 pub use board::Board;
 pub use clocks::{DelayRange, Follower, phase_error};
-pub use junction::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
+pub use junction::{ClosingEvidence, HEAD_PORT, JunctionConnection, JunctionError, JunctionMode, START_PORT};
 pub use plan::{
     AreaPlan, MappedEntry, MappedPdo, PlanError, PlanFault, PlanProblem, PlanWarning, SmPlan, SubDevicePlan, plan,
 };

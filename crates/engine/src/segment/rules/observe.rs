@@ -46,7 +46,6 @@ impl Segment {
             Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
             Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
             Observation::IncidentsForgotten => self.forget_incidents(),
-
             Observation::Places { versions, view } => self.observe_places(versions, view),
             Observation::Readdressing(old) => self.observe_readdressing(old),
             Observation::Offered(station) => self.addresses.offered(station),
