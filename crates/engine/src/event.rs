@@ -102,6 +102,15 @@ pub enum Event {
         /// SubDevices that are no longer there.
         removed: usize,
     },
+    /// The MainDevice goes on with a segment that another process has known, without a scan.
+    Resumed {
+        /// SubDevices now.
+        subdevices: usize,
+        /// SubDevices that go on as they are, in their states.
+        in_state: usize,
+        /// The segment was not as known: what differs was scanned.
+        differs: bool,
+    },
     /// A SubDevice without a declaration did not reach its requested state.
     UndeclaredFailed {
         /// Position.

@@ -90,6 +90,12 @@ impl Layout {
         Ok(layout)
     }
 
+    /// Number of process data datagrams of each domain.
+    pub fn datagrams(&self) -> impl Iterator<Item = usize> {
+        let of_domain = |domain: &PlannedDomain| domain.frames.iter().map(|frame| frame.datagrams.len()).sum();
+        self.domains.iter().map(of_domain)
+    }
+
     /// Logical address of the byte in which a SubDevice shows its AL status; `None` where it has none.
     pub fn presence(&self, subdevice: usize) -> Option<LogicalAddress> {
         let presences =

@@ -29,6 +29,7 @@ pub mod event;
 pub mod exchange;
 pub mod info;
 pub(crate) mod junction;
+pub mod knowledge;
 pub mod layout;
 pub mod link;
 pub mod mail;

@@ -18,6 +18,7 @@ mod ethernet;
 mod found;
 mod function;
 mod gateway;
+mod handover;
 mod idle;
 mod image_memory;
 mod live_status;
@@ -71,12 +72,12 @@ pub use sent_once::SentOnce;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
-pub use crate::role::{Denial, Function, MainDevicePhase, NotPermitted, Permission, Role};
+pub use crate::role::{Denial, Function, MainDevicePhase, MainDeviceRole, NotPermitted, Permission};
 pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
-use crate::info::SubDeviceInfo;
+use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::link::{Link, LinkSet};
 use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
@@ -187,6 +188,15 @@ impl MainDevice {
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or_default())
+    }
+
+    /// As [`MainDevice::start_scan`]; of the SIIs it reads what operation needs, unless the options name an extent.
+    pub fn start_scan_for_operation(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation))
+    }
+
+    fn begin_scan(&mut self, extent: SiiExtent) -> Result<(), ActivateError> {
         self.permit(Function::Scan)?;
         if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
@@ -195,7 +205,7 @@ impl MainDevice {
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let (options, requested) = (self.scan_options(), self.scan_requested.clone());
+        let (options, requested) = (self.scan_options(extent), self.scan_requested.clone());
         requested.set(true);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
@@ -207,11 +217,11 @@ impl MainDevice {
         Ok(())
     }
 
-    fn scan_options(&self) -> ScanOptions {
+    fn scan_options(&self, extent: SiiExtent) -> ScanOptions {
         ScanOptions {
             settle: self.options.settle,
             patience: self.options.patience,
-            extent: self.options.sii_extent,
+            extent,
             cache: self.cache.clone(),
             junctions: self.options.junctions,
             pdos: self.options.pdos,
@@ -262,9 +272,11 @@ impl MainDevice {
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
         let (role, are_reported) = (self.role(), self.supervisor.bus().are_commands_reported());
+        let sequence = self.supervisor.sequence();
         self.supervisor = supervisor(self.identity, &self.options, now);
         self.supervisor.set_role(role);
         self.supervisor.set_command_reports(are_reported);
+        self.supervisor.go_on_from(sequence);
         self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());

@@ -26,6 +26,7 @@ pub(crate) mod reconcile;
 pub mod recover;
 pub(crate) mod request_state;
 pub mod request_states;
+pub(crate) mod resume;
 pub(crate) mod sample;
 pub mod scan;
 pub mod serve_requests;

@@ -19,10 +19,10 @@ pub enum MainDevicePhase {
     Operation,
 }
 
-/// Role of the MainDevice on its segment (protocol 9.11).
+/// MainDeviceRole of the MainDevice on its segment (protocol 9.11).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Role {
+pub enum MainDeviceRole {
     /// It controls the segment.
     #[default]
     Active,
@@ -31,11 +31,11 @@ pub enum Role {
     Inactive,
 }
 
-impl fmt::Display for Role {
+impl fmt::Display for MainDeviceRole {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Role::Active => "ACTIVE",
-            Role::Inactive => "INACTIVE",
+            MainDeviceRole::Active => "ACTIVE",
+            MainDeviceRole::Inactive => "INACTIVE",
         })
     }
 }
@@ -157,7 +157,7 @@ pub struct NotPermitted {
     /// The function.
     pub function: Function,
     /// The role of the MainDevice.
-    pub role: Role,
+    pub role: MainDeviceRole,
     /// The reason.
     pub denial: Denial,
 }
@@ -217,13 +217,13 @@ impl Function {
     }
 
     /// Whether it can be called in a role, while the MainDevice is in a phase.
-    pub const fn permission(self, role: Role, phase: MainDevicePhase) -> Permission {
+    pub const fn permission(self, role: MainDeviceRole, phase: MainDevicePhase) -> Permission {
         let Row { orphaned, idle, operation } = self.row();
         match (role, phase) {
-            (Role::Inactive, _) if self.needs_the_bus() => Permission::Refused,
-            (Role::Active | Role::Inactive, MainDevicePhase::Orphaned) => orphaned,
-            (Role::Active | Role::Inactive, MainDevicePhase::Idle) => idle,
-            (Role::Active | Role::Inactive, MainDevicePhase::Operation) => operation,
+            (MainDeviceRole::Inactive, _) if self.needs_the_bus() => Permission::Refused,
+            (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Orphaned) => orphaned,
+            (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Idle) => idle,
+            (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Operation) => operation,
         }
     }
 
@@ -231,12 +231,12 @@ impl Function {
     ///
     /// # Errors
     /// [`NotPermitted`].
-    pub fn check_role(self, role: Role) -> Result<(), NotPermitted> {
+    pub fn check_role(self, role: MainDeviceRole) -> Result<(), NotPermitted> {
         match role {
-            Role::Inactive if self.needs_the_bus() => {
+            MainDeviceRole::Inactive if self.needs_the_bus() => {
                 Err(NotPermitted { function: self, role, denial: Denial::NeedsTheBus })
             }
-            Role::Active | Role::Inactive => Ok(()),
+            MainDeviceRole::Active | MainDeviceRole::Inactive => Ok(()),
         }
     }
 
@@ -244,7 +244,7 @@ impl Function {
     ///
     /// # Errors
     /// [`NotPermitted`].
-    pub fn check(self, role: Role, phase: MainDevicePhase) -> Result<(), NotPermitted> {
+    pub fn check(self, role: MainDeviceRole, phase: MainDevicePhase) -> Result<(), NotPermitted> {
         self.check_role(role)?;
         let denial = match self.permission(role, phase) {
             Permission::Allowed => return Ok(()),

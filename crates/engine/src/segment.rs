@@ -68,7 +68,7 @@ pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
-pub use undeclared::{AttemptFailure, StateRead, UndeclaredObservation, UpkeepProgress};
+pub use undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, UpkeepProgress};
 pub use versions::Versions;
 
 #[cfg(test)]

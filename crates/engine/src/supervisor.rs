@@ -49,8 +49,8 @@ use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
-use crate::ring::{Class, Classified, Identity, RingState};
-use crate::role::Role;
+use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
+use crate::role::MainDeviceRole;
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
@@ -78,6 +78,22 @@ impl Supervisor {
         self.shared.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
     }
 
+    /// Sequence number of the last frame.
+    pub(crate) fn sequence(&self) -> Sequence {
+        self.shared.borrow().flights.sequence()
+    }
+
+    /// Goes on with the sequence numbers of another supervisor, before the first frame: a frame of that one that comes
+    /// back late is none of this one.
+    pub(crate) fn go_on_from(&mut self, sequence: Sequence) {
+        self.shared.borrow_mut().flights.go_on_from(sequence);
+    }
+
+    /// Goes on with the state of the ring that another process has known, before the first frame.
+    pub(crate) fn assume_ring(&mut self, ring: RingState) {
+        self.shared.borrow_mut().monitor = RingMonitor::of(ring);
+    }
+
     /// Attaches the board of the exchange; from now on [`Bus::ring`] returns the ring state that the exchange posts.
     pub fn attach(&mut self, board: Arc<Board>) {
         let shared = &mut *self.shared.borrow_mut();
@@ -90,13 +106,13 @@ impl Supervisor {
         self.shared.borrow_mut().bell = bell;
     }
 
-    /// Role of the MainDevice.
-    pub fn role(&self) -> Role {
+    /// MainDeviceRole of the MainDevice.
+    pub fn role(&self) -> MainDeviceRole {
         self.shared.borrow().role
     }
 
     /// Sets the role of the MainDevice.
-    pub fn set_role(&mut self, role: Role) {
+    pub fn set_role(&mut self, role: MainDeviceRole) {
         self.shared.borrow_mut().role = role;
     }
 

@@ -1,7 +1,7 @@
 //! Cycles in their own thread, beside the supervisor thread.
 //!
-//! The thread runs a closure of the application in each cycle. Other threads read [`CyclicStatus`], and call services of
-//! the supervisor thread.
+//! The thread runs a closure of the application in each cycle. Other threads read [`CyclicStatus`], and call services
+//! of the supervisor thread.
 //!
 //! A panic of the closure does not stop the bus: cycles continue with zero outputs until [`CyclicThread::end`] returns
 //! the application and the panic message, for an orderly stop.

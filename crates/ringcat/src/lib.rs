@@ -55,6 +55,7 @@
 
 pub mod acyclic;
 pub mod application;
+mod bring_up;
 mod cyclic;
 pub mod cyclic_thread;
 #[cfg(feature = "eni")]
@@ -159,6 +160,7 @@ pub use ringcat_engine::event::{
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
+pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};
@@ -180,7 +182,7 @@ pub use ringcat_engine::main_device::{
     MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
     SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
-pub use ringcat_engine::main_device::{Denial, NotPermitted, Role};
+pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };

@@ -11,6 +11,7 @@ use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
+use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
@@ -42,9 +43,10 @@ use crate::window::{DEFAULT_BUDGET, Window};
 pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
-    /// How much of each SII a scan reads. With less than the default, SubDevices are sooner in OP; the rest is read in
-    /// the background afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
-    pub sii_extent: SiiExtent,
+    /// How much of each SII a scan reads. `None`, the default: all of it in [`MainDevice::scan`], what operation needs
+    /// in [`MainDevice::bring_up`]. The less, the sooner SubDevices are in OP; the rest is read in the background
+    /// afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
+    pub sii_extent: Option<SiiExtent>,
     /// SubDevices with dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
@@ -84,7 +86,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             sii_cache: true,
-            sii_extent: SiiExtent::default(),
+            sii_extent: None,
             pdos: ReadPdos::default(),
             supervision: true,
             source_address: MacCodec::FlagsFirst,
@@ -112,7 +114,7 @@ impl Options {
     /// Sets [`Options::sii_extent`].
     #[must_use]
     pub fn with_sii_extent(mut self, sii_extent: SiiExtent) -> Options {
-        self.sii_extent = sii_extent;
+        self.sii_extent = Some(sii_extent);
         self
     }
 
@@ -249,8 +251,13 @@ impl<L: Links> MainDevice<L> {
     ///
     /// # Errors
     /// As [`MainDevice::scan`].
-    pub fn scan_with(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
+    pub fn scan_with(&mut self, on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         self.engine.start_scan()?;
+        self.finish_scan(on_event)
+    }
+
+    /// Waits for the end of a scan that the engine has begun.
+    pub(crate) fn finish_scan(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         loop {
             self.work();
             while let Some(event) = self.engine.pop_event(self.links.now()) {
@@ -261,6 +268,32 @@ impl<L: Links> MainDevice<L> {
             }
             self.wait();
         }
+    }
+
+    /// Goes on with a segment that another process has known, without a scan ([`Engine::resume`]). Returns what was
+    /// found; nothing was read again that is as known.
+    ///
+    /// # Errors
+    /// [`Error::Scan`]: no SubDevice answers within [`Options::patience`], or the segment does not become stable.
+    pub fn resume(&mut self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.engine.resume(knowledge, handover)?;
+        loop {
+            self.work();
+            if let Some(result) = self.engine.scan_result() {
+                return Ok(result?);
+            }
+            self.wait();
+        }
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    pub fn knowledge(&self) -> Option<Knowledge> {
+        self.engine.knowledge()
+    }
+
+    /// The links, when another process goes on with the segment: this MainDevice ends without a frame.
+    pub fn into_links(self) -> L {
+        self.links
     }
 
     /// Inspects the ring without changing anything on it: counts, cabling, the place of a break, error counters.
@@ -334,7 +367,8 @@ impl<L: Links> MainDevice<L> {
         self.finish(work)
     }
 
-    pub(crate) fn engine_mut(&mut self) -> &mut Engine {
+    /// The engine, for functions without a method here.
+    pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 

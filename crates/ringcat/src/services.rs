@@ -20,7 +20,8 @@ use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, LogFilter, Mess
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
-    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram, Role,
+    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, MainDeviceRole, Pending, Permission,
+    RawDatagram,
 };
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 use ringcat_engine::{BusError, Reply};
@@ -188,13 +189,13 @@ pub trait Services: Sized {
     }
 
     /// The role of the MainDevice on the segment.
-    fn role(self) -> Self::Immediate<Role> {
+    fn role(self) -> Self::Immediate<MainDeviceRole> {
         self.immediately(|engine| engine.role())
     }
 
-    /// Sets the role: in [`Role::Inactive`] functions that need the bus are refused
+    /// Sets the role: in [`MainDeviceRole::Inactive`] functions that need the bus are refused
     /// ([`Function::needs_the_bus`]).
-    fn set_role(self, role: Role) -> Self::Immediate<()> {
+    fn set_role(self, role: MainDeviceRole) -> Self::Immediate<()> {
         self.immediately(move |engine| engine.set_role(role))
     }
 

@@ -21,6 +21,7 @@ use ringcat_engine::Scan;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
@@ -213,8 +214,13 @@ impl SupervisorThread {
     ///
     /// # Errors
     /// As [`SupervisorThread::scan`].
-    pub fn scan_while(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
+    pub fn scan_while(&self, meanwhile: impl FnMut()) -> Result<Scan, Error> {
         self.with(Engine::start_scan)??;
+        self.finish_scan(meanwhile)
+    }
+
+    /// Waits for the end of a scan that the engine has begun.
+    pub(crate) fn finish_scan(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
         let mut scan = self.ask(|engine| engine.scan_result());
         let result = loop {
             meanwhile();
@@ -224,6 +230,23 @@ impl SupervisorThread {
         };
         meanwhile();
         Ok(result?)
+    }
+
+    /// Goes on with a segment that another process has known, as [`crate::MainDevice::resume`].
+    ///
+    /// # Errors
+    /// As [`crate::MainDevice::resume`].
+    pub fn resume(&self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.with(move |engine| engine.resume(knowledge, handover))??;
+        Ok(self.ask(|engine| engine.scan_result()).wait()??)
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn knowledge(&self) -> Result<Option<Knowledge>, Error> {
+        self.with(|engine| engine.knowledge())
     }
 
     /// Lays out process data, starts the configuration of all SubDevices, and returns the running application. Its

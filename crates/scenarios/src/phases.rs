@@ -3,10 +3,12 @@
 //! In: a segment. Out: [`Phase`]s from power-on to all in OP, taken from the devices' own registers. In real time the
 //! number of sequential exchanges counts as well: each costs a round trip through two hosts.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Error, Instant, Link, Links, MainDevice, Options, automatic};
+use ringcat::{Application, Error, Instant, Link, Links, MainDevice, Options, Scan, automatic};
 use ringcat_sim::device::Device;
 use ringcat_sim::network::Network;
 use ringcat_wire::al::AlState;
@@ -56,6 +58,24 @@ pub struct Phase {
     pub frames: u64,
 }
 
+/// Brings all SubDevices of a segment to OP in one step ([`MainDevice::bring_up`]).
+///
+/// # Errors
+/// As [`MainDevice::bring_up`].
+///
+/// # Panics
+/// When it takes more than 20 s.
+pub fn bring_up(network: Network, options: &Options, period: Duration) -> Result<Vec<Phase>, Error> {
+    let links = Watched::new(network);
+    let scanned = links.scanned.clone();
+    let declare = |scan: &Scan| {
+        scanned.set(true);
+        automatic(&scan.subdevices, period)
+    };
+    let application = MainDevice::request(links, options).bring_up(declare)?;
+    Ok(until_op(application))
+}
+
 /// Scans a segment, declares all of it and cycles until all are in OP.
 ///
 /// # Errors
@@ -67,12 +87,15 @@ pub fn start_up(network: Network, options: &Options, period: Duration) -> Result
     let mut main_device = MainDevice::request(Watched::new(network), options);
     let found = main_device.scan()?;
     main_device.links_mut().reach(End::Scanned);
-    let mut application = main_device.activate(automatic(&found.subdevices, period))?;
+    Ok(until_op(main_device.activate(automatic(&found.subdevices, period))?))
+}
+
+fn until_op(mut application: Application<Watched>) -> Vec<Phase> {
     while application.links().phases.len() < ENDS.len() {
         application.cycle(|_| ());
         assert!(application.now() < Instant(0) + LIMIT, "{:?}", application.states());
     }
-    Ok(application.links().phases.clone())
+    application.links().phases.clone()
 }
 
 /// Links into a segment that observe wire and devices.
@@ -83,13 +106,22 @@ struct Watched {
     silent_since: Instant,
     current: Phase,
     phases: Vec<Phase>,
+    /// The application has got the result of the scan.
+    scanned: Rc<Cell<bool>>,
 }
 
 impl Watched {
     fn new(network: Network) -> Watched {
         let current = Phase { end: ENDS[0], at: Duration::ZERO, silent: Duration::ZERO, exchanges: 0, frames: 0 };
         let segment = SimulatedSegment::new(network);
-        Watched { silent_since: segment.now(), segment, under_way: 0, current, phases: Vec::new() }
+        Watched {
+            silent_since: segment.now(),
+            segment,
+            under_way: 0,
+            current,
+            phases: Vec::new(),
+            scanned: Rc::default(),
+        }
     }
 
     fn note_silence(&mut self) {
@@ -116,7 +148,7 @@ impl Watched {
         let all = |holds: fn(&Device, u8) -> bool, code| self.segment.network().devices().all(|it| holds(it, code));
         let reached = match end {
             End::Addressed => all(|device, _| device.controller.register(map::STATION_ADDRESS, 2) != [0, 0], 0),
-            End::Scanned => false,
+            End::Scanned => self.scanned.get(),
             End::State(state) => all(|device, code| device.al_status().state >= code, state.code()),
         };
         if reached {

@@ -34,6 +34,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["info", "link"]),
+    ("knowledge", &["direction", "info", "ring", "topology"]),
     ("ring_status", &["declared", "time", "link", "ring", "topology"]),
     ("config", &["declared", "info"]),
     ("clocks", &["topology"]),
@@ -48,14 +49,14 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
-    ("mail", &["declared", "time", "config", "event", "supervisor", "role"]),
-    ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
-        "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction",
-        "role"]),
+    ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
+    ("procedures", &["declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info", "topology",
+        "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail",
+        "request", "junction", "role"]),
     // both together
     ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
-        "topology", "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail",
-        "request", "junction", "role", "procedures"]),
+        "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
+        "supervisor", "mail", "request", "junction", "role", "procedures"]),
 ];
 
 /// The engine's sources.

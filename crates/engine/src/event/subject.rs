@@ -81,6 +81,7 @@ impl Event {
             | Event::ScanFinished { .. }
             | Event::ScanFailed { .. }
             | Event::SegmentChanged { .. }
+            | Event::Resumed { .. }
             | Event::SiiOddity { .. }
             | Event::DuplicateAlias { .. }
             | Event::Unexpected { .. }

@@ -224,13 +224,18 @@ impl LaneState {
 
     /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may arrive when it is reachable again.
     pub(super) fn suspend(&mut self, now: Instant) {
-        let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
-        let late_for = self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max();
+        let late_for = self.still_expected(now);
         let (mark, proven, expected) = (self.mark, self.proven, self.expected);
         let unanswered = self.is_unanswered(now).then_some(Instant::NEVER);
         self.reset();
         (self.mark, self.proven, self.late_for, self.expected) = (mark, proven, late_for, expected);
         self.unanswered_until = unanswered;
+    }
+
+    /// Time limit of an answer that may still arrive, and that no conversation may wait for any more.
+    pub(super) fn still_expected(&self, now: Instant) -> Option<Duration> {
+        let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
+        self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max()
     }
 
     /// The SubDevice is reachable again.

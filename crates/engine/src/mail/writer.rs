@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, Wkc};
-use ringcat_wire::mailbox::{Header, next_counter};
+use ringcat_wire::mailbox::Header;
 
 use super::error::MailboxError;
 use super::lane::{Lane, Outgoing};
@@ -82,7 +82,7 @@ fn next(shared: &Rc<SharedMailbox>, epoch: u32) -> Option<(Outgoing, Session)> {
         let Some(session) = state.session.as_mut().filter(|_| state.open) else { break };
         if let Some(message) = state.lanes[at].outbox.pop_front() {
             state.next_lane = (at + 1) % count;
-            session.counter = next_counter(session.counter);
+            session.count();
             return Some((message, *session));
         }
     }

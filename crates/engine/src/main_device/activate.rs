@@ -22,7 +22,7 @@ use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, PlannedDomain, Rules};
+use crate::layout::{DomainSpec, Layout, Rules};
 use crate::procedures::clocks;
 use crate::procedures::complete_siis::complete_in_background;
 use crate::procedures::error_statistics::ErrorStatistics;
@@ -69,8 +69,7 @@ impl MainDevice {
         let optional = subdevices.members().map(|member| member.config.optional).collect();
         let addresses = subdevices.members().map(|member| member.station).collect();
         let board = Board::new(count).with_optional(optional).with_stations(addresses);
-        let datagrams = |domain: &PlannedDomain| domain.frames.iter().map(|frame| frame.datagrams.len()).sum();
-        let board = Arc::new(board.with_commands(layout.domains.iter().map(datagrams)));
+        let board = Arc::new(board.with_commands(layout.datagrams()));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = self.exchange(&layout, board.clone(), producer);
         let repeats = repeats::rules(&repeats);

@@ -2,17 +2,17 @@
 //! ([`crate::role`]).
 
 use super::MainDevice;
-use crate::role::{Function, NotPermitted, Permission, Role};
+use crate::role::{Function, MainDeviceRole, NotPermitted, Permission};
 
 impl MainDevice {
-    /// Its role on the segment: [`Role::Active`] unless it was set.
-    pub fn role(&self) -> Role {
+    /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.
+    pub fn role(&self) -> MainDeviceRole {
         self.supervisor.role()
     }
 
     /// Sets the role. It decides which functions are refused from now on; procedures that run go on. A MainDevice with
-    /// a standby partner sets it at a takeover; alone on a segment it stays [`Role::Active`].
-    pub fn set_role(&mut self, role: Role) {
+    /// a standby partner sets it at a takeover; alone on a segment it stays [`MainDeviceRole::Active`].
+    pub fn set_role(&mut self, role: MainDeviceRole) {
         self.supervisor.set_role(role);
     }
 

@@ -56,7 +56,8 @@ impl MainDevice {
         if !self.options.idle_operation || self.segment.view().keeps_undeclared() {
             return;
         }
-        let (bus, segment, options) = (self.supervisor.bus(), self.segment.clone(), self.scan_options());
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         self.supervisor.spawn(keep(bus.clone(), segment.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
@@ -85,7 +86,7 @@ impl MainDevice {
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
-        let options = self.scan_options();
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
         let is_kept = self.options.idle_operation;
         if is_kept {
             segment.observe_undeclared(UndeclaredObservation::KeepingBegun);

@@ -25,7 +25,8 @@ pub struct Options {
     /// Whether SII contents are kept and used for SubDevices with the same first 64 words.
     pub sii_cache: bool,
     /// How much of each SII a scan reads; the rest follows in the background once all are in their target states.
-    pub sii_extent: SiiExtent,
+    /// `None`: all of it, and in [`MainDevice::start_scan_for_operation`](super::MainDevice) what operation needs.
+    pub sii_extent: Option<SiiExtent>,
     /// Dictionaries that are read for PDOs after a scan.
     pub pdos: ReadPdos,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
@@ -62,7 +63,7 @@ impl Options {
             redundant,
             codec: MacCodec::FlagsFirst,
             sii_cache: true,
-            sii_extent: SiiExtent::default(),
+            sii_extent: None,
             pdos: ReadPdos::default(),
             supervision: true,
             settle: Duration::from_millis(5),

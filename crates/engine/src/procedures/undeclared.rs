@@ -9,7 +9,7 @@ mod mailboxes;
 mod request;
 
 pub(super) use attempt::bring_undeclared;
-pub(super) use bring::keep_outputs;
+pub(super) use bring::{keep_outputs, unmap};
 pub(crate) use keep::{keep, settle};
 pub(crate) use mail::watch_undeclared_mail;
 pub(crate) use mailboxes::UndeclaredMailboxes;

@@ -283,6 +283,11 @@ impl Segment {
         self.crossings.reported()
     }
 
+    /// The temporary station address that was given last.
+    pub fn last_offered(&self) -> StationAddress {
+        self.addresses.last()
+    }
+
     /// How often the cabling of a rescan was taken over.
     pub fn adoptions(&self) -> u32 {
         self.adoptions

@@ -5,5 +5,5 @@ mod observation;
 mod upkeep;
 
 pub(super) use keeping::Keeping;
-pub use observation::{StateRead, UndeclaredObservation};
+pub use observation::{KeptState, StateRead, UndeclaredObservation};
 pub use upkeep::{AttemptFailure, Upkeep, UpkeepProgress};

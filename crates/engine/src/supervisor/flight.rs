@@ -1,6 +1,7 @@
 //! An acyclic frame on the wire, its datagrams, and the content of the copies received so far.
 
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
@@ -48,6 +49,8 @@ pub(super) struct Flight {
     pub reads: usize,
     /// All datagrams are answered; the flight is kept to recognise the second copy.
     pub answered: bool,
+    /// All its datagrams may be repeated.
+    pub repeatable: bool,
     /// Links on which copies are known not to return, a bit each.
     pub no_return: u8,
     /// No further copy is awaited because its link is silent: the flight does not count against the window.
@@ -66,6 +69,7 @@ impl Default for Flight {
             deadline: Instant::NEVER,
             reads: 0,
             answered: false,
+            repeatable: true,
             no_return: 0,
             released: false,
         }
@@ -80,7 +84,7 @@ impl Flight {
         self.bytes.clear();
         self.arrivals = Arrivals::default();
         self.reads = 0;
-        self.answered = false;
+        (self.answered, self.repeatable) = (false, true);
         (self.released, self.no_return) = (false, 0);
     }
 
@@ -149,6 +153,20 @@ impl Flight {
     /// The links with a copy that has not returned, a bit each.
     pub fn missing_links(&self, links: LinkSet) -> u8 {
         links.mask() & !self.arrivals.arrived
+    }
+
+    /// Whether replies of it are awaited that can be requested again without another effect.
+    pub fn awaits_repeatable(&self) -> bool {
+        self.repeatable && !self.answered && !self.released && self.no_return == 0
+    }
+
+    /// Whether copies of frames that were sent more than `margin` later have come back on the way of each missing copy,
+    /// which frames do not overtake each other on: it does not come back any more. `newest`: when the newest of these
+    /// was sent, by link.
+    pub fn is_overtaken(&self, newest: [Instant; 2], margin: Duration, links: LinkSet) -> bool {
+        let missing = self.missing_links(links);
+        let is_overtaken = |link: &Link| newest[link.index()] > self.sent_at + margin;
+        self.awaits_repeatable() && Link::ALL.iter().filter(|link| missing & link.bit() != 0).all(is_overtaken)
     }
 
     /// Whether one copy arrived on the other link and one on its own: the ring opened or closed meanwhile, and

@@ -27,6 +27,10 @@ pub(crate) struct Flights {
     in_flight: usize,
     /// No deadline is earlier.
     earliest: Instant,
+    /// No flight that awaits repeatable replies was sent earlier.
+    oldest: Instant,
+    /// When the newest frame was sent of which a copy has come back, by the link on which this was sent.
+    newest_back: [Instant; 2],
     /// Number of flights that no longer count against the window.
     released: usize,
     sequence: Sequence,
@@ -42,11 +46,23 @@ impl Flights {
             slots: (0..SLOTS).map(|_| None).collect(),
             in_flight: 0,
             earliest: Instant::NEVER,
+            oldest: Instant::NEVER,
+            newest_back: [Instant::default(); 2],
             released: 0,
             sequence: Sequence::default(),
             spare: Vec::new(),
             redundant: vec![0; MAX_FRAME].into_boxed_slice(),
         }
+    }
+
+    /// Number of the last frame.
+    pub(super) fn sequence(&self) -> Sequence {
+        self.sequence
+    }
+
+    /// The numbers go on behind this one: no frame is on the wire.
+    pub(super) fn go_on_from(&mut self, sequence: Sequence) {
+        self.sequence = sequence;
     }
 
     /// No flight has an earlier deadline; never if there is none. It may be that of an ended flight.
@@ -58,15 +74,18 @@ impl Flights {
     /// A flight begins.
     fn put(&mut self, flight: Flight) {
         self.earliest = self.next_deadline().min(flight.deadline);
+        self.oldest = if self.in_flight == 0 { flight.sent_at } else { self.oldest.min(flight.sent_at) };
         let slot = Flights::slot(flight.sequence);
         self.slots[slot] = Some(flight);
         self.in_flight += 1;
     }
 
-    /// Flights have ended or not: determines the earliest deadline.
+    /// Flights have ended or not: determines the earliest deadline, and when the oldest was sent.
     fn find_earliest(&mut self) {
-        let deadlines = self.slots.iter().flatten().map(|flight| flight.deadline);
-        self.earliest = deadlines.min().unwrap_or(Instant::NEVER);
+        let flights = self.slots.iter().flatten();
+        self.earliest = flights.clone().map(|flight| flight.deadline).min().unwrap_or(Instant::NEVER);
+        let repeatable = flights.filter(|flight| flight.awaits_repeatable());
+        self.oldest = repeatable.map(|flight| flight.sent_at).min().unwrap_or(Instant::NEVER);
     }
 
     fn slot(sequence: Sequence) -> usize {

@@ -25,7 +25,7 @@ use crate::board::Board;
 use crate::event::{Event, EventLog, Occupant};
 use crate::link::LinkSet;
 use crate::ring::{Identity, RingMonitor};
-use crate::role::Role;
+use crate::role::MainDeviceRole;
 use crate::time::Instant;
 
 pub(crate) struct Shared {
@@ -57,7 +57,7 @@ pub(crate) struct Shared {
     pub(super) bell: Bell,
     /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
-    pub(crate) role: Role,
+    pub(crate) role: MainDeviceRole,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -90,7 +90,7 @@ impl Shared {
             watchers: Watchers::default(),
             bell: Bell::default(),
             max_datagrams: usize::MAX,
-            role: Role::default(),
+            role: MainDeviceRole::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

@@ -9,7 +9,7 @@ use core::time::Duration;
 use proptest::prelude::*;
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
-use ringcat_wire::datagram::HEADER_LEN;
+use ringcat_wire::datagram::{HEADER_LEN, Target};
 use ringcat_wire::frame::{Frame, MacAddress};
 use ringcat_wire::register::map;
 use ringcat_wire::source_address::MacCodec;
@@ -148,23 +148,64 @@ fn a_working_counter_of_0_is_an_error_that_names_station_and_register() {
 
 // covers: SM-04, ring-merge
 #[test]
-fn a_lost_frame_is_repeated_seven_times_with_the_retry_index() {
+fn a_lost_frame_is_repeated_nine_times_with_the_retry_index() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     let result = bench.start(async move { bus.fprd(STATION, map::AL_STATUS, 2).await });
-    for retry in 0..=7 {
+    for retry in 0..=9 {
         bench.step();
         assert_eq!(bench.sent.len(), 1, "try {retry}");
-        // protocol SM-04: bits 6:4 of the first byte of the source address.
-        assert_eq!(bench.sent[0].1[6], retry << 4);
+        // protocol SM-04: bits 6:4 of the first byte of the source address, saturated.
+        assert_eq!(bench.sent[0].1[6], retry.min(7) << 4);
         bench.pass(Duration::from_millis(20));
     }
     bench.step();
     assert!(bench.sent.is_empty());
     let error = result.borrow().clone().unwrap().unwrap_err();
-    assert!(matches!(error, BusError::Lost { retries: 7, .. }), "{error}");
+    assert!(matches!(error, BusError::Lost { retries: 9, .. }), "{error}");
     let counters = bench.supervisor.counters();
-    assert_eq!((counters.lost, counters.resent, counters.timed_out), (8, 7, 1));
+    assert_eq!((counters.lost, counters.resent, counters.timed_out), (10, 9, 1));
+}
+
+/// Sends two frames with a read each, 150 us apart, and returns the second one after 100 us, at most on these links.
+/// One round trip of 100 us is known. Returns what the next step sends.
+fn overtaken(links: LinkSet, returned: &[Link], resend: bool) -> Vec<(Link, Vec<u8>)> {
+    let mut bench = Bench::new(links);
+    let read = |bench: &mut Bench, resend: bool| {
+        let (bus, target) = (bench.supervisor.bus(), Target::Station(STATION, map::AL_STATUS));
+        bench.start(async move {
+            match resend {
+                true => bus.transfer(Command::Fprd, target, vec![0; 2], Some(Wkc(1))).await.map(drop),
+                false => bus.transfer_once(Command::Fprd, target, vec![0; 2]).await.map(drop),
+            }
+        });
+        bench.step();
+        bench.sent.clone()
+    };
+    let copies = read(&mut bench, true);
+    bench.pass(Duration::from_micros(100));
+    for (link, frame) in &copies {
+        bench.supervisor.receive(*link, &answered(frame, 1, 0), bench.now);
+    }
+    read(&mut bench, resend);
+    bench.pass(Duration::from_micros(150));
+    let copies = read(&mut bench, true);
+    bench.pass(Duration::from_micros(100));
+    for (link, frame) in copies.iter().filter(|(link, _)| returned.contains(link)) {
+        bench.supervisor.receive(*link, &answered(frame, 1, 0), bench.now);
+    }
+    bench.step();
+    bench.sent
+}
+
+// covers: SM-04, ring-merge
+#[test]
+fn a_frame_is_lost_when_later_frames_have_come_back_on_all_its_ways() {
+    assert_eq!(overtaken(LinkSet::Single, &[Link::Main], true).len(), 1, "the first is sent again");
+    assert_eq!(overtaken(LinkSet::Single, &[], true).len(), 0);
+    assert_eq!(overtaken(LinkSet::Single, &[Link::Main], false).len(), 0, "it must not be repeated");
+    assert_eq!(overtaken(LinkSet::Ring, &Link::ALL, true).len(), 2);
+    assert_eq!(overtaken(LinkSet::Ring, &[Link::Main], true).len(), 0, "a copy on the other way may return");
 }
 
 #[test]

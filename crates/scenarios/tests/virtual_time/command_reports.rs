@@ -7,7 +7,7 @@ use ringcat::{
     Application, DomainId, Error, Event, Limits, LogFilter, MainDevice, Options, Position, SdoAddress, Services,
     SubDeviceId, Subject, Subjects, TimedEvent, automatic, text,
 };
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::address::{LogicalAddress, Wkc};
@@ -25,6 +25,10 @@ const LIMIT: Duration = Duration::from_secs(5);
 const LIMITS: Limits = Limits::new(Duration::from_secs(1), Duration::from_secs(5));
 
 type Links = Witness<Tap>;
+/// Byte 1 of the source address, and Idx.
+type FrameId = (u8, u8);
+/// Logical address and working counter.
+type Counters = Vec<(u32, u16)>;
 
 /// The last SubDevice but one has inputs.
 fn kinds(count: usize) -> Vec<&'static str> {
@@ -72,13 +76,13 @@ fn run(application: &mut Application<Links>, cycles: usize) -> Vec<TimedEvent> {
 
 /// Working counters of cyclic datagrams that came back, copies of a frame added, by logical address.
 fn seen(passed: &[Passed]) -> BTreeMap<u32, Vec<u16>> {
-    let mut frames: Vec<((u8, u8), Vec<(u32, u16)>)> = Vec::new();
+    let mut frames: Vec<(FrameId, Counters)> = Vec::new();
     let cyclic = passed.iter().filter(|it| !it.is_sent && class_of(&it.frame) == Some(Class::Cyclic));
     for Passed { frame, .. } in cyclic {
         let parsed = Frame::parse(frame).expect("it is intact");
         let logical =
             parsed.datagrams().filter(|it| matches!(it.header.command, Command::Lrd | Command::Lwr | Command::Lrw));
-        let counters: Vec<(u32, u16)> = logical.map(|it| (it.header.logical().0, it.wkc.0)).collect();
+        let counters: Counters = logical.map(|it| (it.header.logical().0, it.wkc.0)).collect();
         let id = (frame[7], frame[17]);
         match frames.iter_mut().rev().take(8).find(|(other, _)| *other == id) {
             Some((_, first)) => first.iter_mut().zip(counters).for_each(|(sum, (_, wkc))| sum.1 += wkc),

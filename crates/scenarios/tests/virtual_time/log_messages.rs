@@ -7,7 +7,7 @@ use ringcat::{
     AlState, Application, Error, LastOutputs, Link, LogFilter, LogLevel, MainDevice, Message, MessageContent, Options,
     Position, Services, StateScope, Subject, Subjects, automatic, text,
 };
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;

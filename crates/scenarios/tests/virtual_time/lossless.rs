@@ -13,6 +13,7 @@ use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use scenarios::check::Judged;
+use scenarios::one_buffer::{self, one_buffer};
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::World;
 
@@ -251,6 +252,48 @@ fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
         let whole = |judged: &&Judged| judged.status.state == DomainState::Complete;
         let missed = world.judged(mark).iter().filter(|judged| !whole(judged)).count();
         assert_eq!(missed, 1, "cable {cable}");
+    }
+}
+
+// covers: lost-frames
+#[test]
+fn process_data_of_one_buffer_subdevices_is_transferred_once_in_a_cycle() {
+    let kinds = ["digital-output-8", "digital-output-16", "digital-input-16", "analog-output-4", "analog-input-4"];
+    for first in [0, 1] {
+        for in_ring in [true, false] {
+            let mut described = descriptions(&kinds);
+            for number in (first..kinds.len()).step_by(2) {
+                described[number] = one_buffer(described[number].clone());
+            }
+            let options = NetworkOptions::default();
+            let network = if in_ring { ring(described, options) } else { line(described, options) };
+            let mut world = world(network, |scan| one_buffer::automatic(&scan.subdevices, MS));
+            world.compare_tries();
+            let mark = world.mark();
+            world.run_cycles(100);
+            assert_eq!(world.incomplete(mark), 0, "buffers are emptied and filled in each cycle");
+            world.judge_latched(false);
+            for cable in 1..kinds.len() {
+                for direction in Direction::ALL {
+                    let (before, spared) = (latched(&world), world.spared());
+                    let tries = world.application().cyclic_counters().sent_again;
+                    world.fault(Fault::Drop { cable: CableId(cable), direction: Some(direction), count: 1 });
+                    world.run_cycles(3);
+                    let what = format!("cable {cable}, {direction:?}, ring {in_ring}, every second from {first}");
+                    let taken: Vec<u64> =
+                        latched(&world).iter().zip(before).map(|(now, before)| now - before).collect();
+                    let most = |device: usize| if device % 2 == first { 3 } else { 4 };
+                    assert!((0..kinds.len()).all(|device| taken[device] <= most(device)), "{what}: {taken:?}");
+                    let sent_again = world.application().cyclic_counters().sent_again - tries;
+                    assert!(sent_again == 0 || world.spared() > spared, "{what}: their areas were not in the try");
+                    world.run_cycles(20);
+                }
+            }
+            assert!(world.application().cyclic_counters().sent_again > 3, "ring {in_ring}");
+            let mark = world.mark();
+            world.run_cycles(20);
+            assert_eq!((world.incomplete(mark), world.left_op(world.beginning())), (0, vec![]));
+        }
     }
 }
 

@@ -191,7 +191,7 @@ fn a_rescan_in_idle_succeeds_while_frames_are_lost_and_names_an_unplugged_segmen
 
 // covers: rescan
 #[test]
-fn a_rescan_without_an_application_and_without_idle_operation_is_refused_with_the_remedy() {
+fn a_rescan_without_application_and_idle_operation_is_refused_with_the_remedy() {
     let network = networks().into_iter().next().expect("one");
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
     main_device.scan().expect("it is stable");

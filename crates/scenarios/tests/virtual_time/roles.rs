@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ringcat::{
     Acknowledge, ActivateError, AlState, AlStatus, Application, ConfigureError, Declaration, EepromAssignment, Error,
-    Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase, NotPermitted,
-    Options, Pending, Position, RawDatagram, RegisterAddress, Role, SdoAddress, SdoFailure, ServiceError, Services,
-    StateScope, StatesError, StopError, Subjects,
+    Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase, MainDeviceRole,
+    NotPermitted, Options, Pending, Position, RawDatagram, RegisterAddress, SdoAddress, SdoFailure, ServiceError,
+    Services, StateScope, StatesError, StopError, Subjects,
 };
 use ringcat_engine::mail::coe::pdo_mail::{self, PdoMailError};
 use ringcat_engine::mail::coe::{self, information};
@@ -135,12 +135,12 @@ fn conversation(engine: &mut Engine, mailbox: Mailbox, lane: Lane) -> Answer {
 fn call_of_states(engine: &mut Engine, function: Function) -> Option<Answer> {
     Some(match function {
         Function::Ethernet => {
-            let is_refused = engine.role() == Role::Inactive && engine.ethernet_port(DRIVE).is_none();
+            let is_refused = engine.role() == MainDeviceRole::Inactive && engine.ethernet_port(DRIVE).is_none();
             unnamed(engine, function, is_refused)
         }
         Function::SubDeviceState => {
             let request = engine.start_state_request(DRIVE, AlState::PreOp);
-            if engine.role() == Role::Active {
+            if engine.role() == MainDeviceRole::Active {
                 return Some(now(engine, None));
             }
             engine.start(async move {
@@ -153,7 +153,7 @@ fn call_of_states(engine: &mut Engine, function: Function) -> Option<Answer> {
         }
         Function::StateOfAll => {
             let request = engine.start_state_of_all(AlState::PreOp, StateScope::All, LIMIT);
-            if engine.role() == Role::Active {
+            if engine.role() == MainDeviceRole::Active {
                 return Some(now(engine, None));
             }
             engine.start(async move {
@@ -288,11 +288,11 @@ fn call(engine: &mut Engine, function: Function) -> Answer {
 }
 
 /// The refusal is the one of the table, and names the function.
-fn judge(denied: Option<NotPermitted>, function: Function, role: Role, phase: MainDevicePhase) {
+fn judge(denied: Option<NotPermitted>, function: Function, role: MainDeviceRole, phase: MainDevicePhase) {
     assert_eq!(denied, function.check(role, phase).err(), "{function:?} in {role}, {phase:?}");
 }
 
-const ROLES: [Role; 2] = [Role::Active, Role::Inactive];
+const ROLES: [MainDeviceRole; 2] = [MainDeviceRole::Active, MainDeviceRole::Inactive];
 
 // covers: 9.11
 #[test]
@@ -334,20 +334,20 @@ fn role_inactive_sends_nothing_for_a_call_and_all_work_again_when_it_is_active()
     // The polls of a mailbox in use end with it.
     main_device.attend(LIMIT);
     for function in Function::ALL.iter().copied().filter(|function| function.needs_the_bus()) {
-        Services::set_role(&mut main_device, Role::Inactive);
+        Services::set_role(&mut main_device, MainDeviceRole::Inactive);
         frames.take();
         let denied = Services::call(&mut main_device, move |engine| call(engine, function)).expect("it is answered");
-        judge(denied, function, Role::Inactive, MainDevicePhase::Idle);
+        judge(denied, function, MainDeviceRole::Inactive, MainDevicePhase::Idle);
         main_device.attend(Duration::from_millis(20));
         let sent = frames.take().into_iter().filter(|passed| passed.is_sent).count();
         assert_eq!(sent, 0, "{function:?}");
-        Services::set_role(&mut main_device, Role::Active);
+        Services::set_role(&mut main_device, MainDeviceRole::Active);
         let states = main_device.subdevice(DRIVE).state().expect("it answers").0;
         assert_eq!(states, AlStatus::new(AlState::PreOp), "{function:?} has changed nothing");
         main_device.subdevice(DRIVE).sdo_read::<u32>(0x1018, 1).expect("it answers");
         main_device.attend(LIMIT);
     }
-    Services::set_role(&mut main_device, Role::Inactive);
+    Services::set_role(&mut main_device, MainDeviceRole::Inactive);
     let error = main_device.subdevice(DRIVE).sdo_read::<u32>(0x1018, 1).expect_err("it is refused");
     let text = error.to_string();
     assert!(text.contains("SdoTransfer is refused in role INACTIVE: it needs the bus"), "{text}");

@@ -4,7 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Application, Links, MainDevice, MapError, Options, Services, SiiExtent, SubDeviceId, SubDeviceInfo, automatic,
+    Application, Error, Links, MainDevice, MapError, Options, Scan, ScanError, Services, SiiExtent, SubDeviceId,
+    SubDeviceInfo, automatic,
 };
 use ringcat_engine::info::InfoWarning;
 use ringcat_sim::cable::DeviceIndex;
@@ -86,6 +87,55 @@ fn names_and_modes_follow_in_the_background_when_all_are_in_op() {
     }
     assert_eq!(from_sii(application.engine().subdevices()), expected);
     assert!(application.output_named::<i8>(DRIVE, "Mode of operation").is_ok());
+}
+
+// covers: scan
+#[test]
+fn a_start_in_one_step_reads_what_operation_needs_and_names_follow() {
+    let expected = from_sii(scanned(network(), SiiExtent::Complete).1);
+    for (extent, known) in [
+        (None, SiiExtent::Operation),
+        (Some(SiiExtent::Clocks), SiiExtent::Clocks),
+        (Some(SiiExtent::Complete), SiiExtent::Complete),
+    ] {
+        let mut options = Options::default();
+        options.sii_extent = extent;
+        let main_device = MainDevice::request(Tap::new(network()), &options);
+        let mut scanned = Vec::new();
+        let declare = |scan: &Scan| {
+            scanned.clone_from(&scan.subdevices);
+            automatic(&scan.subdevices, CYCLE)
+        };
+        let mut application = main_device.bring_up(declare).expect("nothing is lost");
+        assert!(scanned.iter().all(|info| info.extent == known), "{extent:?}");
+        assert_eq!(scanned[1].name.is_empty(), known < SiiExtent::Complete);
+        application.wait_until_op(LIMIT).expect("all reach OP");
+        let named = application.output_named::<i8>(DRIVE, "Mode of operation");
+        assert_eq!(named.is_ok(), known == SiiExtent::Complete, "{extent:?}");
+        let begin = application.now();
+        while application.engine().subdevices().iter().any(|info| info.extent < SiiExtent::Complete) {
+            application.cycle(|_| ());
+            assert!(application.now().since(begin) < Duration::from_secs(1), "{extent:?}");
+        }
+        assert_eq!(from_sii(application.engine().subdevices()), expected);
+        assert!(application.output_named::<i8>(DRIVE, "Mode of operation").is_ok());
+    }
+}
+
+// covers: scan
+#[test]
+fn a_start_in_one_step_that_fails_returns_the_main_device_for_another() {
+    let mut tap = Tap::new(network());
+    tap.network_mut().power_off(DeviceIndex(0));
+    let main_device = MainDevice::request(tap, &Options::default().with_patience(Duration::from_millis(50)));
+    let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
+    let refused = main_device.bring_up(declare).expect_err("nothing answers");
+    assert!(matches!(refused.error, Error::Scan(ScanError::NoAnswer)), "{}", refused.error);
+    let mut main_device = refused.main_device;
+    main_device.links_mut().network_mut().power_on(DeviceIndex(0));
+    let mut application = main_device.bring_up(declare).expect("all answer");
+    application.wait_until_op(LIMIT).expect("all reach OP");
+    assert_eq!(application.states().len(), KINDS.len());
 }
 
 // covers: scan

@@ -8,8 +8,8 @@ use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
-use scenarios::phases::{End, start_up};
-use scenarios::segments::{describe, descriptions, line, plant};
+use scenarios::phases::{ENDS, End, bring_up, start_up};
+use scenarios::segments::{describe, descriptions, drives, line, plant};
 use scenarios::tap::Tap;
 
 const KINDS: [&str; 5] = ["coupler", "digital-output-8", "servo", "digital-input-8", "digital-output-8"];
@@ -89,6 +89,19 @@ fn fifty_subdevices_are_in_op_after_52_ms_and_one_after_34() {
         let op = phases.iter().find(|phase| matches!(phase.end, End::State(ringcat_wire::al::AlState::Op)));
         let at = op.expect("the last phase").at;
         assert!(at <= Duration::from_millis(limit), "{count} SubDevices: {at:?}");
+    }
+}
+
+// covers: scan
+#[test]
+fn drives_are_in_op_after_25_to_40_ms_with_default_options_in_one_step() {
+    for (count, limit) in [(1, 25), (10, 30), (50, 35), (100, 40)] {
+        let phases = bring_up(drives(count), &Options::default(), Duration::from_millis(1)).expect("they start");
+        let ends: Vec<End> = phases.iter().map(|phase| phase.end).collect();
+        let last = phases.last().expect("all phases");
+        assert_eq!(ends, ENDS);
+        println!("{count} drives: {:?}", last.at);
+        assert!(last.at <= Duration::from_millis(limit), "{count} drives: {:?}", last.at);
     }
 }
 

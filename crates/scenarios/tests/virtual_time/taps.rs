@@ -8,7 +8,7 @@ use ringcat::{
     AlState, Application, Error, FrameDirection, FrameReader, Instant, LastOutputs, Link, Links, MainDevice, Options,
     Position, ServiceError, Services, Taps, automatic,
 };
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::{CableId, DeviceIndex, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};

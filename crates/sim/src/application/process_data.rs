@@ -118,14 +118,19 @@ impl ProcessData {
     /// AL events that require an exchange.
     pub fn events(&self) -> u32 {
         let outputs = self.layout.outputs.iter().filter(|area| area.event);
-        let inputs = self.layout.inputs.iter().filter(|area| area.event && self.varies());
+        let inputs = self.layout.inputs.iter().filter(|area| area.event && self.is_rewritten(area));
         outputs.chain(inputs).fold(0, |mask, area| mask | event_bit(area.sync_manager))
     }
 
     /// Whether a SyncManager raises no event and has to be checked after each frame.
     pub fn is_polled(&self) -> bool {
-        let silent = |areas: &[Area]| areas.iter().any(|area| !area.event);
-        silent(&self.layout.outputs) || self.varies() && silent(&self.layout.inputs)
+        let mut inputs = self.layout.inputs.iter().filter(|area| self.is_rewritten(area));
+        self.layout.outputs.iter().any(|area| !area.event) || inputs.any(|area| !area.event)
+    }
+
+    /// Whether inputs are written again after they were read: because they vary, or because the only buffer is empty.
+    fn is_rewritten(&self, area: &Area) -> bool {
+        self.varies() || area.one_buffer
     }
 
     fn varies(&self) -> bool {
@@ -213,13 +218,15 @@ impl ProcessData {
         if fresh && operating {
             self.latch(dictionary, now);
         }
-        let read = self.layout.inputs.iter().any(|area| !area.event || events & event_bit(area.sync_manager) != 0);
+        let is_read = |area: &&Area| !area.event || events & event_bit(area.sync_manager) != 0;
+        let read = self.layout.inputs.iter().any(|area| is_read(&area));
+        let is_empty = self.layout.inputs.iter().filter(is_read).any(|area| area.one_buffer);
         let due = match &self.source {
             Source::Terminal(InputSource::Constant(_)) => false,
             Source::Terminal(InputSource::Outputs) => fresh && operating,
             Source::Terminal(InputSource::Function(_)) | Source::Servo(_) => fresh || read,
         };
-        if due {
+        if due || is_empty {
             self.refresh(controller, now);
         }
     }

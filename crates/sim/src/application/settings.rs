@@ -5,7 +5,7 @@
 
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlStatusCode;
-use ringcat_wire::register::{SyncManager, SyncManagerDirection, SyncManagerMode, map};
+use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerDirection, SyncManagerMode, map};
 use ringcat_wire::sii::{MailboxLayout, SiiSyncManager, SyncManagerKind};
 
 use super::dictionary::Dictionary;
@@ -31,6 +31,8 @@ pub struct Area {
     pub event: bool,
     /// Whether it retriggers the process data watchdog.
     pub watchdog: bool,
+    /// Whether it has one buffer, as a mailbox: a read empties it, and only then it can be written again.
+    pub one_buffer: bool,
 }
 
 /// Areas of outputs and inputs.
@@ -124,7 +126,9 @@ pub fn process_data(
         if !running || manager.start != entry.start || u32::from(manager.length) != expected {
             return Err(wrong);
         }
-        if manager.control.mode != SyncManagerMode::Buffered || manager.control.direction != direction {
+        // Three buffers, unless the device has one buffer here.
+        let mode = SyncManagerControl::from_bits(entry.control).mode;
+        if manager.control.mode != mode || manager.control.direction != direction {
             return Err(AlStatusCode::INVALID_SYNC_MANAGER_TYPES);
         }
         areas.push(area(number, &manager));
@@ -161,6 +165,7 @@ fn area(number: u8, manager: &SyncManager) -> Area {
         length: manager.length,
         event: manager.control.pdi_event,
         watchdog: manager.control.watchdog,
+        one_buffer: manager.control.mode == SyncManagerMode::Mailbox,
     }
 }
 

@@ -4,6 +4,8 @@
 //! must have been read with equal contents before the cache is used for others: one bad EEPROM must not affect another
 //! SubDevice. If two differ, every SubDevice is read.
 
+mod handover;
+
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};

@@ -48,7 +48,7 @@ pub(super) async fn bring(
 }
 
 /// Clears what an application has left: FMMUs and SYNC signals.
-async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
+pub(in crate::procedures) async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
     let fmmus = Fmmu::LEN * usize::from(info.controller.fmmu_count);
     if fmmus > 0 {
         bus.fpwr(info.station, map::FMMU_BASE, &vec![0; fmmus]).await?;

@@ -8,6 +8,7 @@ use core::cell::RefCell;
 use ringcat_wire::address::Position;
 
 use crate::declared::Address;
+use crate::knowledge::KnownMailbox;
 use crate::mail::{EmergencyRings, Mailbox};
 use crate::procedures::configure::ConfigureError;
 use crate::segment::SubDeviceKey;
@@ -73,6 +74,11 @@ impl UndeclaredMailboxes {
     /// The mailbox of a SubDevice.
     pub(crate) fn of(&self, key: SubDeviceKey) -> Option<Mailbox> {
         self.all.borrow().iter().find(|entry| entry.key == key).map(|entry| entry.mailbox.clone())
+    }
+
+    /// What another process must know of the mailbox of a SubDevice.
+    pub(crate) fn known(&self, key: SubDeviceKey) -> Option<KnownMailbox> {
+        self.of(key)?.known()
     }
 
     /// The mailboxes in use.

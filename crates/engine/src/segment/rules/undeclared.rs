@@ -12,7 +12,7 @@ use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
 use crate::segment::reading::Reading;
-use crate::segment::undeclared::{AttemptFailure, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
+use crate::segment::undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
 use crate::time::Instant;
 
 impl Segment {
@@ -29,6 +29,11 @@ impl Segment {
     /// The requested state of a SubDevice without a declaration, and its progress; `None` without a request.
     pub fn upkeep(&self, key: SubDeviceKey) -> Option<&Upkeep> {
         self.unassigned(key)?.unassigned.upkeep.as_ref()
+    }
+
+    /// The SubDevice without a declaration that has a station address.
+    pub fn undeclared_at(&self, station: StationAddress) -> Option<SubDeviceKey> {
+        self.subdevices.unassigned().map(|it| it.key).find(|key| key.station == station)
     }
 
     fn upkeeps(&self) -> impl Iterator<Item = (SubDeviceKey, &Upkeep)> {
@@ -85,6 +90,7 @@ impl Segment {
         match seen {
             UndeclaredObservation::KeepingBegun => self.keeping.is_on = true,
             UndeclaredObservation::TakenOver => self.take_over(now),
+            UndeclaredObservation::HandedOver(kept) => self.go_on(kept, now, effects),
             UndeclaredObservation::AttemptsDue => self.begin_due(now, effects),
             UndeclaredObservation::AttemptEnded { key, attempt, failure } => {
                 self.end_attempt((key, attempt), failure, now, effects);
@@ -101,6 +107,21 @@ impl Segment {
             if it.is_untouched(knowledge) {
                 it.upkeep = Some(Upkeep::due(now));
             }
+        }
+    }
+
+    /// Goes on with SubDevices that another process has kept.
+    fn go_on(&mut self, kept: &[KeptState], now: Instant, effects: &mut Effects) {
+        self.touch();
+        for (key, _, it) in self.subdevices.all_unassigned_mut() {
+            let Some(kept) = kept.iter().find(|kept| kept.station == key.station) else { continue };
+            let upkeep = it.upkeep.insert(Upkeep::handed_over(kept.target, kept.progress));
+            if (kept.target, kept.progress) == (AlState::Op, UpkeepProgress::Reached) {
+                effects.start(Task::KeepOutputs { key, attempt: upkeep.attempt });
+            }
+        }
+        if self.keeping.is_on {
+            self.take_over(now);
         }
     }
 

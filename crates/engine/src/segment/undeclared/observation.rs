@@ -1,6 +1,9 @@
 //! Observations of SubDevices without a declaration.
 
-use super::upkeep::AttemptFailure;
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
+
+use super::upkeep::{AttemptFailure, UpkeepProgress};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::reading::Reading;
 
@@ -15,6 +18,17 @@ pub struct StateRead {
     pub reading: Reading,
 }
 
+/// The requested state of a SubDevice that another process has kept, as its registers show it now.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptState {
+    /// Its station address.
+    pub station: StationAddress,
+    /// The requested state.
+    pub target: AlState,
+    /// Progress towards it.
+    pub progress: UpkeepProgress,
+}
+
 /// An observation of SubDevices without a declaration. Their requested states are observed as those of members.
 #[derive(Debug)]
 pub enum UndeclaredObservation<'a> {
@@ -22,6 +36,9 @@ pub enum UndeclaredObservation<'a> {
     KeepingBegun,
     /// Each of them without a requested state is to go to PREOP.
     TakenOver,
+    /// Another process has kept some of them in their states: this one goes on with these. The others are to go to PREOP
+    /// if SubDevices are kept in their requested states.
+    HandedOver(&'a [KeptState]),
     /// The time has come at which attempts are due.
     AttemptsDue,
     /// An attempt to bring one to its requested state has ended.

@@ -59,6 +59,11 @@ impl Upkeep {
         Upkeep { target: AlState::PreOp, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
     }
 
+    /// Another process has brought it this far.
+    pub(in crate::segment) fn handed_over(target: AlState, progress: UpkeepProgress) -> Upkeep {
+        Upkeep { target, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
+    }
+
     /// Whether it is in its requested state, or left as it is.
     pub fn is_settled(&self) -> bool {
         matches!(self.progress, UpkeepProgress::Reached | UpkeepProgress::Left)

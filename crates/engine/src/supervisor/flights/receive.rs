@@ -10,12 +10,10 @@ use crate::supervisor::flight::{Flight, SentDatagram};
 use crate::supervisor::outbox::Rank;
 use crate::supervisor::received::Received;
 use crate::supervisor::reply::{BusError, Reply};
+use crate::supervisor::round_trip::MAX_RETRIES;
 use crate::supervisor::shared::Shared;
 use crate::supervisor::stray::Stray;
 use crate::supervisor::transfer::{Stage, TransferId};
-
-/// Number of retries of a lost datagram; the retry index in the source address has three bits (protocol SM-04).
-const MAX_RETRIES: u8 = 7;
 
 impl Shared {
     /// Takes a copy of an acyclic frame.
@@ -46,6 +44,8 @@ impl Shared {
             }
         }
         flight.take(copy.sent_on, bytes, first);
+        let newest = &mut self.flights.newest_back[copy.sent_on.index()];
+        *newest = flight.sent_at.max(*newest);
         let finished = flight.has_all_copies(self.links);
         let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.no_return, self.links);
         self.answer(slot, enough);
@@ -54,7 +54,24 @@ impl Shared {
         } else if enough {
             self.flights.release(slot);
         }
+        self.end_overtaken();
         Received::Taken
+    }
+
+    /// Gives up frames whose copies do not come back because later ones have ([`Flight::is_overtaken`]). The margin of
+    /// a round trip covers ways that become shorter when a ring opens or closes.
+    fn end_overtaken(&mut self) {
+        let (newest, margin) = (self.flights.newest_back, self.round_trip.longest());
+        if newest.into_iter().all(|newest| newest <= self.flights.oldest + margin) {
+            return;
+        }
+        for slot in 0..SLOTS {
+            let is_overtaken = |flight: &Flight| flight.is_overtaken(newest, margin, self.links);
+            if self.flights.slots[slot].as_ref().is_some_and(is_overtaken) {
+                self.expire(slot);
+            }
+        }
+        self.flights.find_earliest();
     }
 
     /// Passes replies to procedures: those with the expected working counter at once, all others when no further copy

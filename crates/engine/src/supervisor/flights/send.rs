@@ -5,6 +5,7 @@ use core::time::Duration;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::frame::{FrameBuilder, MAX_FRAME, MIN_FRAME, MacAddress};
+use ringcat_wire::source_address::MAX_RETRY;
 
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
@@ -109,6 +110,7 @@ impl Shared {
                 total += bytes;
                 datagrams += request.datagrams();
                 retry = retry.max(transfer.retries);
+                flight.repeatable &= request.resend;
                 flight.datagrams.push(SentDatagram::new(id, request, data_at));
                 transfer.stage = Stage::InFlight;
                 self.outbox.pop(rank);
@@ -146,7 +148,8 @@ impl Shared {
     fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
         let sequence = flight.sequence;
         flight.bytes.truncate(length);
-        self.identity.stamp(&mut flight.bytes, sequence, retry);
+        // The retry index has three bits (protocol SM-04).
+        self.identity.stamp(&mut flight.bytes, sequence, retry.min(MAX_RETRY));
         if flight.datagrams.is_empty() {
             self.flights.spare.push(flight);
             return None;
