@@ -2,8 +2,8 @@
 //!
 //! Waits for states of the model, for posted words and for replies need no pause (`SharedSegment::until`,
 //! `Bus::until_posted`); the model says until when such a wait lasts at most (`Segment::next_evaluation`: routine
-//! rounds each second, local rings without frames every 5 ms, since silence posts nothing). `cargo test -p ringcat-engine
-//! --test waits -- --nocapture` prints the list.
+//! rounds each second, local rings without frames every 5 ms, since silence posts nothing). `cargo test -p
+//! ringcat-engine --test waits -- --nocapture` prints the list.
 
 use std::collections::BTreeMap;
 use std::fs;
