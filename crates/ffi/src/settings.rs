@@ -278,6 +278,8 @@ impl SyncManager {
         };
         match &self.pdos {
             None => config,
+            // There was nothing to clear.
+            Some(pdos) if pdos.is_empty() && own.is_empty() => config,
             Some(pdos) => {
                 let mapping = |pdo: &Pdo| match &pdo.entries {
                     None => PdoMapping::from_sii(pdo.index),

@@ -35,7 +35,8 @@ pub struct MasterInfo {
     pub link_up: u8,
     /// A scan runs.
     pub scan_busy: u8,
-    padding: [u8; 2],
+    /// Unused.
+    pub padding: [u8; 2],
     /// Application time.
     pub app_time: u64,
 }

@@ -196,6 +196,10 @@ static void writes(const struct handles *h)
     CODE(ecrt_soe_request_write, (h->soe));
     CODE(ecrt_reg_request_write, (h->reg, 0x0420, 2));
     CODE(ecrt_voe_handler_write, (h->voe, 2));
+}
+
+static void direct_read(const struct handles *h)
+{
     CODE(ecrt_voe_handler_read_nosync, (h->voe));
 }
 
@@ -242,13 +246,14 @@ static void bad_arguments(ec_master_t *master)
     of_requests(&none);
     starts(&none);
     writes(&none);
+    direct_read(&none);
     CODE(ecrt_master_reserve, (NULL));
     CODE(ecrt_master_activate, (NULL));
     CODE(ecrt_master_deactivate, (NULL));
     ecrt_release_master(NULL);
     POINTER(ecrt_open_master, (77));
     POINTER(ecrt_request_master, (77));
-    phase = "again";
+    phase = "requested";
     CODE(ecrt_master_reserve, (master));
     POINTER(ecrt_request_master, (0));
 }
@@ -282,7 +287,8 @@ int main(void)
     of_master(h.master);
     of_requests(&h);
     h.master = ecrt_request_master(0);
-    if (!h.master || !make(&h) || ecrt_slave_config_reg_pdo_entry(h.sc, 0x6041, 0, h.domain, NULL) < 0)
+    if (!h.master || !make(&h) || ecrt_slave_config_reg_pdo_entry(h.sc, 0x6041, 0, h.domain, NULL) < 0
+        || ecrt_slave_config_reg_pdo_entry(h.sc, 0x6040, 0, h.domain, NULL) < 0)
         return 1;
     phase = "requested";
     CODE(ecrt_master_activate, (h.master));
@@ -297,6 +303,7 @@ int main(void)
     cycles(&h, 1500);
     writes(&h);
     cycles(&h, 1500);
+    direct_read(&h);
     CODE(ecrt_master_deactivate, (h.master));
     phase = "deactivated";
     of_master(h.master);
@@ -305,6 +312,7 @@ int main(void)
     of_requests(&h);
     starts(&h);
     writes(&h);
+    direct_read(&h);
     CODE(ecrt_master_deactivate, (h.master));
     ecrt_release_master(h.master);
     return 0;

@@ -236,6 +236,10 @@ static int life(void)
         CHECK(configs[i]);
     }
     CHECK(ecrt_slave_config_reg_pdo_entry(configs[DRIVE], 0x6041, 0, domain, NULL) == 0);
+    for (i = DRIVE; i < COUNT; i++) {
+        CHECK(ecrt_slave_config_reg_pdo_entry_pos(configs[i], 2, 0, 0, domain, NULL) >= 0);
+        CHECK(ecrt_slave_config_reg_pdo_entry_pos(configs[i], 3, 0, 0, domain, NULL) >= 0);
+    }
     CHECK((output = ecrt_slave_config_reg_pdo_entry(configs[OUTPUTS], 0x7000, 1, domain, NULL)) > 0);
     CHECK(ecrt_domain_size(domain) == (size_t) output + 1 && !ecrt_domain_data(domain));
     if (questions() || settings())
