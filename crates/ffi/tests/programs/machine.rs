@@ -42,3 +42,11 @@ fn each_service_does_its_work_on_simulated_subdevices() {
     assert_eq!(ended, Ok(()), "{output}");
     assert_eq!(output.lines().last(), Some("all services work"), "{output}");
 }
+
+// covers: c-interface, no-allocation
+#[test]
+fn cyclic_calls_allocate_nothing_and_a_second_caller_is_refused() {
+    let Some(realtime) = program(&here().join("tests/c/realtime.c"), &[]) else { return };
+    let (output, ended) = on_segment(&realtime, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+}
