@@ -7,7 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use ringcat::{Activity, Links, Options, Retries, SubDeviceInfo, SupervisorThread};
+use ringcat::wire::command::Command;
+use ringcat::wire::datagram::Target;
+use ringcat::wire::register::map;
+use ringcat::{Activity, Links, Options, RawDatagram, Retries, Services, SubDeviceInfo, SupervisorThread};
 
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome, report};
@@ -22,6 +25,8 @@ const SILENCE: Duration = Duration::from_millis(300);
 const PAUSE: Duration = Duration::from_millis(2);
 /// PREOP alone, as an OR of AL states.
 const PREOP: u8 = 2;
+/// The bits of AL states in AL status.
+const AL_STATES: u8 = 0x0F;
 
 static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
 
@@ -34,6 +39,24 @@ pub struct Bus {
     cyclic_links: Mutex<Option<AnyLinks>>,
     is_ring: bool,
     is_reserved: AtomicBool,
+}
+
+/// What a broadcast read of the AL status shows now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// SubDevices that processed the copy on the main link, and on the redundant link.
+    pub counts: [u16; 2],
+    /// Their AL states, ORed.
+    pub al_states: u8,
+    /// Which links are up.
+    pub is_up: [bool; 2],
+}
+
+impl Seen {
+    /// SubDevices on both links.
+    pub fn responding(&self) -> u16 {
+        self.counts[0].saturating_add(self.counts[1])
+    }
 }
 
 /// Locks a mutex. A panic of another holder leaves plain data, which stays usable.
@@ -118,26 +141,41 @@ impl Bus {
         self.supervisor.with(|engine| engine.subdevices()).map_err(|_| Code::GONE)
     }
 
+    /// Asks all SubDevices for their states. A lost frame counts as no answer.
+    ///
+    /// # Errors
+    /// [`Code::GONE`].
+    pub fn look(&self) -> Outcome<Seen> {
+        let ring = self.supervisor.with(|engine| engine.ring_status()).map_err(|_| Code::GONE)?;
+        let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::AL_STATUS), [0; 2]);
+        let replies = self.supervisor.datagrams(vec![read.with_resend(true)]).unwrap_or_default();
+        let mut seen = Seen::default();
+        if let Some(Ok(reply)) = replies.first() {
+            seen.counts = [reply.main.0, reply.redundant.0];
+            seen.al_states = reply.data.first().copied().unwrap_or(0) & AL_STATES;
+        }
+        for (number, link) in ring.links.iter().enumerate() {
+            seen.is_up[number] = link.carrier.unwrap_or(seen.counts[number] > 0);
+        }
+        Ok(seen)
+    }
+
     /// Waits until the scan has ended and all SubDevices are in PREOP.
     pub fn wait_until_ready(&self) {
         let begin = Instant::now();
         loop {
-            let Ok((activity, found, seen)) = self.supervisor.with(|engine| {
-                let activity = engine.snapshot().activity;
-                (activity, engine.subdevices().len(), engine.live_status().segment())
-            }) else {
-                return;
-            };
-            let is_scanned = activity == Activity::Scanned && found == usize::from(seen.responding);
-            if is_scanned && found > 0 && seen.al_states == PREOP {
+            let asked = self.supervisor.with(|engine| (engine.snapshot().activity, engine.subdevices().len()));
+            let (Ok((activity, found)), Ok(seen)) = (asked, self.look()) else { return };
+            let (responding, states) = (seen.responding(), seen.al_states);
+            let is_scanned = activity == Activity::Scanned && found == usize::from(responding);
+            if is_scanned && found > 0 && states == PREOP {
                 return;
             }
             let elapsed = begin.elapsed();
-            if seen.responding == 0 && found == 0 && activity != Activity::Scanning && elapsed >= SILENCE {
+            if responding == 0 && found == 0 && activity != Activity::Scanning && elapsed >= SILENCE {
                 return;
             }
             if elapsed >= READY_LIMIT {
-                let (responding, states) = (seen.responding, seen.al_states);
                 report(format_args!(
                     "master {}: expected {responding} SubDevices in PREOP, found {found}, AL states {states:#04x}",
                     self.master

@@ -154,7 +154,7 @@ impl Draft {
                 Some(index) => ReferenceClock::Declared(SubDeviceId(index)),
             };
             let clocks = ClockConfig::default().as_igh().with_reference(reference);
-            declaration.clocks = Some(clocks.with_drift_distributions(0).with_pauses(false));
+            declaration.clocks = Some(clocks.with_drift_distributions(0));
         }
         declaration
     }

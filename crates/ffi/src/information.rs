@@ -25,10 +25,11 @@ const WRITTEN: u8 = 0x04;
 /// The acyclic half has ended.
 pub fn master(bus: &Bus, app_time: u64) -> Outcome<MasterInfo> {
     let asked = bus.supervisor().with(|engine| {
-        let is_up = engine.live_status().segment().is_up;
-        (engine.subdevices().len(), is_up, engine.snapshot().activity == Activity::Scanning)
+        let scans = engine.snapshot().activity == Activity::Scanning;
+        (engine.subdevices().len(), scans)
     });
-    let (count, is_up, scans) = asked.map_err(|_| Code::GONE)?;
+    let (count, scans) = asked.map_err(|_| Code::GONE)?;
+    let is_up = bus.look()?.is_up.contains(&true);
     Ok(MasterInfo {
         slave_count: count as u32,
         link_up: is_up.into(),
@@ -43,15 +44,12 @@ pub fn master(bus: &Bus, app_time: u64) -> Outcome<MasterInfo> {
 /// # Errors
 /// The acyclic half has ended.
 pub fn scan_progress(bus: &Bus) -> Outcome<ScanProgress> {
-    let asked = bus.supervisor().with(|engine| {
-        let (found, responding) = (engine.subdevices().len(), engine.live_status().segment().responding);
-        (found, u32::from(responding), engine.snapshot().activity)
-    });
+    let asked = bus.supervisor().with(|engine| (engine.subdevices().len(), engine.snapshot().activity));
     Ok(match asked.map_err(|_| Code::GONE)? {
-        (_, responding, Activity::Scanning | Activity::Unscanned) => {
-            ScanProgress { slave_count: responding, scan_index: 0 }
+        (_, Activity::Scanning | Activity::Unscanned) => {
+            ScanProgress { slave_count: bus.look()?.responding().into(), scan_index: 0 }
         }
-        (found, ..) => ScanProgress { slave_count: found as u32, scan_index: found as u32 },
+        (found, _) => ScanProgress { slave_count: found as u32, scan_index: found as u32 },
     })
 }
 

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
 use ringcat::{
-    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, LiveStatus, ReferenceClock, Services,
-    SubDeviceId, SupervisorThread,
+    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, LiveStatus, ReferenceClock,
+    Services, SubDeviceId, SupervisorThread,
 };
 
 use crate::any_links::AnyLinks;
@@ -17,6 +17,7 @@ use crate::bus::{Bus, locked};
 use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
 use crate::draft::Draft;
+use crate::types::SegmentState;
 
 /// Limit of the way to PREOP at the end of an application.
 const END_LIMIT: Duration = Duration::from_secs(5);
@@ -48,11 +49,16 @@ impl Active {
         self.application.receive();
     }
 
-    /// Sends what was queued.
+    /// Sends what was queued. Nothing is sent while the acyclic half measures the delays of clocks, for which the wire
+    /// must be empty: an application that cycles by itself has its frames on the wire from one send to the next receive.
     #[inline(always)]
     pub fn send(&mut self) {
         if self.has_clock {
-            self.sent_at = self.application.now();
+            let now = self.application.now();
+            if now < self.application.exchange().pause_until() {
+                return;
+            }
+            self.sent_at = now;
         }
         self.application.send();
     }
@@ -306,16 +312,39 @@ impl Master {
         }
     }
 
-    /// State of the segment and its SubDevices. Loads words while the application of this handle is active; before, it
-    /// asks the acyclic half.
+    /// State of all SubDevices, or of those on one link. Loads words while the application of this handle is active;
+    /// before, it asks the SubDevices.
     ///
     /// # Errors
-    /// The handle was released; it is being activated or deactivated by another thread.
-    pub fn live<R>(&self, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
-        if !self.is_active() {
-            let fresh = self.bus()?.supervisor().live_status().map_err(|_| Code::GONE)?;
-            return Ok(read(&fresh));
+    /// The handle was released; another thread activates or deactivates it.
+    pub fn segment(&self, link: Option<Link>) -> Outcome<SegmentState> {
+        if self.is_active() {
+            return self.live(|live| match link {
+                None => {
+                    let all = live.segment();
+                    SegmentState::new(all.responding, all.al_states, all.is_up)
+                }
+                Some(link) => {
+                    let one = live.link(link);
+                    SegmentState::new(one.answering, one.al_states, one.is_up())
+                }
+            });
         }
+        let seen = self.bus()?.look()?;
+        Ok(match link {
+            None => SegmentState::new(seen.responding(), seen.al_states, seen.is_up.contains(&true)),
+            Some(link) => {
+                let count = seen.counts[link.index()];
+                SegmentState::new(count, if count > 0 { seen.al_states } else { 0 }, seen.is_up[link.index()])
+            }
+        })
+    }
+
+    /// Reads words of the active application.
+    ///
+    /// # Errors
+    /// Another thread activates or deactivates it.
+    pub fn live<R>(&self, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
         self.live.try_read().map(|live| read(&live)).map_err(|_| Code::BUSY)
     }
 

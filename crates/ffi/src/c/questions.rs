@@ -31,9 +31,9 @@ unsafe extern "C" fn ecrt_master_scan_progress(handle: *mut ec_master_t, progres
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_state(handle: *const ec_master_t, state: *mut SegmentState) -> c_int {
     let read = |MasterObject(owner): &MasterObject| {
-        let seen = owner.master.live(|live| live.segment())?;
+        let seen = owner.master.segment(None)?;
         // SAFETY: memory for the result, or NULL (ecrt.h).
-        unsafe { put(state, SegmentState::new(seen.responding, seen.al_states, seen.is_up)) }
+        unsafe { put(state, seen) }
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(handle, read) }
@@ -51,9 +51,9 @@ unsafe extern "C" fn ecrt_master_link_state(
             1 if owner.master.is_ring() => Link::Redundant,
             _ => return Err(Code::INVALID),
         };
-        let seen = owner.master.live(|live| live.link(link))?;
+        let seen = owner.master.segment(Some(link))?;
         // SAFETY: memory for the result, or NULL (ecrt.h).
-        unsafe { put(state, SegmentState::new(seen.answering, seen.al_states, seen.is_up())) }
+        unsafe { put(state, seen) }
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(handle, read) }

@@ -75,7 +75,7 @@ unsafe extern "C" fn ecrt_slave_config_pdos(
     syncs: *const SyncInfo,
 ) -> c_int {
     let configure = |slave: &SlaveObject| -> Outcome {
-        slave.owner.master.check_reserved()?;
+        slave.owner.master.change(|_| Ok(()))?;
         let mut next = syncs;
         for _ in 0..n_syncs {
             // SAFETY: a list of C that is this long, or ends with index 0xff (ecrt.h).

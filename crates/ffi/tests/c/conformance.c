@@ -74,7 +74,7 @@ static void of_master(ec_master_t *m)
     CODE(ecrt_master_link_state, (m, 0, &link));
     CODE(ecrt_master_sdo_upload, (m, DRIVE, 0x1018, 1, data, sizeof data, &size, &abort_code));
     CODE(ecrt_master_sdo_download, (m, DRIVE, 0x6066, 0, data, 2, &abort_code));
-    CODE(ecrt_master_sdo_download_complete, (m, DRIVE, 0x1018, data, 2, &abort_code));
+    CODE(ecrt_master_sdo_download_complete, (m, DRIVE, 0x5fff, data, 2, &abort_code));
     CODE(ecrt_master_read_idn, (m, AXES, 0, 2, data, sizeof data, &size, &error_code));
     CODE(ecrt_master_write_idn, (m, AXES, 0, 134, data, 2, &error_code));
     CODE(ecrt_master_set_send_interval, (m, 1000));
@@ -112,6 +112,8 @@ static void of_slave(const struct handles *h)
     CODE(ecrt_slave_config_pdo_mapping_add, (sc, 0x1A05, 0x6041, 0, 16));
     /* Without effect again, so that the drive can be configured. */
     ecrt_slave_config_pdo_assign_clear(sc, 5);
+    CODE(ecrt_slave_config_reg_pdo_entry, (sc, 0x6041, 0, h->domain, &bit));
+    CODE(ecrt_slave_config_reg_pdo_entry_pos, (sc, 3, 0, 0, h->domain, &bit));
     CODE(ecrt_slave_config_dc, (sc, 0, 0, 0, 0, 0));
     CODE(ecrt_slave_config_sdo, (sc, 0x6066, 0, data, 2));
     CODE(ecrt_slave_config_sdo8, (sc, 0x6060, 0, 8));
@@ -132,8 +134,6 @@ static void of_slave(const struct handles *h)
     CODE(ecrt_slave_config_eoe_dns_address, (sc, address));
     CODE(ecrt_slave_config_eoe_hostname, (sc, "name"));
     CODE(ecrt_slave_config_state, (sc, &state));
-    CODE(ecrt_slave_config_reg_pdo_entry, (sc, 0x6041, 0, h->domain, &bit));
-    CODE(ecrt_slave_config_reg_pdo_entry_pos, (sc, 3, 0, 0, h->domain, &bit));
     POINTER(ecrt_slave_config_create_sdo_request, (sc, 0x6041, 0, 2));
     POINTER(ecrt_slave_config_create_soe_request, (sc, 0, 1, 2));
     POINTER(ecrt_slave_config_create_reg_request, (sc, 2));

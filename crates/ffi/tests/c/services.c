@@ -84,7 +84,7 @@ static int blocking_transfers(void)
     CHECK(ecrt_master_sdo_upload(master, DRIVE, 0x6066, 0, data, sizeof data, &size, &abort_code) == 0);
     CHECK(size == 2 && memcmp(data, value, 2) == 0);
     CHECK(ecrt_master_sdo_download(master, DRIVE, 0x1018, 1, value, 2, &abort_code) == -EIO);
-    CHECK(ecrt_master_sdo_download_complete(master, DRIVE, 0x1018, value, 2, &abort_code) == -EIO);
+    CHECK(ecrt_master_sdo_download_complete(master, DRIVE, 0x5fff, value, 2, &abort_code) == -EIO);
     CHECK(ecrt_master_read_idn(master, AXES, 1, 2, data, sizeof data, &size, &error_code) == 0);
     CHECK(size == 2 && EC_READ_U16(data) == 1000);
     EC_WRITE_U16(data, 2000);
