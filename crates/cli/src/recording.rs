@@ -100,7 +100,7 @@ pub fn lines<'a>(
     recorded: &'a [Recorded],
 ) -> impl Iterator<Item = String> + 'a {
     names.zip(recorded).map(|(name, frames)| {
-        let Recorded { received, sent, lost, lost_by_kernel } = frames;
+        let Recorded { received, sent, lost, lost_by_kernel, .. } = frames;
         format!("{name}: {received} frames received, {sent} sent, {} not recorded", lost + lost_by_kernel)
     })
 }

@@ -5,6 +5,7 @@
 
 pub mod clock_times;
 pub mod clocks;
+pub mod commands;
 pub mod live;
 mod rest;
 pub mod traffic;
@@ -152,6 +153,8 @@ pub struct Board {
     pub traffic: traffic::Traffic,
     /// State of SubDevices and links, for any thread.
     pub live: live::LiveWords,
+    /// Wrong working counters, by datagram.
+    pub commands: commands::CommandWords,
 }
 
 impl Board {
@@ -173,7 +176,15 @@ impl Board {
             clocks: clocks::ClockWords::default(),
             traffic: traffic::Traffic::default(),
             live: live::LiveWords::new(subdevices),
+            commands: commands::CommandWords::default(),
         }
+    }
+
+    /// Sets the numbers of process data datagrams, by domain.
+    #[must_use]
+    pub fn with_commands(mut self, datagrams: impl Iterator<Item = usize>) -> Board {
+        self.commands = commands::CommandWords::new(datagrams);
+        self
     }
 
     /// Sets the station addresses of the SubDevices.

@@ -4,19 +4,23 @@ mod clients;
 mod cyclic;
 pub mod history;
 mod log;
+mod messages;
 mod subject;
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{LogicalAddress, Position, StationAddress, Wkc};
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
 pub use clients::{ClientEvents, ClientId};
 pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
+pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
 pub use subject::{Subject, Subjects};
 
 pub use crate::ring_status::Occupant;
@@ -97,6 +101,15 @@ pub enum Event {
         added: usize,
         /// SubDevices that are no longer there.
         removed: usize,
+    },
+    /// The MainDevice goes on with a segment that another process has known, without a scan.
+    Resumed {
+        /// SubDevices now.
+        subdevices: usize,
+        /// SubDevices that go on as they are, in their states.
+        in_state: usize,
+        /// The segment was not as known: what differs was scanned.
+        differs: bool,
     },
     /// A SubDevice without a declaration did not reach its requested state.
     UndeclaredFailed {
@@ -383,6 +396,40 @@ pub enum Event {
         domain: DomainId,
         /// The new state.
         status: DomainStatus,
+    },
+    /// On request ([`set_command_reports`](crate::main_device::MainDevice::set_command_reports)): a datagram of process
+    /// data had a wrong working counter (EC_NOTIFY_CYCCMD_WKC_ERROR). At most once a second per datagram.
+    CyclicCommand {
+        /// Number of the domain.
+        domain: DomainId,
+        /// The command.
+        command: Command,
+        /// Its logical address.
+        logical: LogicalAddress,
+        /// Bytes of its data.
+        length: u16,
+        /// Expected in the last such cycle.
+        expected: Wkc,
+        /// Received then; 0 if no copy came back.
+        got: Wkc,
+        /// Cycles since the last report.
+        cycles: u32,
+        /// SubDevices that did not process it as expected meanwhile, or of which that is not known.
+        subdevices: Vec<SubDeviceId>,
+    },
+    /// On request, too: an acyclic datagram had a wrong working counter. At most once a second per command and address.
+    /// [`TimedEvent::occupants`] names the SubDevice.
+    AcyclicCommand {
+        /// The command.
+        command: Command,
+        /// Its address; none for commands to more than 64 addresses a second, which are reported together.
+        target: Target,
+        /// Expected.
+        expected: Wkc,
+        /// That of the last one.
+        got: Wkc,
+        /// Their number since the last report.
+        count: u32,
     },
     /// A domain was due while its previous frames were still on the wire.
     Skipped {

@@ -17,6 +17,7 @@ use alloc::vec::Vec;
 use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
+pub(crate) use collect::is_possible;
 pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
 pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};

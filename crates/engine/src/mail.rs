@@ -8,6 +8,7 @@
 //! * `emergencies`: a ring per SubDevice, for any thread;
 //! * `writer`, `reader`: the two directions, each a task that lives as long as it has work;
 //! * `delivery`: assigns mail to its lane; `recent`: detects duplicate mail;
+//! * `handover`: a mailbox in use goes on in another process;
 //! * `conversation`: holds a lane, sends and waits for answers; `answer_time`: when to poll for an answer;
 //! * [`coe`], [`eoe`], [`foe`], [`soe`], [`aoe`], [`voe`]: the protocols; [`relay`]: messages of gateway clients;
 //!   [`raw`]: messages that the application composes.
@@ -23,6 +24,7 @@ mod emergencies;
 pub mod eoe;
 mod error;
 pub mod foe;
+mod handover;
 mod lane;
 mod mailbox;
 mod protocol_error;
@@ -45,6 +47,7 @@ pub use counters::MailCounters;
 pub use emergencies::EmergencyRing;
 pub(crate) use emergencies::EmergencyRings;
 pub use error::MailboxError;
+pub(crate) use handover::InUse;
 pub use lane::Lane;
 pub use mailbox::Mailbox;
 pub use unsolicited::{Unclaimed, Unsolicited};

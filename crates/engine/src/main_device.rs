@@ -10,6 +10,7 @@ mod active;
 mod areas;
 mod clients;
 mod clocks;
+mod commands;
 mod datagrams;
 mod declaration;
 mod declare;
@@ -17,6 +18,7 @@ mod ethernet;
 mod found;
 mod function;
 mod gateway;
+mod handover;
 mod idle;
 mod image_memory;
 mod live_status;
@@ -24,6 +26,7 @@ mod loaded;
 mod lrw;
 mod mail;
 mod memories;
+mod messages;
 mod options;
 mod pending;
 mod prepare;
@@ -59,7 +62,6 @@ pub use areas::{AreaEntries, Directory};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
-pub use function::{Function, Permission};
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
@@ -67,11 +69,11 @@ pub use pending::Pending;
 pub use register_error::RegisterError;
 pub use registered_area::RegisteredArea;
 pub use sent_once::SentOnce;
-pub use states::{GroupState, MainDevicePhase, SubDeviceState};
-
-pub use crate::procedures::undeclared::Retries;
+pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
+pub use crate::role::{Denial, Function, MainDevicePhase, NotPermitted, Permission, Role};
+pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
@@ -82,12 +84,13 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
+use crate::procedures::reconcile::reconcile_without_application;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
 use crate::procedures::stop::{StopError, all_known, stop};
-use crate::procedures::undeclared::Undeclared;
+use crate::procedures::undeclared::UndeclaredMailboxes;
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
@@ -125,8 +128,6 @@ pub struct MainDevice {
     requests: Requests,
     /// Emergencies of all SubDevices.
     emergencies: Rc<RefCell<EmergencyRings>>,
-    /// The procedures of idle operation run.
-    is_idle: bool,
     /// Error counters, once active.
     statistics: Option<ErrorStatistics>,
     statistics_period: Option<Duration>,
@@ -151,7 +152,7 @@ impl MainDevice {
         supervisor.set_events(EventLog::new(now.0));
         let cache = SiiCache::new(options.sii_cache);
         let emergencies: Rc<RefCell<EmergencyRings>> = Rc::default();
-        let undeclared = Undeclared::new(&supervisor.bus(), emergencies.clone(), options.retries);
+        let undeclared = UndeclaredMailboxes::new(&supervisor.bus(), emergencies.clone());
         let segment = Segment::new(choices(&options));
         let segment = SharedSegment::idle(&supervisor.bus(), segment, cache.clone(), undeclared);
         let mut main_device = MainDevice {
@@ -167,7 +168,6 @@ impl MainDevice {
             cyclic_events_lost: 0,
             requests: Requests::default(),
             emergencies,
-            is_idle: false,
             statistics: None,
             statistics_period: None,
             loaded: None,
@@ -178,21 +178,19 @@ impl MainDevice {
             disconnected: None,
             options,
         };
+        main_device.start_reconciler();
         main_device.begin_idle();
         main_device
     }
 
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        if self.active().is_some() {
-            return Err(ActivateError::Active);
-        }
+        self.permit(Function::Scan)?;
         if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
         }
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
-        self.segment.undeclared.clear();
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.scan_options();
@@ -230,14 +228,21 @@ impl MainDevice {
         self.segment.view().found().map(|found| Ok(found.scan()))
     }
 
-    /// SubDevices of the last scan; empty before a successful scan.
+    /// SubDevices of the last scan; empty before a successful scan, and in role INACTIVE.
     pub fn subdevices(&self) -> Vec<SubDeviceInfo> {
+        if self.permit(Function::SubDeviceInfo).is_err() {
+            return Vec::new();
+        }
         self.segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default()
     }
 
     /// Ends supervision and all other procedures, and brings all SubDevices down to a state; SubDevices in a lower
     /// state stay there. The exchange must not send any more. Afterwards a new scan may start.
     pub fn start_stop(&mut self, state: AlState, limit: Duration, now: Instant) {
+        if let Err(denied) = self.permit(Function::Stop) {
+            *self.stopped.borrow_mut() = Some(Err(denied.into()));
+            return;
+        }
         let to_stop = all_known(&self.segment.view());
         self.end_application(now);
         let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
@@ -252,15 +257,21 @@ impl MainDevice {
         self.counted = self.counters();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
+        let (role, are_reported) = (self.role(), self.supervisor.bus().are_commands_reported());
+        let sequence = self.supervisor.sequence();
         self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.set_role(role);
+        self.supervisor.set_command_reports(are_reported);
+        self.supervisor.go_on_from(sequence);
         self.supervisor.set_events(events);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
         self.segment.observe(Observation::Deactivated);
+        self.start_reconciler();
+        self.begin_command_reports();
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
-        self.is_idle = false;
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
@@ -268,6 +279,12 @@ impl MainDevice {
         self.cyclic_events = None;
         self.cyclic_events_lost = 0;
         *self.stopped.borrow_mut() = None;
+    }
+
+    /// Starts procedures that the model requests without an application.
+    fn start_reconciler(&mut self) {
+        let bus = self.supervisor.bus();
+        self.supervisor.spawn(reconcile_without_application(bus, self.segment.clone()));
     }
 
     /// The result of [`MainDevice::start_stop`], once it has ended.
@@ -457,6 +474,7 @@ fn choices(options: &Options) -> Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
         idle_operation: options.idle_operation,
+        retries: options.retries,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

@@ -5,6 +5,7 @@
 pub mod al_state;
 mod cabling;
 pub mod clocks;
+pub(crate) mod command_watch;
 pub(crate) mod complete_siis;
 pub mod configure;
 pub(crate) mod deactivate;
@@ -25,6 +26,7 @@ pub(crate) mod reconcile;
 pub mod recover;
 pub(crate) mod request_state;
 pub mod request_states;
+pub(crate) mod resume;
 pub(crate) mod sample;
 pub mod scan;
 pub mod serve_requests;

@@ -45,12 +45,13 @@ pub mod start;
 mod subdevice;
 mod subdevices;
 pub mod unassigned;
+mod undeclared;
 mod versions;
 pub mod view;
 
 pub use addressed::Addressed;
 pub use cabling::{Cabling, stations_by_position};
-pub use choices::Choices;
+pub use choices::{Choices, Retries};
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
 pub use key::SubDeviceKey;
@@ -67,6 +68,7 @@ pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
+pub use undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, UpkeepProgress};
 pub use versions::Versions;
 
 #[cfg(test)]

@@ -6,7 +6,9 @@
 
 mod alone;
 pub mod bus;
+mod command_reports;
 mod counters;
+mod debug_message;
 mod executor;
 mod flight;
 mod flights;
@@ -31,22 +33,24 @@ use alloc::sync::Arc;
 use core::cell::RefCell;
 use core::future::Future;
 
+use ringcat_wire::frame::MacAddress;
+
 pub(crate) use alone::Turn;
 pub use bus::Bus;
 pub use counters::AcyclicCounters;
-pub use group::Group;
+pub(crate) use debug_message::MOST_WAITING as MOST_DEBUG_MESSAGES;
 pub(crate) use group::{TURN, TURN_PAUSE};
 pub(crate) use posted::Posted;
 pub use received::Received;
-pub use reply::{BusError, Elapsed, Reply};
+pub use reply::{BusError, Reply};
 pub use signal::Signal;
-pub use stray::Stray;
 
 use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
-use crate::ring::{Class, Classified, Identity, RingState};
+use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
+use crate::role::Role;
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
@@ -74,6 +78,22 @@ impl Supervisor {
         self.shared.borrow_mut().spawn(alloc::boxed::Box::pin(procedure));
     }
 
+    /// Sequence number of the last frame.
+    pub(crate) fn sequence(&self) -> Sequence {
+        self.shared.borrow().flights.sequence()
+    }
+
+    /// Goes on with the sequence numbers of another supervisor, before the first frame: a frame of that one that comes
+    /// back late is none of this one.
+    pub(crate) fn go_on_from(&mut self, sequence: Sequence) {
+        self.shared.borrow_mut().flights.go_on_from(sequence);
+    }
+
+    /// Goes on with the state of the ring that another process has known, before the first frame.
+    pub(crate) fn assume_ring(&mut self, ring: RingState) {
+        self.shared.borrow_mut().monitor = RingMonitor::of(ring);
+    }
+
     /// Attaches the board of the exchange; from now on [`Bus::ring`] returns the ring state that the exchange posts.
     pub fn attach(&mut self, board: Arc<Board>) {
         let shared = &mut *self.shared.borrow_mut();
@@ -84,6 +104,16 @@ impl Supervisor {
     /// Attaches the request counter of cyclic threads: procedures wake when it changes.
     pub(crate) fn attach_bell(&mut self, bell: Bell) {
         self.shared.borrow_mut().bell = bell;
+    }
+
+    /// Role of the MainDevice.
+    pub fn role(&self) -> Role {
+        self.shared.borrow().role
+    }
+
+    /// Sets the role of the MainDevice.
+    pub fn set_role(&mut self, role: Role) {
+        self.shared.borrow_mut().role = role;
     }
 
     /// Sets the largest number of datagrams in a frame.
@@ -209,6 +239,17 @@ impl Supervisor {
     /// Works with the log of events.
     pub(crate) fn with_events<T>(&self, work: impl FnOnce(&mut EventLog) -> T) -> T {
         work(&mut self.shared.borrow_mut().events)
+    }
+
+    /// Begins or ends reports of acyclic datagrams with wrong working counters.
+    pub(crate) fn set_command_reports(&self, is_on: bool) {
+        self.shared.borrow_mut().command_reports.set_on(is_on);
+    }
+
+    /// Queues an Ethernet debug message, from the addresses of the links; false if too many wait.
+    pub(crate) fn queue_debug_message(&self, sources: [Option<MacAddress>; 2], ethertype: u16, text: &[u8]) -> bool {
+        let shared = &mut *self.shared.borrow_mut();
+        shared.debug_messages.queue(sources, ethertype, text, shared.now)
     }
 
     /// Whether there are clients of events with queues of their own.

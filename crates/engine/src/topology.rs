@@ -19,12 +19,11 @@ mod rings;
 mod stub;
 mod tree;
 
-pub use candidates::candidates;
 pub(crate) use candidates::{candidates_with, rings_shown, with_longer_rings};
 pub(crate) use ends::{are_doubtful, ends_of_break, ends_of_earlier_break};
 pub use finding::Finding;
 pub use local_ring::{Closing, LocalRing, RingCable};
-pub use port::{Connection, PortOf};
+pub use port::PortOf;
 pub use tree::{Node, NodeStatus, Topology};
 
 use rings::Rings;

@@ -1,6 +1,6 @@
 //! The table of functions and roles against the protocol sheet.
 
-use ringcat_engine::main_device::{Function, MainDevicePhase, Permission};
+use ringcat_engine::main_device::{Denial, Function, MainDevicePhase, Permission, Role};
 
 /// The sheet with the groups of functions, of the repository.
 fn sheet() -> String {
@@ -14,7 +14,7 @@ const BLOCKED: [(&str, &[Function]); 9] = [
     ("FoE", &[Function::FileTransfer]),
     ("SoE", &[Function::SoeAccess]),
     ("AoE", &[Function::AoeAccess]),
-    ("VoE", &[Function::VendorMessage, Function::RawMailbox, Function::Ethernet]),
+    ("VoE", &[Function::VendorMessage, Function::RawMailbox, Function::Ethernet, Function::DebugMessage]),
     (
         "state",
         &[
@@ -75,7 +75,29 @@ fn each_group_of_the_sheet_has_its_functions_and_each_function_its_group() {
 #[test]
 fn functions_without_the_bus_are_never_refused() {
     for phase in [MainDevicePhase::Orphaned, MainDevicePhase::Idle, MainDevicePhase::Operation] {
-        let refused = FREE.iter().filter(|function| function.permission(phase) == Permission::Refused).count();
+        let refused =
+            FREE.iter().filter(|function| function.permission(Role::Active, phase) == Permission::Refused).count();
         assert_eq!(refused, 0, "{phase:?}");
+    }
+}
+
+// covers: 9.11
+#[test]
+fn role_inactive_refuses_what_needs_the_bus_and_names_function_role_and_reason() {
+    for function in Function::ALL.iter().copied() {
+        for phase in [MainDevicePhase::Orphaned, MainDevicePhase::Idle, MainDevicePhase::Operation] {
+            let is_refused = function.permission(Role::Inactive, phase) == Permission::Refused;
+            let is_refused_if_active = function.permission(Role::Active, phase) == Permission::Refused;
+            assert_eq!(is_refused, function.needs_the_bus() || is_refused_if_active, "{function:?}");
+            for role in [Role::Active, Role::Inactive] {
+                let result = function.check(role, phase);
+                assert_eq!(result.is_err(), function.permission(role, phase) == Permission::Refused);
+                let Err(denied) = result else { continue };
+                assert_eq!((denied.function, denied.role), (function, role));
+                assert_eq!(denied.denial == Denial::NeedsTheBus, role == Role::Inactive);
+                let text = denied.to_string();
+                assert!(text.contains(&format!("{function:?}")) && text.contains(&role.to_string()), "{text}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Waits of the engine that pause for a time instead of waiting for an event: each is listed with its reason.
 //!
 //! Waits for states of the model, for posted words and for replies need no pause (`SharedSegment::until`,
-//! `Bus::until_posted`); the model says until when such a wait lasts at most (`Segment::next_look`: routine rounds each
+//! `Bus::until_posted`); the model says until when such a wait lasts at most (`Segment::next_evaluation`: routine rounds each
 //! second, local rings without frames every 5 ms, since silence posts nothing). `cargo test -p ringcat-engine --test
 //! waits -- --nocapture` prints the list.
 
@@ -29,8 +29,10 @@ enum Reason {
 use Reason::{Cyclic, Pace, Register, Retry, Settle, Turn};
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 35] = [
+const WAITS: [(&str, &[Reason]); 38] = [
+    ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
+    ("mail/voe.rs", &[Register]),
     ("mail/writer.rs", &[Register]),
     ("procedures/al_state.rs", &[Register, Register, Register]),
     ("procedures/cabling.rs", &[Settle, Register, Settle, Retry]),
@@ -54,6 +56,7 @@ const WAITS: [(&str, &[Reason]); 35] = [
     ("procedures/scan.rs", &[Register]),
     ("procedures/scan/count.rs", &[Register, Register]),
     ("procedures/services/ports.rs", &[Register]),
+    ("procedures/services/statistics.rs", &[Cyclic]),
     ("procedures/sii.rs", &[Turn]),
     ("procedures/sii/eeprom.rs", &[Register, Register, Register]),
     ("procedures/sii/program.rs", &[Retry, Register]),
@@ -97,9 +100,12 @@ fn each_wait_that_pauses_for_a_time_has_a_reason() {
     assert!(wrong.is_empty(), "each pause needs its reason in WAITS: {wrong:#?}");
 }
 
+/// Calls that return after a time although nothing has changed.
+const CALLS: [&str; 5] = [".sleep(", ".sleep_until(", "conversation.pause(", ".unsolicited_within(", ".until_period("];
+
 fn is_pause(line: &str) -> bool {
     let is_comment = line.trim_start().starts_with("//");
-    !is_comment && [".sleep(", ".sleep_until("].iter().any(|call| line.contains(call))
+    !is_comment && CALLS.iter().any(|call| line.contains(call))
 }
 
 /// All sources below a directory, without tests.

@@ -101,6 +101,18 @@ pub fn option<T: Copy + Plain>(fd: RawFd, level: libc::c_int, option: libc::c_in
     value
 }
 
+/// Index of the interface to which a packet socket is bound; 0 for none.
+pub fn bound_interface(fd: RawFd) -> Result<libc::c_int, i32> {
+    // SAFETY: all bytes zero is a valid sockaddr_ll.
+    let mut address: libc::sockaddr_ll = unsafe { zeroed() };
+    let mut length = size_of::<libc::sockaddr_ll>() as libc::socklen_t;
+    // SAFETY: pointer and length describe a live address for which any bytes are valid.
+    if unsafe { libc::getsockname(fd, std::ptr::from_mut(&mut address).cast(), &mut length) } < 0 {
+        return Err(errno());
+    }
+    Ok(address.sll_ifindex)
+}
+
 /// Types for which all bytes are valid.
 ///
 /// # Safety

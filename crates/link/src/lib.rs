@@ -1,6 +1,7 @@
 //! The part of RingCAT that calls the Linux kernel for network interfaces and time.
 //!
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
+//! * [`descriptors`]: sockets that another process has opened, passed over a Unix socket;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
@@ -18,6 +19,7 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 pub mod carrier;
+pub mod descriptors;
 mod error;
 pub mod filter;
 pub mod interface;
@@ -41,9 +43,10 @@ pub use carrier::{Carrier, CarrierWatch};
 pub use error::LinkError;
 pub use filter::ClassFilter;
 pub use listener::{Listener, Sender};
+pub use packet_socket::handed::HandedSocket;
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use receive_mode::ReceiveMode;
-pub use recorder::{Recorder, RecorderError, Tap};
+pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};
 pub use signals::{HeldSignals, Signal};
 pub use sniffer::Sniffer;
 pub use tap::{TapError, TapInterface};

@@ -4,9 +4,11 @@
 //! ring none. One socket serves one thread; a MainDevice opens two per interface, one for each class of frames
 //! ([`ClassFilter`]). The socket receives only EtherType 0x88A4 and no frames sent by this host.
 
+pub mod handed;
+
 use std::cell::Cell;
 use std::mem::{size_of, zeroed};
-use std::os::fd::{AsRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
 
 use crate::error::LinkError;
 use crate::filter::{self, ClassFilter};
@@ -95,6 +97,8 @@ pub struct PacketSocket {
     overrun: Cell<u64>,
     /// From the monotonic clock to the Unix clock, in which the kernel stamps frames.
     unix_offset_ns: u64,
+    /// The place in the ring is in doubt until the first frame.
+    is_searching: bool,
 }
 
 impl PacketSocket {
@@ -143,6 +147,7 @@ impl PacketSocket {
             counters: LinkCounters::default(),
             overrun: Cell::new(0),
             unix_offset_ns: monotonic::unix_offset_ns(),
+            is_searching: false,
         })
     }
 
@@ -247,6 +252,12 @@ impl PacketSocket {
     #[inline]
     pub fn fd(&self) -> RawFd {
         self.fd.as_raw_fd()
+    }
+}
+
+impl AsFd for PacketSocket {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
     }
 }
 

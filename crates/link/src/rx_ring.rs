@@ -5,6 +5,8 @@
 //!
 //! The functions of a cycle are inlined on purpose, so that its closure is called directly (bin `socket_cycle`).
 
+mod place;
+
 use std::io;
 use std::mem::size_of;
 use std::ptr::NonNull;
@@ -99,6 +101,11 @@ impl RxRing {
         // SAFETY: the mapping has this length.
         let end = unsafe { base.add(slots * SLOT) };
         Ok(RxRing { base, slots, head: base, end, stamp: [0; 2] })
+    }
+
+    /// Number of slots.
+    pub fn slots(&self) -> usize {
+        self.slots
     }
 
     /// Whether a frame waits.

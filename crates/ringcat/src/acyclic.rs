@@ -1,11 +1,11 @@
 //! Where the acyclic half runs: in the thread of the cycles, or in one of its own.
 
+use ringcat_engine::AcyclicCounters;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceId, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
 use crate::error::Error;
@@ -147,6 +147,13 @@ pub(crate) fn carry_out_link_order(engine: &mut Engine, links: &mut impl Links) 
     }
 }
 
+/// Passes new messages to a subscriber of `tracing`.
+pub(crate) fn log_messages(engine: &mut Engine) {
+    #[cfg(feature = "tracing")]
+    crate::trace::record_messages(engine);
+    let _ = engine;
+}
+
 /// Runs procedures and sends their datagrams as far as the window allows. True if datagrams have to wait for the next
 /// window.
 pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window) -> bool {
@@ -154,6 +161,7 @@ pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window)
     engine.poll(links.now());
     carry_out_link_order(engine, links);
     if !engine.wants_to_send() {
+        log_messages(engine);
         return false;
     }
     // Procedures have taken time, and the kernel takes time for each frame: the window is read as late as possible.
@@ -167,5 +175,6 @@ pub(crate) fn work(engine: &mut Engine, links: &mut impl Links, window: &Window)
             links.send(link, frame);
         });
     }
+    log_messages(engine);
     engine.wants_to_send()
 }

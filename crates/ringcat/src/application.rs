@@ -14,18 +14,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::clocks::Follower;
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::Follower;
+use ringcat_engine::RingState;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
-use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange, Received};
+use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
 use ringcat_engine::main_device::{
     Active, Directory, LiveStatus, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
 };
-use ringcat_engine::ring::RingState;
-use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{Class, class_of};
 
 use crate::acyclic::{AcyclicHalf, Inline};
 use crate::cyclic::Cyclic;
@@ -116,12 +116,14 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         let left_at = cyclic.left_at()?;
         let mut now = links.now();
         let until = cyclic.begins_at();
-        let wake = if H::SHARES_LINKS { until.min(acyclic.due_at(links)) } else { until };
+        let sends_again = cyclic.exchange.sends_again();
+        let wake = if sends_again { until.min(cyclic.exchange.decide_at()) } else { until };
+        let wake = if H::SHARES_LINKS { wake.min(acyclic.due_at(links)) } else { wake };
         if now >= wake {
             return None;
         }
         links.wait_from(now, wake);
-        if H::SHARES_LINKS {
+        if H::SHARES_LINKS || sends_again {
             now = links.now();
         }
         let (mut is_back, mut lap) = (false, Lap::begin::<P>(|| links.now()));
@@ -129,7 +131,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
                 acyclic.receive(link, frame, now);
             } else {
-                is_back = cyclic.exchange.receive(link, frame, now) == Received::Taken;
+                is_back = cyclic.take_only_frame(link, frame, now);
             }
         });
         if !is_back {

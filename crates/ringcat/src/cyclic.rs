@@ -6,7 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::clocks::Follower;
+use ringcat_engine::Follower;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::{CopyError, CopyRule, Exchange, Received};
 use ringcat_engine::link::Link;
@@ -143,6 +143,13 @@ impl Cyclic {
         };
         let taken = taken == Received::Taken;
         taken.then(|| self.exchange.taken_left_at())
+    }
+
+    /// Takes a frame while only one is on the wire. False if this was another one, or if it is to be decided whether it
+    /// is sent again.
+    #[inline(always)]
+    pub fn take_only_frame(&mut self, link: Link, frame: &[u8], now: Instant) -> bool {
+        self.receive(link, frame, now).is_some() && self.exchange.decide_at() == Instant::NEVER
     }
 
     /// Records the arrival at the interface of a copy with this departure.
@@ -356,6 +363,7 @@ impl Cyclic {
                 window.occupy(Half::Cyclic, now, frame.len());
                 links.send(Link::Main, frame);
             });
+            self.follow_departures(now);
             self.cycle += 1;
             self.window.expect_cycle(next);
         } else {
@@ -396,6 +404,17 @@ impl Cyclic {
         exchange.decide_at()
     }
 
+    /// Where lost frames are sent again: notes when the frames that have left are lost.
+    #[inline(always)]
+    fn follow_departures(&mut self, now: Instant) {
+        let Cyclic { exchange, window, .. } = self;
+        if exchange.sends_again() {
+            exchange.expect_next(self.next_cycle);
+            exchange.follow_departures(now);
+            window.expect_try(exchange.decide_at());
+        }
+    }
+
     /// Sends the queued frames; the next cycle's frames leave at `next`.
     #[inline(never)]
     fn send(&mut self, now: Instant, next: Instant, links: &mut impl Links) {
@@ -407,11 +426,7 @@ impl Cyclic {
             }
             links.send(link, frame);
         });
-        if exchange.sends_again() {
-            exchange.expect_next(self.next_cycle);
-            exchange.follow_departures(now);
-            window.expect_try(exchange.decide_at());
-        }
+        self.follow_departures(now);
         self.cycle += 1;
         self.window.expect_cycle(next);
         self.cyclic_status.publish_spread(self.exchange.clock_spread_ns());

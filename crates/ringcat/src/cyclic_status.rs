@@ -6,10 +6,10 @@
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::Duration;
 
+use ringcat_engine::RingState;
 use ringcat_engine::domain::{DomainId, DomainState, DomainStatus};
 use ringcat_engine::exchange::CyclicCounters;
 use ringcat_engine::link::Link;
-use ringcat_engine::ring::RingState;
 use ringcat_wire::frame::MacAddress;
 
 use crate::histogram::Histogram;

@@ -3,14 +3,14 @@
 use core::fmt;
 use std::time::Duration;
 
+use ringcat_engine::BusError;
+use ringcat_engine::ConfigureError;
+use ringcat_engine::ScanError;
+use ringcat_engine::ServiceError;
+use ringcat_engine::StatesError;
+use ringcat_engine::StopError;
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
-use ringcat_engine::procedures::configure::ConfigureError;
-use ringcat_engine::procedures::request_states::StatesError;
-use ringcat_engine::procedures::scan::ScanError;
-use ringcat_engine::procedures::services::ServiceError;
-use ringcat_engine::procedures::stop::StopError;
-use ringcat_engine::supervisor::BusError;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
 

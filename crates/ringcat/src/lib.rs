@@ -49,7 +49,7 @@
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
-//! | `tracing` | events of the acyclic half for a `tracing` subscriber |
+//! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
 
@@ -135,7 +135,16 @@ pub use subdevice::{SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
 pub use value::{Number, ObjectValue};
 
-pub use ringcat_engine::clocks::{DelayRange, Follower, phase_error};
+pub use ringcat_engine::Acknowledge;
+pub use ringcat_engine::BlockedPort;
+pub use ringcat_engine::ConfigureError;
+pub use ringcat_engine::PortOf;
+pub use ringcat_engine::ReadPdos;
+pub use ringcat_engine::RingInspection;
+pub use ringcat_engine::ServiceError;
+pub use ringcat_engine::SiiWritten;
+pub use ringcat_engine::StopError;
+pub use ringcat_engine::Urgency;
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, DeclaredSyncManager, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError,
     Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock, RegisterAccess, RegisterCommand,
@@ -143,11 +152,14 @@ pub use ringcat_engine::config::{
     Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
-pub use ringcat_engine::event::{ClientEvents, ClientId, Event, EventsSince, Occupant, Subject, Subjects, TimedEvent};
+pub use ringcat_engine::event::{
+    ClientEvents, ClientId, Event, EventsSince, LogFilter, LogLevel, Message, MessageContent, MessagesSince, Occupant,
+    Subject, Subjects, TimedEvent,
+};
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
-pub use ringcat_engine::junction::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
+pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};
@@ -169,33 +181,26 @@ pub use ringcat_engine::main_device::{
     MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
     SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
-pub use ringcat_engine::plan::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
-pub use ringcat_engine::procedures::configure::ConfigureError;
-pub use ringcat_engine::procedures::dictionary::ReadPdos;
-pub use ringcat_engine::procedures::inspect_ring::RingInspection;
-pub use ringcat_engine::procedures::request_states::{NotFollowed, NotFollowedReason, StateScope, StatesError};
-pub use ringcat_engine::procedures::scan::{FIRST_STATION, Scan, ScanError};
-pub use ringcat_engine::procedures::services::ServiceError;
-pub use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, EepromOwner, EepromOwnership};
-pub use ringcat_engine::procedures::services::forced_state::Acknowledge;
-pub use ringcat_engine::procedures::services::port_report::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
-pub use ringcat_engine::procedures::services::ports::BlockedPort;
-pub use ringcat_engine::procedures::services::registers::Urgency;
-pub use ringcat_engine::procedures::services::statistics::{PortErrors, Statistics};
-pub use ringcat_engine::procedures::sii::program::SiiWritten;
-pub use ringcat_engine::procedures::stop::StopError;
-pub use ringcat_engine::procedures::unassigned::rescan::{Found, Identified, Rescan};
+pub use ringcat_engine::main_device::{Denial, NotPermitted, Role};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
 };
-pub use ringcat_engine::ring::identity::{Classified, Identity};
-pub use ringcat_engine::ring::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use ringcat_engine::ring_status::{
     Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
 };
-pub use ringcat_engine::supervisor::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::time::Instant;
-pub use ringcat_engine::topology::PortOf;
+pub use ringcat_engine::{AcyclicCounters, BusError, Reply};
+pub use ringcat_engine::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
+pub use ringcat_engine::{Classified, Identity};
+pub use ringcat_engine::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
+pub use ringcat_engine::{DelayRange, Follower, phase_error};
+pub use ringcat_engine::{EepromAssignment, EepromOwner, EepromOwnership};
+pub use ringcat_engine::{FIRST_STATION, Scan, ScanError};
+pub use ringcat_engine::{Found, Identified, Rescan};
+pub use ringcat_engine::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
+pub use ringcat_engine::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
+pub use ringcat_engine::{NotFollowed, NotFollowedReason, StateScope, StatesError};
+pub use ringcat_engine::{PortErrors, Statistics};
 pub use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 pub use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 pub use ringcat_wire::mailbox::coe::{DataType, ListType, ObjectCode};
@@ -203,6 +208,11 @@ pub use ringcat_wire::mailbox::soe::Idn;
 pub use ringcat_wire::register::LoopControl;
 pub use ringcat_wire::source_address::MacCodec;
 
+pub use ringcat_engine::NotLocked;
+pub use ringcat_engine::SetupError;
+pub use ringcat_engine::SiiProgramError;
+pub use ringcat_engine::StateError;
+pub use ringcat_engine::Topology;
 pub use ringcat_engine::config::SyncManagerOverride;
 pub use ringcat_engine::event::history::Incident;
 pub use ringcat_engine::exchange::Exchange;
@@ -212,14 +222,11 @@ pub use ringcat_engine::mail::eoe::EthernetStatus;
 pub use ringcat_engine::mail::stream::Overflow;
 pub use ringcat_engine::mail::{Conversation, Lane, MailCounters};
 pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice};
-pub use ringcat_engine::plan::{PlanFault, PlanProblem, PlanWarning, SmPlan};
-pub use ringcat_engine::procedures::al_state::StateError;
-pub use ringcat_engine::procedures::clocks::NotLocked;
-pub use ringcat_engine::procedures::configure::SetupError;
-pub use ringcat_engine::procedures::sii::program::SiiProgramError;
-pub use ringcat_engine::topology::Topology;
+pub use ringcat_engine::{PlanFault, PlanProblem, PlanWarning, SmPlan};
 #[cfg(feature = "packet")]
-pub use ringcat_link::recorder::Tap;
+pub use ringcat_link::pcapng::Direction as FrameDirection;
+#[cfg(feature = "packet")]
+pub use ringcat_link::recorder::{AlreadyRead, FrameNote, FrameReader, Recorded, Recorder, RecorderError, Tap, Taps};
 
 #[cfg(any(feature = "eni", feature = "esi"))]
 pub use ringcat_config as config;

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::LiveStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
 use crate::cyclic_status::CyclicStatus;

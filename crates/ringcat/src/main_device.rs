@@ -4,25 +4,26 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::ReadPdos;
+use ringcat_engine::Scan;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
-use ringcat_engine::junction::{JunctionConnection, JunctionMode};
+use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
 };
-use ringcat_engine::procedures::dictionary::ReadPdos;
-use ringcat_engine::procedures::inspect_ring::{RingInspection, inspect_ring};
-use ringcat_engine::procedures::scan::Scan;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{JunctionConnection, JunctionMode};
+use ringcat_engine::{RingInspection, inspect_ring};
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
-use crate::acyclic::{Inline, carry_out_link_order};
+use crate::acyclic::{Inline, carry_out_link_order, log_messages};
 use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
@@ -263,6 +264,32 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
+    /// Goes on with a segment that another process has known, without a scan ([`Engine::resume`]). Returns what was
+    /// found; nothing was read again that is as known.
+    ///
+    /// # Errors
+    /// [`Error::Scan`]: no SubDevice answers within [`Options::patience`], or the segment does not become stable.
+    pub fn resume(&mut self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.engine.resume(knowledge, handover)?;
+        loop {
+            self.work();
+            if let Some(result) = self.engine.scan_result() {
+                return Ok(result?);
+            }
+            self.wait();
+        }
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    pub fn knowledge(&self) -> Option<Knowledge> {
+        self.engine.knowledge()
+    }
+
+    /// The links, when another process goes on with the segment: this MainDevice ends without a frame.
+    pub fn into_links(self) -> L {
+        self.links
+    }
+
     /// Inspects the ring without changing anything on it: counts, cabling, the place of a break, error counters.
     ///
     /// # Errors
@@ -283,6 +310,7 @@ impl<L: Links> MainDevice<L> {
         engine.poll(now);
         carry_out_link_order(engine, links);
         engine.transmit(now, usize::MAX, &mut |link, frame| links.send(link, frame));
+        log_messages(engine);
     }
 
     /// Works for a time without an application: with [`Options::idle_operation`] it watches the segment meanwhile.
@@ -333,7 +361,8 @@ impl<L: Links> MainDevice<L> {
         self.finish(work)
     }
 
-    pub(crate) fn engine_mut(&mut self) -> &mut Engine {
+    /// The engine, for functions without a method here.
+    pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 

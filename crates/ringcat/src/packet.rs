@@ -3,6 +3,7 @@
 //! Time is `CLOCK_MONOTONIC`. [`ReceiveMode`] selects how [`Links::wait`] waits: asleep, spinning, or first spinning,
 //! then asleep. A link that is down drops frames, and works again as soon as it is up.
 
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::task::Waker;
 use std::time::Duration;
 
@@ -12,14 +13,14 @@ use ringcat_link::interface;
 use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, UsualReturn, WakeUp, monotonic};
 use ringcat_wire::frame::MacAddress;
 
-pub use ringcat_link::{LinkCounters, LinkError, ReceiveMode};
+pub use ringcat_link::{HandedSocket, LinkCounters, LinkError, ReceiveMode};
 
 use crate::links::Links;
 
 /// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on
-/// the wire at once ([`ringcat_engine::ring::MAX_IN_FLIGHT`]).
+/// the wire at once ([`ringcat_engine::MAX_IN_FLIGHT`]).
 const RING_FRAMES: u32 = 128;
-const _: () = assert!(RING_FRAMES as usize > ringcat_engine::ring::MAX_IN_FLIGHT);
+const _: () = assert!(RING_FRAMES as usize > ringcat_engine::MAX_IN_FLIGHT);
 
 /// One or two network interfaces.
 #[derive(Debug)]
@@ -41,7 +42,12 @@ pub struct PacketLinks {
     names: [Option<String>; 2],
     /// Interfaces that were switched off to be disconnected.
     disconnected: [bool; 2],
+    /// The place in a ring may be in doubt.
+    is_searching: bool,
 }
+
+/// A socket that another process has opened, with what it said about it.
+pub type HandedLink = (OwnedFd, HandedSocket);
 
 impl Drop for PacketLinks {
     fn drop(&mut self) {
@@ -103,7 +109,51 @@ impl PacketLinks {
             wake_up: None,
             names,
             disconnected: [false; 2],
+            is_searching: false,
         })
+    }
+
+    /// Goes on with sockets that another process has opened and that this one has received
+    /// ([`ringcat_link::descriptors`]), for all classes of frames. No privilege is needed. Frames that wait are
+    /// received first. Where the place in a ring is not given it is found ([`PacketSocket::adopt`]).
+    ///
+    /// # Errors
+    /// A descriptor is no packet socket with a ring of this size, or it is bound to another interface.
+    pub fn adopt(main: HandedLink, redundant: Option<HandedLink>) -> Result<PacketLinks, LinkError> {
+        let names = [Some(main.1.interface.clone()), redundant.as_ref().map(|(_, it)| it.interface.clone())];
+        let mode = main.1.receive;
+        let adopt = |(fd, handed): HandedLink| PacketSocket::adopt(fd, &handed);
+        let links = PacketLinks {
+            main: adopt(main)?,
+            redundant: redundant.map(adopt).transpose()?,
+            taken_from: Link::Main,
+            mode,
+            usual: UsualReturn::default(),
+            has_sent: false,
+            carriers: None,
+            wake_up: None,
+            names: names.clone(),
+            disconnected: [false; 2],
+            is_searching: true,
+        };
+        let [main, redundant] = names.each_ref().map(|name| name.as_deref());
+        links.watch_carriers(main.unwrap_or_default(), redundant)
+    }
+
+    /// What another process must know to go on with the sockets, beside duplicates of their descriptors.
+    pub fn handed(&self) -> (HandedSocket, Option<HandedSocket>) {
+        (self.main.handed(), self.redundant.as_ref().map(PacketSocket::handed))
+    }
+
+    /// The descriptors of both sockets, to be duplicated for another process.
+    pub fn descriptors(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+        (self.main.as_fd(), self.redundant.as_ref().map(PacketSocket::as_fd))
+    }
+
+    #[cold]
+    fn find_places(&mut self) {
+        let is_found = self.main.find_place() & self.redundant.as_mut().is_none_or(PacketSocket::find_place);
+        self.is_searching = !is_found;
     }
 
     /// A hybrid wait for the first frame that comes back.
@@ -208,6 +258,9 @@ impl Links for PacketLinks {
 
     #[inline(always)]
     fn wait_from(&mut self, now: Instant, until: Instant) {
+        if self.is_searching {
+            self.find_places();
+        }
         let is_first = core::mem::take(&mut self.has_sent);
         if let ReceiveMode::Hybrid { spin } = self.mode
             && is_first

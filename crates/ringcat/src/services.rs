@@ -12,19 +12,19 @@
 
 use std::time::Duration;
 
-use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, Subjects};
+use ringcat_engine::Rescan;
+use ringcat_engine::ServiceError;
+use ringcat_engine::Statistics;
+use ringcat_engine::SubDevicePorts;
+use ringcat_engine::event::{ClientEvents, ClientId, EventsSince, LogFilter, MessagesSince, Subjects};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::snapshot::Snapshot;
 use ringcat_engine::main_device::{
-    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram,
+    Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, Pending, Permission, RawDatagram, Role,
 };
-use ringcat_engine::procedures::request_states::{StateScope, StatesError};
-use ringcat_engine::procedures::services::ServiceError;
-use ringcat_engine::procedures::services::port_report::SubDevicePorts;
-use ringcat_engine::procedures::services::statistics::Statistics;
-use ringcat_engine::procedures::unassigned::rescan::Rescan;
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
-use ringcat_engine::supervisor::{BusError, Reply};
+use ringcat_engine::{BusError, Reply};
+use ringcat_engine::{StateScope, StatesError};
 use ringcat_wire::al::AlState;
 
 use crate::acyclic::Inline;
@@ -90,10 +90,13 @@ pub trait Services: Sized {
     /// Scans the whole segment again while process data continues, and returns the SubDevice at each position: which
     /// ones are new, have moved or are absent. New SubDevices are identified but not configured. A SubDevice that has
     /// moved is also reported by an event. The scan ends when the segment is stable and each SubDevice is identified,
-    /// at the latest after `limit`. It fails before activation, when the segment keeps changing, or when the bus fails.
+    /// at the latest after `limit`. It fails when the segment keeps changing, or when the bus fails.
     ///
     /// Locations of breaks, CRC errors of cables and positions in events follow the new cabling from then on, unless
     /// the ring of two links is open or a mandatory SubDevice is absent.
+    ///
+    /// Without an application it needs [`Options::idle_operation`](crate::Options). SubDevices that did not change keep
+    /// their states, mailboxes and transfers, and the result says what is different from the scan before.
     fn rescan(self, limit: Duration) -> Self::Outcome<Rescan, ServiceError> {
         self.call(move |engine| engine.start_rescan(limit))
     }
@@ -152,7 +155,50 @@ pub trait Services: Sized {
         self.immediately(move |engine| engine.unregister_client(client))
     }
 
-    /// Whether a function can be called in the present phase.
+    /// Sets which messages of the acyclic half are reported from now on, beside the events: the level (0 to 2, as
+    /// `ethercat debug`) and the mask of subjects. It is level 0 at first, and stays over activations and stops. The
+    /// cyclic half reports no messages.
+    fn set_log_filter(self, filter: LogFilter) -> Self::Immediate<()> {
+        self.immediately(move |engine| engine.set_log_filter(filter))
+    }
+
+    /// Which messages are reported.
+    fn log_filter(self) -> Self::Immediate<LogFilter> {
+        self.immediately(|engine| engine.log_filter())
+    }
+
+    /// The messages from a number on: the last 4,096 are kept, up to 1 MiB. The number of missing ones is in the
+    /// result, and the number to continue with. [`text::message`](crate::text::message) has a line for each.
+    fn messages_since(self, number: u64) -> Self::Immediate<MessagesSince> {
+        self.immediately(move |engine| engine.messages_since(number))
+    }
+
+    /// Begins or ends events about single datagrams, cyclic and acyclic, with wrong working counters:
+    /// [`Event::CyclicCommand`](crate::Event) and `AcyclicCommand`, at most one a second per command and address. They
+    /// are off at first.
+    fn set_command_reports(self, is_on: bool) -> Self::Immediate<()> {
+        self.immediately(move |engine| engine.set_command_reports(is_on))
+    }
+
+    /// Sends a text in an Ethernet frame on each link: a mark in captures, up to the first SubDevice, which destroys it
+    /// and counts an error; with bit 0 of DL_CONTROL cleared SubDevices pass it on, and what comes back is ignored. The
+    /// EtherType is any but that of EtherCAT; 0x88B5 is free for such uses (IEEE 802). At most 1,500 bytes.
+    fn debug_message(self, ethertype: u16, text: Vec<u8>) -> Self::Outcome<(), ServiceError> {
+        self.call(move |engine| engine.start_debug_message(ethertype, &text))
+    }
+
+    /// The role of the MainDevice on the segment.
+    fn role(self) -> Self::Immediate<Role> {
+        self.immediately(|engine| engine.role())
+    }
+
+    /// Sets the role: in [`Role::Inactive`] functions that need the bus are refused
+    /// ([`Function::needs_the_bus`]).
+    fn set_role(self, role: Role) -> Self::Immediate<()> {
+        self.immediately(move |engine| engine.set_role(role))
+    }
+
+    /// Whether a function can be called in the present role and phase.
     fn permission(self, function: Function) -> Self::Immediate<Permission> {
         self.immediately(move |engine| engine.permission(function))
     }

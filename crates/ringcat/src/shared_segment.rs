@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant as WallClock};
 
 use ringcat_engine::link::Link;
-use ringcat_engine::ring::identity::{Class, class_of};
 use ringcat_engine::time::Instant;
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::HostLink;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;

@@ -4,12 +4,20 @@ use std::time::Duration;
 
 use ringcat_wire::al::AlState;
 
-use crate::acyclic::Inline;
+use crate::acyclic::{AcyclicHalf, Inline};
 use crate::application::{Application, LastOutputs};
 use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::{MainDevice, Refused};
 use crate::supervisor_thread::SupervisorThread;
+
+impl<L: Links, A: AcyclicHalf> Application<L, A> {
+    /// The links, when another process goes on with the segment: the application ends without a further frame, and what
+    /// the SubDevices do is up to that process and to their watchdogs ([`crate::MainDevice::resume`]).
+    pub fn into_links(self) -> L {
+        self.links
+    }
+}
 
 impl<L: Links> Application<L, Inline> {
     /// Stops in order: runs a few more cycles, with all outputs zero if `outputs` requests it, then brings all

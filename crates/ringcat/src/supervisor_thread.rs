@@ -15,17 +15,18 @@ use std::task::Waker;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
+use ringcat_engine::JunctionConnection;
+use ringcat_engine::Scan;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::junction::JunctionConnection;
+use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
 };
-use ringcat_engine::procedures::scan::Scan;
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 #[cfg(feature = "eoe")]
 use ringcat_link::WakeUp;
@@ -224,6 +225,23 @@ impl SupervisorThread {
         };
         meanwhile();
         Ok(result?)
+    }
+
+    /// Goes on with a segment that another process has known, as [`crate::MainDevice::resume`].
+    ///
+    /// # Errors
+    /// As [`crate::MainDevice::resume`].
+    pub fn resume(&self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.with(move |engine| engine.resume(knowledge, handover))??;
+        Ok(self.ask(|engine| engine.scan_result()).wait()??)
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn knowledge(&self) -> Result<Option<Knowledge>, Error> {
+        self.with(|engine| engine.knowledge())
     }
 
     /// Lays out process data, starts the configuration of all SubDevices, and returns the running application. Its

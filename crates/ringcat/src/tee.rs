@@ -2,7 +2,9 @@
 //!
 //! Input: any [`Links`] and a [`Tap`]. Output: links. Frames are recorded with the time of the links: sent frames
 //! before they are passed on, received frames when they are taken. Interface 0 of the capture is the main link, 1 the
-//! redundant one. One tap serves one thread; tees of several threads write into one file.
+//! redundant one. One tap serves one thread; tees of several threads write into one file. With taps of
+//! [`Taps`](ringcat_link::Taps), recording begins and ends while the links are in use, on a call from any thread;
+//! without a reader each frame costs one load.
 
 use std::task::Waker;
 

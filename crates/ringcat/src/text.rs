@@ -3,6 +3,7 @@
 //! Positions are places on the bus, indices are places in the declaration; a line names which of the two it gives.
 
 mod clocks;
+mod messages;
 mod names;
 mod ring;
 mod scan;
@@ -11,6 +12,7 @@ mod subdevices;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_wire::frame::MacAddress;
 
+pub use messages::message;
 pub use names::Names;
 
 /// The source address of a frame, if it is long enough to have one.
@@ -32,6 +34,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| ring::junction(event, names))
         .or_else(|| subdevices::describe(event, names, *occupants))
         .or_else(|| clocks::describe(event, names, *occupants))
+        .or_else(|| messages::of_command(event, names, *occupants))
         .or_else(|| of_process_data(event));
     // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))

@@ -2,14 +2,18 @@
 //!
 //! The acyclic half reports each event once, in its own thread if it has one, with the target `ringcat`, the text of
 //! [`describe`] and the field `at_ns`. Events that impair process data or redundancy are warnings, states of single
-//! cycles are debug messages, all others are information. The cyclic half itself reports nothing.
+//! cycles are debug messages, all others are information. The cyclic half itself reports nothing. Messages have the
+//! target `ringcat::messages`: steps are debug messages, frames are traces; their level and subjects are those of
+//! `Services::set_log_filter`.
 
-use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::event::{Event, MessageContent, TimedEvent};
+use ringcat_engine::main_device::MainDevice as Engine;
 use tracing::{Level, enabled, event};
 
-use crate::text::{Names, describe};
+use crate::text::{Names, describe, message};
 
 const TARGET: &str = "ringcat";
+const MESSAGES: &str = "ringcat::messages";
 
 /// Records an event.
 pub(crate) fn record(timed: &TimedEvent) {
@@ -24,6 +28,22 @@ pub(crate) fn record(timed: &TimedEvent) {
             event!(target: TARGET, Level::INFO, at_ns = timed.at.0, "{}", describe(timed, &Names::default()));
         }
         _ => {}
+    }
+}
+
+/// Records the messages since the last call.
+pub(crate) fn record_messages(engine: &mut Engine) {
+    while let Some(next) = engine.pop_message() {
+        match next.content {
+            MessageContent::Step(_) if enabled!(target: MESSAGES, Level::DEBUG) => {
+                event!(target: MESSAGES, Level::DEBUG, at_ns = next.at.0, "{}", message(&next));
+            }
+            MessageContent::Sent { .. } | MessageContent::Received { .. } if enabled!(target: MESSAGES, Level::TRACE) =>
+            {
+                event!(target: MESSAGES, Level::TRACE, at_ns = next.at.0, "{}", message(&next));
+            }
+            _ => {}
+        }
     }
 }
 

@@ -9,15 +9,15 @@ use std::time::Duration;
 
 use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
-use ringcat_engine::board::Board;
+use ringcat_engine::Board;
+use ringcat_engine::Identity;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LayoutError};
 use ringcat_engine::link::LinkSet;
-use ringcat_engine::queue::{Consumer, queue};
-use ringcat_engine::ring::Identity;
 use ringcat_engine::time::Instant;
+use ringcat_engine::{Consumer, queue};
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 

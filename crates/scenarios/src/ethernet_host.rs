@@ -5,8 +5,8 @@
 use std::time::Duration;
 
 use ringcat::Instant;
+use ringcat_engine::Bus;
 use ringcat_engine::mail::eoe::EthernetPort;
-use ringcat_engine::supervisor::Bus;
 use ringcat_sim::application::eoe::frames::Frames;
 use smoltcp::iface::{Config, Interface, PollResult, SocketHandle, SocketSet};
 use smoltcp::socket::tcp;

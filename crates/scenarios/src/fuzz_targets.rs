@@ -1,5 +1,5 @@
 //! Fuzz targets for arbitrary bytes: one per mailbox decoder (protocol 6, 10.1), and one each for ENI, ESI
-//! and network files (protocol 8, 12).
+//! and network files (protocol 8, 12), and for knowledge of a segment (decision 0061).
 //!
 //! A target is a plain function. It panics if a decoder panics, or if a decoded value changes when it is encoded and
 //! decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus` and mutants
@@ -7,6 +7,7 @@
 
 pub mod eni;
 pub mod esi;
+pub mod knowledge;
 pub mod network;
 pub mod seeds;
 
@@ -28,7 +29,7 @@ use crate::dice::Dice;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 16] = [
+pub const TARGETS: [(&str, Target); 17] = [
     ("mailbox", mailbox),
     ("error_reply", error_reply),
     ("coe", coe),
@@ -45,6 +46,7 @@ pub const TARGETS: [(&str, Target); 16] = [
     ("eni", eni::target),
     ("esi", esi::target),
     ("network", network::target),
+    ("knowledge", knowledge::target),
 ];
 
 /// Buffer size for any message: more than a mailbox, and the largest prefix of an encoder.

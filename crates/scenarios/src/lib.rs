@@ -38,4 +38,5 @@ pub mod tampered_links;
 pub mod tap;
 pub mod terminals;
 pub mod truth;
+pub mod witness;
 pub mod world;

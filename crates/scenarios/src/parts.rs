@@ -7,7 +7,7 @@
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Direction, DomainId, Instant, Link, Links};
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::network::Network;
 use ringcat_wire::command::Command;
 use ringcat_wire::frame::{Frame, MacAddress};

@@ -11,7 +11,13 @@ pub const fn sends_again(seed: u64) -> bool {
     Dice::new(seed ^ 0x00A1_0000).one_in(3)
 }
 
-/// Number of these seeds.
+/// Whether the links of a seed's scenario know when frames arrived, as packet sockets do, so that cycles of one frame
+/// take their fast path: one in two.
+pub const fn knows_arrivals(seed: u64) -> bool {
+    Dice::new(seed ^ 0x00A2_0000).one_in(2)
+}
+
+/// Number of seeds in whose scenarios lost frames are sent again.
 pub fn sending_again(seeds: &Range<u64>) -> usize {
     seeds.clone().filter(|seed| sends_again(*seed)).count()
 }

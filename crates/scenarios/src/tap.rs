@@ -3,7 +3,7 @@
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Instant, Link, Links};
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::network::Network;
 use ringcat_wire::command::Command;
 use ringcat_wire::frame::{Frame, MacAddress};
@@ -67,6 +67,10 @@ pub struct Tap {
     outdated: u64,
     /// Other copies that came back after a further try of their cycle had been sent.
     superseded: u64,
+    /// Whether the arrival of the frame that was taken last is known, as with packet sockets.
+    knows_arrivals: bool,
+    /// When the last frame was taken.
+    taken_at: Instant,
     /// Whether links can be taken down.
     can_disconnect: bool,
     /// Injected losses.
@@ -98,6 +102,8 @@ impl Tap {
             departed: Vec::new(),
             outdated: 0,
             superseded: 0,
+            knows_arrivals: false,
+            taken_at: Instant::default(),
             can_disconnect: true,
             losses: Vec::new(),
             lost_per_mille: 0,
@@ -132,6 +138,11 @@ impl Tap {
     /// Number of losses that have not occurred yet.
     pub fn losses_left(&self) -> u32 {
         self.losses.iter().map(|loss| loss.count).sum()
+    }
+
+    /// From now on the links know when frames arrived, as packet sockets do: cycles of one frame take their fast path.
+    pub fn know_arrivals(&mut self) {
+        self.knows_arrivals = true;
     }
 
     /// From now on links cannot be taken down.
@@ -288,6 +299,7 @@ impl Links for Tap {
         if !self.injected.is_empty() {
             let (link, bytes) = self.injected.remove(0);
             self.note(false, link, &bytes);
+            self.taken_at = self.segment.now();
             take(link, &bytes);
             return true;
         }
@@ -295,12 +307,21 @@ impl Links for Tap {
         let any = self.segment.receive(&mut |link, frame| received = Some((link, frame.to_vec())));
         if let Some((link, frame)) = received.filter(|(_, frame)| !self.is_lost(false, frame)) {
             self.note(false, link, &frame);
+            self.taken_at = self.segment.now();
             take(link, &frame);
         }
         if !any {
             self.count_idle();
         }
         any
+    }
+
+    fn knows_arrivals(&self) -> bool {
+        self.knows_arrivals
+    }
+
+    fn received_at(&mut self, _sent_at: Instant, _now: Instant) -> Option<Instant> {
+        self.knows_arrivals.then_some(self.taken_at)
     }
 
     fn carrier(&self, link: Link) -> Option<bool> {

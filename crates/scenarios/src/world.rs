@@ -27,6 +27,7 @@ use self::journal::Journal;
 pub use self::journal::Step;
 use crate::check::{Delivery, Judged, Mirror};
 use crate::once::Declared;
+use crate::seeds;
 use crate::tap::{Fingerprint, Tap};
 use crate::truth::{Departure, Truth};
 
@@ -114,6 +115,9 @@ impl World {
             devices.for_each(|device| network.device_mut(device).controller.log_logical());
         }
         let mut tap = Tap::new(network);
+        if seeds::knows_arrivals(seed) {
+            tap.know_arrivals();
+        }
         tap.set_limit(tap.now() + SCAN_LIMIT);
         let mut main_device = MainDevice::request(tap, options);
         let mut journal = Journal::default();

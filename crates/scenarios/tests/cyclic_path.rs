@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::time::Duration;
 
+use ringcat::Taps;
 use ringcat::eni::{EniFile, EniImage};
 use ringcat::links::Links;
 use ringcat::memory::MemoryLinks;
@@ -151,6 +152,51 @@ fn recorded_cycles_do_not_allocate() {
         assert_eq!(link.sent + link.received + link.lost, CYCLES * 6 + (CYCLES - 1) * 6, "{link:?}");
         assert!(link.sent > 0 && link.received > 0, "{link:?}");
     }
+}
+
+// covers: capture, no-allocation
+#[test]
+fn taps_that_another_thread_switches_on_and_off_do_not_allocate_in_cycles() {
+    const SWITCHES: usize = 20;
+    let taps = Taps::new(2);
+    let mut load = load(Cabling::ClosedRing);
+    let CyclicLoad { exchange, links, double, now, .. } = &mut load;
+    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().0, None, 1)), taps.tap());
+    let switching = std::thread::spawn(move || {
+        let mut frames = 0_usize;
+        for _ in 0..SWITCHES {
+            let mut reader = taps.read().expect("it is the only one");
+            let before = frames;
+            while frames == before {
+                let read = reader.read_all(|note, frame| {
+                    frames += 1;
+                    if note.length == frame.len() { Ok(()) } else { Err(note) }
+                });
+                read.expect("frames are whole");
+            }
+        }
+        frames
+    });
+    let mut cycles = 0;
+    let used = counted(|| {
+        while cycles < CYCLES || !switching.is_finished() {
+            cycles += 1;
+            *now += PERIOD;
+            tee.links_mut().set_now(*now);
+            while tee.receive(&mut |link, frame| {
+                exchange.receive(link, frame, *now);
+            }) {}
+            for domain in (0..3).map(DomainId) {
+                exchange.process(domain, *now);
+                exchange.queue(domain, *now);
+            }
+            exchange.send(*now, &mut |link, frame| tee.send(link, frame));
+            let links = tee.links_mut();
+            double.answer(&mut links.sent, &mut links.arriving);
+        }
+    });
+    assert_eq!(used, (0, 0));
+    assert!(switching.join().expect("no panic") >= SWITCHES);
 }
 
 // covers: copy

@@ -9,13 +9,15 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{Application, Instant, LastOutputs, Links, MainDevice, Options, automatic};
+use ringcat::{Application, Instant, Knowledge, LastOutputs, Links, MainDevice, Options, automatic};
+use ringcat_engine::knowledge::seal;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
 use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::frame::Frame;
 use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
 use scenarios::dice::Dice;
+use scenarios::fuzz_targets::knowledge;
 use scenarios::seeds;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tampered_links::{TamperedLinks, Verdict};
@@ -225,4 +227,35 @@ fn seeds_from_the_environment() {
     let Some(seeds) = seeds::from_environment() else { return println!("skipped: no SEED given") };
     runs(seeds.clone(), eeproms);
     runs(seeds, lies);
+}
+
+/// Most memory for the bytes of a knowledge: 32 times their length, and an error.
+fn check_memory(content: &[u8]) {
+    let bytes = seal(content);
+    let before = counts().bytes;
+    restart_peak();
+    let knowledge = Knowledge::from_bytes(&bytes);
+    let peak = counts().peak - before;
+    assert!(peak <= 32 * bytes.len() as i64 + 1024, "{peak} bytes of memory for {}", bytes.len());
+    drop(knowledge);
+    assert_eq!(counts().bytes, before);
+}
+
+// covers: states
+#[test]
+fn memory_for_knowledge_is_bounded_by_the_length_of_the_bytes() {
+    for seed in seeds::from_environment().unwrap_or(0..2_000) {
+        let mut dice = Dice::new(seed);
+        let mut content = knowledge::SMALL[knowledge::HEADER..].to_vec();
+        // Lengths of lists lie anywhere; behind them are many elements of the fewest bytes.
+        let at = dice.below(content.len() as u64 - 4) as usize;
+        let filling = if dice.one_in(2) { 0 } else { dice.roll() as u8 };
+        content.truncate(at);
+        let count = if dice.one_in(4) { u32::MAX } else { dice.below(40_000) as u32 };
+        content.extend(count.to_le_bytes());
+        content.resize(at + dice.below(60_000) as usize, filling);
+        check_memory(&content);
+        let any = bytes(&mut dice, 5_000);
+        check_memory(&any);
+    }
 }

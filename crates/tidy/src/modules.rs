@@ -27,12 +27,14 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("bell", &[]),
     ("request", &["declared", "bell"]),
     ("junction", &["declared"]),
+    ("role", &[]),
     // frames
     ("ring", &["time", "link"]),
     ("board", &["time", "link", "ring"]),
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["info", "link"]),
+    ("knowledge", &["direction", "info", "ring", "topology"]),
     ("ring_status", &["declared", "time", "link", "ring", "topology"]),
     ("config", &["declared", "info"]),
     ("clocks", &["topology"]),
@@ -46,14 +48,15 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // cyclic half
     ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
-    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event"]),
-    ("mail", &["declared", "time", "config", "event", "supervisor"]),
+    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
+    ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
     ("procedures", &["declared", "time", "bell", "link", "queue", "ring", "board", "info", "topology", "ring_status",
-        "config", "clocks", "plan", "layout", "event", "segment", "supervisor", "mail", "request", "junction"]),
+        "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail", "request",
+        "junction", "role"]),
     // both together
     ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
-        "topology", "ring_status", "config", "plan", "layout", "event", "segment", "exchange", "supervisor", "mail",
-        "request", "junction", "procedures"]),
+        "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
+        "supervisor", "mail", "request", "junction", "role", "procedures"]),
 ];
 
 /// The engine's sources.

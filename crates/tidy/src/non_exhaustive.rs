@@ -31,6 +31,8 @@ const EXEMPT: &[(&str, &str)] = &[
     ("Entry", "domain, first bit and number of bits"),
     ("Freshness", "an application has to handle each"),
     ("Half", "acyclic or cyclic"),
+    ("HandedSocket", "made by the process that has received the descriptor"),
+    ("Handover", "in order or after a crash: a new owner has to know which"),
     ("Link", "a ring has two links"),
     ("PacketOptions", "of the kernel's sockets; applications name interfaces"),
     ("RegisterAccess", "a register is written or checked"),

@@ -14,13 +14,13 @@ use ringcat::wire::datagram::OVERHEAD;
 use ringcat::wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN};
 use ringcat::wire::source_address::{MacCodec, PROCESSED};
 use ringcat::{DomainId, DomainState, Instant, Links};
-use ringcat_engine::board::Board;
+use ringcat_engine::Board;
+use ringcat_engine::Identity;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::exchange::{Exchange, Received};
 use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout};
 use ringcat_engine::link::LinkSet;
-use ringcat_engine::queue::{Consumer, queue};
-use ringcat_engine::ring::Identity;
+use ringcat_engine::{Consumer, queue};
 use ringcat_link::{PacketOptions, PacketSocket, ReceiveMode, monotonic, wait};
 
 use super::quantile::quantile_us;

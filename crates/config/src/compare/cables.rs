@@ -6,7 +6,7 @@
 use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::topology::{PortOf, Topology};
+use ringcat_engine::{PortOf, Topology};
 use ringcat_wire::address::Position;
 
 use super::difference::{Difference, DifferenceKind};

@@ -3,7 +3,7 @@
 use ringcat_engine::config::{DeclaredSyncManager, PdoEntry, PdoMapping, SubDeviceConfig, SyncManagerRole};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
-use ringcat_engine::plan::plan;
+use ringcat_engine::plan;
 
 use super::difference::{Difference, DifferenceKind, Stated};
 

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
+use ringcat_engine::Topology;
 use ringcat_engine::config::IdentityField;
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::topology::Topology;
 use ringcat_wire::address::Position;
 
 /// A difference between a network and a file.

@@ -13,9 +13,9 @@ use ringcat_engine::config::{
 };
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
-use ringcat_engine::junction::{JunctionConnection, JunctionMode};
 use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::main_device::{Declaration, DomainConfig, DomainMember, Required};
+use ringcat_engine::{JunctionConnection, JunctionMode};
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;

@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
+use ringcat_engine::Topology;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
-use ringcat_engine::plan::{AreaPlan, MappedPdo, plan};
-use ringcat_engine::topology::Topology;
+use ringcat_engine::{AreaPlan, MappedPdo, plan};
 use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::MailboxLayout;
 
@@ -200,7 +200,7 @@ fn sync_manager(info: &SubDeviceInfo, area: &AreaPlan) -> SyncManager {
 /// A PDO with the names and types of the SII.
 fn of_pdo(described: Option<&PdoInfo>, pdo: &MappedPdo) -> Pdo {
     let texts = described.map(|described| &described.entries[..]).unwrap_or_default();
-    let entry = |(at, mapped): (usize, &ringcat_engine::plan::MappedEntry)| {
+    let entry = |(at, mapped): (usize, &ringcat_engine::MappedEntry)| {
         let described = texts.get(at);
         Entry {
             index: mapped.index,

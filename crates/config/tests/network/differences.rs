@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use ringcat_config::network::{NetworkFile, ScanOptions};
 use ringcat_config::{DifferenceKind, FoundNetwork};
+use ringcat_engine::Topology;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::topology::Topology;
 use ringcat_wire::address::Position;
 use ringcat_wire::sii::Identity;
 

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use ringcat_config::network::NetworkFile;
+use ringcat_engine::JunctionMode;
 use ringcat_engine::config::{ConfigAddress, StartupAction, Transition, Watchdog};
 use ringcat_engine::declared::GroupId;
 use ringcat_engine::info::Direction;
-use ringcat_engine::junction::JunctionMode;
 
 use crate::WHOLE;
 

@@ -7,9 +7,10 @@ use alloc::vec::Vec;
 
 use super::clients::{ClientEvents, ClientId, Clients};
 use super::history::History;
+use super::messages::Messages;
 use super::subject::Subjects;
 use super::{Event, Occupant, TimedEvent};
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 
 use crate::time::Instant;
 
@@ -46,6 +47,7 @@ pub struct EventLog {
     history: History,
     occupants: Vec<Occupant>,
     clients: Clients,
+    messages: Messages,
 }
 
 impl EventLog {
@@ -68,6 +70,11 @@ impl EventLog {
     /// The SubDevices at cabling positions.
     pub fn occupants(&self, positions: [Option<Position>; 2]) -> [Option<Occupant>; 2] {
         positions.map(|position| self.occupants.get(usize::from(position?.0)).copied())
+    }
+
+    /// The SubDevice with a station address, if its position is known.
+    pub(crate) fn occupant_at(&self, station: StationAddress) -> Option<Occupant> {
+        self.occupants.iter().find(|occupant| occupant.station == station).copied()
     }
 
     /// Appends an event, with the SubDevices at the cabling positions that it names.
@@ -94,6 +101,11 @@ impl EventLog {
         let event = TimedEvent { number, at, event, occupants };
         self.clients.queue(&event);
         self.kept.push_back(event);
+    }
+
+    /// Messages beside the events.
+    pub(crate) fn messages(&mut self) -> &mut Messages {
+        &mut self.messages
     }
 
     /// Adds a client with a queue of its own; `None` if there are too many.

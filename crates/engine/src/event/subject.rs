@@ -22,11 +22,15 @@ pub enum Subject {
     Domains,
     /// Distributed clocks.
     Clocks,
+    /// Single datagrams with wrong working counters: events on request.
+    Commands,
+    /// Content of acyclic frames: messages of level 2 only, no event.
+    Frames,
 }
 
 impl Subject {
     /// All of them.
-    pub const ALL: [Subject; 8] = [
+    pub const ALL: [Subject; 10] = [
         Subject::Scan,
         Subject::Cabling,
         Subject::Ring,
@@ -35,6 +39,8 @@ impl Subject {
         Subject::Mail,
         Subject::Domains,
         Subject::Clocks,
+        Subject::Commands,
+        Subject::Frames,
     ];
 }
 
@@ -75,6 +81,7 @@ impl Event {
             | Event::ScanFinished { .. }
             | Event::ScanFailed { .. }
             | Event::SegmentChanged { .. }
+            | Event::Resumed { .. }
             | Event::SiiOddity { .. }
             | Event::DuplicateAlias { .. }
             | Event::Unexpected { .. }
@@ -114,6 +121,7 @@ impl Event {
             | Event::GroupLeft { .. } => Subject::States,
             Event::Emergency { .. } => Subject::Mail,
             Event::Domain { .. } | Event::Skipped { .. } => Subject::Domains,
+            Event::CyclicCommand { .. } | Event::AcyclicCommand { .. } => Subject::Commands,
             Event::ClocksLocked { .. }
             | Event::ReferenceClock { .. }
             | Event::DelaysChanged { .. }

@@ -205,7 +205,13 @@ impl Again {
     pub fn count_errors(&self, first: &CyclicFrame, board: &Board) {
         let missing = self.proofs.iter().filter(|proof| !proof.found.holds(proof.needed));
         let expected = missing.filter(|proof| first.expects(proof.datagram, proof.contribution));
-        expected.for_each(|proof| board.count_wkc_error(proof.subdevice));
+        let mut last = None;
+        for proof in expected {
+            board.count_wkc_error(proof.subdevice);
+            if last.replace(proof.datagram) != Some(proof.datagram) {
+                first.post_error(proof.datagram, board);
+            }
+        }
     }
 }
 

@@ -249,10 +249,16 @@ impl CyclicFrame {
         self.shown.complete
     }
 
+    /// Posts a cycle in which the tries of a datagram, by its number in the frame, did not make it complete.
+    pub(crate) fn post_error(&self, datagram: usize, board: &Board) {
+        let links = Link::ALL.map(|link| self.shown.arrivals.arrived & link.bit() != 0);
+        self.places.get(datagram).into_iter().for_each(|place| place.post_error(board, self.domain, links));
+    }
+
     /// Counts the wrong working counters of this flight.
     pub(crate) fn count_errors(&self, board: &Board) {
         let links = Link::ALL.map(|link| self.shown.arrivals.arrived & link.bit() != 0);
-        self.places.iter().for_each(|place| place.count_errors(board, links));
+        self.places.iter().for_each(|place| place.count_errors(board, self.domain, links));
     }
 
     /// Result of this flight's supervision datagram, if it has one and any copy came back.

@@ -1,5 +1,6 @@
 //! The fast path of a cycle with one frame: one domain with one cycle of one frame on the wire, on one link, without
-//! clocks, copies or further tries. Nearly all cycles of such an application take it (decision 0055).
+//! clocks or copies. Nearly all cycles of such an application take it (decision 0055). If lost frames are sent again, a
+//! cycle without a further try takes it too.
 //!
 //! A step that returns false has changed nothing, and the general step follows: [`Exchange::process`],
 //! [`Exchange::queue`] with [`Exchange::send`].
@@ -10,13 +11,12 @@ use crate::link::LinkSet;
 use crate::time::Instant;
 
 impl Exchange {
-    /// Determines whether this path exists. It depends on the layout, the table of copies and the rules for lost frames
-    /// only.
+    /// Determines whether this path exists. It depends on the layout and the table of copies only.
     pub(super) fn find_only_frame(&mut self) {
         let has_clocks = |frame: &CyclicFrame| frame.clocks().is_some();
         let has_one_set = self.domains.len() == 1 && self.domains.iter().all(|domain| domain.frames() == (0..1));
         let has_clocks = self.frames.iter().chain(&self.others).any(has_clocks);
-        let is_simple = self.copies.is_empty() && self.again.is_empty() && self.service.stays_at(0);
+        let is_simple = self.copies.is_empty() && self.service.stays_at(0);
         self.has_only_frame = self.links == LinkSet::Single && has_one_set && !has_clocks && is_simple;
     }
 

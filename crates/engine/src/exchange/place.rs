@@ -287,10 +287,11 @@ impl Place {
     }
 
     /// Counts an error for each expected SubDevice that processed none of the received copies, or both.
-    pub fn count_errors(&self, board: &Board, links: [bool; 2]) {
+    pub fn count_errors(&self, board: &Board, domain: usize, links: [bool; 2]) {
         if self.is_complete(links) {
             return;
         }
+        self.post_error(board, domain, links);
         let is_summed = self.is_summed();
         let processed = |it: &Contribution| {
             it.processed.iter().zip(links).filter(|(processed, arrived)| **processed && *arrived).count()

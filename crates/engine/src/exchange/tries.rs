@@ -58,7 +58,6 @@ impl Exchange {
         self.is_alone = again.len() == 1;
         self.base_ns = layout.domains.iter().map(|domain| domain.period.as_nanos() as u64).min().unwrap_or(0);
         self.again = again;
-        self.find_only_frame();
     }
 
     /// When [`Exchange::decide`] is to be called, after all frames that have arrived were received.

@@ -16,6 +16,7 @@ use ringcat_wire::sii::{
 use super::subdevice::{PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 use super::warning::{InfoWarning, SiiProblem};
 use crate::direction::Direction;
+pub(crate) use mailboxes::is_possible;
 use parts::{Parts, fixed_area, whole, within};
 
 /// Byte offsets in the fixed area, for warnings.

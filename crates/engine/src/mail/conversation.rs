@@ -10,6 +10,7 @@ use super::error::MailboxError;
 use super::lane::{Arrival, Lane, LaneState, PendingRequest, Refusal};
 use super::reader;
 use super::shared::SharedMailbox;
+use crate::role::Function;
 use crate::time::Instant;
 
 /// Time limits of one message and its answer.
@@ -76,7 +77,12 @@ fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
 
 impl Conversation {
     /// Waits until the lane is free, and takes it.
-    pub(super) async fn take(shared: &Rc<SharedMailbox>, lane: Lane) -> Result<Conversation, MailboxError> {
+    pub(super) async fn take(
+        shared: &Rc<SharedMailbox>,
+        lane: Lane,
+        function: Function,
+    ) -> Result<Conversation, MailboxError> {
+        shared.bus.permit(function)?;
         let (mut turn, epoch) = {
             let state = &mut *shared.state_mut();
             if !state.open {

@@ -1,5 +1,6 @@
 //! Delivers a mail to its lane (decision 0007).
 
+use alloc::format;
 use alloc::rc::Rc;
 
 use ringcat_wire::mailbox::coe::{CoeHeader, CoeService, Emergency, SdoInformation};
@@ -11,7 +12,7 @@ use super::protocol_error;
 use super::recent::ReadKind;
 use super::shared::{MailboxState, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::time::Instant;
 
 /// SoE services that are answers; the others are unsolicited (protocol 6.6).
@@ -32,6 +33,16 @@ const EOE_ANSWERS: [u8; 4] = [3, 5, 7, 9];
 
 /// Takes the content of the send mailbox. Any bytes are allowed. True if a conversation waited for it.
 pub(super) fn deliver(shared: &Rc<SharedMailbox>, mail: &[u8], kind: ReadKind, sent: Instant) -> bool {
+    shared.bus.step(Subject::Mail, || {
+        let station = shared.state().session.map(|session| session.station).unwrap_or_default();
+        match Message::decode(mail) {
+            Ok(Message { header, payload }) => {
+                let (protocol, counter) = (header.protocol, header.counter);
+                format!("{station}: {protocol:?} mail of {} bytes read, counter {counter}", payload.len())
+            }
+            Err(error) => format!("{station}: mail that cannot be read: {error:?}"),
+        }
+    });
     let wanted = {
         let state = &mut *shared.state_mut();
         let Ok(message) = Message::decode(mail) else {

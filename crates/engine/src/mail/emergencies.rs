@@ -129,6 +129,11 @@ impl EmergencyRings {
         self.rings.insert(subdevice, ring);
     }
 
+    /// A SubDevice no longer has this name.
+    pub(crate) fn forget(&mut self, subdevice: Address) {
+        self.rings.remove(&subdevice);
+    }
+
     /// A new scan: positions of the scan before are no longer valid.
     pub(crate) fn forget_positions(&mut self) {
         self.rings.retain(|subdevice, _| matches!(subdevice, Address::Declared(_)));

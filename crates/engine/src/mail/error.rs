@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::ErrorReply;
 
+use crate::role::NotPermitted;
 use crate::supervisor::BusError;
 
 /// Why a request has no answer.
@@ -13,6 +14,8 @@ use crate::supervisor::BusError;
 pub enum MailboxError {
     /// The bus failed.
     Bus(BusError),
+    /// Mail is refused in the present role.
+    NotPermitted(NotPermitted),
     /// The mailbox is not in use: the SubDevice has none, is in INIT, or does not answer.
     Closed,
     /// The message is too long.
@@ -40,6 +43,7 @@ impl fmt::Display for MailboxError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             MailboxError::Bus(error) => error.fmt(f),
+            MailboxError::NotPermitted(denied) => denied.fmt(f),
             MailboxError::Closed => {
                 f.write_str("the mailbox is not in use: the SubDevice is in INIT or does not answer")
             }
@@ -57,6 +61,12 @@ impl fmt::Display for MailboxError {
 }
 
 impl core::error::Error for MailboxError {}
+
+impl From<NotPermitted> for MailboxError {
+    fn from(denied: NotPermitted) -> MailboxError {
+        MailboxError::NotPermitted(denied)
+    }
+}
 
 impl From<BusError> for MailboxError {
     fn from(error: BusError) -> MailboxError {

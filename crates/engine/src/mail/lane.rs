@@ -9,6 +9,7 @@ use ringcat_wire::mailbox::{ErrorReply, Protocol};
 use super::answer_time::AnswerTime;
 use super::error::MailboxError;
 use super::unsolicited::Unsolicited;
+use crate::role::Function;
 use crate::time::Instant;
 
 /// Answers that may wait in a lane; a conversation takes one at a time.
@@ -47,6 +48,19 @@ pub enum Lane {
 }
 
 impl Lane {
+    /// The function that begins a conversation in it.
+    pub(super) const fn function(self) -> Function {
+        match self {
+            Lane::Coe => Function::SdoTransfer,
+            Lane::Foe => Function::FileTransfer,
+            Lane::Soe => Function::SoeAccess,
+            Lane::Aoe => Function::AoeAccess,
+            Lane::Voe => Function::VendorMessage,
+            Lane::Eoe | Lane::Frames => Function::Ethernet,
+            Lane::Other(_) => Function::RawMailbox,
+        }
+    }
+
     /// Number of lanes.
     pub(super) const COUNT: usize = 8;
 
@@ -210,13 +224,18 @@ impl LaneState {
 
     /// As [`LaneState::reset`], but the SubDevice keeps its messages: an answer may arrive when it is reachable again.
     pub(super) fn suspend(&mut self, now: Instant) {
-        let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
-        let late_for = self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max();
+        let late_for = self.still_expected(now);
         let (mark, proven, expected) = (self.mark, self.proven, self.expected);
         let unanswered = self.is_unanswered(now).then_some(Instant::NEVER);
         self.reset();
         (self.mark, self.proven, self.late_for, self.expected) = (mark, proven, late_for, expected);
         self.unanswered_until = unanswered;
+    }
+
+    /// Time limit of an answer that may still arrive, and that no conversation may wait for any more.
+    pub(super) fn still_expected(&self, now: Instant) -> Option<Duration> {
+        let late = self.late_until.filter(|until| *until > now).map(|_| self.late_limit);
+        self.pending.map(|pending| pending.limit).into_iter().chain(late).chain(self.late_for).max()
     }
 
     /// The SubDevice is reachable again.

@@ -15,6 +15,7 @@ use super::lane::{Lane, LaneState};
 use super::shared::{Session, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::declared::Address;
+use crate::role::Function;
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -99,9 +100,14 @@ impl Mailbox {
 
     /// Waits until a lane is free, and takes it.
     pub async fn conversation(&self, lane: Lane) -> Result<Conversation, MailboxError> {
+        self.conversation_for(lane, lane.function()).await
+    }
+
+    /// The same, for a function that is not the usual one in this lane.
+    pub(super) async fn conversation_for(&self, lane: Lane, function: Function) -> Result<Conversation, MailboxError> {
         // Types with a lane of their own use only that.
         let lane = if let Lane::Other(code) = lane { Lane::of(code) } else { lane };
-        Conversation::take(&self.shared, lane).await
+        Conversation::take(&self.shared, lane, function).await
     }
 
     /// The bus.

@@ -5,6 +5,7 @@
 //! content is compared because some SubDevices never change their counter.
 
 use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 use core::time::Duration;
 
 use crate::time::Instant;
@@ -81,6 +82,21 @@ impl Recent {
         }
         self.mails.insert(place.min(self.mails.len()), Known { counter, content, sent });
         false
+    }
+}
+
+impl Recent {
+    /// Counter and hash of the mails that a repeat may return, newest first.
+    pub(super) fn known(&self) -> Vec<(u8, u64)> {
+        self.mails.iter().take(AFTER_REPEAT).map(|known| (known.counter, known.content)).collect()
+    }
+
+    /// Mails that another process has accepted, newest first.
+    pub(super) fn of(known: &[(u8, u64)], now: Instant) -> Recent {
+        let known = known.iter().take(AFTER_REPEAT);
+        Recent {
+            mails: known.map(|(counter, content)| Known { counter: *counter, content: *content, sent: now }).collect(),
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use alloc::rc::Rc;
 use core::cell::{Cell, Ref, RefCell, RefMut};
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::mailbox::next_counter;
 use ringcat_wire::register::{SyncManager, map};
 use ringcat_wire::sii::MailboxLayout;
 
@@ -29,6 +30,8 @@ pub(super) struct Session {
     pub send_manager: u8,
     /// Counter of the last message sent.
     pub counter: u8,
+    /// This counter may be any: the next message gets counter 0, which a SubDevice compares with none (protocol 6.1).
+    pub is_stale: bool,
     /// Start of the session.
     pub since: Instant,
 }
@@ -208,7 +211,12 @@ impl MailboxState {
 impl Session {
     /// A session with a SubDevice that has just entered PREOP or BOOT.
     pub(super) fn new(station: StationAddress, layout: MailboxLayout, send_manager: u8, since: Instant) -> Session {
-        Session { station, layout, send_manager, counter: 0, since }
+        Session { station, layout, send_manager, counter: 0, is_stale: false, since }
+    }
+
+    /// The counter of the next message.
+    pub(super) fn count(&mut self) {
+        self.counter = if core::mem::take(&mut self.is_stale) { 0 } else { next_counter(self.counter) };
     }
 
     /// Status of the send mailbox.

@@ -3,17 +3,19 @@
 //! A lost write is repeated with the same counter until the SubDevice accepts it; a SubDevice that received the first
 //! write drops the repetition. No other message is sent meanwhile: after it, the old counter would count as new.
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, Wkc};
-use ringcat_wire::mailbox::{Header, next_counter};
+use ringcat_wire::mailbox::Header;
 
 use super::error::MailboxError;
 use super::lane::{Lane, Outgoing};
 use super::reader;
 use super::shared::{Session, SharedMailbox};
+use crate::event::Subject;
 
 /// First pause between two attempts to write into a full mailbox; the pauses grow.
 const FIRST_PAUSE: Duration = Duration::from_micros(100);
@@ -54,6 +56,15 @@ async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
             }
             state.lanes[lane.index()].wrote(&message, result, now);
         }
+        shared.bus.step(Subject::Mail, || {
+            let (station, protocol, length) = (session.station, lane.protocol(), message.payload.len());
+            match &result {
+                Ok(()) => {
+                    format!("{station}: {protocol:?} mail of {length} bytes written, counter {}", session.counter)
+                }
+                Err(error) => format!("{station}: {protocol:?} mail of {length} bytes not written: {error}"),
+            }
+        });
         shared.notify_all();
         reader::start(&shared);
     }
@@ -71,7 +82,7 @@ fn next(shared: &Rc<SharedMailbox>, epoch: u32) -> Option<(Outgoing, Session)> {
         let Some(session) = state.session.as_mut().filter(|_| state.open) else { break };
         if let Some(message) = state.lanes[at].outbox.pop_front() {
             state.next_lane = (at + 1) % count;
-            session.counter = next_counter(session.counter);
+            session.count();
             return Some((message, *session));
         }
     }

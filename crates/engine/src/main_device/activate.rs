@@ -22,7 +22,7 @@ use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, Rules};
+use crate::layout::{DomainSpec, Layout, PlannedDomain, Rules};
 use crate::procedures::clocks;
 use crate::procedures::complete_siis::complete_in_background;
 use crate::procedures::error_statistics::ErrorStatistics;
@@ -67,7 +67,9 @@ impl MainDevice {
         let count = subdevices.member_count();
         let optional = subdevices.members().map(|member| member.config.optional).collect();
         let addresses = subdevices.members().map(|member| member.station).collect();
-        let board = Arc::new(Board::new(count).with_optional(optional).with_stations(addresses));
+        let board = Board::new(count).with_optional(optional).with_stations(addresses);
+        let datagrams = |domain: &PlannedDomain| domain.frames.iter().map(|frame| frame.datagrams.len()).sum();
+        let board = Arc::new(board.with_commands(layout.domains.iter().map(datagrams)));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = self.exchange(&layout, board.clone(), producer);
         let repeats = repeats::rules(&repeats);
@@ -142,7 +144,6 @@ impl MainDevice {
     fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
         let bus = self.supervisor.bus();
         self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
-        self.begin_keeping_undeclared(&segment);
         if with_clocks {
             // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
             // afterwards.

@@ -14,6 +14,7 @@ use crate::domain::DomainId;
 use crate::info::Direction;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
+use crate::role::NotPermitted;
 use crate::segment::setup::SetupError;
 
 /// Why a declaration cannot be activated.
@@ -22,8 +23,8 @@ use crate::segment::setup::SetupError;
 pub enum ActivateError {
     /// There is no scan result.
     NoScan,
-    /// The MainDevice is active.
-    Active,
+    /// It is refused in the present role, or while the MainDevice is active.
+    NotPermitted(NotPermitted),
     /// A declared SubDevice is missing, or has another identity.
     Config {
         /// Index in the declaration.
@@ -161,7 +162,7 @@ impl fmt::Display for ActivateError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ActivateError::NoScan => f.write_str("no scan result: scan before activating"),
-            ActivateError::Active => f.write_str("the MainDevice is active already"),
+            ActivateError::NotPermitted(denied) => denied.fmt(f),
             ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
             ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
             ActivateError::Scanning => f.write_str("a scan is running"),
@@ -287,3 +288,9 @@ fn fmt_sync_cycle(
 }
 
 impl core::error::Error for ActivateError {}
+
+impl From<NotPermitted> for ActivateError {
+    fn from(denied: NotPermitted) -> ActivateError {
+        ActivateError::NotPermitted(denied)
+    }
+}

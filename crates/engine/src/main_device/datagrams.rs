@@ -18,6 +18,7 @@ use crate::link::LinkSet;
 use crate::procedures::junction::{UnderWay, ordering};
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
+use crate::role::Function;
 use crate::supervisor::{Bus, BusError, Reply};
 
 /// Maximum number of the application's datagrams per call.
@@ -64,7 +65,8 @@ impl MainDevice {
         datagrams: Vec<RawDatagram>,
     ) -> Pending<Result<Vec<Result<Reply, BusError>>, ServiceError>> {
         let bus = self.bus();
-        let addressed = self.addressed(datagrams);
+        let addressed = self.permit(Function::RawDatagrams).map_err(ServiceError::NotPermitted);
+        let addressed = addressed.and_then(|()| self.addressed(datagrams));
         let segment = self.active().cloned();
         self.start(async move {
             let addressed = addressed?;

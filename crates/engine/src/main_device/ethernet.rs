@@ -10,6 +10,7 @@ use super::MainDevice;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::mail::eoe::EthernetPort;
+use crate::role::Function;
 
 /// A SubDevice that supports Ethernet frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +56,10 @@ impl MainDevice {
             _ if !self.options.idle_operation => Vec::new(),
             // After a deactivation mailboxes open one after the other: each SubDevice stays in the list meanwhile.
             Some(found) => (0..).map(Position).zip(found.subdevices.iter().cloned()).collect(),
-            None => self.segment.undeclared.all(),
+            None => {
+                let with_mailbox = view.subdevices().unassigned().filter(|it| it.upkeep.is_some());
+                with_mailbox.filter_map(|it| Some((it.position, it.knowledge.info()?.clone()))).collect()
+            }
         };
         for (position, info) in &undeclared {
             add((*position).into(), *position, info);
@@ -65,8 +69,9 @@ impl MainDevice {
 
     /// The Ethernet of a SubDevice. Its port is opened at the first call. It lasts until the SubDevice has another
     /// mailbox, which is when a declaration with it begins or ends, or until the MainDevice stops. `None` if the
-    /// SubDevice has no mailbox, or if this mailbox has another port.
+    /// SubDevice has no mailbox, if this mailbox has another port, and in role INACTIVE.
     pub fn ethernet_port(&mut self, subdevice: impl Into<Address>) -> Option<&EthernetPort> {
+        self.permit(Function::Ethernet).ok()?;
         let subdevice = self.find(subdevice).ok()?;
         let mailbox = self.segment.mailbox_of(subdevice)?;
         // The station address stays when SubDevices before this one come or go; the position does not.

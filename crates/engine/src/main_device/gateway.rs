@@ -11,6 +11,7 @@ use crate::mail::Mailbox;
 use crate::mail::relay::{GatewayQueue, Recipient, RelayCounters, Relayed};
 use crate::procedures::own_objects::Seen;
 use crate::procedures::shared_segment::SharedSegment;
+use crate::role::Function;
 
 /// The address of the MainDevice itself.
 const OWN_ADDRESS: u16 = 0;
@@ -27,6 +28,7 @@ impl MainDevice {
         let gateway_queue = self.gateway_queue.get_or_insert_with(|| GatewayQueue::new(&bus));
         gateway_queue.take(client, message, |message| {
             if message.header.address != OWN_ADDRESS {
+                bus.permit(Function::RawMailbox).map_err(|_| ErrorReply::SERVICE_NOT_SUPPORTED)?;
                 return find(&segment, message);
             }
             if message.header.protocol != Protocol::Coe {
@@ -83,6 +85,6 @@ fn mailbox_at(segment: &SharedSegment, station: StationAddress) -> Option<(Mailb
     {
         return Some((view.member(index)?.info?.protocols, segment.mailbox(index)?));
     }
-    let (info, mailbox) = segment.undeclared.of_station(station)?;
-    Some((info.protocols, mailbox))
+    let it = view.subdevices().at(station)?.as_unassigned()?;
+    Some((it.knowledge.info()?.protocols, segment.undeclared.of(it.key)?))
 }

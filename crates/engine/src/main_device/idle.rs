@@ -4,14 +4,13 @@
 use core::time::Duration;
 
 use super::MainDevice;
-use super::states::MainDevicePhase;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
-use crate::procedures::shared_segment::SharedSegment;
-use crate::procedures::undeclared::{follow_unassigned, keep, watch_undeclared_mail, without_declaration};
-use crate::segment::Addressed;
+use crate::procedures::undeclared::{keep, watch_undeclared_mail};
+use crate::role::{Function, MainDevicePhase};
+use crate::segment::{Addressed, Observation, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -54,24 +53,14 @@ impl MainDevice {
 
     /// Starts the procedures of idle operation, if it is requested and they do not run.
     pub(super) fn begin_idle(&mut self) {
-        if !self.options.idle_operation || core::mem::replace(&mut self.is_idle, true) {
+        if !self.options.idle_operation || self.segment.view().keeps_undeclared() {
             return;
         }
         let (bus, segment, options) = (self.supervisor.bus(), self.segment.clone(), self.scan_options());
-        segment.undeclared.begin_keeping();
-        self.supervisor.spawn(keep(bus.clone(), segment.undeclared.clone()));
+        segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
+        self.supervisor.spawn(keep(bus.clone(), segment.clone()));
         self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
         self.supervisor.spawn(watch(bus, segment, options));
-    }
-
-    /// An application begins: declared SubDevices are no longer kept in their states of idle operation.
-    pub(super) fn begin_keeping_undeclared(&mut self, segment: &SharedSegment) {
-        if self.is_idle {
-            segment.undeclared.follow(&without_declaration(&segment.view()));
-            self.supervisor.spawn(follow_unassigned(segment.clone()));
-        } else {
-            segment.undeclared.clear();
-        }
     }
 
     /// Ends the application: process data, supervision and all other procedures end, and every SubDevice goes to PREOP
@@ -80,23 +69,23 @@ impl MainDevice {
     /// send any more.
     ///
     /// # Errors
-    /// [`ServiceError::NotActive`].
+    /// [`ServiceError::NotPermitted`].
     pub fn start_deactivate(&mut self, limit: Duration, now: Instant) -> Result<(), ServiceError> {
+        self.permit(Function::Deactivate)?;
         let segment = self.active().ok_or(ServiceError::NotActive)?;
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
         let options = self.scan_options();
         let is_kept = self.options.idle_operation;
-        self.is_idle = is_kept;
         if is_kept {
-            segment.undeclared.begin_keeping();
+            segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         }
         self.supervisor.spawn(async move {
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {
-                bus.spawn(keep(bus.clone(), segment.undeclared.clone()));
+                bus.spawn(keep(bus.clone(), segment.clone()));
                 bus.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
                 watch(bus, segment, options).await;
             }
@@ -106,15 +95,10 @@ impl MainDevice {
 
     /// Repeats the failed configuration of a SubDevice now, or of all. False if there is no such SubDevice.
     pub fn retry(&mut self, subdevice: Option<Address>) -> bool {
-        match subdevice.map(|subdevice| self.find(subdevice)) {
-            None => {
-                self.segment.undeclared.retry(None);
-                self.segment.retry(None);
-            }
-            Some(Ok(Addressed::Undeclared(key))) => self.segment.undeclared.retry(Some(key.station)),
-            Some(Ok(Addressed::Member(index))) => self.segment.retry(Some(index)),
-            Some(Err(_)) => return false,
+        let found = subdevice.map(|subdevice| self.find(subdevice)).transpose();
+        if let Ok(subdevice) = found {
+            self.segment.observe(Observation::Retried(subdevice));
         }
-        true
+        found.is_ok()
     }
 }

@@ -14,7 +14,8 @@ use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
 use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
-use crate::segment::{Addressed, Observation};
+use crate::role::Function;
+use crate::segment::Addressed;
 
 impl MainDevice {
     /// Mailbox of a SubDevice. That of a SubDevice without a declaration is in use after
@@ -39,18 +40,17 @@ impl MainDevice {
         subdevice: impl Into<Address>,
         state: AlState,
     ) -> Pending<Result<(), ConfigureError>> {
-        let bus = self.supervisor.bus();
+        if let Err(denied) = self.permit(Function::SubDeviceState) {
+            return self.start(async move { Err(denied.into()) });
+        }
         match self.find(subdevice) {
-            Ok(Addressed::Member(index)) => self.start(request_state(&bus, &self.segment, index, state)),
+            Ok(Addressed::Member(index)) => {
+                let requested = request_state(&self.supervisor.bus(), &self.segment, index, state);
+                self.start(requested)
+            }
             Ok(Addressed::Undeclared(key)) => {
-                self.segment.observe(Observation::Visited);
-                let known = self
-                    .segment
-                    .view()
-                    .unassigned(key)
-                    .and_then(|it| Some((it.position, it.knowledge.info()?.clone())));
-                let work = known.map(|(position, info)| request(&bus, &self.segment, (position, &info), state));
-                self.start(async move { work.ok_or(ConfigureError::NoSetup)?.await })
+                let requested = request(&self.segment, key, state);
+                self.start(requested)
             }
             Err(_) => self.start(async { Err(ConfigureError::NoSetup) }),
         }

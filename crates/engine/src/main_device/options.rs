@@ -9,8 +9,8 @@ use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::procedures::dictionary::ReadPdos;
-use crate::procedures::undeclared::Retries;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
+use crate::segment::Retries;
 
 /// Configuration of a MainDevice that is needed before the first frame.
 #[derive(Clone, Debug)]

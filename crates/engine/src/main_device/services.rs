@@ -15,12 +15,14 @@ use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::procedures::complete_siis::complete;
 use crate::procedures::error_statistics::ErrorStatistics;
+use crate::procedures::idle::rescue;
 use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::registers::Urgency;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
 use crate::procedures::sii::program::{self, SiiWritten};
 use crate::procedures::unassigned::rescan::{Rescan, rescan};
+use crate::role::Function;
 use crate::segment::{Addressed, Observation};
 use crate::supervisor::Bus;
 
@@ -32,8 +34,9 @@ impl MainDevice {
     }
 
     /// Identity and features of a SubDevice as the scan found them, or as they were read when it came later; `None` if
-    /// it was absent.
+    /// it was absent, and in role INACTIVE.
     pub fn info(&self, subdevice: impl Into<Address>) -> Option<SubDeviceInfo> {
+        self.permit(Function::SubDeviceInfo).ok()?;
         let view = self.segment.view();
         let info = match view.find(subdevice)? {
             Addressed::Undeclared(key) => view.unassigned(key)?.knowledge.info(),
@@ -48,6 +51,7 @@ impl MainDevice {
     /// Starts a procedure on one SubDevice.
     pub(super) fn start_on<T, E, W>(
         &mut self,
+        function: Function,
         subdevice: impl Into<Address>,
         work: impl FnOnce(Bus, StationAddress) -> W,
     ) -> Pending<Result<T, ServiceError>>
@@ -57,8 +61,9 @@ impl MainDevice {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let subdevice = subdevice.into();
+        let permitted = self.permit(function).map_err(ServiceError::NotPermitted);
         let station = self.station(subdevice).ok_or(ServiceError::NoSubDevice { subdevice });
-        let work = station.map(|station| work(self.bus(), station));
+        let work = permitted.and(station).map(|station| work(self.bus(), station));
         self.start(async move { Ok(work?.await?) })
     }
 
@@ -69,10 +74,9 @@ impl MainDevice {
         address: RegisterAddress,
         length: usize,
     ) -> Pending<Result<Vec<u8>, ServiceError>> {
-        self.start_on(
-            subdevice,
-            move |bus, station| async move { registers::read(&bus, station, address, length).await },
-        )
+        self.start_on(Function::Registers, subdevice, move |bus, station| async move {
+            registers::read(&bus, station, address, length).await
+        })
     }
 
     /// Starts a write of registers or memory. A datagram of a lost frame is sent again: a register may be written
@@ -95,7 +99,7 @@ impl MainDevice {
         urgency: Urgency,
     ) -> Pending<Result<(), ServiceError>> {
         let segment = self.active().cloned();
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::Registers, subdevice, move |bus, station| async move {
             registers::write(&bus, segment.as_ref(), station, address, &data, urgency).await
         })
     }
@@ -106,7 +110,9 @@ impl MainDevice {
         subdevice: impl Into<Address>,
         port: u8,
     ) -> Pending<Result<LoopControl, ServiceError>> {
-        self.start_on(subdevice, move |bus, station| async move { ports::read(&bus, station, port).await })
+        self.start_on(Function::PortState, subdevice, move |bus, station| async move {
+            ports::read(&bus, station, port).await
+        })
     }
 
     /// Starts to open or close a port. SubDevices behind a closed one are out of reach.
@@ -117,7 +123,7 @@ impl MainDevice {
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
         let segment = self.active().cloned();
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::PortState, subdevice, move |bus, station| async move {
             ports::set(&bus, segment.as_ref(), station, port, control).await
         })
     }
@@ -125,14 +131,17 @@ impl MainDevice {
     /// Starts to cut off a declared SubDevice, by closing the ports of its neighbours. In a line the SubDevices behind
     /// it are cut off too.
     pub fn start_block(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<BlockedPort>, ServiceError>> {
-        let (bus, segment, index) = (self.bus(), self.segment.clone(), self.find_member(subdevice));
+        let permitted = self.permit(Function::BlockedPorts).map_err(ServiceError::NotPermitted);
+        let index = permitted.and_then(|()| self.find_member(subdevice));
+        let (bus, segment) = (self.bus(), self.segment.clone());
         self.start(async move { ports::block(&bus, &segment, index?).await })
     }
 
     /// Starts to open all ports that were closed to cut SubDevices off.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.active().cloned());
+        let (bus, segment, permitted) = (self.bus(), self.active().cloned(), self.permit(Function::BlockedPorts));
         self.start(async move {
+            permitted?;
             let segment = segment.ok_or(ServiceError::NotActive)?;
             ports::open_blocked(&bus, &segment).await
         })
@@ -140,16 +149,19 @@ impl MainDevice {
 
     /// Starts a reset of a SubDevice controller. A declared SubDevice is lost, found again and configured again.
     pub fn start_reset(&mut self, subdevice: impl Into<Address>) -> Pending<Result<(), ServiceError>> {
-        self.start_on(subdevice, move |bus, station| async move { reset::reset_controller(&bus, station).await })
+        self.start_on(Function::ControllerReset, subdevice, move |bus, station| async move {
+            reset::reset_controller(&bus, station).await
+        })
     }
 
     /// Makes supervision scan all SubDevices now, and search for new ones, as if the segment had changed. False before
     /// activation, when a normal scan does the same.
     pub fn force_topology_change(&mut self) -> bool {
-        if let Some(segment) = self.active() {
+        let is_permitted = self.permit(Function::ForceTopologyChange).is_ok();
+        if let Some(segment) = self.active().filter(|_| is_permitted) {
             segment.observe(Observation::RoundWanted);
         }
-        self.active().is_some()
+        is_permitted
     }
 
     /// Starts a scan of the whole segment while process data continues: the position of each SubDevice, and which are
@@ -159,22 +171,38 @@ impl MainDevice {
     /// From then on places of breaks, errors of cables and positions in events follow the new cabling, rings behind
     /// junctions included. Exception: while the ring of two links is open, or a mandatory SubDevice does not answer,
     /// they follow the previous cabling.
+    ///
+    /// Without an application it needs idle operation. SubDevices that have kept their station addresses are left in
+    /// their states, their mailboxes stay open, and no word of their EEPROMs is read; others get addresses, are read
+    /// and brought to PREOP. The result has the differences from the scan before ([`Rescan::added`], `removed`,
+    /// `moved_from`).
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.active().cloned());
-        self.start(async move { rescan(&bus, &segment.ok_or(ServiceError::NotActive)?, limit).await })
+        let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::Rescan));
+        let (is_active, is_kept) = (self.active().is_some(), self.options.idle_operation);
+        self.start(async move {
+            permitted?;
+            match (is_active, is_kept) {
+                (true, _) => rescan(&bus, &segment, limit).await,
+                (false, true) => rescue(&bus, &segment, limit).await,
+                (false, false) => Err(ServiceError::NoIdleOperation),
+            }
+        })
     }
 
     /// Starts a read of what the scan left out of the SIIs ([`Options::sii_extent`](super::Options)); the result is the
     /// SubDevices of the scan with all of it. Only the reading of SIIs that are not complete yet takes time.
     pub fn start_sii_completion(&mut self) -> Pending<Result<Vec<SubDeviceInfo>, ServiceError>> {
-        let (bus, segment) = (self.bus(), self.segment.clone());
-        self.start(async move { complete(&bus, &segment).await })
+        let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::SiiCompletion));
+        self.start(async move {
+            permitted?;
+            complete(&bus, &segment).await
+        })
     }
 
     /// Starts a read of a whole EEPROM; the SII contains its size.
     pub fn start_sii_read(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<u8>, ServiceError>> {
         let eeproms = self.segment.eeproms.clone();
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             program::read_all(&bus, station).await
         })
@@ -189,7 +217,7 @@ impl MainDevice {
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
         let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
@@ -206,7 +234,7 @@ impl MainDevice {
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
         let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
@@ -217,7 +245,7 @@ impl MainDevice {
     /// Starts a reload of a controller's configuration from the EEPROM.
     pub fn start_sii_reload(&mut self, subdevice: impl Into<Address>) -> Pending<Result<(), ServiceError>> {
         let eeproms = self.segment.eeproms.clone();
-        self.start_on(subdevice, move |bus, station| async move {
+        self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             program::reload(&bus, station).await
         })
@@ -234,6 +262,7 @@ impl MainDevice {
 
     /// Error counts of a declared SubDevice as of the last reading. `None` before activation.
     pub fn statistics(&self, subdevice: impl Into<Address>) -> Option<Statistics> {
+        self.permit(Function::Statistics).ok()?;
         self.statistics.as_ref()?.find(self.find_member(subdevice).ok()?)
     }
 
@@ -264,7 +293,8 @@ impl MainDevice {
         T: 'static,
         W: Future<Output = Result<T, ServiceError>> + 'static,
     {
-        let work = self.find_member(subdevice).and_then(|index| {
+        let permitted = self.permit(Function::Statistics).map_err(ServiceError::NotPermitted);
+        let work = permitted.and_then(|()| self.find_member(subdevice)).and_then(|index| {
             let book = self.statistics.clone().ok_or(ServiceError::NotActive)?;
             let station = self.station(SubDeviceId(index)).ok_or(ServiceError::NotActive)?;
             Ok(work(self.bus(), book, index, station))

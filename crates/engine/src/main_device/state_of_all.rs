@@ -7,6 +7,7 @@ use ringcat_wire::al::AlState;
 use super::MainDevice;
 use super::pending::Pending;
 use crate::procedures::request_states::{StateScope, StatesError, request_states};
+use crate::role::Function;
 
 impl MainDevice {
     /// Starts to bring all SubDevices to INIT, PREOP, SAFEOP or OP: while active the declared ones, each at most to its
@@ -21,6 +22,9 @@ impl MainDevice {
         scope: StateScope,
         limit: Duration,
     ) -> Pending<Result<(), StatesError>> {
+        if let Err(denied) = self.permit(Function::StateOfAll) {
+            return self.start(async move { Err(denied.into()) });
+        }
         let work = request_states(&self.bus(), &self.segment, state, scope, limit);
         self.start(work)
     }

@@ -16,18 +16,6 @@ pub enum SubDeviceState {
     Settled(AlState),
 }
 
-/// What the MainDevice does as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum MainDevicePhase {
-    /// No link has a carrier: nothing can be sent.
-    Orphaned,
-    /// No application is active.
-    Idle,
-    /// An application is active.
-    Operation,
-}
-
 /// State of a hot connect group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]

@@ -19,17 +19,16 @@ use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::junction::refute;
 use crate::procedures::scan::node_status;
+use crate::role::Function;
 use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
     /// First step: loads a declaration. It replaces a previously loaded one, with all added connections.
     ///
     /// # Errors
-    /// [`ActivateError::Active`], and errors in the declaration alone.
+    /// [`ActivateError::NotPermitted`], and errors in the declaration alone.
     pub fn load(&mut self, mut declaration: Declaration) -> Result<(), ActivateError> {
-        if self.active().is_some() {
-            return Err(ActivateError::Active);
-        }
+        self.permit(Function::Activate)?;
         check(&declaration)?;
         self.memories = Memories::of(&mut declaration)?;
         self.loaded = Some(Loaded { declaration, connections: Vec::new() });
@@ -101,9 +100,7 @@ impl MainDevice {
     /// # Errors
     /// [`ActivateError`]: nothing is loaded or scanned, or the declaration does not fit the scan.
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
-        if self.active().is_some() {
-            return Err(ActivateError::Active);
-        }
+        self.permit(Function::Activate)?;
         let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;
         let active = self.start_loaded(loaded)?;
         self.loaded = None;

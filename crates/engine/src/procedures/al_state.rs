@@ -1,5 +1,6 @@
 //! Requests a state of a SubDevice and waits for it (protocol 5.3).
 
+use alloc::format;
 use core::fmt;
 use core::time::Duration;
 
@@ -7,6 +8,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{EscConfiguration, map};
 
+use crate::event::Subject;
 use crate::supervisor::{Bus, BusError};
 
 /// First two pauses between reads of AL status. Later pauses grow by half: a change that takes milliseconds is detected
@@ -124,6 +126,7 @@ pub async fn acknowledge(bus: &Bus, station: StationAddress, emulated: bool) -> 
     let (status, _) = read_status(bus, station).await?;
     let state = status.al_state().unwrap_or(AlState::Init);
     let control = if emulated { AlControl::new(state) } else { AlControl::with_acknowledge(state) };
+    bus.step(Subject::States, || format!("{station}: error acknowledged in {state}"));
     bus.fpwr(station, map::AL_CONTROL, &control.encode()).await?;
     let limit = bus.now() + ACKNOWLEDGE_LIMIT;
     let mut pause = FIRST_PAUSE;
@@ -139,6 +142,23 @@ pub async fn acknowledge(bus: &Bus, station: StationAddress, emulated: bool) -> 
 
 /// Requests a state and waits for it. After a refusal its code is read, and the error acknowledged.
 pub async fn request(
+    bus: &Bus,
+    station: StationAddress,
+    state: AlState,
+    emulated: bool,
+    limit: Duration,
+) -> Result<(), StateError> {
+    let begin = bus.now();
+    bus.step(Subject::States, || format!("{station}: {state} requested"));
+    let result = request_once(bus, station, state, emulated, limit).await;
+    bus.step(Subject::States, || match &result {
+        Ok(()) => format!("{station}: {state} after {} us", bus.now().since(begin).as_micros()),
+        Err(error) => format!("{station}: {state} not reached: {error}"),
+    });
+    result
+}
+
+async fn request_once(
     bus: &Bus,
     station: StationAddress,
     state: AlState,

@@ -7,6 +7,7 @@ mod register_error;
 mod registers;
 mod startup;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::vec;
 use core::time::Duration;
@@ -20,6 +21,7 @@ use super::clocks;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use crate::config::{SdoDownload, SubDeviceConfig, Transition};
+use crate::event::Subject;
 use crate::mail::coe::{self, SdoAddress};
 use crate::mail::{Limits, Mailbox};
 use crate::segment::setup::Setup;
@@ -30,7 +32,7 @@ use crate::supervisor::{Bus, BusError};
 pub use crate::segment::setup::SetupError;
 
 pub use error::{ConfigureError, StartupError};
-pub use register_error::{RegisterError, RegisterFailure, WrongValue};
+pub use register_error::RegisterFailure;
 
 /// Cycles of the exchange before the request of OP, so that valid outputs are present (protocol 5.2). The first of them
 /// may have been queued without process data; one is enough if it is known to have had it.
@@ -55,6 +57,7 @@ pub(super) struct BringUp<'a> {
 impl BringUp<'_> {
     /// The full bring-up. The working counter expects the SubDevice from SAFEOP on.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
+        self.bus.step(Subject::States, || format!("{}: configuration begins, target {}", self.station, self.target));
         self.process_data(ProcessDataStep::Off);
         self.set_configured(false);
         self.mailbox.close();
@@ -194,6 +197,7 @@ impl BringUp<'_> {
         if fmmus.is_empty() {
             return Ok(());
         }
+        self.bus.step(Subject::States, || format!("{}: {} bytes of FMMUs written", self.station, fmmus.len()));
         self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await
     }
 
@@ -250,6 +254,7 @@ impl BringUp<'_> {
         let limits = Limits::new(self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
         for SdoDownload { index, sub_index, complete_access, data } in &self.setup.plan.assign_sdos {
             let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
+            self.bus.step(Subject::Mail, || format!("{}: SDO {index:#06x}:{sub_index:02x} assigns PDOs", self.station));
             coe::write(&self.mailbox, object, data, limits).await?;
         }
         Ok(())

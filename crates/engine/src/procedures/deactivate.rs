@@ -9,13 +9,13 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 use super::al_state::read_status;
-use super::idle::{present, scan_again};
+use super::idle::scan_again;
 use super::scan::ScanOptions;
 use super::shared_segment::SharedSegment;
 use super::stop::{StopError, ToStop, all_known, stop};
-use super::undeclared::run_due;
+use super::undeclared::settle;
 use crate::info::SubDeviceInfo;
-use crate::segment::{Observation, Segment, SubDevice};
+use crate::segment::{Observation, Segment, SubDevice, UndeclaredObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -62,9 +62,8 @@ pub(crate) async fn deactivate(
     // A SubDevice that does not leave its state must not take the time of the others.
     let stopped = stop(bus, to_stop, AlState::PreOp, limit / 2).await;
     scan_until(bus, segment, options, &known, until).await;
-    segment.undeclared.follow(&present(&segment.view()));
-    segment.observe(Observation::Visited);
-    let settling = run_due(bus, &segment.undeclared);
+    segment.observe_undeclared(UndeclaredObservation::TakenOver);
+    let settling = settle(bus, segment);
     let is_settled = bus.within(until.since(bus.now()), settling).await.is_ok();
     if is_settled { Ok(()) } else { late(bus, segment, &declared, limit).await.map_or(stopped, Err) }
 }
@@ -89,7 +88,7 @@ async fn scan_until(
 
 /// The first SubDevice that answers and is not in PREOP.
 async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Option<StopError> {
-    let stations: Vec<StationAddress> = segment.undeclared.unsettled();
+    let stations: Vec<StationAddress> = segment.view().unsettled();
     let states = bus.gather(stations, |bus, station| async move { (station, read_status(&bus, station).await) }).await;
     let mut late = states.into_iter().filter_map(|(station, read)| Some((station, read.ok()?)));
     let (station, (status, code)) = late.next()?;

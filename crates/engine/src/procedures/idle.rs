@@ -4,31 +4,31 @@
 //! whether a port has changed. Other datagrams are sent only after a change, and once a second.
 
 mod changes;
+pub(super) mod requests;
+mod rescue;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec::Vec;
-use core::future::{Future, poll_fn};
-use core::pin::pin;
-use core::task::Poll;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlStatus;
 use ringcat_wire::register::{DlStatus, EcatEvent, map};
 
 use changes::nothing;
 pub(crate) use changes::scan_again;
+use rescue::differences;
+pub(crate) use rescue::rescue;
 
 use super::inspect::read_subdevice;
 use super::scan::{ScanOptions, scan};
-use super::shared_segment::SharedSegment;
-use super::undeclared::report_left;
-use crate::event::Event;
-use crate::info::SubDeviceInfo;
+use super::shared_segment::{SharedSegment, until_active};
+use crate::event::{Event, Subject};
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::segment::{Observation, Reading, Segment};
+use crate::segment::{Observation, Reading, StateRead, UndeclaredObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -72,18 +72,6 @@ pub(crate) async fn watch(bus: Bus, segment: SharedSegment, options: ScanOptions
     .await;
 }
 
-/// Runs a procedure until an application is active.
-async fn until_active(segment: &SharedSegment, procedure: impl Future<Output = ()>) {
-    let mut procedure = pin!(procedure);
-    poll_fn(|context| {
-        if segment.view().is_active() {
-            return Poll::Ready(());
-        }
-        procedure.as_mut().poll(context)
-    })
-    .await;
-}
-
 struct Watch {
     bus: Bus,
     segment: SharedSegment,
@@ -121,22 +109,24 @@ impl Watch {
         if is_first {
             self.counts = Some(self.scanned_counts());
         }
-        if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale {
-            return self.follow(seen).await;
+        let wanted = self.segment.idle_rescans.wanted();
+        if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale || wanted.is_some() {
+            return self.follow(seen, wanted).await;
         }
-        let expected = self.segment.undeclared.expected_states();
-        let is_unexpected = expected.is_some_and(|expected| seen.al_status != expected);
-        if self.bus.now() >= self.next_routine || (self.segment.undeclared.are_settled() && is_unexpected) {
+        let is_unexpected = {
+            let view = self.segment.view();
+            let is_other = view.expected_states().is_some_and(|expected| seen.al_status != expected);
+            is_other && view.are_undeclared_settled()
+        };
+        if self.bus.now() >= self.next_routine || is_unexpected {
             self.read_states().await;
         }
     }
 
-    /// SubDevices of the last scan become entries that are kept in their states.
+    /// SubDevices of the last scan are kept in their states from now on.
     fn take_over(&self) {
-        let present = present(&self.segment.view());
-        if !self.segment.undeclared.is_of(&present) {
-            self.segment.observe(Observation::Visited);
-            self.segment.undeclared.follow(&present);
+        if self.segment.view().has_untouched() {
+            self.segment.observe_undeclared(UndeclaredObservation::TakenOver);
         }
     }
 
@@ -203,36 +193,36 @@ impl Watch {
             return;
         }
         self.segment.observe(Observation::ScanBegun);
-        self.segment.undeclared.clear();
         let ended = scan(&self.bus, &self.options).await.map_err(|error| error.to_string());
         self.segment.observe(Observation::ScanEnded(ended));
         self.counts = None;
     }
 
-    /// The segment has changed.
-    async fn follow(&mut self, seen: Seen) {
+    /// The segment has changed, or a rescan is requested.
+    async fn follow(&mut self, seen: Seen, wanted: Option<u64>) {
         if self.counts != Some(seen.counts) && !self.is_stale {
             self.bus.report(Event::Counted { main: seen.counts.0.0, redundant: seen.counts.1.0 });
         }
+        self.bus.step(Subject::Scan, || {
+            let (main, redundant) = (seen.counts.0, seen.counts.1);
+            format!("the segment has changed: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+        });
         self.is_stale = true;
         // Clears the ECAT events of the ports. Changes from now on set them again.
         if seen.ports_changed && self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
             return;
         }
         let versions = self.segment.view().versions();
-        let known = self.segment.view().found().map(|found| found.subdevices.clone()).unwrap_or_default();
+        let before = self.segment.view().found().cloned().unwrap_or_else(|| Rc::new(nothing()));
+        let known = before.subdevices.clone();
         let found = match self.is_unplugged() {
             true => Ok(Some(nothing())),
             false => scan_again(&self.bus, &self.segment, &self.options, &known).await,
         };
         match found {
             Ok(Some(found)) => {
-                let now = found.subdevices.iter();
-                let is_of = |all: &[Rc<SubDeviceInfo>], info: &SubDeviceInfo| {
-                    all.iter().any(|other| other.station == info.station)
-                };
-                let added = now.filter(|info| !is_of(&known, info)).count();
-                let removed = known.iter().filter(|info| !is_of(&found.subdevices, info)).count();
+                let differences = differences(&before, &found);
+                let (added, removed) = (differences.added.len(), differences.removed.len());
                 let subdevices = found.subdevices.len();
                 self.segment.observe(Observation::FoundAgain { versions, found: Rc::new(found) });
                 (self.is_stale, self.failures) = (false, 0);
@@ -240,6 +230,9 @@ impl Watch {
                 self.take_over();
                 if added + removed > 0 {
                     self.bus.report(Event::SegmentChanged { subdevices, added, removed });
+                }
+                if let Some(number) = wanted {
+                    self.segment.idle_rescans.end(number, differences);
                 }
             }
             Ok(None) => self.failures += 1,
@@ -255,19 +248,15 @@ impl Watch {
     /// Reads the state of each SubDevice.
     async fn read_states(&mut self) {
         self.next_routine = self.bus.now() + ROUTINE;
-        let stations = self.segment.undeclared.settled();
-        let readings: Vec<(StationAddress, Reading)> = self
+        let settled = self.segment.view().settled();
+        let readings: Vec<StateRead> = self
             .bus
-            .gather(stations, |bus, station| async move { (station, read_subdevice(&bus, station).await) })
+            .gather(settled, |bus, (key, attempt)| async move {
+                StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
+            })
             .await;
         // A SubDevice without its station address has lost its power.
-        self.is_stale |= readings.iter().any(|(_, reading)| matches!(reading, Reading::Silent | Reading::Doubled));
-        report_left(&self.bus, &self.segment.undeclared, &readings);
+        self.is_stale |= readings.iter().any(|read| matches!(read.reading, Reading::Silent | Reading::Doubled));
+        self.segment.observe_undeclared(UndeclaredObservation::StatesRead(&readings));
     }
-}
-
-/// SubDevices of the last scan, at their positions.
-pub(crate) fn present(segment: &Segment) -> Vec<(Position, Rc<SubDeviceInfo>)> {
-    let found = segment.found().map(|found| found.subdevices.as_slice()).unwrap_or_default();
-    (0..).map(Position).zip(found.iter().cloned()).collect()
 }

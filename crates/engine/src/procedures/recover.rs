@@ -1,6 +1,7 @@
 //! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
 //! continues.
 
+use alloc::format;
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
 use core::pin::pin;
@@ -17,9 +18,8 @@ use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
-use super::undeclared::Retries;
 use crate::declared::SubDeviceId;
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
@@ -27,7 +27,7 @@ use crate::mail::soe::SoeFailure;
 use crate::segment::effect::{Check, Shown};
 use crate::segment::member::Member;
 use crate::segment::start::Start;
-use crate::segment::{MemberFinding, ProcessDataStep};
+use crate::segment::{MemberFinding, ProcessDataStep, Retries};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first repeated attempt to configure a SubDevice; it doubles with every failure.
@@ -54,6 +54,10 @@ pub(super) async fn keep_up(
     let mut disturbed = false;
     loop {
         let result = try_once(bus, segment, (index, attempt), start, &mut reported).await;
+        bus.step(Subject::States, || match &result {
+            Ok(state) => format!("SubDevice {index}: attempt {attempt} reached {state}"),
+            Err(error) => format!("SubDevice {index}: attempt {attempt} failed: {error}"),
+        });
         // After a failed short start the full start follows, and the reverse.
         start = if start == Start::Unknown { Start::Doubtful } else { Start::Unknown };
         match result {
@@ -81,7 +85,7 @@ pub(super) async fn keep_up(
             }
             Err(error) => {
                 bus.report(failure(index, &error));
-                if segment.undeclared.retries() == Retries::OnRequest {
+                if segment.view().retries() == Retries::OnRequest {
                     segment.until_retried(index).await;
                     continue;
                 }
@@ -111,6 +115,7 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         ConfigureError::Startup { error: StartupError::Value { .. }, .. }
         | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
+        | ConfigureError::NotPermitted(_)
         | ConfigureError::NoSetup
         | ConfigureError::Unfit(_)
         | ConfigureError::NoBoot

@@ -17,7 +17,7 @@ use super::recover::{bring_up, failure, is_of_bus, keep_up, no_setup, while_curr
 use super::shared_segment::SharedSegment;
 use crate::segment::member::Phase;
 use crate::segment::start::Start;
-use crate::segment::{MemberFinding, Observation};
+use crate::segment::{Addressed, MemberFinding, Observation};
 use crate::supervisor::Bus;
 
 /// Whether process data may be exchanged in a state.
@@ -72,7 +72,7 @@ fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, resul
         let Some(member) = view.member(index) else { return };
         (member.phase, member.target)
     };
-    segment.observe(Observation::Requested { index, state });
+    segment.observe(Observation::Requested { subdevice: Addressed::Member(index), state });
     match phase {
         Phase::Absent => *result.borrow_mut() = Some(Err(ConfigureError::Absent)),
         Phase::Settled(is) if is == state => *result.borrow_mut() = Some(Ok(())),

@@ -6,7 +6,6 @@
 mod error;
 
 use alloc::boxed::Box;
-use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::future::Future;
 use core::pin::Pin;
@@ -19,14 +18,12 @@ pub use error::{NotFollowed, NotFollowedReason, StatesError};
 
 use super::al_state::read_status;
 use super::configure::ConfigureError;
-use super::idle::present;
 use super::recover::is_of_bus;
 use super::request_state::request_state;
 use super::shared_segment::SharedSegment;
-use super::undeclared;
+use super::undeclared::{self, until_decided};
 use crate::declared::{Address, SubDeviceId};
-use crate::info::SubDeviceInfo;
-use crate::segment::Observation;
+use crate::segment::SubDeviceKey;
 use crate::segment::member::{Member, Phase};
 use crate::supervisor::Bus;
 
@@ -65,7 +62,7 @@ pub(crate) fn request_states(
     let followers = match state {
         AlState::Boot => Err(StatesError::Boot),
         _ if segment.view().is_active() => Ok(members(bus, segment, state, scope)),
-        _ => scanned(bus, segment, state),
+        _ => scanned(segment, state),
     };
     let (bus, until) = (bus.clone(), bus.now() + limit);
     async move {
@@ -155,23 +152,24 @@ fn is_passing(error: &ConfigureError) -> bool {
     is_of_bus(error) || matches!(error, ConfigureError::Absent | ConfigureError::Interrupted)
 }
 
-fn scanned(bus: &Bus, segment: &SharedSegment, state: AlState) -> Result<Vec<Follower>, StatesError> {
-    let all = present(&segment.view());
+fn scanned(segment: &SharedSegment, state: AlState) -> Result<Vec<Follower>, StatesError> {
+    let all: Vec<(SubDeviceKey, Position)> = {
+        let view = segment.view();
+        view.subdevices().unassigned().filter(|it| it.is_undeclared()).map(|it| (it.key, it.position)).collect()
+    };
     if all.is_empty() {
         return Err(StatesError::NoSubDevices);
     }
-    segment.observe(Observation::Visited);
-    let follower = |(position, info): (Position, Rc<SubDeviceInfo>)| {
-        let list = segment.undeclared.clone();
-        let station = info.station;
-        let outcome: Pin<Box<dyn Future<Output = Outcome>>> = if list.is_in_boot(position) {
+    let follower = |(key, position): (SubDeviceKey, Position)| {
+        let in_boot = segment.view().upkeep(key).is_some_and(|upkeep| upkeep.target == AlState::Boot);
+        let outcome: Pin<Box<dyn Future<Output = Outcome>>> = if in_boot {
             Box::pin(core::future::ready(Err(NotFollowedReason::InBoot)))
         } else {
-            let request = undeclared::request(bus, segment, (position, &info), state);
+            let (request, segment) = (undeclared::request(segment, key, state), segment.clone());
             Box::pin(async move {
                 match request.await {
                     Ok(()) => Ok(()),
-                    Err(error) if is_passing(&error) => match list.until_decided(station, state).await {
+                    Err(error) if is_passing(&error) => match until_decided(&segment, key, state).await {
                         true => Ok(()),
                         false => Err(NotFollowedReason::Overtaken),
                     },
@@ -179,7 +177,7 @@ fn scanned(bus: &Bus, segment: &SharedSegment, state: AlState) -> Result<Vec<Fol
                 }
             })
         };
-        Follower { subdevice: Address::Scanned(position), station, optional: false, outcome }
+        Follower { subdevice: Address::Scanned(position), station: key.station, optional: false, outcome }
     };
     Ok(all.into_iter().map(follower).collect())
 }

@@ -9,6 +9,7 @@ mod identification;
 mod options;
 mod stations;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::vec;
@@ -40,7 +41,7 @@ use super::services::ServiceError;
 use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
-use crate::event::Event;
+use crate::event::{Event, Subject};
 use crate::info::{InfoWarning, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
@@ -69,8 +70,13 @@ const SIZE_AT: usize = 2 * 0x3E;
 pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
     let begin = bus.now();
     let mut attempts = 1;
+    bus.step(Subject::Scan, || "scan begins: SubDevices are counted".to_string());
     let mut expected = count::first(bus, options, begin).await?;
     loop {
+        bus.step(Subject::Scan, || {
+            let (main, redundant) = expected.pair();
+            format!("scan: {main} SubDevices on MAIN, {redundant} on REDUNDANT; they go to INIT and get addresses")
+        });
         expected = match attempt(bus, options, expected).await {
             Ok(mut scan) => {
                 complete(bus, &mut scan, options.pdos).await;
@@ -78,6 +84,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
                 return Ok(scan);
             }
             Err(Failure::Unsettled(now)) => {
+                bus.step(Subject::Scan, || "scan: the count has changed, the scan begins again".to_string());
                 // A changed count is an unstable segment; a count that falls to 0 is another error.
                 if now.is_none_or(|now| now.total() == 0) {
                     explain(bus).await?;
@@ -92,6 +99,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
                 }
             }
             Err(Failure::Scan(error)) => {
+                bus.step(Subject::Scan, || format!("scan: attempt {attempts} failed: {error}"));
                 explain(bus).await?;
                 if !error.is_passing() || attempts >= ATTEMPTS {
                     return Err(error);
@@ -330,7 +338,12 @@ pub(super) async fn ask(
     cache: &SiiCache,
     extent: SiiExtent,
 ) -> Result<Said, ScanError> {
-    let contents = match sii::read(bus, station, cache, extent).await {
+    let read = sii::read(bus, station, cache, extent).await;
+    bus.step(Subject::Scan, || match &read {
+        Ok(_) => format!("position {position}: SII read, station address {station}"),
+        Err(error) => format!("position {position}: SII not read: {error}"),
+    });
+    let contents = match read {
         Ok(contents) => contents,
         Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
         // A broken EEPROM fails only its own SubDevice.

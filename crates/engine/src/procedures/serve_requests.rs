@@ -19,6 +19,7 @@ use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::request::{Access, AcyclicSide, Order, RequestFailure, Subject};
+use crate::role::Function;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
@@ -158,6 +159,7 @@ async fn register(
     length: u16,
     order: &Order,
 ) -> Result<Option<Vec<u8>>, RequestFailure> {
+    bus.permit(Function::Registers).map_err(|_| RequestFailure::Failed)?;
     let result = match &order.access {
         Access::Write(data) => {
             registers::write(bus, Some(segment), station, address, data, Urgency::InOrder).await.map(|()| None)
@@ -219,8 +221,10 @@ fn of_element(error: &SoeError) -> RequestFailure {
 fn of_mailbox(error: MailboxError) -> RequestFailure {
     match error {
         MailboxError::NoAnswer { .. } | MailboxError::Full { .. } => RequestFailure::Timeout,
-        MailboxError::Bus(_) | MailboxError::Closed | MailboxError::TooLong { .. } | MailboxError::Error(_) => {
-            RequestFailure::Failed
-        }
+        MailboxError::Bus(_)
+        | MailboxError::NotPermitted(_)
+        | MailboxError::Closed
+        | MailboxError::TooLong { .. }
+        | MailboxError::Error(_) => RequestFailure::Failed,
     }
 }

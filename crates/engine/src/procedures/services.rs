@@ -15,6 +15,7 @@ use ringcat_wire::address::LogicalAddress;
 
 use super::sii::program::SiiProgramError;
 use crate::declared::{Address, SubDeviceId};
+use crate::role::NotPermitted;
 use crate::supervisor::BusError;
 
 /// Why a service failed.
@@ -47,8 +48,24 @@ pub enum ServiceError {
         /// The SubDevice.
         subdevice: SubDeviceId,
     },
+    /// An EtherType that a debug message may not have: that of EtherCAT or of a VLAN tag, or a length.
+    EtherType {
+        /// The EtherType.
+        ethertype: u16,
+    },
+    /// A debug message that fits no frame, in bytes.
+    TooLong {
+        /// Its length.
+        got: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// The function is refused in the present role or phase.
+    NotPermitted(NotPermitted),
     /// No declaration is active yet.
     NotActive,
+    /// Without an application this needs idle operation; a scan does the same for SubDevices in INIT.
+    NoIdleOperation,
     /// The segment was not stable for long enough.
     Unsteady,
     /// More datagrams than allowed per call.
@@ -80,7 +97,15 @@ impl fmt::Display for ServiceError {
             ServiceError::OnTheLink { subdevice } => {
                 write!(f, "SubDevice {subdevice} is connected to the main link: there is no port before it")
             }
+            ServiceError::EtherType { ethertype } => {
+                write!(f, "EtherType {ethertype:#06x} is that of EtherCAT or of a VLAN tag, or a length: take another")
+            }
+            ServiceError::TooLong { got, limit } => write!(f, "{got} bytes, at most {limit} fit"),
+            ServiceError::NotPermitted(denied) => denied.fmt(f),
             ServiceError::NotActive => f.write_str("nothing is declared yet"),
+            ServiceError::NoIdleOperation => {
+                f.write_str("no application is active, and idle operation is off: set the option, or scan")
+            }
             ServiceError::Unsteady => f.write_str("the segment changes repeatedly"),
             ServiceError::TooMany { got, limit } => write!(f, "{got} at once, at most {limit} are taken"),
             ServiceError::LrwOnTwoLinks { logical, length, subdevices: [one, other] } => write!(
@@ -96,6 +121,12 @@ impl fmt::Display for ServiceError {
 }
 
 impl core::error::Error for ServiceError {}
+
+impl From<NotPermitted> for ServiceError {
+    fn from(denied: NotPermitted) -> ServiceError {
+        ServiceError::NotPermitted(denied)
+    }
+}
 
 impl From<SiiProgramError> for ServiceError {
     fn from(error: SiiProgramError) -> ServiceError {

@@ -6,17 +6,21 @@ use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::{Cell, Ref, RefCell};
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 use core::time::Duration;
 
 use super::error_statistics::ErrorStatistics;
+use super::idle::requests::IdleRescans;
 use super::sii::{EepromTurns, SiiCache};
-use super::undeclared::Undeclared;
+use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
 use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Addressed, MemberFinding, Observation, Segment, Words};
+use crate::segment::{Addressed, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -40,10 +44,10 @@ pub struct SharedSegment {
     pub eeproms: EepromTurns,
     /// Error counters.
     pub statistics: ErrorStatistics,
-    /// SubDevices without a declaration.
-    pub undeclared: Undeclared,
-    /// Requests for another attempt to configure a member: of all, and by member.
-    retried: Rc<(Cell<u32>, RefCell<Vec<u32>>)>,
+    /// Mailboxes of SubDevices without a declaration.
+    pub(crate) undeclared: UndeclaredMailboxes,
+    /// Rescans that are requested without an application.
+    pub(crate) idle_rescans: IdleRescans,
 }
 
 /// Data beside the model.
@@ -57,78 +61,53 @@ pub struct Beside {
     pub statistics: ErrorStatistics,
 }
 
-impl Beside {
-    fn nothing(bus: &Bus, cache: SiiCache) -> Beside {
-        Beside { mailboxes: Vec::new(), cache, statistics: ErrorStatistics::new(bus, 0, None) }
-    }
-}
-
 impl SharedSegment {
     /// Shares a model without an application.
-    pub fn idle(bus: &Bus, segment: Segment, cache: SiiCache, undeclared: Undeclared) -> SharedSegment {
-        let (segment, board) = (Rc::new(RefCell::new(segment)), Arc::new(Board::new(0)));
-        SharedSegment::of(bus, segment, board, Beside::nothing(bus, cache), undeclared)
+    pub fn idle(bus: &Bus, segment: Segment, cache: SiiCache, undeclared: UndeclaredMailboxes) -> SharedSegment {
+        SharedSegment::without(bus, Rc::new(RefCell::new(segment)), cache, undeclared)
     }
 
-    /// The same model, with an application that is activated next.
+    /// The same model, with an application that is activated next. Procedures that run without an application and
+    /// continue beside it share procedures to be started, and changes wake them as well.
     pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
-        SharedSegment::of(bus, self.segment.clone(), board, beside, self.undeclared.clone())
+        let Beside { mailboxes, cache, statistics } = beside;
+        let eeproms = EepromTurns::new(bus);
+        SharedSegment { mailboxes: mailboxes.into(), cache, statistics, board, eeproms, ..self.clone() }
     }
 
-    /// The same model, without an application.
+    /// The same model, without an application and on another bus.
     pub fn without_application(&self, bus: &Bus) -> SharedSegment {
-        let beside = Beside::nothing(bus, self.cache.clone());
         let undeclared = self.undeclared.renewed(bus);
-        SharedSegment::of(bus, self.segment.clone(), Arc::new(Board::new(0)), beside, undeclared)
+        SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared)
     }
 
-    fn of(
+    fn without(
         bus: &Bus,
         segment: Rc<RefCell<Segment>>,
-        board: Arc<Board>,
-        beside: Beside,
-        undeclared: Undeclared,
+        cache: SiiCache,
+        undeclared: UndeclaredMailboxes,
     ) -> SharedSegment {
-        let Beside { mailboxes, cache, statistics } = beside;
         SharedSegment {
             segment,
-            mailboxes: mailboxes.into(),
+            mailboxes: Rc::default(),
             tasks: Rc::default(),
             news: Rc::default(),
             changed: bus.signal(),
             bus: bus.clone(),
-            board,
+            board: Arc::new(Board::new(0)),
             cache,
             eeproms: EepromTurns::new(bus),
-            statistics,
+            statistics: ErrorStatistics::new(bus, 0, None),
             undeclared,
-            retried: Rc::default(),
+            idle_rescans: IdleRescans::new(bus),
         }
     }
 
-    /// Requests another attempt to configure a member, or all, without a further pause.
-    pub(crate) fn retry(&self, index: Option<usize>) {
-        let (all, single) = &*self.retried;
-        match index {
-            None => all.set(all.get().wrapping_add(1)),
-            Some(index) => {
-                let mut single = single.borrow_mut();
-                let count = single.len().max(index + 1).min(self.mailboxes.len());
-                single.resize(count, 0);
-                single.get_mut(index).into_iter().for_each(|requests| *requests = requests.wrapping_add(1));
-            }
-        }
-        self.changed.notify();
-    }
-
-    /// Waits until another attempt is requested.
+    /// Waits until another attempt to configure a member is requested.
     pub(super) async fn until_retried(&self, index: usize) {
-        let requests = || {
-            let (all, single) = &*self.retried;
-            (all.get(), single.borrow().get(index).copied().unwrap_or_default())
-        };
-        let before = requests();
-        self.changed.until(|| (requests() != before).then_some(())).await;
+        let requests = |model: &Segment| model.member(index).map(|member| member.retries);
+        let before = requests(&self.view());
+        self.until(|model| (requests(model) != before).then_some(())).await;
     }
 
     /// Borrows the model, between two points at which a procedure waits.
@@ -148,6 +127,7 @@ impl SharedSegment {
                 Effect::SuspendMailbox { index } => self.mailboxes.get(index).into_iter().for_each(Mailbox::suspend),
                 Effect::MainCount(count) => self.bus.set_main_count(count),
                 Effect::Occupants(occupants) => self.bus.set_occupants(occupants),
+                Effect::Mailboxes(now) => self.undeclared.follow(&now),
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
         }
@@ -168,6 +148,11 @@ impl SharedSegment {
     /// Passes an observation of clocks to the model.
     pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
+    }
+
+    /// Passes an observation of SubDevices without a declaration to the model.
+    pub(crate) fn observe_undeclared(&self, seen: UndeclaredObservation<'_>) {
+        self.observe(Observation::Undeclared(seen));
     }
 
     /// The posted words, in the form that the model takes.
@@ -229,7 +214,7 @@ impl SharedSegment {
     pub(crate) fn mailbox_of(&self, subdevice: Addressed) -> Option<Mailbox> {
         match subdevice {
             Addressed::Member(index) => self.mailbox(index),
-            Addressed::Undeclared(key) => self.undeclared.mailbox(key.station),
+            Addressed::Undeclared(key) => self.undeclared.of(key),
         }
     }
 
@@ -242,6 +227,18 @@ impl SharedSegment {
     pub fn mailboxes(&self) -> &[Mailbox] {
         &self.mailboxes
     }
+}
+
+/// Runs a procedure until an application is active.
+pub(super) async fn until_active(segment: &SharedSegment, procedure: impl Future<Output = ()>) {
+    let mut procedure = pin!(procedure);
+    poll_fn(|context| {
+        if segment.view().is_active() {
+            return Poll::Ready(());
+        }
+        procedure.as_mut().poll(context)
+    })
+    .await;
 }
 
 /// The turn of a disturbance, or its place in the queue. Dropping it ends the disturbance, also if its procedure is

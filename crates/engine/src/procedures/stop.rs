@@ -16,6 +16,7 @@ use ringcat_wire::register::map;
 
 use super::al_state::{ask, read_status};
 use crate::declared::SubDeviceId;
+use crate::role::NotPermitted;
 use crate::segment::Segment;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -37,6 +38,8 @@ const ASKED_AGAIN: Duration = Duration::from_millis(20);
 pub enum StopError {
     /// The bus failed.
     Bus(BusError),
+    /// A stop is refused in the present role.
+    NotPermitted(NotPermitted),
     /// No SubDevice answers any more.
     NoAnswer,
     /// Some did not reach the state in time.
@@ -62,6 +65,7 @@ impl fmt::Display for StopError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             StopError::Bus(error) => error.fmt(f),
+            StopError::NotPermitted(denied) => denied.fmt(f),
             StopError::NoAnswer => f.write_str("no SubDevice answers"),
             StopError::NotReached { subdevice, station, requested, status, code, limit, others } => {
                 match subdevice {
@@ -80,6 +84,12 @@ impl fmt::Display for StopError {
 }
 
 impl core::error::Error for StopError {}
+
+impl From<NotPermitted> for StopError {
+    fn from(denied: NotPermitted) -> StopError {
+        StopError::NotPermitted(denied)
+    }
+}
 
 impl From<BusError> for StopError {
     fn from(error: BusError) -> StopError {

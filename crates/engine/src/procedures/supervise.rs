@@ -14,9 +14,8 @@ use super::inspect::{read_all_unassigned, read_members};
 use super::junction::note_controls;
 use super::shared_segment::SharedSegment;
 use super::unassigned;
-use super::undeclared::report_left;
 use crate::segment::member::Phase;
-use crate::segment::{Observation, Reading, RoundResult};
+use crate::segment::{Observation, Reading, RoundResult, StateRead, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Pause before SubDevices that did not answer are read again.
@@ -53,9 +52,9 @@ pub(super) async fn run_round(bus: Bus, segment: SharedSegment, routine: bool) {
 async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     let versions = segment.view().versions();
     let before: Vec<Phase> = segment.view().members().map(|member| member.phase).collect();
+    let settled = segment.view().settled();
     let unassigned = read_all_unassigned(bus, segment).await;
-    let states: Vec<_> = unassigned.iter().map(|(key, reading)| (key.station, *reading)).collect();
-    report_left(bus, &segment.undeclared, &states);
+    observe_states(segment, &settled, &unassigned);
     let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
     let counted = || segment.board.supervision().map(|(_, seen)| seen.total());
@@ -66,6 +65,18 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     let round_result =
         RoundResult { versions, readings: &readings, before: &before, unassigned: &unassigned, counted: counted() };
     segment.observe(Observation::Round(round_result));
+}
+
+/// States of SubDevices without a declaration that had reached them before the round.
+fn observe_states(segment: &SharedSegment, settled: &[(SubDeviceKey, u32)], read: &[(SubDeviceKey, Reading)]) {
+    let reading = |key: SubDeviceKey| read.iter().find(|(other, _)| *other == key).map(|(_, reading)| *reading);
+    let read = settled
+        .iter()
+        .filter_map(|(key, attempt)| Some(StateRead { key: *key, attempt: *attempt, reading: reading(*key)? }));
+    let read: Vec<StateRead> = read.collect();
+    if !read.is_empty() {
+        segment.observe_undeclared(UndeclaredObservation::StatesRead(&read));
+    }
 }
 
 async fn follow_up(bus: &Bus, segment: &SharedSegment) {

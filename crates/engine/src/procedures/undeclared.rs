@@ -1,13 +1,16 @@
 //! SubDevices without a declaration: all of them while no application is active, otherwise those that its declaration
-//! does not name. Each has a mailbox and a requested state, PREOP unless another one is requested.
+//! does not name. The model (`segment::upkeep`) has their requested states and attempts.
 
+mod attempt;
 mod bring;
 mod keep;
 mod mail;
-mod registry;
+mod mailboxes;
 mod request;
 
-pub(crate) use keep::{follow_unassigned, keep, report_left, run_due, without_declaration};
+pub(super) use attempt::bring_undeclared;
+pub(super) use bring::{keep_outputs, unmap};
+pub(crate) use keep::{keep, settle};
 pub(crate) use mail::watch_undeclared_mail;
-pub use registry::{Retries, Undeclared};
-pub(crate) use request::request;
+pub(crate) use mailboxes::UndeclaredMailboxes;
+pub(crate) use request::{request, until_decided};

@@ -61,6 +61,11 @@ pub struct RingMonitor {
 }
 
 impl RingMonitor {
+    /// A monitor of a ring whose state another process has known.
+    pub(crate) fn of(state: RingState) -> RingMonitor {
+        RingMonitor { state, ..RingMonitor::default() }
+    }
+
     /// The current state.
     pub const fn state(&self) -> RingState {
         self.state

@@ -35,6 +35,11 @@ impl Addresses {
         (0..COUNT).map(at).find(|address| !is_in_use(*address)).unwrap_or(at(0))
     }
 
+    /// The temporary address that was given last.
+    pub fn last(&self) -> StationAddress {
+        StationAddress(FIRST + (self.next + COUNT - 1) % COUNT)
+    }
+
     /// Whether the last search failed so often that it has to be tested whether frames hold too many datagrams.
     pub fn are_frames_doubtful(&self) -> bool {
         self.failures == DOUBT

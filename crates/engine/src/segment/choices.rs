@@ -2,6 +2,17 @@
 
 use crate::junction::JunctionMode;
 
+/// What follows a failed configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Retries {
+    /// It is repeated after pauses of 100 ms to 5 s, without end.
+    #[default]
+    Always,
+    /// The SubDevice stays as it is until a retry is requested. Losses of frames are repeated at any rate.
+    OnRequest,
+}
+
 /// Settings at activation.
 #[derive(Clone, Copy, Debug)]
 pub struct Choices {
@@ -13,4 +24,6 @@ pub struct Choices {
     pub follow_groups: bool,
     /// SubDevices without a declaration are kept in their requested states.
     pub idle_operation: bool,
+    /// What follows a failed configuration.
+    pub retries: Retries,
 }

@@ -3,6 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use ringcat_wire::address::Position;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
 use super::key::SubDeviceKey;
@@ -26,6 +27,8 @@ pub enum Effect {
         /// The member.
         index: usize,
     },
+    /// The SubDevices without a declaration that have mailboxes now, at their positions.
+    Mailboxes(Vec<(SubDeviceKey, Position)>),
     /// Positions from here on are reached through the redundant link (protocol CR-09).
     MainCount(u16),
     /// The SubDevices at the positions of the cabling have changed.
@@ -78,6 +81,20 @@ pub enum Task {
     ReadUnassigned {
         /// The SubDevice.
         key: SubDeviceKey,
+    },
+    /// Brings a SubDevice without a declaration to its requested state, once.
+    BringUndeclared {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// Number of the attempt.
+        attempt: u32,
+    },
+    /// Writes the outputs of a SubDevice without a declaration as long as it is to stay in OP.
+    KeepOutputs {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// Number of the attempt that has reached OP.
+        attempt: u32,
     },
     /// Scans the segment for crossed lines.
     ExamineCabling {

@@ -8,6 +8,7 @@ use crate::time::Instant;
 
 /// What is known of a SubDevice from its SII and registers.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Knowledge {
     /// It has never answered.
     NeverSeen,

@@ -55,6 +55,8 @@ pub struct Member {
     pub(super) mistaken: Mistaken,
     /// Repeated configurations because of lost registers.
     pub repair: Repair,
+    /// Requests for another attempt without a further pause.
+    pub retries: u32,
 }
 
 /// First pause before the SubDevice at the address of a lost member is identified again.
@@ -153,6 +155,7 @@ impl Member {
             suspended: false,
             mistaken: Mistaken::default(),
             repair: Repair::default(),
+            retries: 0,
         }
     }
 }

@@ -25,6 +25,7 @@ use super::silence::Silence;
 use super::stage::Stage;
 use super::subdevices::SubDevices;
 use super::unassigned::UnassignedView;
+use super::undeclared::Keeping;
 use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
@@ -95,6 +96,7 @@ pub struct Segment {
     pub(super) attention: Attention,
     pub(super) slot: Slot,
     pub(super) addresses: Addresses,
+    pub(super) keeping: Keeping,
     /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
     /// Until this time it is not necessary to test how many datagrams a frame may hold.
@@ -121,6 +123,7 @@ impl Segment {
             attention: Attention::default(),
             slot: Slot::default(),
             addresses: Addresses::default(),
+            keeping: Keeping::default(),
             adoptions: 0,
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),
@@ -278,6 +281,11 @@ impl Segment {
     /// Crossed lines as reported.
     pub fn reported_crossings(&self) -> &LineCheck {
         self.crossings.reported()
+    }
+
+    /// The temporary station address that was given last.
+    pub fn last_offered(&self) -> StationAddress {
+        self.addresses.last()
     }
 
     /// How often the cabling of a rescan was taken over.

@@ -9,6 +9,7 @@ use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
+use super::addressed::Addressed;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
@@ -20,6 +21,7 @@ use super::ring::Words;
 use super::round_result::RoundResult;
 use super::scan::{Found, Scan};
 use super::seen::Seen;
+use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
 use crate::info::SubDeviceInfo;
@@ -112,8 +114,6 @@ pub enum Observation<'a> {
         /// Its data.
         read: &'a SubDeviceInfo,
     },
-    /// A SubDevice is configured for its mailbox before an application is active.
-    Visited,
     /// An application declares SubDevices.
     Activated(Box<Declared>),
     /// The application ends. The result of the scan stays.
@@ -140,13 +140,19 @@ pub enum Observation<'a> {
         /// Number of the mapping for which they were read.
         mapping: u32,
     },
-    /// The application requests a state of a member.
+    /// The application requests a state of a SubDevice.
     Requested {
-        /// The member.
-        index: usize,
+        /// The SubDevice.
+        subdevice: Addressed,
         /// The state.
         state: AlState,
     },
+
+    /// The application requests that failed attempts are repeated now: of a SubDevice, or of all.
+    Retried(Option<Addressed>),
+
+    /// States of SubDevices without a declaration, and attempts to reach them.
+    Undeclared(UndeclaredObservation<'a>),
 
     /// The incident counters of members are reset.
     IncidentsForgotten,

@@ -14,3 +14,4 @@ mod recabling;
 mod silence;
 mod stages;
 mod unassigned;
+mod undeclared;

@@ -60,6 +60,12 @@ impl SubDevice {
         }
     }
 
+    /// Whether the identities of both are known and equal.
+    pub(super) fn is_same(&self, other: &SubDevice) -> bool {
+        let (one, other) = (self.knowledge.info(), other.knowledge.info());
+        one.zip(other).is_some_and(|(one, other)| one.identity == other.identity)
+    }
+
     /// It, if it is declared.
     pub fn as_member(&self) -> Option<MemberView<'_>> {
         let Role::Declared(member) = &self.role else { return None };

@@ -1,5 +1,6 @@
 //! The list of all SubDevices of the segment.
 
+use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -43,6 +44,20 @@ impl SubDevices {
     pub(super) fn begun(mut self, version: u32, attempt: u32) -> SubDevices {
         self.all.iter_mut().for_each(|it| it.key.since = version);
         self.members_mut().for_each(|member| member.attempt = attempt);
+        self
+    }
+
+    /// The list with those SubDevices without a declaration that were in another list, too: they keep their keys and
+    /// requested states.
+    pub(super) fn keeping(mut self, before: SubDevices) -> SubDevices {
+        let before = before.all.into_iter().skip(before.declared);
+        let before: BTreeMap<StationAddress, SubDevice> = before.map(|it| (it.key.station, it)).collect();
+        for it in &mut self.all[self.declared..] {
+            let Some(same) = before.get(&it.key.station).filter(|same| same.is_same(it)) else { continue };
+            if let (Role::Unassigned(now), Role::Unassigned(unassigned)) = (&mut it.role, &same.role) {
+                (it.key, now.upkeep) = (same.key, unassigned.upkeep);
+            }
+        }
         self
     }
 

@@ -4,6 +4,7 @@ mod addressed;
 mod clocks;
 mod stages;
 mod stale;
+mod undeclared;
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -108,6 +109,7 @@ impl Ring {
             junctions: JunctionMode::Disabled,
             follow_groups: false,
             idle_operation: false,
+            retries: Retries::Always,
         };
         let mut segment = Segment::new(choices);
         segment.observe(Observation::ScanBegun, Instant(0));

@@ -10,6 +10,7 @@ use ringcat_wire::address::Position;
 use super::key::SubDeviceKey;
 use super::knowledge::Knowledge;
 use super::owners::Owners;
+use super::undeclared::Upkeep;
 use crate::time::Instant;
 
 /// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.
@@ -30,6 +31,8 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
+    /// Its requested state and the attempts to reach it; `None` without a request.
+    pub upkeep: Option<Upkeep>,
 }
 
 /// The place of a SubDevice in the order of positions.
@@ -52,7 +55,15 @@ impl Unassigned {
             from_main: at.position < at.main_count,
             reported: false,
             held_since: None,
+            upkeep: None,
         }
+    }
+}
+
+impl Unassigned {
+    /// It is known to be undeclared, and no state was requested of it. `knowledge`: what is known of it.
+    pub(super) fn is_untouched(&self, knowledge: &Knowledge) -> bool {
+        self.reported && knowledge.info().is_some() && self.upkeep.is_none()
     }
 }
 

@@ -8,6 +8,7 @@ mod wait;
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
+use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
@@ -26,9 +27,10 @@ use super::signal::Signal;
 use super::transfer::Request;
 use crate::board::Board;
 use crate::event::history::History;
-use crate::event::{Event, Occupant};
+use crate::event::{Event, Occupant, Subject};
 use crate::link::LinkSet;
 use crate::ring::RingState;
+use crate::role::{Function, NotPermitted};
 use crate::time::Instant;
 use future::TransferFuture;
 
@@ -67,6 +69,14 @@ impl Bus {
         self.shared.borrow().carriers
     }
 
+    /// Checks a function that begins and is the same in all phases.
+    ///
+    /// # Errors
+    /// The role of the MainDevice does not allow it.
+    pub fn permit(&self, function: Function) -> Result<(), NotPermitted> {
+        function.check_role(self.shared.borrow().role)
+    }
+
     /// The board of the exchange, once there is one.
     pub fn board(&self) -> Option<alloc::sync::Arc<Board>> {
         self.shared.borrow().board.clone()
@@ -88,6 +98,28 @@ impl Bus {
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
+    }
+
+    /// Reports a step of a procedure as a message of level 1; `text` is called only where such messages are wanted.
+    pub(crate) fn step(&self, subject: Subject, text: impl FnOnce() -> String) {
+        if !self.shared.borrow_mut().events.messages().takes_step(subject) {
+            return;
+        }
+        let text = text();
+        let shared = &mut *self.shared.borrow_mut();
+        shared.events.messages().step(shared.now, subject, text);
+    }
+
+    /// Whether datagrams with wrong working counters are reported.
+    pub(crate) fn are_commands_reported(&self) -> bool {
+        self.shared.borrow().command_reports.is_on()
+    }
+
+    /// Reports acyclic datagrams with wrong working counters that have waited.
+    pub(crate) fn report_waiting_commands(&self) {
+        let shared = &mut *self.shared.borrow_mut();
+        let waiting = shared.command_reports.take_waiting(shared.now);
+        waiting.into_iter().for_each(|wrong| shared.report_command(wrong));
     }
 
     /// Reports an event of a SubDevice.

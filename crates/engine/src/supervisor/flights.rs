@@ -49,6 +49,16 @@ impl Flights {
         }
     }
 
+    /// Number of the last frame.
+    pub(super) fn sequence(&self) -> Sequence {
+        self.sequence
+    }
+
+    /// The numbers go on behind this one: no frame is on the wire.
+    pub(super) fn go_on_from(&mut self, sequence: Sequence) {
+        self.sequence = sequence;
+    }
+
     /// No flight has an earlier deadline; never if there is none. It may be that of an ended flight.
     #[inline]
     pub(super) fn next_deadline(&self) -> Instant {

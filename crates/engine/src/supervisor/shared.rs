@@ -4,10 +4,12 @@ use alloc::collections::{BinaryHeap, VecDeque};
 use alloc::sync::Arc;
 use core::cmp::Reverse;
 
-use ringcat_wire::datagram::MAX_DATA;
+use ringcat_wire::datagram::{MAX_DATA, Target};
 
 use super::alone::Alone;
+use super::command_reports::{CommandReports, WrongCommand};
 use super::counters::AcyclicCounters;
+use super::debug_message::DebugMessages;
 use super::flights::Flights;
 use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
@@ -20,9 +22,10 @@ use super::task::{Task, TaskId};
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::bell::Bell;
 use crate::board::Board;
-use crate::event::EventLog;
+use crate::event::{Event, EventLog, Occupant};
 use crate::link::LinkSet;
 use crate::ring::{Identity, RingMonitor};
+use crate::role::Role;
 use crate::time::Instant;
 
 pub(crate) struct Shared {
@@ -34,7 +37,9 @@ pub(crate) struct Shared {
     pub(crate) counters: AcyclicCounters,
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
+    pub(crate) command_reports: CommandReports,
     pub(crate) outbox: Outbox,
+    pub(crate) debug_messages: DebugMessages,
     pub(crate) alone: Alone,
     pub(crate) flights: Flights,
     pub(crate) silence: Silence,
@@ -52,6 +57,7 @@ pub(crate) struct Shared {
     pub(super) bell: Bell,
     /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
+    pub(crate) role: Role,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -69,7 +75,9 @@ impl Shared {
             counters: AcyclicCounters::default(),
             events: EventLog::default(),
             transfers: Transfers::default(),
+            command_reports: CommandReports::default(),
             outbox: Outbox::default(),
+            debug_messages: DebugMessages::default(),
             alone: Alone::default(),
             flights: Flights::new(),
             silence: Silence::default(),
@@ -82,11 +90,24 @@ impl Shared {
             watchers: Watchers::default(),
             bell: Bell::default(),
             max_datagrams: usize::MAX,
+            role: Role::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),
             timers: BinaryHeap::new(),
         }
+    }
+
+    /// Reports a datagram with a wrong working counter, named by its SubDevice.
+    pub(crate) fn report_command(&mut self, wrong: WrongCommand) {
+        let WrongCommand { command, target, expected, got, count } = wrong;
+        let station = if let Target::Station(station, _) = target { Some(station) } else { None };
+        let occupant = match target {
+            Target::Position(position, _) => self.events.occupants([Some(position), None])[0],
+            _ => station.map(|it| self.events.occupant_at(it).unwrap_or(Occupant::new(it, None))),
+        };
+        let event = Event::AcyclicCommand { command, target, expected, got, count };
+        self.events.push_of(self.now, event, [occupant, None]);
     }
 
     pub(crate) fn spawn(&mut self, task: Task) {
@@ -132,7 +153,7 @@ impl Shared {
     pub(crate) fn wants_to_send(&self) -> bool {
         match self.alone.is_held() {
             true => self.alone.next_deadline(self.now).is_some(),
-            false => self.outbox.is_ready(self.now),
+            false => self.outbox.is_ready(self.now) || self.debug_messages.are_waiting(),
         }
     }
 

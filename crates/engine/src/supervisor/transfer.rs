@@ -7,6 +7,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD, Target};
 use ringcat_wire::register::map;
 
+use super::command_reports::WrongCommand;
 use super::reply::{BusError, Reply};
 use super::task::TaskId;
 use crate::time::Instant;
@@ -30,6 +31,9 @@ pub(crate) struct Request {
     pub preceding: Option<(Command, Target, Vec<u8>)>,
     /// Set for a read of this SubDevice's mailbox: the content of every copy is kept, also of a late one.
     pub mail: Option<StationAddress>,
+    /// It is repeated until its working counter is as expected, so that another one is no error: a mailbox is full or
+    /// empty.
+    pub polls: bool,
     /// It is sent before all datagrams that wait.
     pub urgent: bool,
     /// Number of further datagrams of the same kind before it, in a frame of their own.
@@ -54,11 +58,18 @@ impl Request {
             resend: false,
             preceding: None,
             mail: None,
+            polls: false,
             urgent: false,
             before: 0,
             alone: None,
             time_at: None,
         }
+    }
+
+    /// The datagram, if this working counter is a wrong one.
+    pub(super) fn wrong_command(&self, got: Wkc) -> Option<WrongCommand> {
+        let expected = self.expected.filter(|expected| *expected != got && !self.polls)?;
+        Some(WrongCommand { command: self.command, target: self.target, expected, got, count: 1 })
     }
 
     /// Advances a time in the data to now.

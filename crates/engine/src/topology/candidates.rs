@@ -16,11 +16,8 @@ use super::tree::{NodeStatus, Topology};
 /// Open ports alone do not show where a ring ends: any SubDevice after the junction could also be connected to the last
 /// member of the ring. The caller must find out which set is right. If the redundant link has SubDevices (a broken
 /// ring, or branches that only its frames pass), the result is empty.
-pub fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
-    candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
-}
-
-/// As [`candidates`]; every set contains the closing cables known to be right, and none contains one known to be wrong.
+///
+/// Every set contains the closing cables known to be right, and none contains one known to be wrong.
 pub(crate) fn candidates_with(
     nodes: &[NodeStatus],
     main_count: usize,

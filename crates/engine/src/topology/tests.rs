@@ -5,7 +5,8 @@ use std::vec::Vec;
 use proptest::prelude::*;
 use ringcat_wire::register::{DlStatus, PortKind};
 
-use super::{Connection, Finding, Node, NodeStatus, PortOf, Topology};
+use super::port::Connection;
+use super::{Finding, Node, NodeStatus, PortOf, Topology};
 use walk_model::{End, Segment};
 
 mod local_rings;

@@ -1,5 +1,5 @@
 //! The queue between the thread that receives or sends frames and the writing thread: a bounded queue of bytes with one
-//! producer and one consumer.
+//! producer and one consumer at a time.
 //!
 //! Input: frames with interface, direction and time. Output: the same frames in the same order. It uses no locks and no
 //! `unsafe`: the memory consists of atomic words. The producer does not wait, allocate or call the kernel. Frames that
@@ -21,7 +21,8 @@ const FILLING: u64 = u64::MAX;
 
 /// Properties of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Note {
+#[non_exhaustive]
+pub struct FrameNote {
     /// Position of the interface in the list of the capture, at most 255.
     pub interface: usize,
     /// Direction.
@@ -32,8 +33,9 @@ pub struct Note {
     pub length: usize,
 }
 
+/// The memory of a queue.
 #[derive(Debug)]
-struct Shared {
+pub struct Queue {
     /// The length is a power of two; a count of words modulo the length is a position.
     words: Box<[AtomicU64]>,
     /// Words written so far; only the producer stores it.
@@ -44,16 +46,32 @@ struct Shared {
     lost: Box<[AtomicU64]>,
 }
 
-impl Shared {
+impl Queue {
+    /// A queue of `bytes`, rounded up to a power of two, for this number of interfaces. It has at most one producer and
+    /// one consumer at a time.
+    pub fn new(bytes: usize, interfaces: usize) -> Queue {
+        let words = bytes.div_ceil(WORD).clamp(2 * HEAD, 1 << 28).next_power_of_two();
+        Queue {
+            words: (0..words).map(|_| AtomicU64::new(FILLING)).collect(),
+            written: AtomicU64::new(0),
+            read: AtomicU64::new(0),
+            lost: (0..interfaces).map(|_| AtomicU64::new(0)).collect(),
+        }
+    }
+
     fn word(&self, at: u64) -> &AtomicU64 {
         &self.words[at as usize & (self.words.len() - 1)]
+    }
+
+    fn lost(&self, interface: usize) -> u64 {
+        self.lost.get(interface).map_or(0, |lost| lost.load(Ordering::Relaxed))
     }
 }
 
 /// The writing end.
 #[derive(Debug)]
 pub struct Producer {
-    shared: Arc<Shared>,
+    shared: Arc<Queue>,
     written: u64,
     /// Last known count of the consumer; the current count may be higher.
     read: u64,
@@ -62,25 +80,21 @@ pub struct Producer {
 /// The reading end.
 #[derive(Debug)]
 pub struct Consumer {
-    shared: Arc<Shared>,
+    shared: Arc<Queue>,
     read: u64,
-}
-
-/// A queue of `bytes`, rounded up to a power of two, for this number of interfaces.
-pub fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
-    let words = bytes.div_ceil(WORD).clamp(2 * HEAD, 1 << 28).next_power_of_two();
-    let shared = Arc::new(Shared {
-        words: (0..words).map(|_| AtomicU64::new(FILLING)).collect(),
-        written: AtomicU64::new(0),
-        read: AtomicU64::new(0),
-        lost: (0..interfaces).map(|_| AtomicU64::new(0)).collect(),
-    });
-    (Producer { shared: shared.clone(), written: 0, read: 0 }, Consumer { shared, read: 0 })
+    /// Frames that did not fit before, by interface.
+    lost_before: Vec<u64>,
 }
 
 impl Producer {
+    /// The producer of a queue.
+    pub fn new(shared: Arc<Queue>) -> Producer {
+        let (written, read) = (shared.written.load(Ordering::Relaxed), shared.read.load(Ordering::Acquire));
+        Producer { shared, written, read }
+    }
+
     /// Appends a frame; false (and counted) if the queue is full.
-    pub fn push(&mut self, note: Note, frame: &[u8]) -> bool {
+    pub fn push(&mut self, note: FrameNote, frame: &[u8]) -> bool {
         let shared = &*self.shared;
         let frame = &frame[..frame.len().min(LONGEST)];
         let needed = (HEAD + frame.len().div_ceil(WORD)) as u64;
@@ -123,6 +137,20 @@ impl Producer {
 }
 
 impl Consumer {
+    /// The consumer of a queue, from its next frame on.
+    pub fn new(shared: Arc<Queue>) -> Consumer {
+        let read = shared.written.load(Ordering::Acquire);
+        shared.read.store(read, Ordering::Release);
+        let lost_before = (0..shared.lost.len()).map(|interface| shared.lost(interface)).collect();
+        Consumer { shared, read, lost_before }
+    }
+
+    /// The first consumer of a queue, from its first frame on.
+    pub fn first(shared: Arc<Queue>) -> Consumer {
+        let lost_before = vec![0; shared.lost.len()];
+        Consumer { shared, read: 0, lost_before }
+    }
+
     /// The producer's current position, for [`Consumer::is_before`].
     pub fn end(&self) -> u64 {
         self.shared.written.load(Ordering::Acquire)
@@ -139,7 +167,7 @@ impl Consumer {
     }
 
     /// Removes the oldest frame before `end`; its bytes replace the content of `frame`.
-    pub fn pop(&mut self, end: u64, frame: &mut Vec<u8>) -> Option<Note> {
+    pub fn pop(&mut self, end: u64, frame: &mut Vec<u8>) -> Option<FrameNote> {
         let time_ns = self.oldest(end)?;
         let head = self.shared.word(self.read).load(Ordering::Relaxed);
         let length = head as usize & 0xFFFF;
@@ -153,12 +181,12 @@ impl Consumer {
         self.read += (HEAD + words) as u64;
         self.shared.read.store(self.read, Ordering::Release);
         let direction = if head >> 16 & 1 == 0 { Direction::In } else { Direction::Out };
-        Some(Note { interface: (head >> 24) as usize & 0xFF, direction, time_ns, length: (head >> 32) as usize })
+        Some(FrameNote { interface: (head >> 24) as usize & 0xFF, direction, time_ns, length: (head >> 32) as usize })
     }
 
-    /// Frames of an interface that did not fit.
+    /// Frames of an interface that did not fit since this consumer began.
     pub fn lost(&self, interface: usize) -> u64 {
-        self.shared.lost.get(interface).map_or(0, |lost| lost.load(Ordering::Relaxed))
+        self.shared.lost(interface) - self.lost_before.get(interface).copied().unwrap_or(0)
     }
 }
 
@@ -166,9 +194,14 @@ impl Consumer {
 mod tests {
     use super::*;
 
-    fn note(number: u64) -> Note {
+    fn queue(bytes: usize, interfaces: usize) -> (Producer, Consumer) {
+        let queue = Arc::new(Queue::new(bytes, interfaces));
+        (Producer::new(queue.clone()), Consumer::first(queue))
+    }
+
+    fn note(number: u64) -> FrameNote {
         let direction = if number.is_multiple_of(3) { Direction::In } else { Direction::Out };
-        Note { interface: number as usize % 2, direction, time_ns: number << 33, length: frame(number).len() }
+        FrameNote { interface: number as usize % 2, direction, time_ns: number << 33, length: frame(number).len() }
     }
 
     fn frame(number: u64) -> Vec<u8> {
@@ -192,7 +225,7 @@ mod tests {
     #[test]
     fn a_frame_for_a_full_queue_is_counted_and_the_others_are_kept() {
         let (mut producer, mut consumer) = queue(256, 2);
-        let ones = Note { interface: 1, ..note(1) };
+        let ones = FrameNote { interface: 1, ..note(1) };
         let pushed = (0..5).filter(|_| producer.push(ones, &[7; 64])).count();
         assert_eq!((pushed, consumer.lost(0), consumer.lost(1)), (3, 0, 2));
         let mut taken = Vec::new();
@@ -227,5 +260,25 @@ mod tests {
         }
         assert_eq!(writer.join().expect("no panic"), seen);
         assert_eq!(consumer.lost(0) + consumer.lost(1) + seen as u64, FRAMES);
+    }
+
+    // covers: capture
+    #[test]
+    fn a_later_consumer_begins_with_the_next_frame_and_counts_its_own_losses() {
+        let queue = Arc::new(Queue::new(256, 1));
+        let mut producer = Producer::new(queue.clone());
+        let zero = |number| FrameNote { interface: 0, ..note(number) };
+        let first = Consumer::first(queue.clone());
+        assert_eq!((0..5).filter(|number| producer.push(zero(*number), &[1; 64])).count(), 3);
+        assert_eq!(first.lost(0), 2);
+        drop(first);
+        let mut later = Consumer::new(queue);
+        assert_eq!((later.lost(0), later.oldest(later.end())), (0, None));
+        assert!((7..10).all(|number| producer.push(zero(number), &[2; 64])), "the room of old frames is free");
+        assert!(!producer.push(zero(10), &[2; 64]));
+        let mut taken = Vec::new();
+        let end = later.end();
+        assert_eq!(later.pop(end, &mut taken).map(|note| (note.time_ns >> 33, taken[0])), Some((7, 2)));
+        assert_eq!(later.lost(0), 1);
     }
 }

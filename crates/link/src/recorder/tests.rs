@@ -50,26 +50,14 @@ fn frames(blocks: &[(u32, Vec<u8>)]) -> Vec<(u32, u64, u8)> {
 // covers: capture
 #[test]
 fn frames_of_two_threads_are_in_one_file_in_the_order_of_time() {
-    let shared = Arc::new(Shared {
-        interfaces: 2,
-        new: Mutex::default(),
-        clock: OnceLock::new(),
-        lost_by_kernel: Vec::new(),
-        end: AtomicBool::new(false),
-        failure: OnceLock::new(),
-    });
-    let (mut producers, queues): (Vec<Producer>, Vec<(Consumer, u64)>) = (0..2)
-        .map(|_| {
-            let (producer, consumer) = frame_queue::queue(4096, 2);
-            (producer, (consumer, 0))
-        })
-        .unzip();
+    let shared = Arc::new(Shared { lost_by_kernel: Vec::new(), end: AtomicBool::new(false), failure: OnceLock::new() });
+    let taps = Taps::new(2);
+    let mut producers = [taps.tap_with(4096), taps.tap_with(4096)];
     let writer = Writer::new(Vec::new(), &[("a", ""), ("b", "")]).expect("writing to memory succeeds");
-    let recorded = vec![Recorded::default(); 2];
-    let mut scribe = WritingThread { writer, shared, queues, frame: Vec::new(), recorded };
+    let reader = taps.read().expect("there is no other");
+    let mut scribe = WritingThread { writer, shared, reader, recorded: vec![Recorded::default(); 2] };
     let mut put = |thread: usize, time_ns: u64| {
-        let note = Note { interface: thread, direction: Direction::Out, time_ns, length: 60 };
-        assert!(producers[thread].push(note, &[time_ns as u8; 60]));
+        producers[thread].record(thread, Direction::Out, time_ns, &[time_ns as u8; 60]);
     };
     let written = |scribe: &WritingThread<Vec<u8>>| scribe.recorded[0].sent + scribe.recorded[1].sent;
     put(0, 10);
@@ -113,7 +101,7 @@ fn frames_of_two_threads_at_once_are_all_in_the_file() {
 fn frames_lost_to_a_full_queue_are_in_the_statistics() {
     let scratch = Scratch::new();
     let recorder = Recorder::start(&scratch.0, &[("a", ""), ("b", "")]).expect("a file");
-    let mut tap = recorder.tap_with(1024);
+    let mut tap = recorder.taps.tap_with(1024);
     for length in [60, 1514, 60, 60, 1514] {
         tap.record(1, Direction::Out, 7, &vec![0xEE; length]);
     }
@@ -175,4 +163,65 @@ fn an_error_of_writing_names_the_file_and_the_remedy() {
     assert!(start("/").ends_with("name a file in it"));
     let full = start("/dev/full");
     assert!(full.contains("No space left") && full.contains("make room"), "{full}");
+}
+
+/// Interface and first byte of the frames that a reader takes.
+fn taken(reader: &mut FrameReader) -> Vec<(usize, u8)> {
+    let mut taken = Vec::new();
+    let all = reader.read_all(|note, frame| {
+        taken.push((note.interface, frame[0]));
+        Ok::<(), ()>(())
+    });
+    all.expect("nothing fails");
+    taken
+}
+
+// covers: capture
+#[test]
+fn taps_record_while_they_have_a_reader_and_for_one_at_a_time() {
+    let taps = Taps::new(2);
+    let mut early = taps.tap_with(4096);
+    let put = |tap: &mut Tap, interface: usize, byte: u8| {
+        tap.record(interface, Direction::In, u64::from(byte), &[byte; 60]);
+    };
+    put(&mut early, 0, 1);
+    let mut reader = taps.read().expect("it is the only one");
+    assert_eq!(taps.read().err(), Some(AlreadyRead));
+    put(&mut early, 0, 2);
+    // A tap of a thread that begins later.
+    let mut late = taps.clone().tap_with(4096);
+    put(&mut late, 1, 3);
+    put(&mut early, 1, 4);
+    assert_eq!(taken(&mut reader), [(0, 2), (1, 3), (1, 4)]);
+    // The last frames of a tap that is gone, and its losses.
+    (0..100).for_each(|_| put(&mut late, 0, 5));
+    drop(late);
+    let last = taken(&mut reader);
+    assert_eq!(last.len() as u64 + reader.lost(0), 100);
+    assert!(reader.lost(0) > 0 && taken(&mut reader).is_empty());
+    assert_eq!((reader.lost(0) + last.len() as u64, reader.taps()), (100, 1));
+    put(&mut early, 0, 6);
+    drop(reader);
+    put(&mut early, 0, 7);
+    let mut again = taps.read().expect("the first one has ended");
+    assert_eq!((taken(&mut again), again.lost(0)), (vec![], 0));
+    put(&mut early, 0, 8);
+    assert_eq!(taken(&mut again), [(0, 8)]);
+}
+
+// covers: capture
+#[test]
+fn two_captures_follow_each_other_on_the_same_taps() {
+    let (taps, names) = (Taps::new(1), [("a", "")]);
+    let mut tap = taps.tap_with(1 << 16);
+    let scratch = [Scratch::new(), Scratch::new()];
+    for (number, file) in scratch.iter().enumerate() {
+        let recorder = Recorder::of(&taps, &file.0, &names).expect("a file");
+        let busy = Recorder::of(&taps, &scratch[1 - number].0, &names).expect_err("it is read");
+        assert!(busy.to_string().ends_with("end the other capture first"), "{busy}");
+        (0..10).for_each(|at| tap.record(0, Direction::Out, at, &[number as u8; 60]));
+        assert_eq!(recorder.finish().expect("it is written")[0].sent, 10);
+        tap.record(0, Direction::Out, 99, &[9; 60]);
+        assert_eq!(frames(&blocks(&file.0)).iter().filter(|(.., byte)| *byte == number as u8).count(), 10);
+    }
 }

@@ -6,6 +6,7 @@ mod bench;
 mod exclusive;
 mod faults;
 mod frames;
+mod handed;
 mod listening;
 mod taps;
 mod waits;

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
 use ringcat_config::{Configuration, Difference, Stated, follow};
+use ringcat_engine::Topology;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::Declaration;
-use ringcat_engine::topology::Topology;
 #[cfg(feature = "sim")]
 use ringcat_sim::network::Network;
 #[cfg(feature = "sim")]

@@ -1,12 +1,12 @@
 //! Services without a mailbox: states, registers, ports, the EEPROM, error counters.
 
+use ringcat_engine::Acknowledge;
+use ringcat_engine::BlockedPort;
+use ringcat_engine::SiiWritten;
+use ringcat_engine::Statistics;
+use ringcat_engine::Urgency;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership};
-use ringcat_engine::procedures::services::forced_state::Acknowledge;
-use ringcat_engine::procedures::services::ports::BlockedPort;
-use ringcat_engine::procedures::services::registers::Urgency;
-use ringcat_engine::procedures::services::statistics::Statistics;
-use ringcat_engine::procedures::sii::program::SiiWritten;
+use ringcat_engine::{EepromAssignment, EepromOwnership};
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{LoopControl, map};

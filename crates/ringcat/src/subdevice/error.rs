@@ -4,14 +4,14 @@ use std::error::Error as StdError;
 use std::fmt;
 use std::time::Duration;
 
+use ringcat_engine::ConfigureError;
+use ringcat_engine::ServiceError;
 use ringcat_engine::mail::MailboxError;
 use ringcat_engine::mail::aoe::AoeError;
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::mail::coe::information::InformationError;
 use ringcat_engine::mail::foe::FoeError;
 use ringcat_engine::mail::soe::SoeError;
-use ringcat_engine::procedures::configure::ConfigureError;
-use ringcat_engine::procedures::services::ServiceError;
 
 use super::name::SubDeviceName;
 

@@ -3,9 +3,9 @@
 use std::future::Future;
 use std::time::Duration;
 
+use ringcat_engine::ConfigureError;
 use ringcat_engine::mail::{Mailbox, MailboxError};
 use ringcat_engine::main_device::{Address, MainDevice as Engine, Pending};
-use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_wire::al::AlState;
 
 use super::error::{SubDeviceError, SubDeviceFailure};

@@ -7,11 +7,11 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use ringcat_engine::AcyclicCounters;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{MainDevice as Engine, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
-use ringcat_engine::supervisor::AcyclicCounters;
 use ringcat_engine::time::Instant;
 
 use crate::acyclic::work;

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
+use ringcat_engine::PortOf;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Address, SubDeviceId};
 use ringcat_engine::ring_status::{Cable, Occupant};
-use ringcat_engine::topology::PortOf;
 use ringcat_wire::address::Position;
 
 /// Names of declared SubDevices, by their index in the declaration. A position has no name of its own: an event that

@@ -13,6 +13,10 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::SegmentChanged { subdevices, added, removed } => {
             format!("the segment has changed: {subdevices} SubDevices, {added} added, {removed} removed")
         }
+        Event::Resumed { subdevices, in_state, differs } => {
+            let found = if *differs { "it has changed, and what differs was scanned" } else { "it is as known" };
+            format!("going on with the segment of another process: {found}; {in_state} of {subdevices} SubDevices stay")
+        }
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
         Event::SiiOddity { position, what } => format!("{}: SII: {what}", at(*position)),

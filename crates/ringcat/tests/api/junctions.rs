@@ -8,7 +8,7 @@ use ringcat::{
     ActivateError, Declaration, Error, Event, Instant, JunctionConnection, JunctionError, JunctionMode, MainDevice,
     Options, Refused, SubDeviceId, TimedEvent, automatic,
 };
-use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_engine::{Closing, PortOf};
 use ringcat_wire::address::{Position, StationAddress};
 
 const SEGMENT: &str = include_str!("../../../sim/segments/junction-ring.toml");
@@ -109,7 +109,7 @@ fn apply_refuses_connections_that_the_segment_does_not_have_and_takes_the_right_
         application.cycle(|_| ());
     }
     assert!(application.all_settled());
-    assert!(matches!(application.engine_mut().load(Declaration::default()), Err(ActivateError::Active)));
+    assert!(matches!(application.engine_mut().load(Declaration::default()), Err(ActivateError::NotPermitted(_))));
 }
 
 // covers: junctions

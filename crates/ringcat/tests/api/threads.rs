@@ -57,8 +57,10 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     )?;
     until("all are in OP", || cycles.supervisor().all_settled());
     until("outputs arrive", || plant.with_network(|network| outputs(network)[0] == [1]));
-    let status = cycles.cyclic_status().status(DomainId(0))?;
-    assert!(status.expected > 0 && status.wkc > 0, "{status:?}");
+    // On a busy machine a frame may be late.
+    until("a cycle is complete", || {
+        cycles.cyclic_status().status(DomainId(0)).is_ok_and(|status| status.expected > 0 && status.wkc > 0)
+    });
     let events: Vec<_> = std::iter::from_fn(|| cycles.supervisor().pop_event()).collect();
     assert!(events.len() >= 3, "{events:?}");
     assert!(cycles.cyclic_status().pace().cycles > 0 && cycles.cyclic_status().counters().sent > 0);

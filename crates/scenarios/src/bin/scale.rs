@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Application, Error, MainDevice, Options, automatic};
-use ringcat_engine::ring::RingState;
+use ringcat_engine::RingState;
 use scenarios::counting_allocator::{CountingAllocator, counts, restart_peak};
 use scenarios::cpu_time::process_cpu_time;
 use scenarios::figures::{Figures, verdict};

@@ -22,7 +22,7 @@ use ringcat_engine::exchange::Exchange;
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::{MainDevice, Options, Pending};
 use ringcat_engine::request::{RequestState, SdoRequest};
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::frame::wire_time_ns;
 use scenarios::callgrind::{is_installed, profile_self_within};

@@ -233,8 +233,20 @@ fn measure(parts: &[&str]) -> Tried<bool> {
     Ok(met)
 }
 
+/// A simulated segment at the far end, with its file.
+struct Simulator {
+    _server: Server,
+    file: PathBuf,
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.file);
+    }
+}
+
 /// This many servos at the far end. A frame takes `hop_ns` from one to the next.
-fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Server> {
+fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Simulator> {
     let file = std::env::temp_dir().join(format!("ringcat-socket-cycle-{}.toml", std::process::id()));
     let segment = format!(
         "[segment]\nname = \"servos\"\nring = false\nhop_ns = {hop_ns}\n\
@@ -244,9 +256,7 @@ fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Server
     let here = std::env::current_exe().map_err(said)?;
     let ringcat = here.parent().map(PathBuf::from).unwrap_or_default().join("ringcat");
     let arguments = ["sim", "--segment", &file.display().to_string(), "--main", "far0", "--receive", "block"];
-    let server = namespaces.serve(ringcat, &arguments);
-    let removed = fs::remove_file(&file).map_err(said);
-    server.and_then(|server| removed.map(|()| server))
+    namespaces.serve(ringcat, &arguments).map(|_server| Simulator { _server, file })
 }
 
 fn instructions(namespaces: &Namespaces) -> Tried<bool> {
@@ -275,7 +285,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
             let calls = calls as f64 / COUNTED as f64;
             figures.show(&format!("   {what}"), format!("{calls:.2}"));
         }
-        profiles.push((name, best));
+        profiles.push((name.clone(), best));
         if threads == "one" {
             continue;
         }
@@ -284,6 +294,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
             profile(namespaces, servos, threads, "always")?
         };
         figures.show("   with lost frames sent again (an option)", format!("{:.0} instructions", per_cycle(&again)));
+        profiles.push((format!("{name}, lost frames sent again"), again));
         let _simulator = simulate(namespaces, servos, hop_ns)?;
         if let Some(per_cycle) = soem(namespaces, servos)? {
             let name = format!("{servos} servo{}, SOEM (pysoem): send and receive alone, no sleep", s(servos));

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use ringcat::{Instant, MainDevice, Options, automatic};
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use scenarios::segments::plant;
 use scenarios::tampered_links::{TamperedLinks, Verdict};
 

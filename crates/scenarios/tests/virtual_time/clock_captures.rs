@@ -10,7 +10,7 @@ use std::time::Duration;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::tee::Tee;
 use ringcat::{Application, JunctionMode, MainDevice, Options};
-use ringcat_engine::ring::identity::{Class, class_of};
+use ringcat_engine::{Class, class_of};
 use ringcat_link::Recorder;
 use ringcat_link::pcapng::{Direction, Writer};
 use ringcat_sim::cable::{CableId, DeviceIndex};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ringcat::{ServiceError, SubDeviceId};
-use ringcat_engine::procedures::sii::program::{SiiProgramError, SiiWritten};
+use ringcat_engine::{SiiProgramError, SiiWritten};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::fault::{Fault, SpoiltWrite};
 use ringcat_sim::network::NetworkOptions;

@@ -277,6 +277,36 @@ fn undeclared_subdevices_have_mailbox_state_and_eeprom_while_others_are_in_op() 
     }
 }
 
+// covers: states
+#[test]
+fn rounds_of_reads_during_requests_report_no_state_as_left() {
+    for (network, lost) in [0, 1].into_iter().flat_map(|lost| networks().map(|network| (network, lost))) {
+        let mut application = activate(idle(network), &[0, 1, 5]);
+        cycles(&mut application, 300);
+        while application.pop_event().is_some() {}
+        let states = [AlState::Op, AlState::Init, AlState::SafeOp, AlState::Op, AlState::PreOp];
+        for (number, state) in states.into_iter().cycle().take(60).enumerate() {
+            let at = [2, 3, 4][number % 3];
+            if lost > 0 {
+                let drop = Fault::Drop { cable: CableId(number % 3), direction: None, count: lost };
+                application.links_mut().network_mut().apply(drop);
+            }
+            cycles(&mut application, number % 7);
+            let request = ringcat::SubDevice::new(&mut application, Position(at)).request_state(state);
+            application.cycle_until(request, LIMIT, |_| ()).expect("it follows");
+            for cycle in 0..30 {
+                let is = application.links().network().device(DeviceIndex(at.into())).al_status();
+                assert_eq!(is, AlStatus::new(state), "request {number}, {cycle} cycles after it was reached");
+                application.cycle(|_| ());
+            }
+        }
+        let is_wrong = |event: &Event| matches!(event, Event::UndeclaredState { .. } | Event::UndeclaredFailed { .. });
+        let wrong: Vec<TimedEvent> =
+            std::iter::from_fn(|| application.pop_event()).filter(|timed| is_wrong(&timed.event)).collect();
+        assert!(wrong.is_empty(), "{wrong:?}");
+    }
+}
+
 // covers: states, jobs
 #[test]
 fn requests_of_the_cyclic_thread_reach_subdevices_without_a_declaration() {

@@ -13,8 +13,8 @@ use std::time::Duration;
 
 use ringcat::Position;
 use ringcat::{Event, JunctionConnection, JunctionMode, Limits, Options, SdoAddress, SubDeviceId, automatic};
+use ringcat_engine::PortOf;
 use ringcat_engine::mail::coe;
-use ringcat_engine::topology::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;

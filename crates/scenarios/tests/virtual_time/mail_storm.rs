@@ -10,9 +10,9 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use ringcat::{ConfigureError, Event, Limits, SubDeviceId, SubDeviceState};
+use ringcat_engine::UnderWay;
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
-use ringcat_engine::supervisor::UnderWay;
 use ringcat_sim::application::mailbox::faults::MailFault;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;

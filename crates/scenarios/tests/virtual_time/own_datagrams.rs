@@ -7,8 +7,8 @@ use ringcat::{
     ActivateError, Declaration, DomainId, DomainMember, Error, Group, JunctionConnection, JunctionMode, LrwPolicy,
     Options, RawDatagram, Scan, SubDeviceConfig, SubDeviceId, automatic,
 };
-use ringcat_engine::procedures::services::ServiceError;
-use ringcat_engine::supervisor::{BusError, Reply};
+use ringcat_engine::ServiceError;
+use ringcat_engine::{BusError, Reply};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::address::{LogicalAddress, Position, RegisterAddress, StationAddress, Wkc};

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::RawDatagram;
-use ringcat_engine::supervisor::Reply;
+use ringcat_engine::Reply;
 use ringcat_sim::cable::CableId;
 use ringcat_sim::device::Device;
 use ringcat_sim::frame::Port;

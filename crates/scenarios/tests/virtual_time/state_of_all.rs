@@ -6,7 +6,7 @@ use ringcat::{
     Address, AlState, AlStatus, AlStatusCode, Error, MainDevice, NotFollowedReason, Options, Position, Services,
     StateScope, StatesError, SubDeviceId, automatic,
 };
-use ringcat_engine::procedures::configure::ConfigureError;
+use ringcat_engine::ConfigureError;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};

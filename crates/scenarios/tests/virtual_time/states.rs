@@ -6,10 +6,10 @@ use std::time::Duration;
 use ringcat::{
     DomainId, Event, Freshness, Limits, Options, Scan, SdoAddress, SubDeviceId, SubDeviceState, Transition, automatic,
 };
+use ringcat_engine::ConfigureError;
 use ringcat_engine::mail::coe;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::Bytes;
-use ringcat_engine::procedures::configure::ConfigureError;
 use ringcat_sim::application::foe::firmware;
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::{DeviceDescription, SyncManagerDescription};

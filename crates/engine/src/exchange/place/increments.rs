@@ -1,11 +1,21 @@
-//! Increments of a working counter by SubDevice.
+//! Increments of a working counter by SubDevice; wrong ones for the board.
+
+use ringcat_wire::address::Wkc;
 
 use super::Place;
+use crate::board::Board;
 
 impl Place {
     /// Number of the datagram in the image.
     pub fn number(&self) -> usize {
         self.datagram
+    }
+
+    /// Posts a cycle with a wrong working counter of the received copies.
+    pub fn post_error(&self, board: &Board, domain: usize, links: [bool; 2]) {
+        let expected = self.contributions.iter().filter(|it| it.is_proven || it.required);
+        let expected = expected.fold(Wkc(0), |sum, it| sum.plus(it.wkc));
+        board.commands.post(domain, self.datagram, expected, Wkc(self.sum(links) as u16));
     }
 
     /// Its SubDevices, and the increment of each in copies on these links, as last evaluated; `None` where the working

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use ringcat_wire::sii::{MailboxLayout, SiiHeader, SyncManagerKind};
 
 use super::parts::fixed_area;
-use crate::info::subdevice::SubDeviceInfo;
+use crate::info::subdevice::{ControllerInfo, SubDeviceInfo};
 use crate::info::warning::{InfoWarning, MAILBOX_HEADER, SiiProblem};
 
 /// Byte offsets in the fixed area, for warnings.
@@ -17,11 +17,7 @@ const PROCESS_RAM: u32 = 0x1000;
 
 /// Requires that the SyncManagers are collected.
 pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
-    let memory_end = match info.controller.ram_kib {
-        // The controller does not report its RAM size.
-        0 => 0x1_0000,
-        kib => PROCESS_RAM + 1024 * u32::from(kib),
-    };
+    let memory_end = memory_end(&info.controller);
     info.bootstrap = pair(&header.bootstrap_mailbox, BOOTSTRAP_AT, memory_end, &mut info.warnings);
     info.mailbox = pair(&header.standard_mailbox, STANDARD_AT, memory_end, &mut info.warnings);
     let protocols = header.protocols.0;
@@ -29,7 +25,7 @@ pub(super) fn collect(info: &mut SubDeviceInfo, header: &SiiHeader) {
         return;
     }
     // A SubDevice with mailbox protocols has mailboxes: its SyncManagers may contain their addresses.
-    let described = of_sync_managers(info).filter(|layout| is_possible(layout, memory_end));
+    let described = of_sync_managers(info).filter(|layout| fits(layout, memory_end));
     info.mailbox = described;
     if described.is_none() {
         info.warnings.push(fixed_area(PROTOCOLS_AT, SiiProblem::NoMailbox { protocols }));
@@ -47,7 +43,7 @@ fn pair(
     let MailboxLayout { receive_size, send_size, .. } = *layout;
     let problem = match (none(receive_size), none(send_size)) {
         (true, true) => return None,
-        (false, false) if is_possible(layout, memory_end) => return Some(*layout),
+        (false, false) if fits(layout, memory_end) => return Some(*layout),
         (false, false) => SiiProblem::Mailbox { layout: *layout, memory_end },
         _ => SiiProblem::HalfMailbox { receive_size, send_size },
     };
@@ -55,14 +51,28 @@ fn pair(
     None
 }
 
-/// Whether the mailboxes are long enough for messages, lie in the process RAM, and do not overlap.
-fn is_possible(layout: &MailboxLayout, memory_end: u32) -> bool {
+/// First byte behind the process RAM.
+fn memory_end(controller: &ControllerInfo) -> u32 {
+    match controller.ram_kib {
+        // The controller does not report its RAM size.
+        0 => 0x1_0000,
+        kib => PROCESS_RAM + 1024 * u32::from(kib),
+    }
+}
+
+/// Whether mailboxes can exist in a controller: they are long enough for messages, lie in the process RAM, and do not
+/// overlap.
+pub(crate) fn is_possible(layout: &MailboxLayout, controller: &ControllerInfo) -> bool {
+    fits(layout, memory_end(controller))
+}
+
+fn fits(layout: &MailboxLayout, memory_end: u32) -> bool {
     let span = |offset: u16, size: u16| (u32::from(offset), u32::from(offset) + u32::from(size));
     let (out, inward) = (span(layout.receive_offset, layout.receive_size), span(layout.send_offset, layout.send_size));
-    let fits = |(start, end): (u32, u32)| {
+    let is_inside = |(start, end): (u32, u32)| {
         start >= PROCESS_RAM && end <= memory_end && end - start >= u32::from(MAILBOX_HEADER)
     };
-    fits(out) && fits(inward) && (out.1 <= inward.0 || inward.1 <= out.0)
+    is_inside(out) && is_inside(inward) && (out.1 <= inward.0 || inward.1 <= out.0)
 }
 
 fn of_sync_managers(info: &SubDeviceInfo) -> Option<MailboxLayout> {

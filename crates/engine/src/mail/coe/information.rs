@@ -15,6 +15,7 @@ use ringcat_wire::mailbox::sdo::AbortCode;
 use super::transfer::settle;
 use crate::mail::lane::Lane;
 use crate::mail::{Conversation, Limits, Mailbox, MailboxError};
+use crate::role::Function;
 
 /// Longest answer: a list of all possible indices.
 const LONGEST: usize = 2 + 2 * 0x1_0000;
@@ -179,7 +180,7 @@ async fn request_fragments(
     key: usize,
     limits: Limits,
 ) -> Result<Vec<u8>, InformationError> {
-    let mut conversation = mailbox.conversation(Lane::Coe).await?;
+    let mut conversation = mailbox.conversation_for(Lane::Coe, Function::ObjectDictionary).await?;
     settle(&mut conversation, limits).await?;
     let mut payload = vec![0; SdoInformation::OVERHEAD + data.len()];
     let length = SdoInformation::whole(request, data).encode(&mut payload).unwrap_or(0);

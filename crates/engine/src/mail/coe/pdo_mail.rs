@@ -9,6 +9,7 @@ use ringcat_wire::mailbox::coe::{CoeHeader, CoeService};
 use super::transfer::settle;
 use crate::mail::lane::Lane;
 use crate::mail::{Limits, Mailbox, MailboxError};
+use crate::role::Function;
 
 /// The first RxPDO and the first TxPDO; the number in the header counts from them.
 const RX_BASE: u16 = 0x1600;
@@ -49,7 +50,7 @@ impl From<MailboxError> for PdoMailError {
 /// Sends an RxPDO, which has no answer: a refusal by the SubDevice is counted as an unclaimed error reply.
 pub async fn send(mailbox: &Mailbox, pdo: u16, data: &[u8], limit: Duration) -> Result<(), PdoMailError> {
     let number = number(pdo, RX_BASE).ok_or(PdoMailError::Index { pdo })?;
-    let mut conversation = mailbox.conversation(Lane::Coe).await?;
+    let mut conversation = mailbox.conversation_for(Lane::Coe, Function::PdoByMailbox).await?;
     let mut payload = CoeHeader { number, ..CoeHeader::new(CoeService::RxPdo) }.encode().to_vec();
     payload.extend_from_slice(data);
     Ok(conversation.send(&payload, limit).await?)
@@ -62,7 +63,7 @@ pub async fn receive(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result<Vec<
         (None, Some(number)) => (number, CoeService::RxPdoRemote, CoeService::RxPdo),
         (None, None) => return Err(PdoMailError::Index { pdo }),
     };
-    let mut conversation = mailbox.conversation(Lane::Coe).await?;
+    let mut conversation = mailbox.conversation_for(Lane::Coe, Function::PdoByMailbox).await?;
     settle(&mut conversation, limits).await?;
     conversation.mark(pdo);
     let [request, answer] = [request, service].map(|service| CoeHeader { number, ..CoeHeader::new(service) }.encode());

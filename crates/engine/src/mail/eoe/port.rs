@@ -9,6 +9,7 @@ use crate::mail::conversation::Conversation;
 use crate::mail::lane::Lane;
 use crate::mail::shared::SharedMailbox;
 use crate::mail::{Mailbox, MailboxError};
+use crate::role::Function;
 use ringcat_wire::mailbox::eoe::EoeFragment;
 
 /// Longest time that a SubDevice may leave a fragment in its mailbox; then its frame is dropped, as a network does.
@@ -138,8 +139,17 @@ async fn send_all(shared: Rc<SharedMailbox>, attachment: u32) {
         if !shared.changed.until(work).await {
             return;
         }
+        if shared.bus.permit(Function::Ethernet).is_err() {
+            while let Some(frame) = next(&shared, attachment) {
+                let now = shared.bus.now();
+                shared.state_mut().ethernet.sent(frame.bytes.len(), false, now);
+            }
+            continue;
+        }
         // The mailbox was closed meanwhile: its queued frames are dropped, too.
-        let Ok(mut conversation) = Conversation::take(&shared, Lane::Frames).await else { continue };
+        let Ok(mut conversation) = Conversation::take(&shared, Lane::Frames, Function::Ethernet).await else {
+            continue;
+        };
         while let Some(frame) = next(&shared, attachment) {
             let result = send(&mut conversation, &frame).await;
             let now = shared.bus.now();

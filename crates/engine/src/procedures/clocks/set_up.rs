@@ -1,6 +1,7 @@
 //! Delays, offsets and filters are measured and written (protocol 7.1, 7.2): of all clocks at the beginning, after each
 //! change of the segment, and of one clock that has lost its registers.
 
+use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
@@ -8,6 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use super::measure::{Opening, latch, measure};
+use crate::event::Subject;
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::clocks::{ClockObservation, LatchedTimes, Node};
@@ -29,6 +31,7 @@ pub(super) async fn set_up(bus: &Bus, segment: &SharedSegment, opening: Opening)
         let view = segment.view();
         (view.clocks().stations(), view.clocks().epoch)
     };
+    bus.step(Subject::Clocks, || format!("delays measured; offsets of {} clocks follow", stations.len()));
     let wanted = bus.now().0.wrapping_add(epoch);
     let latched = latched_times(bus, segment, &stations).await.map_err(text)?;
     segment.observe_clocks(ClockObservation::Latched { latched: &latched, wanted });

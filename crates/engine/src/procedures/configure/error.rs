@@ -11,6 +11,7 @@ use crate::mail::eoe::EoeError;
 use crate::mail::soe::SoeError;
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
+use crate::role::NotPermitted;
 use crate::segment::setup::SetupError;
 use crate::supervisor::BusError;
 
@@ -37,6 +38,8 @@ pub enum ConfigureError {
     },
     /// A clock did not lock.
     NotLocked(NotLocked),
+    /// State requests are refused in the present role.
+    NotPermitted(NotPermitted),
     /// It was never present, so its configuration is unknown.
     NoSetup,
     /// Its SII cannot be set up as declared.
@@ -86,6 +89,7 @@ impl fmt::Display for ConfigureError {
             }
             ConfigureError::NotLocked(error) => error.fmt(f),
             ConfigureError::Unfit(error) => error.fmt(f),
+            ConfigureError::NotPermitted(denied) => denied.fmt(f),
             ConfigureError::NoSetup => f.write_str("nothing is known about this SubDevice yet"),
             ConfigureError::NoBoot => f.write_str("its SII gives no mailboxes for BOOT"),
             ConfigureError::Absent => f.write_str("it does not answer"),
@@ -109,6 +113,12 @@ impl fmt::Display for StartupError {
 }
 
 impl core::error::Error for ConfigureError {}
+
+impl From<NotPermitted> for ConfigureError {
+    fn from(denied: NotPermitted) -> ConfigureError {
+        ConfigureError::NotPermitted(denied)
+    }
+}
 
 impl core::error::Error for StartupError {}
 

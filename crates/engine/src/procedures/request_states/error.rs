@@ -8,6 +8,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
 use crate::declared::Address;
 use crate::procedures::configure::ConfigureError;
+use crate::role::NotPermitted;
 
 /// A SubDevice that did not follow.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +45,8 @@ pub enum NotFollowedReason {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum StatesError {
+    /// State requests are refused in the present role.
+    NotPermitted(NotPermitted),
     /// BOOT is a state of single SubDevices.
     Boot,
     /// Nothing is declared, and no SubDevice was found.
@@ -80,6 +83,7 @@ impl fmt::Display for NotFollowed {
 impl fmt::Display for StatesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            StatesError::NotPermitted(denied) => denied.fmt(f),
             StatesError::Boot => f.write_str("BOOT is a state of single SubDevices"),
             StatesError::NoSubDevices => f.write_str("no SubDevice is declared or was found"),
             StatesError::NotFollowed { state, limit, subdevices } => {
@@ -91,3 +95,9 @@ impl fmt::Display for StatesError {
 }
 
 impl core::error::Error for StatesError {}
+
+impl From<NotPermitted> for StatesError {
+    fn from(denied: NotPermitted) -> StatesError {
+        StatesError::NotPermitted(denied)
+    }
+}

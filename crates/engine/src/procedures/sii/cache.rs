@@ -4,6 +4,8 @@
 //! must have been read with equal contents before the cache is used for others: one bad EEPROM must not affect another
 //! SubDevice. If two differ, every SubDevice is read.
 
+mod handover;
+
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
@@ -85,16 +87,6 @@ impl SiiCache {
     /// An empty cache; a disabled one stores nothing.
     pub fn new(enabled: bool) -> SiiCache {
         SiiCache { enabled, entries: Rc::default(), pace: Rc::default() }
-    }
-
-    /// Number of stored SII contents.
-    pub fn len(&self) -> usize {
-        self.entries.borrow().len()
-    }
-
-    /// Whether nothing is stored.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Clears the cache: an EEPROM was written.
@@ -225,12 +217,12 @@ mod tests {
         let claims = [1, 2].map(|station| claim(&cache, &area(1), station).expect("two may read"));
         assert!(claim(&cache, &area(1), 3).is_none(), "two do");
         drop(claims);
-        assert!(cache.is_empty(), "both have gone away");
+        assert!(cache.entries.borrow().is_empty(), "both have gone away");
         for station in [1, 2] {
             claim(&cache, &area(1), station).expect("free again").settle(Vec::new(), contents(&area(1)));
         }
         assert!(matches!(cache.find(&area(1), SiiExtent::Complete, StationAddress(3)), Found::Contents(..)));
-        assert_eq!(cache.len(), 1);
+        assert_eq!(cache.entries.borrow().len(), 1);
     }
 
     #[test]
@@ -250,7 +242,7 @@ mod tests {
         for number in 0..2 * MAX_ENTRIES {
             claim(&cache, &area(number), 1).expect("another one").settle(Vec::new(), contents(&area(number)));
         }
-        assert_eq!(cache.len(), MAX_ENTRIES);
+        assert_eq!(cache.entries.borrow().len(), MAX_ENTRIES);
     }
 
     #[test]

@@ -171,19 +171,6 @@ pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
     if sii.end_marker { Ok(()) } else { Err(SiiProgramError::EndMarker) }
 }
 
-/// Reads words from the EEPROM of one SubDevice.
-pub async fn read_words(
-    bus: &Bus,
-    station: StationAddress,
-    first: u32,
-    count: u32,
-) -> Result<Vec<u8>, SiiProgramError> {
-    let access = Access::begin(bus, station).await?;
-    let bytes = access.read(first, count).await;
-    access.end().await?;
-    bytes
-}
-
 /// Reads the whole EEPROM of one SubDevice; the SII contains its size.
 pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, SiiProgramError> {
     const SIZE_WORD: u32 = 0x3E;

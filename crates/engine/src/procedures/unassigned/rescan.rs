@@ -43,7 +43,7 @@ const LONGEST: Duration = Duration::from_secs(2);
 pub enum Identified {
     /// A declared one, by its index in the declaration.
     Declared(SubDeviceId),
-    /// An undeclared one. It is left alone.
+    /// An undeclared one. It is left alone, or, with idle operation, kept in its state.
     Undeclared(Identity),
     /// Not identified in time.
     Unknown,
@@ -73,6 +73,10 @@ pub struct Rescan {
     pub subdevices: Vec<Found>,
     /// Declared SubDevices that do not answer, by their index in the declaration.
     pub missing: Vec<SubDeviceId>,
+    /// Without an application: SubDevices that the scan before did not find. They have got these station addresses.
+    pub added: Vec<StationAddress>,
+    /// Without an application: SubDevices of the scan before that do not answer, by their station addresses.
+    pub removed: Vec<StationAddress>,
     /// Present cabling according to the ports, with the known rings behind junctions.
     pub topology: Topology,
 }
@@ -204,7 +208,7 @@ async fn scan_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Rescan>,
     let missing = (0..access.subdevices().member_count()).map(SubDeviceId).filter(|it| !is_found(it)).collect();
     let topology = retrace::cabling(access.cabling(), &seen.stations, &nodes, usize::from(seen.counts.0.0));
     let counts = LinkCounts { main: seen.counts.0.0, redundant: seen.counts.1.0 };
-    Ok(Some(Rescan { counts, subdevices, missing, topology }))
+    Ok(Some(Rescan { counts, subdevices, missing, added: Vec::new(), removed: Vec::new(), topology }))
 }
 
 /// The ports of all SubDevices; `None` if the segment has changed since: port states of two cablings would be mixed.
@@ -240,7 +244,7 @@ fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<
 }
 
 /// Members of a longest ascending subsequence of distinct numbers.
-fn longest_ascent(numbers: &[usize]) -> Vec<bool> {
+pub(in crate::procedures) fn longest_ascent(numbers: &[usize]) -> Vec<bool> {
     // `ends[n]`: the place of the smallest last number of a subsequence of length n + 1. By place: its predecessor in
     // the subsequence.
     let mut ends: Vec<usize> = Vec::new();

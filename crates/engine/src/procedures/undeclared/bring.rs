@@ -15,13 +15,15 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, map};
 
-use super::registry::{Attempt, Undeclared};
 use crate::config::{SubDeviceConfig, Timeouts};
 use crate::info::{Direction, SubDeviceInfo};
+use crate::mail::Mailbox;
 use crate::plan::{SubDevicePlan, plan};
 use crate::procedures::al_state;
 use crate::procedures::configure::ConfigureError;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::visit::visit;
+use crate::segment::SubDeviceKey;
 use crate::segment::setup::SetupError;
 use crate::supervisor::{Bus, BusError};
 
@@ -29,20 +31,24 @@ use crate::supervisor::{Bus, BusError};
 const OUTPUTS_PERIOD: Duration = Duration::from_millis(20);
 
 /// Brings it to the requested state, through INIT. Its mailbox is open from PREOP and BOOT on.
-pub(super) async fn bring(bus: &Bus, attempt: &Attempt) -> Result<(), ConfigureError> {
-    let Attempt { info, mailbox, target, .. } = attempt;
+pub(super) async fn bring(
+    bus: &Bus,
+    info: &SubDeviceInfo,
+    mailbox: &Mailbox,
+    target: AlState,
+) -> Result<(), ConfigureError> {
     unmap(bus, info).await?;
     match target {
-        AlState::Init | AlState::PreOp | AlState::Boot => visit(bus, info, mailbox, *target).await,
+        AlState::Init | AlState::PreOp | AlState::Boot => visit(bus, info, mailbox, target).await,
         AlState::SafeOp | AlState::Op => {
             visit(bus, info, mailbox, AlState::PreOp).await?;
-            raise(bus, info, *target).await
+            raise(bus, info, target).await
         }
     }
 }
 
 /// Clears what an application has left: FMMUs and SYNC signals.
-async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
+pub(in crate::procedures) async fn unmap(bus: &Bus, info: &SubDeviceInfo) -> Result<(), BusError> {
     let fmmus = Fmmu::LEN * usize::from(info.controller.fmmu_count);
     if fmmus > 0 {
         bus.fpwr(info.station, map::FMMU_BASE, &vec![0; fmmus]).await?;
@@ -87,12 +93,14 @@ async fn raise(bus: &Bus, info: &SubDeviceInfo, target: AlState) -> Result<(), C
 }
 
 /// Writes the outputs of a SubDevice that has reached OP, as long as it is to stay there.
-pub(super) async fn keep_outputs(bus: Bus, undeclared: Undeclared, attempt: Attempt) {
-    let Ok(plan) = defaults(&attempt.info) else { return };
+pub(in crate::procedures) async fn keep_outputs(bus: Bus, segment: SharedSegment, (key, attempt): (SubDeviceKey, u32)) {
+    let info = segment.view().unassigned(key).and_then(|it| it.knowledge.info()).cloned();
+    let Some(Ok(plan)) = info.map(|info| defaults(&info)) else { return };
     let outputs = outputs(&plan);
-    while !outputs.is_empty() && undeclared.is_reached(&attempt) {
+    let is_to_stay = || segment.view().upkeep(key).is_some_and(|upkeep| upkeep.is_reached(attempt));
+    while !outputs.is_empty() && is_to_stay() {
         // A SubDevice that does not answer leaves OP; the reading of its state shows this.
-        let _ = write_once(&bus, attempt.station, &outputs).await;
+        let _ = write_once(&bus, key.station, &outputs).await;
         bus.sleep(OUTPUTS_PERIOD).await;
     }
 }

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use ringcat_wire::register::SyncManagerStatus;
 
-use super::registry::Undeclared;
+use super::mailboxes::UndeclaredMailboxes;
 use crate::mail::Mailbox;
 use crate::supervisor::Bus;
 
@@ -12,10 +12,10 @@ use crate::supervisor::Bus;
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Polls the mailboxes in use, one round after the other. Runs until the MainDevice stops.
-pub(crate) async fn watch_undeclared_mail(bus: Bus, undeclared: Undeclared) {
+pub(crate) async fn watch_undeclared_mail(bus: Bus, undeclared: UndeclaredMailboxes) {
     loop {
         bus.sleep(PAUSE).await;
-        bus.gather_in_turns(undeclared.mailboxes(), poll).await;
+        bus.gather_in_turns(undeclared.in_use(), poll).await;
     }
 }
 

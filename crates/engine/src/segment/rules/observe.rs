@@ -14,6 +14,7 @@ impl Segment {
         let mut effects = Effects::default();
         self.take(seen, now, &mut effects);
         self.hot_connect.observe(&self.subdevices, &mut effects);
+        self.keep_undeclared(now, &mut effects);
         effects
     }
 
@@ -35,14 +36,15 @@ impl Segment {
             Observation::Activated(declared) => self.activate(*declared, effects),
             Observation::Deactivated => self.deactivate(),
             Observation::SiiCompleted { station, read } => self.observe_whole_sii(station, read, effects),
-            Observation::Visited => self.observe_visit(),
             Observation::Started => self.start_all(effects),
             Observation::Delayed => self.delay_all(),
             Observation::OfMember { index, attempt, finding } => {
                 self.observe_finding((index, attempt), finding, now, effects);
             }
             Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
-            Observation::Requested { index, state } => self.request(index, state),
+            Observation::Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
+            Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
+            Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
             Observation::IncidentsForgotten => self.forget_incidents(),
 
             Observation::Places { versions, view } => self.observe_places(versions, view),

@@ -49,7 +49,8 @@ impl Segment {
         if let Stage::Scanned(scanned) = &mut self.stage
             && is_valid
         {
-            self.subdevices = SubDevices::of_scan(&found).begun(self.addresses.version(), self.first_attempt);
+            let now = SubDevices::of_scan(&found).begun(self.addresses.change(), self.first_attempt);
+            self.subdevices = now.keeping(core::mem::take(&mut self.subdevices));
             *scanned = Scanned { found, registers: Start::Doubtful };
         }
     }
@@ -73,8 +74,8 @@ impl Segment {
         self.subdevices.replace(&before, known);
     }
 
-    /// Single SubDevices were configured before an application is active.
-    pub(in crate::segment) fn observe_visit(&mut self) {
+    /// Single SubDevices are configured before an application is active.
+    pub(in crate::segment) fn touch(&mut self) {
         if let Stage::Scanned(scanned) = &mut self.stage {
             scanned.registers = Start::Doubtful;
         }
@@ -103,9 +104,22 @@ impl Segment {
         declared.cabling.version = self.cabling.version.wrapping_add(1);
         let mut addresses = core::mem::take(&mut self.addresses);
         let first_attempt = self.subdevices.next_attempt(self.first_attempt);
+        let mut keeping = core::mem::take(&mut self.keeping);
+        keeping.is_on &= matches!(stage, Stage::Active(_));
+        let before = core::mem::take(&mut self.subdevices);
         declared.subdevices = declared.subdevices.begun(addresses.change(), first_attempt);
+        if keeping.is_on {
+            declared.subdevices = declared.subdevices.keeping(before);
+        }
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
-        *self =
-            Segment { stage, addresses, slot, frames_tested_until, first_attempt, ..Segment::of(declared, choices) };
+        *self = Segment {
+            stage,
+            addresses,
+            keeping,
+            slot,
+            frames_tested_until,
+            first_attempt,
+            ..Segment::of(declared, choices)
+        };
     }
 }

@@ -58,7 +58,8 @@ impl Segment {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
-                *it = Unassigned { reported: it.reported, held_since: it.held_since, ..Unassigned::at(&at) };
+                let Unassigned { reported, held_since, upkeep, .. } = *it;
+                *it = Unassigned { reported, held_since, upkeep, ..Unassigned::at(&at) };
             }
         }
     }

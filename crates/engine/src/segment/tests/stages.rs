@@ -10,6 +10,7 @@ pub(super) fn choices() -> Choices {
         junctions: JunctionMode::Disabled,
         follow_groups: false,
         idle_operation: false,
+        retries: Retries::Always,
     }
 }
 
@@ -123,7 +124,8 @@ fn after_deactivation_the_scan_stays_and_nothing_of_the_declaration() {
 #[test]
 fn a_subdevice_that_was_visited_is_not_taken_for_a_cleared_one() {
     let mut segment = scanned(3);
-    segment.observe(Observation::Visited, Instant(0));
+    let subdevice = segment.find(Position(0)).unwrap();
+    segment.observe(Observation::Requested { subdevice, state: AlState::PreOp }, Instant(0));
     let declared = declare(&segment);
     segment.observe(Observation::Activated(declared), Instant(0));
     assert_eq!(bring_up(&segment.observe(Observation::Started, Instant(0))), Some(Start::Doubtful));

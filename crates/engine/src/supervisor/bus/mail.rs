@@ -33,7 +33,7 @@ impl Bus {
             whole.resize(usize::from(size), 0);
             (None, at(0), whole)
         };
-        self.submit(Request { expected, preceding, ..Request::once(command, target, data) })
+        self.submit(Request { expected, preceding, polls: true, ..Request::once(command, target, data) })
     }
 
     /// Reads a mailbox, once. The mail of a second copy, and late mail, is kept for [`Bus::stray_mail`].
@@ -45,7 +45,7 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let (target, data) = (Target::Station(station, register), vec![0; length]);
         let (command, expected, mail) = (Command::Fprd, Some(Wkc(1)), Some(station));
-        self.submit(Request { expected, mail, ..Request::once(command, target, data) })
+        self.submit(Request { expected, mail, polls: true, ..Request::once(command, target, data) })
     }
 
     /// Takes the oldest mail of a SubDevice that came back after its read was given up.

@@ -21,6 +21,7 @@ impl Shared {
     /// Takes a copy of an acyclic frame.
     pub(in crate::supervisor) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
         self.silence.came_back(copy.sent_on);
+        self.events.messages().received(self.now, arrived_on, bytes);
         let slot = Flights::slot(copy.sequence);
         let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
             self.round_trip.was_late();
@@ -109,9 +110,15 @@ impl Shared {
             self.transfers.remove(id);
             return;
         }
+        let wrong = match &result {
+            Ok(reply) if self.command_reports.is_on() => transfer.request.wrong_command(reply.wkc()),
+            _ => None,
+        };
         transfer.stage = Stage::Done(result);
         let task = transfer.task;
         self.wake(task);
+        let due = wrong.and_then(|wrong| self.command_reports.note(wrong, self.now));
+        due.into_iter().for_each(|wrong| self.report_command(wrong));
     }
 
     /// Gives up flights after their deadline.

@@ -21,7 +21,7 @@ const STARVED: Duration = Duration::from_millis(10);
 impl Shared {
     /// Packs datagrams from the outbox into frames and sends them, within the budget and the window.
     pub(in crate::supervisor) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
-        let mut used = 0;
+        let mut used = self.send_debug_messages(budget, transmit);
         while self.flights.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
             let flight = match self.alone.is_held() {
@@ -36,6 +36,7 @@ impl Shared {
             self.counters.bytes += flight.bytes.len() as u64;
             self.counters.datagrams += flight.datagrams.len() as u64;
             self.silence.sent(Link::Main, self.now);
+            self.events.messages().sent(self.now, Link::Main, &flight.bytes);
             transmit(Link::Main, &flight.bytes);
             if self.links == LinkSet::Ring {
                 self.silence.sent(Link::Redundant, self.now);
@@ -54,6 +55,7 @@ impl Shared {
                         copy[at..at + datagram.length].copy_from_slice(data);
                     }
                 }
+                self.events.messages().sent(self.now, Link::Redundant, copy);
                 transmit(Link::Redundant, copy);
             }
             self.flights.put(flight);

@@ -7,7 +7,12 @@ use proptest::prelude::*;
 
 use super::walk_model::{End, Segment};
 use super::{END, HEAD, PASS, at, parents, status, trees};
-use crate::topology::{Closing, RingCable, Topology, candidates};
+use crate::topology::{Closing, NodeStatus, RingCable, Topology, candidates_with};
+
+/// All sets, without knowledge of single cables.
+fn candidates(nodes: &[NodeStatus], main_count: usize, ring_closed: bool, most: usize) -> Vec<Vec<Closing>> {
+    candidates_with(nodes, main_count, ring_closed, most, (&[], &[]))
+}
 
 /// Junction J with the ring 10, 11, 12 from its port 3 to its port 1 (closed from port 1 of 12), and 20 on port 2.
 const JUNCTION: u8 = 0xAA;

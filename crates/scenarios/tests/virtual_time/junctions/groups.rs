@@ -9,7 +9,7 @@ use ringcat::{
     Declaration, DomainMember, Event, Identified, JunctionConnection, JunctionMode, Options, Scan, SubDeviceConfig,
     SubDeviceId, TimedEvent, automatic,
 };
-use ringcat_engine::topology::PortOf;
+use ringcat_engine::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};

@@ -3,7 +3,7 @@
 
 use ringcat::Position;
 use ringcat::{Cable, Event, JunctionMode};
-use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_engine::{Closing, PortOf};
 use ringcat_sim::cable::CableId;
 use ringcat_sim::frame::Port::{A, B, C, D};
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};

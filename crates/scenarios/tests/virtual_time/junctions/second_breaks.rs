@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::Position;
 use ringcat::{Event, JunctionConnection, JunctionMode, Options, SubDeviceId, automatic};
-use ringcat_engine::topology::PortOf;
+use ringcat_engine::PortOf;
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::frame::Port::{A, B, C, D};

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::Position;
 use ringcat::{Event, JunctionMode};
-use ringcat_engine::topology::{Closing, PortOf};
+use ringcat_engine::{Closing, PortOf};
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;

@@ -1,0 +1,55 @@
+//! One attempt to bring a SubDevice without a declaration to its requested state.
+
+use alloc::string::ToString;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
+
+use super::bring::bring;
+use crate::procedures::configure::ConfigureError;
+use crate::procedures::recover::is_of_bus;
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::{AttemptFailure, SubDeviceKey, UndeclaredObservation};
+use crate::supervisor::Bus;
+
+/// Runs an attempt as long as it is the current one of its SubDevice.
+pub(in crate::procedures) async fn bring_undeclared(
+    bus: Bus,
+    segment: SharedSegment,
+    (key, attempt): (SubDeviceKey, u32),
+) {
+    let result = while_current(&segment, (key, attempt), run(&bus, &segment, key)).await;
+    let Some(result) = result else { return };
+    let failure =
+        result.as_ref().err().map(|error| AttemptFailure { is_of_bus: is_of_bus(error), reason: error.to_string() });
+    segment.undeclared.end(key, attempt, result);
+    segment.observe_undeclared(UndeclaredObservation::AttemptEnded { key, attempt, failure });
+}
+
+async fn run(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Result<(), ConfigureError> {
+    let known = {
+        let view = segment.view();
+        let info = view.unassigned(key).and_then(|it| it.knowledge.info()).cloned();
+        info.zip(view.upkeep(key).map(|upkeep| upkeep.target))
+    };
+    let (Some((info, target)), Some(mailbox)) = (known, segment.undeclared.of(key)) else {
+        return Err(ConfigureError::NoSetup);
+    };
+    bring(bus, &info, &mailbox, target).await
+}
+
+/// Runs an attempt until another one begins or the SubDevice has left.
+async fn while_current<T>(
+    segment: &SharedSegment,
+    (key, attempt): (SubDeviceKey, u32),
+    work: impl Future<Output = T>,
+) -> Option<T> {
+    let mut work = pin!(work);
+    poll_fn(|context| {
+        if !segment.view().upkeep(key).is_some_and(|upkeep| upkeep.is_under_way(attempt)) {
+            return Poll::Ready(None);
+        }
+        work.as_mut().poll(context).map(Some)
+    })
+    .await
+}

@@ -1,0 +1,145 @@
+//! The requested state of a SubDevice without a declaration, and the attempts to reach it.
+//!
+//! An attempt has a number: when another one has begun, or the SubDevice has left, its findings are refused.
+
+use alloc::string::String;
+use core::time::Duration;
+
+use ringcat_wire::al::{AlState, AlStatus};
+
+use crate::segment::choices::Retries;
+use crate::time::Instant;
+
+/// Pause before the first repeated attempt; it doubles with every failure.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Longest pause between attempts.
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+/// Progress of a SubDevice towards its requested state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpkeepProgress {
+    /// The next attempt is due at this time; never, if it waits for a request.
+    Due(Instant),
+    /// An attempt is under way.
+    UnderWay,
+    /// It was reached.
+    Reached,
+    /// The application has forced a state: it is left as it is until another state is requested.
+    Left,
+}
+
+/// Why an attempt has failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AttemptFailure {
+    /// Frames were lost: the SubDevice has not refused anything.
+    pub is_of_bus: bool,
+    /// The reason in words.
+    pub reason: String,
+}
+
+/// The requested state of a SubDevice without a declaration, and the attempts to reach it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Upkeep {
+    /// The requested state.
+    pub target: AlState,
+    /// The requested state before the last request.
+    before: AlState,
+    /// Progress towards it.
+    pub progress: UpkeepProgress,
+    /// Number of the last attempt.
+    pub attempt: u32,
+    /// Consecutive failed attempts.
+    failures: u32,
+}
+
+impl Upkeep {
+    /// PREOP is requested, and the first attempt is due at this time.
+    pub(in crate::segment) fn due(at: Instant) -> Upkeep {
+        let progress = UpkeepProgress::Due(at);
+        Upkeep { target: AlState::PreOp, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
+    }
+
+    /// Another process has brought it this far.
+    pub(in crate::segment) fn handed_over(target: AlState, progress: UpkeepProgress) -> Upkeep {
+        Upkeep { target, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
+    }
+
+    /// Whether it is in its requested state, or left as it is.
+    pub fn is_settled(&self) -> bool {
+        matches!(self.progress, UpkeepProgress::Reached | UpkeepProgress::Left)
+    }
+
+    /// Whether this attempt is under way.
+    pub fn is_under_way(&self, attempt: u32) -> bool {
+        self.attempt == attempt && self.progress == UpkeepProgress::UnderWay
+    }
+
+    /// Whether this attempt has reached its state, which is still requested.
+    pub fn is_reached(&self, attempt: u32) -> bool {
+        self.attempt == attempt && self.progress == UpkeepProgress::Reached
+    }
+
+    /// Begins another attempt. Returns its number.
+    fn begin(&mut self) -> u32 {
+        self.progress = UpkeepProgress::UnderWay;
+        self.attempt = self.attempt.wrapping_add(1);
+        self.attempt
+    }
+
+    /// Begins the next attempt if it is due. Returns its number.
+    pub(in crate::segment) fn begin_if_due(&mut self, now: Instant) -> Option<u32> {
+        matches!(self.progress, UpkeepProgress::Due(at) if at <= now).then(|| self.begin())
+    }
+
+    /// Another state is requested. Returns the number of the new attempt; `None` if the same request is under way.
+    pub(in crate::segment) fn request(&mut self, state: AlState) -> Option<u32> {
+        if self.progress == UpkeepProgress::UnderWay && self.target == state {
+            return None;
+        }
+        self.before = core::mem::replace(&mut self.target, state);
+        self.failures = 0;
+        Some(self.begin())
+    }
+
+    /// The attempt under way has ended. True if its failure is to be reported.
+    pub(in crate::segment) fn end(&mut self, failure: Option<&AttemptFailure>, retries: Retries, now: Instant) -> bool {
+        let Some(AttemptFailure { is_of_bus, .. }) = failure else {
+            (self.progress, self.failures) = (UpkeepProgress::Reached, 0);
+            return false;
+        };
+        let tried = self.target;
+        if !is_of_bus {
+            // A SubDevice that refuses a requested state goes back to the state before.
+            self.target = core::mem::replace(&mut self.before, AlState::PreOp);
+        }
+        self.failures = self.failures.saturating_add(1);
+        let pause = FIRST_PAUSE.saturating_mul(1 << (self.failures - 1).min(8)).min(LONGEST_PAUSE);
+        let waits = retries == Retries::OnRequest && !is_of_bus && tried == self.target;
+        self.progress = UpkeepProgress::Due(if waits { Instant::NEVER } else { now + pause });
+        self.failures == 1 || !is_of_bus
+    }
+
+    /// It is left as it is until another state is requested; an attempt under way ends.
+    pub(in crate::segment) fn leave(&mut self) {
+        self.attempt = self.attempt.wrapping_add(1);
+        self.progress = UpkeepProgress::Left;
+    }
+
+    /// A failed attempt is repeated now.
+    pub(in crate::segment) fn retry(&mut self, now: Instant) {
+        if matches!(self.progress, UpkeepProgress::Due(_)) {
+            (self.progress, self.failures) = (UpkeepProgress::Due(now), 0);
+        }
+    }
+
+    /// Its state was read; the read was requested after this attempt had reached its state. True if it has left the
+    /// requested state since: then it is brought back.
+    pub(in crate::segment) fn has_left(&mut self, attempt: u32, status: AlStatus, now: Instant) -> bool {
+        let is_there = !status.error && status.al_state() == Some(self.target);
+        let has_left = self.is_reached(attempt) && !is_there;
+        if has_left {
+            (self.progress, self.before) = (UpkeepProgress::Due(now), AlState::PreOp);
+        }
+        has_left
+    }
+}
