@@ -85,8 +85,7 @@ impl Draft {
     pub fn register(&mut self, index: usize, domain: DomainId, object: (u16, u8)) -> Outcome<Entry> {
         let found = self.prepare(index)?;
         let (object, sub_index) = object;
-        let placed =
-            self.declaration.register_entry(domain, SubDeviceId(index), object, sub_index, found.as_ref());
+        let placed = self.declaration.register_entry(domain, SubDeviceId(index), object, sub_index, found.as_ref());
         self.registered(domain);
         placed.map_err(refusal)
     }

@@ -54,11 +54,10 @@ impl Active {
     #[inline(always)]
     pub fn send(&mut self) {
         if self.has_clock {
-            let now = self.application.now();
-            if now < self.application.exchange().pause_until() {
+            if self.application.pauses() {
                 return;
             }
-            self.sent_at = now;
+            self.sent_at = self.application.now();
         }
         self.application.send();
     }
@@ -382,9 +381,8 @@ impl Master {
             return self.change(|draft| draft.choose_reference(index));
         }
         self.check_reserved()?;
-        let reference = index.map_or(ReferenceClock::FirstWithClock, |index| {
-            ReferenceClock::Declared(SubDeviceId(index))
-        });
+        let reference =
+            index.map_or(ReferenceClock::FirstWithClock, |index| ReferenceClock::Declared(SubDeviceId(index)));
         let chosen = self.bus()?.supervisor().with(move |engine| engine.choose_reference_clock(reference));
         chosen.map_err(|_| Code::GONE)?.map(|_| ()).ok_or(Code::NO_CLOCK)
     }

@@ -109,10 +109,7 @@ unsafe extern "C" fn ecrt_master_slave_config(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_master_select_reference_clock(
-    master: *mut ec_master_t,
-    sc: *mut ec_slave_config_t,
-) -> c_int {
+unsafe extern "C" fn ecrt_master_select_reference_clock(master: *mut ec_master_t, sc: *mut ec_slave_config_t) -> c_int {
     let select = |MasterObject(owner): &MasterObject| {
         let index = match sc.is_null() {
             true => None,

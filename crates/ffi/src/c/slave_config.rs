@@ -22,10 +22,7 @@ const END: u8 = 0xFF;
 const MAX_NAME: usize = 32;
 
 /// Changes the settings of a SubDevice.
-fn change(
-    slave: &SlaveObject,
-    change: impl FnOnce(&mut Settings, Option<&SubDeviceInfo>) -> Outcome,
-) -> Outcome {
+fn change(slave: &SlaveObject, change: impl FnOnce(&mut Settings, Option<&SubDeviceInfo>) -> Outcome) -> Outcome {
     slave.owner.master.change(|draft| {
         let (settings, info) = draft.settings(slave.index)?;
         change(settings, info.as_ref())
@@ -33,15 +30,33 @@ fn change(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_sync_manager(sc: *mut ec_slave_config_t, sync_index: u8, direction: c_int, watchdog_mode: c_int) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_sync_manager(
+    sc: *mut ec_slave_config_t,
+    sync_index: u8,
+    direction: c_int,
+    watchdog_mode: c_int,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| settings.set_sync_manager(sync_index, direction, watchdog_mode))) }
+    unsafe {
+        call(sc, |slave| change(slave, |settings, _| settings.set_sync_manager(sync_index, direction, watchdog_mode)))
+    }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_watchdog(sc: *mut ec_slave_config_t, watchdog_divider: u16, watchdog_intervals: u16) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_watchdog(
+    sc: *mut ec_slave_config_t,
+    watchdog_divider: u16,
+    watchdog_intervals: u16,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| { settings.set_watchdog(watchdog_divider, watchdog_intervals); Ok(()) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, _| {
+                settings.set_watchdog(watchdog_divider, watchdog_intervals);
+                Ok(())
+            })
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -57,9 +72,21 @@ unsafe extern "C" fn ecrt_slave_config_pdo_assign_clear(sc: *mut ec_slave_config
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_pdo_mapping_add(sc: *mut ec_slave_config_t, pdo_index: u16, entry_index: u16, entry_subindex: u8, entry_bit_length: u8) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_pdo_mapping_add(
+    sc: *mut ec_slave_config_t,
+    pdo_index: u16,
+    entry_index: u16,
+    entry_subindex: u8,
+    entry_bit_length: u8,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, info| { settings.map(pdo_index, PdoEntry::new(entry_index, entry_subindex, entry_bit_length), info) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, info| {
+                settings.map(pdo_index, PdoEntry::new(entry_index, entry_subindex, entry_bit_length), info)
+            })
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -168,9 +195,23 @@ unsafe extern "C" fn ecrt_slave_config_reg_pdo_entry_pos(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_dc(sc: *mut ec_slave_config_t, assign_activate: u16, sync0_cycle: u32, sync0_shift: i32, sync1_cycle: u32, _sync1_shift: i32) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_dc(
+    sc: *mut ec_slave_config_t,
+    assign_activate: u16,
+    sync0_cycle: u32,
+    sync0_shift: i32,
+    sync1_cycle: u32,
+    _sync1_shift: i32,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| { settings.set_sync(assign_activate, (sync0_cycle, sync0_shift), sync1_cycle); Ok(()) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, _| {
+                settings.set_sync(assign_activate, (sync0_cycle, sync0_shift), sync1_cycle);
+                Ok(())
+            })
+        })
+    }
 }
 
 /// Adds an SDO download.
@@ -193,33 +234,77 @@ fn with_data(mut sdo: SdoDownload, data: Vec<u8>) -> SdoDownload {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_sdo(sc: *mut ec_slave_config_t, index: u16, subindex: u8, data: *const u8, size: usize) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_sdo(
+    sc: *mut ec_slave_config_t,
+    index: u16,
+    subindex: u8,
+    data: *const u8,
+    size: usize,
+) -> c_int {
     // SAFETY: a handle of the library, data of this size (ecrt.h).
     unsafe { add_sdo(sc, SdoDownload::new(index, subindex, []), data, size) }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_complete_sdo(sc: *mut ec_slave_config_t, index: u16, data: *const u8, size: usize) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_complete_sdo(
+    sc: *mut ec_slave_config_t,
+    index: u16,
+    data: *const u8,
+    size: usize,
+) -> c_int {
     // SAFETY: a handle of the library, data of this size (ecrt.h).
     unsafe { add_sdo(sc, SdoDownload::new(index, 0, []).with_complete_access(true), data, size) }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_sdo8(sc: *mut ec_slave_config_t, sdo_index: u16, sdo_subindex: u8, value: u8) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_sdo8(
+    sc: *mut ec_slave_config_t,
+    sdo_index: u16,
+    sdo_subindex: u8,
+    value: u8,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| { settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes())) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, _| {
+                settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes()))
+            })
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_sdo16(sc: *mut ec_slave_config_t, sdo_index: u16, sdo_subindex: u8, value: u16) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_sdo16(
+    sc: *mut ec_slave_config_t,
+    sdo_index: u16,
+    sdo_subindex: u8,
+    value: u16,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| { settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes())) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, _| {
+                settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes()))
+            })
+        })
+    }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_sdo32(sc: *mut ec_slave_config_t, sdo_index: u16, sdo_subindex: u8, value: u32) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_sdo32(
+    sc: *mut ec_slave_config_t,
+    sdo_index: u16,
+    sdo_subindex: u8,
+    value: u32,
+) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| { settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes())) })) }
+    unsafe {
+        call(sc, |slave| {
+            change(slave, |settings, _| {
+                settings.add_sdo(SdoDownload::new(sdo_index, sdo_subindex, value.to_le_bytes()))
+            })
+        })
+    }
 }
 
 #[unsafe(no_mangle)]

@@ -14,10 +14,7 @@ use crate::types::SlaveConfigState;
 const EMERGENCY_BYTES: usize = 8;
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_slave_config_state(
-    sc: *const ec_slave_config_t,
-    state: *mut SlaveConfigState,
-) -> c_int {
+unsafe extern "C" fn ecrt_slave_config_state(sc: *const ec_slave_config_t, state: *mut SlaveConfigState) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
     unsafe { call(sc, |slave| put(state, state_of(slave)?)) }
 }
