@@ -32,7 +32,8 @@ unsafe extern "C" fn ecrt_domain_process(domain: *mut ec_domain_t) -> c_int {
     let process = |domain: &DomainObject| {
         domain.owner.master.cycle(|active| {
             let status = active.application.process(domain.id);
-            domain.words.post(&status, active.application.ring() == RingState::Open);
+            let is_open_ring = domain.owner.master.is_ring() && active.application.ring() == RingState::Open;
+            domain.words.post(&status, is_open_ring);
         })
     };
     // SAFETY: a handle of the library (ecrt.h).
