@@ -36,7 +36,8 @@ pub struct Active {
     pub application: App,
     /// The last call of send.
     sent_at: Instant,
-    /// The call of send before the last call of receive.
+    /// The call of send before that one: what is read from its frame is not old, whether or not the domain was
+    /// processed since the last call of receive.
     awaited: Instant,
     has_clock: bool,
 }
@@ -45,24 +46,24 @@ impl Active {
     /// Receives the frames that have arrived.
     #[inline(always)]
     pub fn receive(&mut self) {
-        self.awaited = self.sent_at;
         self.application.receive();
     }
 
     /// Sends what was queued. Nothing is sent while the acyclic half measures the delays of clocks, for which the wire
-    /// must be empty: an application that cycles by itself has its frames on the wire from one send to the next receive.
+    /// must be empty: here frames count as on the wire from one send to the next receive.
     #[inline(always)]
     pub fn send(&mut self) {
         if self.has_clock {
             if self.application.pauses() {
                 return;
             }
+            self.awaited = self.sent_at;
             self.sent_at = self.application.now();
         }
         self.application.send();
     }
 
-    /// The time of the reference clock, if the last frame before the last call of receive has returned with it.
+    /// The time of the reference clock, if one of the last two frames has returned with it.
     pub fn reference_time(&self) -> Option<u64> {
         let read = self.application.exchange().reference_time()?;
         (read.sent_at >= self.awaited).then_some(read.time)
