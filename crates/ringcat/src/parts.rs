@@ -39,6 +39,18 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     pub fn receive_until(&mut self, until: Instant) -> bool {
         self.probed(&mut ()).receive_until(until)
     }
+
+    /// Whether the acyclic half asks for an empty wire now, to measure the delays of clocks
+    /// ([`ClockConfig::pauses`](crate::ClockConfig)): the application then leaves out [`Application::send`] in this
+    /// cycle. For an application with its own loop, whose frames are on the wire until it receives again.
+    pub fn pauses(&mut self) -> bool {
+        let until = self.cyclic.exchange.pause_until();
+        let pauses = self.links.now() < until;
+        if pauses {
+            self.window.expect_cycle(until);
+        }
+        pauses
+    }
 }
 
 impl<L: Links, H: AcyclicHalf, P: CycleProbe> ProbedParts<'_, L, H, P> {

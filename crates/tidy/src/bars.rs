@@ -28,7 +28,7 @@ pub struct Row {
 pub const POLLING: &str = "<!-- polling tasks of the engine -->";
 
 /// Crates that are published, by directory; their documentation counts.
-const PUBLISHED: [&str; 8] = ["cli", "config", "engine", "gateway", "link", "ringcat", "sim", "wire"];
+const PUBLISHED: [&str; 9] = ["cli", "config", "engine", "ffi", "gateway", "link", "ringcat", "sim", "wire"];
 /// The pages that are documentation of `ringcat`.
 const GUIDE: &str = "docs/guide/";
 const EXAMPLES: usize = 20;

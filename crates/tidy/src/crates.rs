@@ -68,6 +68,7 @@ const RULES: &[CrateRule] = &[
         // Disabled unless an application enables its feature.
         external: External::Only(&["tracing"]),
     },
+    CrateRule { directory: "ffi", internal: Internal::Only(&["ringcat"]), external: External::Only(&["libc"]) },
     CrateRule {
         directory: "cli",
         internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link"]),

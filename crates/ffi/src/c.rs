@@ -1,0 +1,17 @@
+//! The functions of `ecrt.h`, one file per subject.
+//!
+//! Pointers of C are checked here and nowhere else. A handle that is NULL, or was ended by deactivation or release, is
+//! found out by its mark. Functions end in a call of the safe modules.
+
+mod cyclic;
+mod data;
+mod handle;
+mod life;
+mod memory;
+mod objects;
+mod questions;
+mod requests;
+mod slave_config;
+mod slave_state;
+mod soe_voe;
+mod transfers;

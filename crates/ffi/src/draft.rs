@@ -1,0 +1,173 @@
+//! What a program declares before it activates: SubDevices, domains, places of process data.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat::{
+    ClockConfig, Declaration, DomainId, Entry, ReferenceClock, RegisterError, Required, SubDeviceConfig, SubDeviceId,
+    SubDeviceInfo,
+};
+
+use crate::code::{Code, Outcome, report};
+use crate::domain_words::DomainWords;
+use crate::settings::{Name, Settings};
+
+/// A declaration under construction.
+#[derive(Debug, Default)]
+pub struct Draft {
+    declaration: Declaration,
+    settings: Vec<Settings>,
+    domains: Vec<Arc<DomainWords>>,
+    reference: Option<usize>,
+    found: Vec<SubDeviceInfo>,
+}
+
+impl Draft {
+    /// Takes over the result of the last scan.
+    pub fn set_found(&mut self, found: Vec<SubDeviceInfo>) {
+        self.found = found;
+    }
+
+    /// The index of a SubDevice with a name, if it was declared before.
+    ///
+    /// # Errors
+    /// Another SubDevice was declared at this place.
+    pub fn known(&self, name: Name) -> Outcome<Option<usize>> {
+        let is_place = |other: &Settings| (other.name.alias, other.name.position) == (name.alias, name.position);
+        match self.settings.iter().position(is_place) {
+            Some(index) if self.settings[index].name != name => Err(Code::NOT_FOUND),
+            known => Ok(known),
+        }
+    }
+
+    /// Declares a SubDevice.
+    pub fn add(&mut self, name: Name) -> usize {
+        let settings = Settings::new(name);
+        self.declaration.add_without_domain(settings.config(None));
+        self.settings.push(settings);
+        self.settings.len() - 1
+    }
+
+    /// Declares a domain.
+    pub fn add_domain(&mut self) -> (DomainId, Arc<DomainWords>) {
+        let words = Arc::new(DomainWords::default());
+        self.domains.push(words.clone());
+        (self.declaration.add_domain(Duration::ZERO), words)
+    }
+
+    /// The domains.
+    pub fn domains(&self) -> &[Arc<DomainWords>] {
+        &self.domains
+    }
+
+    /// The settings of a SubDevice, and what the scan has found at its place.
+    ///
+    /// # Errors
+    /// No such SubDevice.
+    pub fn settings(&mut self, index: usize) -> Outcome<(&mut Settings, Option<SubDeviceInfo>)> {
+        let info = self.info(index).cloned();
+        Ok((self.settings.get_mut(index).ok_or(Code::INVALID)?, info))
+    }
+
+    /// The SubDevice that the scan has found at the place of a declared one; `None` if it is absent or another one.
+    pub fn info(&self, index: usize) -> Option<&SubDeviceInfo> {
+        self.declaration.found(&self.found, SubDeviceId(index))
+    }
+
+    fn config(&self, index: usize) -> Option<SubDeviceConfig> {
+        Some(self.settings.get(index)?.config(self.info(index)))
+    }
+
+    /// Places an object in a domain.
+    ///
+    /// # Errors
+    /// It is not mapped, or the SubDevice has too few FMMUs.
+    pub fn register(&mut self, index: usize, domain: DomainId, object: (u16, u8)) -> Outcome<Entry> {
+        let found = self.prepare(index)?;
+        let (object, sub_index) = object;
+        let placed = self.declaration.register_entry(domain, SubDeviceId(index), object, sub_index, found.as_ref());
+        self.registered(domain);
+        placed.map_err(refusal)
+    }
+
+    /// Places the entry at a place (SyncManager, PDO in it, entry in that) in a domain.
+    ///
+    /// # Errors
+    /// There is none, or the SubDevice has too few FMMUs.
+    pub fn register_at(&mut self, index: usize, domain: DomainId, place: (u8, usize, usize)) -> Outcome<Entry> {
+        let found = self.prepare(index)?;
+        let placed = self.declaration.register_entry_at(domain, SubDeviceId(index), place, found.as_ref());
+        self.registered(domain);
+        placed.map_err(refusal)
+    }
+
+    fn registered(&self, domain: DomainId) {
+        if let Some(words) = self.domains.get(domain.0) {
+            words.set_bytes(self.image_bytes(domain));
+        }
+    }
+
+    /// Puts the present settings of a SubDevice into the declaration.
+    fn prepare(&mut self, index: usize) -> Outcome<Option<SubDeviceInfo>> {
+        let config = self.config(index).ok_or(Code::INVALID)?;
+        let found = self.info(index).cloned();
+        self.declaration.subdevices[index] = config;
+        Ok(found)
+    }
+
+    /// Bytes of the image of a domain.
+    fn image_bytes(&self, domain: DomainId) -> usize {
+        self.declaration.image_bytes(domain)
+    }
+
+    /// Chooses the reference clock; `None`: the first SubDevice with a clock.
+    ///
+    /// # Errors
+    /// The SubDevice was found and has no clock.
+    pub fn choose_reference(&mut self, index: Option<usize>) -> Outcome {
+        let info = index.and_then(|index| self.info(index));
+        if info.is_some_and(|info| info.receive_times.is_none()) {
+            return Err(Code::INVALID);
+        }
+        self.reference = index;
+        Ok(())
+    }
+
+    /// Whether the bus has a SubDevice with a clock.
+    pub fn has_clock(&self) -> bool {
+        self.found.iter().any(|info| info.receive_times.is_some())
+    }
+
+    /// The declaration with all settings. Absent SubDevices are no obstacle. Clocks as with IgH: datagrams on call, no
+    /// drift compensation in advance.
+    pub fn declaration(&self) -> Declaration {
+        let mut declaration = self.declaration.clone().with_required(Required::Nothing);
+        for index in 0..self.settings.len() {
+            if let Some(config) = self.config(index) {
+                declaration.subdevices[index] = config;
+            }
+        }
+        if self.has_clock() {
+            let reference = match self.reference {
+                None => ReferenceClock::FirstWithClock,
+                Some(index) => ReferenceClock::Declared(SubDeviceId(index)),
+            };
+            let clocks = ClockConfig::default().as_igh().with_reference(reference);
+            declaration.clocks = Some(clocks.with_drift_distributions(0));
+        }
+        declaration
+    }
+}
+
+fn refusal(error: RegisterError) -> Code {
+    let code = match error {
+        RegisterError::TooManyPlaces { .. } | RegisterError::TooLarge { .. } => Code::OVERFLOW,
+        RegisterError::Plan { .. }
+        | RegisterError::Unknown { .. }
+        | RegisterError::NotMapped { .. }
+        | RegisterError::NoSuchPlace { .. } => Code::NOT_FOUND,
+        _ => Code::INVALID,
+    };
+    report(format_args!("process data: {error}"));
+    code
+}

@@ -1,0 +1,44 @@
+//! Which links a master has: from variables of the environment.
+//!
+//! Without a daemon the library opens the links itself. Master 0 takes `RINGCAT_SIM` (a segment file that is simulated
+//! in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces); master 1 takes `RINGCAT_SIM_1`,
+//! `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes first.
+
+/// Links of a master.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A segment file.
+    Simulated(String),
+    /// Network interfaces: main, redundant.
+    Interfaces(String, Option<String>),
+}
+
+/// The links of a master; `None` if no variable names them. Empty variables count as missing.
+pub fn source(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<Source> {
+    let value = |name: &str| {
+        let numbered = variable(&format!("{name}_{master}"));
+        let plain = if master == 0 { variable(name) } else { None };
+        numbered.or(plain).filter(|value| !value.is_empty())
+    };
+    if let Some(file) = value("RINGCAT_SIM") {
+        return Some(Source::Simulated(file));
+    }
+    Some(Source::Interfaces(value("RINGCAT_MAIN")?, value("RINGCAT_REDUNDANT")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: c-interface
+    #[test]
+    fn each_master_has_variables_of_its_own_and_a_segment_file_comes_first() {
+        let set = [("RINGCAT_SIM_1", "ring.toml"), ("RINGCAT_MAIN", "eth1"), ("RINGCAT_REDUNDANT", "")];
+        let variable = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
+        assert_eq!(source(0, variable), Some(Source::Interfaces("eth1".into(), None)));
+        assert_eq!(source(1, variable), Some(Source::Simulated("ring.toml".into())));
+        assert_eq!(source(2, variable), None);
+        let both = |name: &str| Some(format!("{name}!"));
+        assert_eq!(source(0, both), Some(Source::Simulated("RINGCAT_SIM_0!".into())));
+    }
+}

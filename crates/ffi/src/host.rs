@@ -1,0 +1,49 @@
+//! The host: threads of the library, and whether the process runs with the rights of another user.
+
+use std::mem::MaybeUninit;
+
+/// Signals of the calling thread are blocked until this is dropped. Threads that it starts inherit that.
+pub struct HeldSignals(libc::sigset_t);
+
+impl HeldSignals {
+    /// Blocks all signals of the calling thread.
+    pub fn hold() -> HeldSignals {
+        let (mut all, mut before) = (MaybeUninit::uninit(), MaybeUninit::zeroed());
+        // SAFETY: both sets are memory of this function; `sigfillset` initialises the first before it is read, and
+        // zeros are an empty set, should the mask not be reported.
+        unsafe {
+            libc::sigfillset(all.as_mut_ptr());
+            libc::pthread_sigmask(libc::SIG_SETMASK, all.as_ptr(), before.as_mut_ptr());
+            HeldSignals(before.assume_init())
+        }
+    }
+}
+
+impl Drop for HeldSignals {
+    fn drop(&mut self) {
+        // SAFETY: the set was filled in by `hold`; no old mask is asked for.
+        unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, &raw const self.0, std::ptr::null_mut()) };
+    }
+}
+
+/// Gives the calling thread normal priority and all processors, whatever the thread had that started it.
+pub fn be_an_ordinary_thread() {
+    // SAFETY: all zeros are a valid `sched_param` and an empty `cpu_set_t`, which both outlive the calls; 0 is the
+    // calling thread. A refusal by the kernel leaves the thread as it is.
+    unsafe {
+        let parameters: libc::sched_param = std::mem::zeroed();
+        libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameters);
+        let mut processors: libc::cpu_set_t = std::mem::zeroed();
+        for processor in 0..libc::CPU_SETSIZE as usize {
+            libc::CPU_SET(processor, &mut processors);
+        }
+        libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const processors);
+    }
+}
+
+/// A variable of the environment. In a process with more rights than its user (set-uid) none is given.
+pub fn variable(name: &str) -> Option<String> {
+    // SAFETY: reads a word of the process; no pointer is involved.
+    let is_secure = unsafe { libc::getauxval(libc::AT_SECURE) } != 0;
+    if is_secure { None } else { std::env::var(name).ok() }
+}

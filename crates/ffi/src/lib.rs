@@ -1,0 +1,32 @@
+//! The C interface `ecrt.h` on RingCAT: programs that were written for it compile, link and run unchanged.
+//!
+//! The crate is linked into `libethercat.so.1` by the C compiler (`crates/ffi/install`). Its layers, from below:
+//!
+//! | for | see |
+//! |---|---|
+//! | return codes, structures of C | `code`, `types` |
+//! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
+//! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
+//! | a handle of a master: reservation, activation, cyclic calls | `master`, `claim`, `domain_words` |
+//! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
+//! | the functions of C | `c` |
+//!
+//! `unsafe` is in `c` (pointers of C), `claim` (a value for one caller at a time) and `host` (calls of the system).
+//! docs/ecrt.md has each function with its return codes by phase.
+#![deny(unsafe_op_in_unsafe_fn)]
+
+mod any_links;
+mod bus;
+mod c;
+mod claim;
+mod code;
+mod domain_words;
+mod draft;
+mod environment;
+mod host;
+mod information;
+mod mailbox;
+mod master;
+mod request;
+mod settings;
+mod types;

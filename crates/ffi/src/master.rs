@@ -1,0 +1,395 @@
+//! One handle of a master: reservation, activation, the way back.
+//!
+//! A handle that only opened the master may ask for information and use mailboxes, beside the one that reserved it. The
+//! application exists between activation and deactivation; cyclic calls use it by a claim that never waits.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, RwLock};
+use std::time::Duration;
+
+use ringcat::{
+    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, LiveStatus, ReferenceClock,
+    Services, SubDeviceId, SupervisorThread,
+};
+
+use crate::any_links::AnyLinks;
+use crate::bus::{Bus, locked};
+use crate::claim::Claim;
+use crate::code::{Code, Outcome, report};
+use crate::draft::Draft;
+use crate::types::SegmentState;
+
+/// Limit of the way to PREOP at the end of an application.
+const END_LIMIT: Duration = Duration::from_secs(5);
+/// Longest wait for a cyclic call of another thread.
+const CLAIM_LIMIT: Duration = Duration::from_secs(1);
+/// Memory of an image is allocated in pieces of this size, so that later applications can use it again.
+const MEMORY_GRAIN: usize = 4096;
+
+/// The application of a handle.
+type App = Application<AnyLinks, SupervisorThread>;
+
+/// The application, and the times of its last cycle.
+#[derive(Debug)]
+pub struct Active {
+    /// The application.
+    pub application: App,
+    /// The last call of send.
+    sent_at: Instant,
+    /// The call of send before that one: what is read from its frame is not old, whether or not the domain was
+    /// processed since the last call of receive.
+    awaited: Instant,
+    has_clock: bool,
+}
+
+impl Active {
+    /// Receives the frames that have arrived.
+    #[inline(always)]
+    pub fn receive(&mut self) {
+        self.application.receive();
+    }
+
+    /// Sends what was queued. Nothing is sent while the acyclic half measures the delays of clocks, for which the wire
+    /// must be empty: here frames count as on the wire from one send to the next receive.
+    #[inline(always)]
+    pub fn send(&mut self) {
+        if self.has_clock {
+            if self.application.pauses() {
+                return;
+            }
+            self.awaited = self.sent_at;
+            self.sent_at = self.application.now();
+        }
+        self.application.send();
+    }
+
+    /// The time of the reference clock, if one of the last two frames has returned with it.
+    pub fn reference_time(&self) -> Option<u64> {
+        let read = self.application.exchange().reference_time()?;
+        (read.sent_at >= self.awaited).then_some(read.time)
+    }
+}
+
+/// A handle of a master.
+#[derive(Debug)]
+pub struct Master {
+    /// `None` after the release.
+    bus: Mutex<Option<Arc<Bus>>>,
+    is_reserved: AtomicBool,
+    is_active: AtomicBool,
+    has_clock: AtomicBool,
+    draft: Mutex<Draft>,
+    application: Claim<Option<Active>>,
+    live: RwLock<LiveStatus>,
+    application_time: AtomicU64,
+    is_ring: bool,
+    /// Memory of images that no application uses.
+    memory: Mutex<Vec<&'static mut [u8]>>,
+}
+
+impl Master {
+    /// Opens a master.
+    ///
+    /// # Errors
+    /// What is wrong, for the operator.
+    pub fn open(index: u32) -> Result<Master, String> {
+        let bus = Bus::open(index)?;
+        let live = bus.supervisor().live_status().map_err(|error| error.to_string())?;
+        let is_ring = bus.is_ring();
+        Ok(Master {
+            bus: Mutex::new(Some(bus)),
+            is_reserved: AtomicBool::new(false),
+            is_active: AtomicBool::new(false),
+            has_clock: AtomicBool::new(false),
+            draft: Mutex::default(),
+            application: Claim::new(None),
+            live: RwLock::new(live),
+            application_time: AtomicU64::new(0),
+            is_ring,
+            memory: Mutex::default(),
+        })
+    }
+
+    /// Its bus.
+    ///
+    /// # Errors
+    /// It was released.
+    pub fn bus(&self) -> Outcome<Arc<Bus>> {
+        locked(&self.bus).clone().ok_or(Code::INVALID)
+    }
+
+    /// Reserves the bus; returns when it is scanned and all SubDevices are in PREOP.
+    ///
+    /// # Errors
+    /// Another handle has it, or this one has it already.
+    pub fn reserve(&self) -> Outcome {
+        let bus = self.bus()?;
+        bus.reserve()?;
+        bus.wait_until_ready();
+        locked(&self.draft).set_found(bus.found()?);
+        self.is_reserved.store(true, Ordering::Release);
+        Ok(())
+    }
+
+    /// Whether this handle has reserved the bus.
+    ///
+    /// # Errors
+    /// It has not.
+    pub fn check_reserved(&self) -> Outcome {
+        if self.is_reserved.load(Ordering::Acquire) { Ok(()) } else { Err(Code::NOT_RESERVED) }
+    }
+
+    /// Whether an application is active.
+    pub fn is_active(&self) -> bool {
+        self.is_active.load(Ordering::Acquire)
+    }
+
+    /// Changes the declaration.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus, or the application is active.
+    pub fn change<R>(&self, change: impl FnOnce(&mut Draft) -> Outcome<R>) -> Outcome<R> {
+        self.check_reserved()?;
+        let mut draft = locked(&self.draft);
+        if self.is_active() {
+            return Err(Code::BUSY);
+        }
+        change(&mut draft)
+    }
+
+    /// Reads the declaration.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus.
+    pub fn look<R>(&self, look: impl FnOnce(&Draft) -> R) -> Outcome<R> {
+        self.check_reserved()?;
+        Ok(look(&locked(&self.draft)))
+    }
+
+    /// The declaration follows the last scan from now on.
+    ///
+    /// # Errors
+    /// As [`Master::change`].
+    pub fn refresh(&self) -> Outcome {
+        let found = self.bus()?.found()?;
+        self.change(|draft| {
+            draft.set_found(found);
+            Ok(())
+        })
+    }
+
+    /// Starts the application. It returns at once; SubDevices are configured while it cycles.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus, or the declaration does not fit.
+    pub fn activate(&self) -> Outcome {
+        self.check_reserved()?;
+        if self.is_active() {
+            report(format_args!("the master is active already"));
+            return Ok(());
+        }
+        self.refresh()?;
+        let bus = self.bus()?;
+        let draft = locked(&self.draft);
+        let mut declaration = draft.declaration();
+        for (number, words) in draft.domains().iter().enumerate() {
+            let (domain, bytes) = (DomainId(number), words.bytes());
+            if bytes > 0 {
+                let memory = self.take_memory(bytes);
+                words.set_memory(memory.as_mut_ptr());
+                declaration.place_image(domain, memory);
+            }
+        }
+        self.has_clock.store(draft.has_clock(), Ordering::Release);
+        let begun = self.begin(&bus, declaration, draft.domains().len());
+        match &begun {
+            Ok(()) => self.is_active.store(true, Ordering::Release),
+            Err(_) => draft.domains().iter().for_each(|words| words.set_memory(std::ptr::null_mut())),
+        }
+        begun
+    }
+
+    fn begin(&self, bus: &Bus, declaration: Declaration, domains: usize) -> Outcome {
+        let links = bus.take_links().ok_or(Code::BUSY)?;
+        let supervisor = bus.supervisor().clone();
+        if let Err(error) = supervisor.load(declaration) {
+            bus.give_links_back(links);
+            report(format_args!("master {}: {error}", bus.master()));
+            return Err(Code::INVALID);
+        }
+        let mut application = match supervisor.apply(links) {
+            Ok(application) => application,
+            Err(refused) => {
+                report(format_args!("master {}: {}", bus.master(), refused.error));
+                let (supervisor, links) = refused.main_device;
+                let unused = (0..domains).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
+                locked(&self.memory).extend(unused);
+                bus.give_links_back(links);
+                return Err(Code::INVALID);
+            }
+        };
+        application.exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
+        let (time, now) = (self.application_time.load(Ordering::Relaxed), application.now());
+        if time != 0 {
+            application.exchange_mut().set_application_time(time, now);
+        }
+        self.follow_live_status(bus);
+        let has_clock = self.has_clock.load(Ordering::Relaxed);
+        let begun = Active { application, sent_at: now, awaited: now, has_clock };
+        self.application.use_within(CLAIM_LIMIT, |active| *active = Some(begun))
+    }
+
+    /// Zeroed memory for an image, as long or longer.
+    fn take_memory(&self, bytes: usize) -> &'static mut [u8] {
+        let mut unused = locked(&self.memory);
+        let fitting = unused.iter().position(|memory| memory.len() >= bytes);
+        match fitting.map(|place| unused.swap_remove(place)) {
+            Some(memory) => {
+                memory.fill(0);
+                memory
+            }
+            None => Vec::leak(vec![0; bytes.next_multiple_of(MEMORY_GRAIN)]),
+        }
+    }
+
+    fn follow_live_status(&self, bus: &Bus) {
+        if let (Ok(fresh), Ok(mut live)) = (bus.supervisor().live_status(), self.live.write()) {
+            *live = fresh;
+        }
+    }
+
+    /// Ends the application: all SubDevices go to PREOP, the declaration is empty again.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus, or nothing is active.
+    pub fn deactivate(&self) -> Outcome {
+        self.check_reserved()?;
+        let bus = self.bus()?;
+        let taken = self.application.use_within(CLAIM_LIMIT, Option::take)?;
+        let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
+        let mut draft = locked(&self.draft);
+        for (number, words) in draft.domains().iter().enumerate() {
+            words.set_memory(std::ptr::null_mut());
+            locked(&self.memory).extend(application.exchange_mut().give_memory_back(DomainId(number)));
+        }
+        let (_, links) = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+            Ok(parts) => parts,
+            Err(refused) => {
+                report(format_args!("master {}: {}", bus.master(), refused.error));
+                refused.main_device
+            }
+        };
+        bus.give_links_back(links);
+        *draft = Draft::default();
+        draft.set_found(bus.found()?);
+        self.application_time.store(0, Ordering::Relaxed);
+        self.follow_live_status(&bus);
+        self.is_active.store(false, Ordering::Release);
+        Ok(())
+    }
+
+    /// Ends everything that the handle has.
+    pub fn release(&self) {
+        if self.is_active() {
+            let _ = self.deactivate();
+        }
+        let bus = locked(&self.bus).take();
+        if let Some(bus) = bus.filter(|_| self.is_reserved.swap(false, Ordering::AcqRel)) {
+            bus.unreserve();
+        }
+    }
+
+    /// A cyclic call: uses the application, or does nothing while there is none.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus; another cyclic call runs.
+    #[inline(always)]
+    pub fn cycle<R: Default>(&self, work: impl FnOnce(&mut Active) -> R) -> Outcome<R> {
+        let done = self.application.use_now(|application| application.as_mut().map(work))?;
+        match done {
+            Some(result) => Ok(result),
+            None => self.check_reserved().map(|()| R::default()),
+        }
+    }
+
+    /// State of all SubDevices, or of those on one link. Loads words while the application of this handle is active;
+    /// before, it asks the SubDevices.
+    ///
+    /// # Errors
+    /// The handle was released; another thread activates or deactivates it.
+    pub fn segment(&self, link: Option<Link>) -> Outcome<SegmentState> {
+        if self.is_active() {
+            return self.live(|live| match link {
+                None => {
+                    let all = live.segment();
+                    SegmentState::new(all.responding, all.al_states, all.is_up)
+                }
+                Some(link) => {
+                    let one = live.link(link);
+                    SegmentState::new(one.answering, one.al_states, one.is_up())
+                }
+            });
+        }
+        let seen = self.bus()?.look()?;
+        Ok(match link {
+            None => SegmentState::new(seen.responding(), seen.al_states, seen.is_up.contains(&true)),
+            Some(link) => {
+                let count = seen.counts[link.index()];
+                SegmentState::new(count, if count > 0 { seen.al_states } else { 0 }, seen.is_up[link.index()])
+            }
+        })
+    }
+
+    /// Reads words of the active application.
+    ///
+    /// # Errors
+    /// Another thread activates or deactivates it.
+    pub fn live<R>(&self, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
+        self.live.try_read().map(|live| read(&live)).map_err(|_| Code::BUSY)
+    }
+
+    /// Whether a clock takes part in the application.
+    pub fn has_clock(&self) -> bool {
+        self.is_active() && self.has_clock.load(Ordering::Relaxed)
+    }
+
+    /// Sets the application's time.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus; another cyclic call runs.
+    pub fn set_application_time(&self, time: u64) -> Outcome {
+        self.check_reserved()?;
+        self.application_time.store(time, Ordering::Relaxed);
+        self.cycle(|Active { application, .. }| {
+            let now = application.now();
+            application.exchange_mut().set_application_time(time, now);
+        })
+    }
+
+    /// The application's time.
+    pub fn application_time(&self) -> u64 {
+        self.application_time.load(Ordering::Relaxed)
+    }
+}
+
+impl Master {
+    /// Chooses the reference clock, also while the application is active; `None`: the first SubDevice with a clock.
+    ///
+    /// # Errors
+    /// The SubDevice has no clock; no SubDevice has one.
+    pub fn select_reference(&self, index: Option<usize>) -> Outcome {
+        if !self.is_active() {
+            return self.change(|draft| draft.choose_reference(index));
+        }
+        self.check_reserved()?;
+        let reference =
+            index.map_or(ReferenceClock::FirstWithClock, |index| ReferenceClock::Declared(SubDeviceId(index)));
+        let chosen = self.bus()?.supervisor().with(move |engine| engine.choose_reference_clock(reference));
+        chosen.map_err(|_| Code::GONE)?.map(|_| ()).ok_or(Code::NO_CLOCK)
+    }
+
+    /// Whether the bus has two links.
+    pub fn is_ring(&self) -> bool {
+        self.is_ring
+    }
+}

@@ -1,0 +1,52 @@
+//! Return codes of each function in each phase, compared with the table of docs/ecrt.md.
+
+use std::collections::BTreeMap;
+
+use crate::library::{here, on_segment, program, root};
+
+/// Columns of the table by the phases that the program prints.
+const PHASES: [&str; 5] = ["opened", "requested", "active", "deactivated", "NULL"];
+
+/// The table: function and phase, with the code.
+fn table() -> BTreeMap<(String, &'static str), String> {
+    let page = std::fs::read_to_string(root().join("docs/ecrt.md")).expect("docs/ecrt.md");
+    let mut table = BTreeMap::new();
+    for line in page.lines().filter(|line| line.starts_with("| `ecrt_")) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        if let [function, codes @ .., _source] = &cells[..]
+            && codes.len() == PHASES.len()
+        {
+            for (phase, code) in PHASES.into_iter().zip(codes) {
+                table.insert((function.trim_matches('`').to_owned(), phase), (*code).to_owned());
+            }
+        }
+    }
+    table
+}
+
+// covers: c-interface
+#[test]
+fn each_function_returns_the_code_of_the_table_in_each_phase() {
+    let Some(calls) = program(&here().join("tests/c/conformance.c"), &[]) else { return };
+    let (output, ended) = on_segment(&calls, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+    let mut expected = table();
+    assert!(expected.len() > 95 * PHASES.len(), "{} rows", expected.len());
+    let mut wrong = Vec::new();
+    for line in output.lines() {
+        let [function, phase, got] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let Some(phase) = PHASES.into_iter().find(|known| *known == phase) else { continue };
+        let wanted = expected.remove(&(function.to_owned(), phase));
+        if wanted.as_deref() != Some(got) {
+            wrong.push(format!("{function} {phase}: expected {wanted:?}, got {got}"));
+        }
+    }
+    // What the table promises and the program does not call.
+    let promised = expected.iter().filter(|(_, code)| *code != "-");
+    wrong.extend(promised.map(|(call, code)| format!("{call:?} {code}: not called")));
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let released = output.lines().filter(|line| line.contains(" released "));
+    assert!(released.clone().count() > 40);
+    let good = ["EINVAL", "NULL", "ERROR", "0", "positive"];
+    assert!(released.clone().all(|line| good.iter().any(|good| line.ends_with(good))), "{output}");
+}

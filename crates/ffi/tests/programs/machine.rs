@@ -1,0 +1,56 @@
+//! Whole programs on simulated machines: the examples, all services, cycles without allocation.
+
+use crate::library::{here, on_segment, program, root};
+
+// covers: c-interface
+#[test]
+fn the_first_application_of_the_manual_reaches_op_and_prints_its_lines() {
+    let examples = root().join("examples/c");
+    let Some(first) = program(&examples.join("first_application.c"), &[]) else { return };
+    let (output, ended) = on_segment(&first, &examples.join("first_application.toml"), &["8000"]);
+    assert_eq!(ended, Ok(()), "{output}");
+    let lines: Vec<&str> = output.lines().collect();
+    // One LRW: 2 for each of the two SubDevices with outputs, 1 for the one with inputs.
+    for wanted in ["Domain1: WC 5.", "Domain1: State 2.", "5 slave(s).", "Link is up.", "AnaIn: State 0x08."] {
+        assert!(lines.contains(&wanted), "{wanted}\n{output}");
+    }
+    assert!(lines.contains(&"AnaIn: operational.") && lines.contains(&"AnaIn: online."), "{output}");
+    // The SubDevice at position 1 stays in PREOP.
+    assert!(lines.contains(&"AL states: 0x0A."), "{output}");
+    assert!(!lines.iter().any(|line| line.starts_with("AL states: 0x01")), "{output}");
+}
+
+/// How well the clocks follow is tested in virtual time (`clock_times.rs`): here the calls come with the delays of a
+/// busy host. The difference is printed; it is known, and the reference is read.
+// covers: c-interface, dc-sync
+#[ignore = "in two of three runs a clock stays 10 to 50 ms away from the reference for the whole run (docs/ecrt.md)"]
+#[test]
+fn drives_with_clocks_reach_op_and_their_differences_are_known() {
+    let examples = root().join("examples/c");
+    let Some(clocks) = program(&examples.join("clocks.c"), &[]) else { return };
+    let (output, ended) = on_segment(&clocks, &examples.join("clocks.toml"), &["6000"]);
+    assert_eq!(ended, Ok(()), "{output}");
+    assert!(output.contains("2 of 2 drives operational."), "{output}");
+    let last = output.lines().rfind(|line| line.starts_with("AL states")).expect("a line about clocks");
+    println!("{last}");
+    assert!(last.contains("reference read"), "{output}");
+    let difference = last.split("at most ").nth(1).and_then(|rest| rest.split(' ').next()).expect(last);
+    assert!((1..1_000_000).contains(&difference.parse::<i64>().expect(last)), "{output}");
+}
+
+// covers: c-interface
+#[test]
+fn each_service_does_its_work_on_simulated_subdevices() {
+    let Some(services) = program(&here().join("tests/c/services.c"), &[]) else { return };
+    let (output, ended) = on_segment(&services, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+    assert_eq!(output.lines().last(), Some("all services work"), "{output}");
+}
+
+// covers: c-interface, no-allocation
+#[test]
+fn cyclic_calls_allocate_nothing_and_a_second_caller_is_refused() {
+    let Some(realtime) = program(&here().join("tests/c/realtime.c"), &[]) else { return };
+    let (output, ended) = on_segment(&realtime, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+}

@@ -1,0 +1,69 @@
+//! Symbols with their versions, layout of the structures, and the header in several languages.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use crate::library::{here, library, program, run};
+
+// covers: c-interface
+#[test]
+fn the_library_exports_the_103_functions_with_their_versions_and_nothing_else() {
+    let Some(library) = library() else { return };
+    let facts = include_str!("../facts/ecrt_symbol_versions.csv");
+    let wanted: BTreeMap<&str, &str> = facts.lines().skip(1).filter_map(|line| line.split_once(',')).collect();
+    assert_eq!(wanted.len(), 103);
+    let symbols = run(Command::new("nm").args(["-D", "--defined-only", "--with-symbol-versions"]).arg(library));
+    let mut got = BTreeMap::new();
+    for line in symbols.lines() {
+        let (kind, name) = line.split_once(' ').and_then(|(_, rest)| rest.split_once(' ')).expect(line);
+        if kind == "A" {
+            continue;
+        }
+        let (name, version) = name.split_once("@@").expect(line);
+        got.insert(name, version);
+    }
+    assert_eq!(got, wanted);
+    let headers = run(Command::new("readelf").arg("-d").arg(library));
+    assert!(headers.contains("[libethercat.so.1]") && headers.contains("NODELETE"), "{headers}");
+}
+
+// covers: c-interface
+#[test]
+fn the_header_is_clean_in_c99_c11_and_cpp17() {
+    if library().is_none() {
+        return;
+    }
+    let source = here().join("tests/c/header.c");
+    for (compiler, standard, language) in [("cc", "c99", "c"), ("cc", "c11", "c"), ("c++", "c++17", "c++")] {
+        let mut command = Command::new(compiler);
+        command.args([&format!("-std={standard}"), "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]);
+        command.args(["-x", language]).arg("-I").arg(here().join("include")).arg(&source);
+        run(&mut command);
+    }
+}
+
+// covers: c-interface
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn structures_have_the_sizes_and_offsets_that_programs_were_compiled_with() {
+    let facts = include_str!("../facts/ecrt_abi_x86_64.txt");
+    let mut source = String::from("#include <stddef.h>\n#include <stdio.h>\n#include \"ecrt.h\"\nint main(void) {\n");
+    let mut structure = "";
+    for line in facts.lines() {
+        let (name, _) = line.rsplit_once(' ').expect(line);
+        let (name, expression) = match name.trim().strip_prefix('.') {
+            Some(member) => (name, format!("offsetof({structure}, {member})")),
+            None => {
+                structure = name;
+                (name, format!("sizeof({structure})"))
+            }
+        };
+        let at = if name.starts_with(' ') { "@" } else { "" };
+        source += &format!("printf(\"{name} {at}%zu\\n\", {expression});\n");
+    }
+    source += "return 0; }\n";
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("layout.c");
+    std::fs::write(&file, source).expect("a file");
+    let Some(layout) = program(&file, &[]) else { return };
+    assert_eq!(run(&mut Command::new(layout)), facts);
+}
