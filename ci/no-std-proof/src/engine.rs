@@ -9,14 +9,14 @@ use core::hint::black_box;
 use core::time::Duration;
 
 use ringcat_engine::Board;
+use ringcat_engine::Identity;
+use ringcat_engine::Supervisor;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::domain::{DomainId, DomainState};
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout};
 use ringcat_engine::link::{Link, LinkSet};
 use ringcat_engine::queue;
-use ringcat_engine::Identity;
-use ringcat_engine::Supervisor;
 use ringcat_engine::time::Instant;
 use ringcat_wire::address::{RegisterAddress, Wkc};
 use ringcat_wire::datagram::{HEADER_LEN, MORE, OVERHEAD};
