@@ -85,7 +85,7 @@ use crate::mail::relay::GatewayQueue;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::reconcile_without_application;
-use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
+use crate::procedures::scan::{Scan, ScanError, scan};
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
@@ -215,18 +215,6 @@ impl MainDevice {
         });
         self.begin_idle();
         Ok(())
-    }
-
-    fn scan_options(&self, extent: SiiExtent) -> ScanOptions {
-        ScanOptions {
-            settle: self.options.settle,
-            patience: self.options.patience,
-            extent,
-            cache: self.cache.clone(),
-            junctions: self.options.junctions,
-            pdos: self.options.pdos,
-            enhanced_line_crossed: self.options.enhanced_line_crossed,
-        }
     }
 
     /// The shared model, while an application is active.
