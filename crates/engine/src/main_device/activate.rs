@@ -47,8 +47,7 @@ const CYCLIC_EVENTS: usize = 1024;
 impl MainDevice {
     /// Starts a loaded declaration.
     pub(super) fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
-        self.end_first_scan();
-        let scan = self.segment.view().found().cloned().ok_or(ActivateError::NoScan)?;
+        let scan = self.found_to_begin().ok_or(ActivateError::NoScan)?;
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
         let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;

@@ -1,6 +1,7 @@
 //! The MainDevice without an application: phases, idle operation, the way back to it, and SubDevices by
 //! address.
 
+use alloc::rc::Rc;
 use core::time::Duration;
 
 use super::MainDevice;
@@ -10,7 +11,7 @@ use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
 use crate::procedures::undeclared::{keep, watch_undeclared_mail};
 use crate::role::{Function, MainDevicePhase};
-use crate::segment::{Addressed, Observation, Scan, UndeclaredObservation};
+use crate::segment::{Addressed, Found, Observation, Scan, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -64,13 +65,14 @@ impl MainDevice {
         self.supervisor.spawn(watch(bus, segment, options));
     }
 
-    /// With idle operation an application may begin before the first scan has ended: the scan has found nothing then,
-    /// and each SubDevice is configured when it comes. A requested scan goes on.
-    pub(super) fn end_first_scan(&self) {
+    /// What the last scan has found. With idle operation an application may begin before the first scan has ended: it
+    /// has found nothing then, and each SubDevice is configured when it comes. A requested scan goes on.
+    pub(super) fn found_to_begin(&self) -> Option<Rc<Found>> {
         if self.options.idle_operation && self.segment.view().found().is_none() && !self.scan_requested.get() {
             self.segment.observe(Observation::ScanBegun);
             self.segment.observe(Observation::ScanEnded(Ok(Scan::nothing())));
         }
+        self.segment.view().found().cloned()
     }
 
     /// Ends the application: process data, supervision and all other procedures end, and every SubDevice goes to PREOP
