@@ -29,7 +29,7 @@ enum Reason {
 use Reason::{Cyclic, Pace, Register, Retry, Settle, Turn};
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 38] = [
+const WAITS: [(&str, &[Reason]); 40] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -39,6 +39,7 @@ const WAITS: [(&str, &[Reason]); 38] = [
     ("procedures/clocks/drift.rs", &[Retry, Pace]),
     ("procedures/clocks/measure.rs", &[Register]),
     ("procedures/clocks/watch.rs", &[Register]),
+    ("procedures/command_watch.rs", &[Cyclic]),
     ("procedures/complete_siis.rs", &[Retry]),
     ("procedures/configure.rs", &[Settle, Turn]),
     ("procedures/configure/registers.rs", &[Register, Register, Register]),
@@ -52,6 +53,7 @@ const WAITS: [(&str, &[Reason]); 38] = [
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
     ("procedures/recover.rs", &[Retry, Retry]),
+    ("procedures/resume.rs", &[Retry]),
     ("procedures/sample.rs", &[Cyclic]),
     ("procedures/scan.rs", &[Register]),
     ("procedures/scan/count.rs", &[Register, Register]),

@@ -54,3 +54,16 @@ impl Executor {
         }
     }
 }
+
+impl Drop for Executor {
+    fn drop(&mut self) {
+        self.tasks.clear();
+        // Procedures that were spawned and never polled have handles to what holds them.
+        loop {
+            let task = self.shared.borrow_mut().spawned.pop_front();
+            if task.is_none() {
+                return;
+            }
+        }
+    }
+}

@@ -55,6 +55,29 @@ impl Bench {
     }
 }
 
+// covers: stop
+#[test]
+fn nothing_remains_of_a_supervisor_that_ends_before_its_procedures_begin() {
+    for polls in 0..3 {
+        let mut bench = Bench::new(LinkSet::Single);
+        let (held, bus) = (Rc::new(()), bench.supervisor.bus());
+        let (inner, outer) = (held.clone(), bus.clone());
+        bench.start(async move {
+            let (of_task, in_task) = (inner.clone(), outer.clone());
+            outer.spawn(async move {
+                in_task.sleep(Duration::from_secs(1)).await;
+                drop(of_task);
+            });
+            outer.sleep(Duration::from_secs(1)).await;
+            drop(inner);
+        });
+        drop(bus);
+        (0..polls).for_each(|_| bench.step());
+        drop(bench);
+        assert_eq!(Rc::strong_count(&held), 1, "after {polls} polls");
+    }
+}
+
 /// A copy that came back with this working counter in every datagram, and this data in the reads.
 fn answered(frame: &[u8], wkc: u16, fill: u8) -> Vec<u8> {
     let mut frame = frame.to_vec();
