@@ -2,7 +2,7 @@
 //!
 //! In: a function, the role of the MainDevice, and its phase. Out: whether it is allowed, or the error that names
 //! function, role and reason. Functions are checked where they start, and nowhere else: `MainDevice::permit` for all,
-//! and the mailbox where a conversation begins. A further phase is a further column of [`Row`], a further role a
+//! and the mailbox where a conversation begins. A further phase is a further column of `Row`, a further role a
 //! further arm of [`Function::permission`]: each function needs an entry then, because neither has a default.
 
 use core::fmt;
