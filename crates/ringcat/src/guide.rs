@@ -7,6 +7,7 @@
 //! 5. [`several_threads`]: cycles in a thread of their own, services from any other
 //! 6. [`testing`]: an application against the simulator, in its own CI
 //! 7. [`known_places`]: offsets before activation, cycles in parts
+//! 8. [`without_an_application`]: idle operation, states, mailboxes and rescans
 
 // Of two definitions of a link the first one counts: in a page it leads to the file beside it, here to the module.
 /// [a drive with clocks]: drive_with_clocks

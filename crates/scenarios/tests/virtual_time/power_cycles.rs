@@ -93,7 +93,7 @@ fn a_power_cycle_in_a_ring_costs_the_others_at_most_four_edges() {
             worst = worst.max(incomplete);
         }
     }
-    println!("ring of 16, one SubDevice off and on: at most {worst} cycles that missed anybody else ({EDGES} allowed)");
+    println!("ring of 16, one SubDevice off and on: at most {worst} cycles that missed another one ({EDGES} allowed)");
 }
 
 #[test]
