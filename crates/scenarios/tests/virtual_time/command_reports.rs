@@ -147,13 +147,13 @@ fn an_acyclic_command_without_its_answer_is_reported_once_a_second_with_its_numb
         main_device.set_command_reports(true);
         let client = main_device.register_client(Subjects::NONE.with(Subject::Commands), 1000).expect("there is room");
         main_device.links_mut().links_mut().network_mut().power_off(DeviceIndex(device));
-        let read = move |engine: &mut ringcat_engine::main_device::MainDevice| {
-            engine.start_register_read(position, map::BUILD, 2)
-        };
-        for _ in 0..5 {
-            assert!(Services::call(&mut main_device, read).is_err(), "it has no power");
-        }
+        // All begin before it is known that the SubDevice has left.
+        let engine = main_device.engine_mut();
+        let reads: Vec<_> = (0..5).map(|_| engine.start_register_read(position, map::BUILD, 2)).collect();
         main_device.attend(Duration::from_secs(3));
+        for mut read in reads {
+            assert!(read.take().is_some_and(|result| result.is_err()), "it has no power");
+        }
         let events = main_device.client_events(client).expect("it is registered").events;
         let of_reads: Vec<(u64, u32)> = events
             .iter()

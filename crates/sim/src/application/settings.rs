@@ -126,9 +126,9 @@ pub fn process_data(
         if !running || manager.start != entry.start || u32::from(manager.length) != expected {
             return Err(wrong);
         }
-        // Three buffers, unless the device has one buffer here.
-        let mode = SyncManagerControl::from_bits(entry.control).mode;
-        if manager.control.mode != mode || manager.control.direction != direction {
+        // Three buffers; one as well, if the EEPROM says so.
+        let modes = [SyncManagerMode::Buffered, SyncManagerControl::from_bits(entry.control).mode];
+        if !modes.contains(&manager.control.mode) || manager.control.direction != direction {
             return Err(AlStatusCode::INVALID_SYNC_MANAGER_TYPES);
         }
         areas.push(area(number, &manager));
