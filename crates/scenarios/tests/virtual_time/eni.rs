@@ -2,6 +2,7 @@
 //! and exchanges data through the variables of the file (protocol 8).
 
 mod cables;
+mod numbers;
 mod variants;
 
 use std::path::{Path, PathBuf};
@@ -434,12 +435,12 @@ const FILES: usize = 40;
 #[test]
 fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
     let text = std::str::from_utf8(MACHINE).expect("it is text");
-    let numbers: Vec<(usize, usize)> = numbers(text);
+    let places = numbers::of(text);
     let (mut refused, mut started) = (0, 0);
     for seed in seeds::from_environment().unwrap_or(1..2) {
         let mut dice = Dice::new(seed);
         for _ in 0..FILES {
-            let changed = with_other_numbers(text, &numbers, &mut dice);
+            let changed = numbers::replaced(text, &places, &mut dice);
             match EniFile::from_bytes(changed.as_bytes()) {
                 Ok(file) => started += usize::from(starts(&file, dice.one_in(2))),
                 Err(_) => refused += 1,
@@ -448,26 +449,6 @@ fn files_with_wrong_numbers_are_refused_or_followed_without_harm() {
     }
     println!("{refused} refused, {started} started");
     assert!(refused > 0 && started > 0);
-}
-
-/// A file with up to three of its numbers replaced.
-fn with_other_numbers(text: &str, numbers: &[(usize, usize)], dice: &mut Dice) -> String {
-    let mut changed = text.to_owned();
-    let mut places: Vec<(usize, usize)> = (0..=dice.below(3)).map(|_| *dice.pick(numbers)).collect();
-    places.sort_unstable();
-    places.dedup();
-    for (start, end) in places.into_iter().rev() {
-        let hex = changed[start..end].len() > 3 && dice.one_in(2);
-        let number = match dice.below(5) {
-            0 => "0".to_owned(),
-            1 => "65535".to_owned(),
-            2 => dice.below(300).to_string(),
-            3 if hex => format!("{:016x}", dice.roll()),
-            _ => dice.below(1 << 33).to_string(),
-        };
-        changed.replace_range(start..end, &number);
-    }
-    changed
 }
 
 /// Whether a file is followed as far as cycles; each step may refuse it.
@@ -486,17 +467,4 @@ fn starts(file: &EniFile, ring: bool) -> bool {
         });
     }
     true
-}
-
-/// Ranges of numbers in the text of elements.
-fn numbers(text: &str) -> Vec<(usize, usize)> {
-    let mut found = Vec::new();
-    for (at, _) in text.match_indices('>') {
-        let rest = &text[at + 1..];
-        let length = rest.find('<').unwrap_or(0);
-        if length > 0 && rest[..length].chars().all(|c| c.is_ascii_hexdigit()) {
-            found.push((at + 1, at + 1 + length));
-        }
-    }
-    found
 }
