@@ -367,6 +367,9 @@ pub enum Event {
         domain: DomainId,
         /// The new state.
         status: DomainStatus,
+        /// Evaluated cycles of this interruption that were not complete; with a complete state those of the
+        /// interruption that has ended.
+        incomplete: u64,
     },
     /// On request ([`set_command_reports`](crate::main_device::MainDevice::set_command_reports)): a datagram of process
     /// data had a wrong working counter (EC_NOTIFY_CYCCMD_WKC_ERROR). At most once a second per datagram.

@@ -483,8 +483,9 @@ fn note_change(
     if domain.state() != DomainState::Complete {
         counters.incomplete += 1;
     }
+    let incomplete = domain.count_interruption();
     if changed {
-        events.push(CyclicEvent::Domain { domain: id.0 as u16, status: domain.status(false) }.pack());
+        events.push(CyclicEvent::Domain { domain: id.0 as u16, status: domain.status(false), incomplete }.pack());
     }
 }
 

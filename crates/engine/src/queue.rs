@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Words of one message.
-pub const WORDS: usize = 2;
+pub const WORDS: usize = 3;
 
 #[derive(Debug)]
 struct Shared {
@@ -69,7 +69,7 @@ impl Consumer {
             return None;
         }
         let slot = &shared.slots[tail as usize & (shared.slots.len() - 1)];
-        let message = [slot[0].load(Ordering::Relaxed), slot[1].load(Ordering::Relaxed)];
+        let message = core::array::from_fn(|word| slot[word].load(Ordering::Relaxed));
         shared.tail.store(tail.wrapping_add(1), Ordering::Release);
         Some(message)
     }
@@ -88,12 +88,12 @@ mod tests {
     fn messages_come_out_in_order_and_an_overflow_is_counted() {
         let (mut producer, mut consumer) = queue(3);
         for value in 0..4 {
-            assert!(producer.push([value, value + 10]));
+            assert!(producer.push([value, value + 10, 0]));
         }
-        assert!(!producer.push([9, 9]));
+        assert!(!producer.push([9, 9, 9]));
         assert_eq!(consumer.dropped(), 1);
         for value in 0..4 {
-            assert_eq!(consumer.pop(), Some([value, value + 10]));
+            assert_eq!(consumer.pop(), Some([value, value + 10, 0]));
         }
         assert_eq!(consumer.pop(), None);
     }
@@ -104,7 +104,7 @@ mod tests {
         let writer = std::thread::spawn(move || {
             let mut value = 0;
             while value < 100_000 {
-                if producer.push([value, !value]) {
+                if producer.push([value, !value, value << 8]) {
                     value += 1;
                 } else {
                     std::thread::yield_now();
@@ -115,7 +115,7 @@ mod tests {
         while expected < 100_000 {
             match consumer.pop() {
                 Some(message) => {
-                    assert_eq!(message, [expected, !expected]);
+                    assert_eq!(message, [expected, !expected, expected << 8]);
                     expected += 1;
                 }
                 None => std::thread::yield_now(),

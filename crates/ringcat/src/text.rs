@@ -9,6 +9,7 @@ mod ring;
 mod scan;
 mod subdevices;
 
+use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_wire::frame::MacAddress;
 
@@ -42,9 +43,14 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
 
 fn of_process_data(event: &Event) -> Option<String> {
     Some(match event {
-        Event::Domain { domain, status } => {
+        Event::Domain { domain, status, incomplete } => {
+            let ended = match (status.state, *incomplete) {
+                (DomainState::Complete, 1) => ", after 1 incomplete cycle".to_owned(),
+                (DomainState::Complete, cycles @ 2..) => format!(", after {cycles} incomplete cycles"),
+                _ => String::new(),
+            };
             let state = status.in_words();
-            format!("domain {domain}: {state}, working counter {} of {}", status.wkc, status.expected)
+            format!("domain {domain}: {state}, working counter {} of {}{ended}", status.wkc, status.expected)
         }
         Event::Skipped { domain } => {
             format!("domain {domain}: cycle skipped, the frames of the previous cycle have not come back")

@@ -13,6 +13,8 @@ pub enum CyclicEvent {
         domain: u16,
         /// The new state.
         status: DomainStatus,
+        /// Incomplete cycles of this interruption so far, or of the one that has ended.
+        incomplete: u64,
     },
     /// A domain was due while its previous frames were still on the wire.
     Skipped {
@@ -33,10 +35,11 @@ const KIND_SKIPPED: u64 = 2;
 const KIND_SYNC_WINDOW: u64 = 3;
 
 impl CyclicEvent {
-    /// As two words: kind 8 bits, state 7, whether a frame returned 1, domain 16, then the working counters.
+    /// As words: kind 8 bits, state 7, whether a frame returned 1, domain 16, skipped cycles 32; then the working
+    /// counters; then the incomplete cycles.
     pub const fn pack(self) -> [u64; WORDS] {
         match self {
-            CyclicEvent::Domain { domain, status } => {
+            CyclicEvent::Domain { domain, status, incomplete } => {
                 let state = match status.state {
                     DomainState::Zero => 0,
                     DomainState::Incomplete => 1,
@@ -49,11 +52,12 @@ impl CyclicEvent {
                         | (domain as u64) << 16
                         | (status.skipped << 32),
                     status.wkc as u64 | (status.expected as u64) << 32,
+                    incomplete,
                 ]
             }
-            CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0],
+            CyclicEvent::Skipped { domain } => [KIND_SKIPPED | (domain as u64) << 16, 0, 0],
             CyclicEvent::SyncWindow { inside, spread_ns } => {
-                [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64]
+                [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64, 0]
             }
         }
     }
@@ -77,7 +81,7 @@ impl CyclicEvent {
                     pending: false,
                     skipped: words[0] >> 32,
                 };
-                Some(CyclicEvent::Domain { domain, status })
+                Some(CyclicEvent::Domain { domain, status, incomplete: words[2] })
             }
             KIND_SKIPPED => Some(CyclicEvent::Skipped { domain }),
             KIND_SYNC_WINDOW => {
@@ -90,7 +94,9 @@ impl CyclicEvent {
     /// The event as the application receives it.
     pub fn event(self) -> Event {
         match self {
-            CyclicEvent::Domain { domain, status } => Event::Domain { domain: DomainId(domain.into()), status },
+            CyclicEvent::Domain { domain, status, incomplete } => {
+                Event::Domain { domain: DomainId(domain.into()), status, incomplete }
+            }
             CyclicEvent::Skipped { domain } => Event::Skipped { domain: DomainId(domain.into()) },
             CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
         }
@@ -112,9 +118,10 @@ mod tests {
             ..DomainStatus::default()
         };
         let window = CyclicEvent::SyncWindow { inside: true, spread_ns: u32::MAX };
-        for event in [CyclicEvent::Domain { domain: 7, status }, CyclicEvent::Skipped { domain: 65_535 }, window] {
+        let change = CyclicEvent::Domain { domain: 7, status, incomplete: u64::MAX };
+        for event in [change, CyclicEvent::Skipped { domain: 65_535 }, window] {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(event));
         }
-        assert_eq!(CyclicEvent::unpack([0xFF, 0]), None);
+        assert_eq!(CyclicEvent::unpack([0xFF, 0, 0]), None);
     }
 }

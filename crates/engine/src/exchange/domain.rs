@@ -58,6 +58,8 @@ pub struct Domain {
     evaluated: u64,
     /// Incomplete cycles in a row in which frames were sent again.
     fruitless: u8,
+    /// Evaluated cycles since the last complete one.
+    interruption: u64,
 }
 
 /// Last reported state of a domain.
@@ -97,6 +99,7 @@ impl Domain {
             reported: Reported::Nothing { silent: 0 },
             evaluated: 0,
             fruitless: 0,
+            interruption: 0,
         }
     }
 
@@ -326,6 +329,16 @@ impl Domain {
                 is_due
             }
         }
+    }
+
+    /// Counts an evaluated cycle after [`Domain::change_state`]: incomplete cycles of this interruption, of the one that
+    /// has just ended if the cycle was complete.
+    pub(crate) fn count_interruption(&mut self) -> u64 {
+        if self.status.state == DomainState::Complete {
+            return core::mem::take(&mut self.interruption);
+        }
+        self.interruption += 1;
+        self.interruption
     }
 
     /// Whether SubDevices with process data in the domain take part.

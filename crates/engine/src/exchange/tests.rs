@@ -127,6 +127,30 @@ fn in_a_closed_ring_the_complete_copy_is_delivered_without_waiting_for_the_other
     assert!(ring.events.pop().is_some() && ring.events.pop().is_none(), "one change of state");
 }
 
+// covers: domains
+#[test]
+fn the_event_of_a_complete_cycle_counts_the_incomplete_ones_before_it() {
+    for lost in 1..5 {
+        let mut ring = Ring::new();
+        let cycle = |ring: &mut Ring, is_lost: bool| {
+            let [mut main, redundant] = ring.send();
+            process(&mut main, if is_lost { &[0, 1] } else { &[0, 1, 2] }, 0x40);
+            ring.receive(Link::Redundant, &main);
+            ring.receive(Link::Main, &redundant);
+            ring.evaluate();
+        };
+        cycle(&mut ring, false);
+        (0..lost).for_each(|_| cycle(&mut ring, true));
+        cycle(&mut ring, false);
+        let events = core::iter::from_fn(|| ring.events.pop().and_then(CyclicEvent::unpack));
+        let counts = events.map(|event| match event {
+            CyclicEvent::Domain { incomplete, .. } => incomplete,
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(counts.collect::<Vec<_>>(), [0, 1, lost]);
+    }
+}
+
 // covers: ring-merge
 #[test]
 fn inputs_of_the_first_copy_stay_where_a_second_one_was_processed_again() {

@@ -207,7 +207,7 @@ fn a_domain_without_a_response_from_the_start_is_reported_once() {
         "it does not know of it"
     );
     let told = world.events(mark).iter().filter_map(|timed| match timed.event {
-        Event::Domain { domain, status } => Some((domain, status.state, status.wkc, status.returned)),
+        Event::Domain { domain, status, .. } => Some((domain, status.state, status.wkc, status.returned)),
         _ => None,
     });
     assert_eq!(told.collect::<Vec<_>>(), [(DomainId(0), DomainState::Zero, 0, true)]);
