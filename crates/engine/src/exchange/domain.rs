@@ -331,8 +331,8 @@ impl Domain {
         }
     }
 
-    /// Counts an evaluated cycle after [`Domain::change_state`]: incomplete cycles of this interruption, of the one that
-    /// has just ended if the cycle was complete.
+    /// Counts an evaluated cycle after [`Domain::change_state`]: incomplete cycles of this interruption, or of the one
+    /// that has just ended if the cycle was complete.
     pub(crate) fn count_interruption(&mut self) -> u64 {
         if self.status.state == DomainState::Complete {
             return core::mem::take(&mut self.interruption);

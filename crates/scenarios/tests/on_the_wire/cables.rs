@@ -17,8 +17,8 @@ const CYCLE_MS: f64 = 1.0;
 const PAUSE: Duration = Duration::from_millis(550);
 /// A cut of the simulator's cables is detected after 10 us: within one cycle.
 const INNER_ALLOWED: usize = 1;
-/// Cables that may be cut and repaired once more, of 19: a stall in the kernel, or one of less than a cycle, is measured
-/// neither by the simulator nor by RingCAT, and would be taken for a fault.
+/// Cables that may be cut and repaired once more, of 19: a stall in the kernel, or one of less than a cycle, is
+/// measured neither by the simulator nor by RingCAT, and would be taken for a fault.
 const REPEATED: usize = 2;
 
 /// A cut or repair, and its result.
