@@ -29,7 +29,8 @@ const AGAIN: Duration = Duration::from_secs(10);
 const FULL: u8 = 128;
 
 /// Runs until the MainDevice stops.
-pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
+pub(super) async fn watch_errors(bus: Bus, segment: SharedSegment) {
+    segment.until_branches_are_open().await;
     let count = segment.view().subdevices().member_count();
     let mut last = vec![None; count];
     let mut versions = segment.view().versions();

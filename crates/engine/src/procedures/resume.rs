@@ -145,7 +145,7 @@ async fn verified(
                     true => all.collect(),
                     false => all.filter(|info| !replaced.contains(&info.station)).collect(),
                 };
-                match scan_again(bus, segment, options, &known).await {
+                match scan_again(bus, segment, options, (&known, &before.found)).await {
                     Ok(Some(now)) if !now.subdevices.is_empty() => {
                         found = now;
                         continue;

@@ -13,6 +13,8 @@ use super::addressed::Addressed;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
+use super::effect::Shown;
+use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
 use super::model::Declared;
 use super::port_control::BlockedPort;
@@ -44,6 +46,20 @@ pub enum ProcessDataStep {
     Joined,
 }
 
+/// Why an attempt to bring up a member has failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Problem {
+    /// It refused a state.
+    Refused {
+        /// The requested state.
+        requested: AlState,
+        /// Its AL status and code.
+        shown: Shown,
+    },
+    /// Another reason, in words.
+    Other(String),
+}
+
 /// What an attempt to bring up a member has found.
 #[derive(Debug)]
 pub enum MemberFinding<'a> {
@@ -63,6 +79,10 @@ pub enum MemberFinding<'a> {
     Held,
     /// How it takes part in process data from now on.
     ProcessData(ProcessDataStep),
+    /// The attempt has failed; it is repeated, or given up.
+    Failed(Problem),
+    /// It shows an error that is not reported yet.
+    Shows(Shown),
     /// It refused the requested state; the previous target state.
     Refused(AlState),
     /// Its SII was read again.
@@ -72,8 +92,10 @@ pub enum MemberFinding<'a> {
 /// An observation.
 #[derive(Debug)]
 pub enum Observation<'a> {
-    /// Words posted by the exchange, and carriers of the links.
+    /// Words posted by the exchange, or without an application the answer to a broadcast, and carriers of the links.
     Words(Words),
+    /// Observations without an application.
+    Idle(IdleObservation<'a>),
     /// Intermediate result of a round of reads. `others`: answers of SubDevices without a declaration.
     PartOfRound {
         /// Version of the model at the request.
@@ -116,13 +138,14 @@ pub enum Observation<'a> {
     },
     /// An application declares SubDevices.
     Activated(Box<Declared>),
+    /// Both halves know the declaration: the procedures of the application begin. The configuration begins at once, or
+    /// with clocks when they are set up: an answer meanwhile is not a return.
+    Attached,
     /// The application ends. The result of the scan stays.
     Deactivated,
 
     /// The configuration of all present members may begin.
     Started,
-    /// They will be configured later: an answer meanwhile is not a return.
-    Delayed,
     /// A finding of an attempt to bring up a member. It is refused if that is no longer the current attempt: the member
     /// was lost, or another attempt has begun.
     OfMember {

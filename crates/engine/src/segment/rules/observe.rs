@@ -21,7 +21,9 @@ impl Segment {
     /// Processes an observation.
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
-            Observation::Words(words) => self.observe_words(&words, now, effects),
+            Observation::Words(words) if self.is_active() => self.observe_words(&words, now, effects),
+            Observation::Words(words) => self.observe_idle_words(&words, now, effects),
+            Observation::Idle(seen) => self.observe_idle(seen, now, effects),
             Observation::PartOfRound { versions, readings, others, counted } => {
                 self.observe_part_of_round(versions, readings, others, counted);
             }
@@ -34,10 +36,10 @@ impl Segment {
             Observation::ScanEnded(result) => self.end_scan(result, effects),
             Observation::FoundAgain { versions, found } => self.find_again(versions, found),
             Observation::Activated(declared) => self.activate(*declared, effects),
+            Observation::Attached => self.begin_procedures(effects),
             Observation::Deactivated => self.deactivate(),
             Observation::SiiCompleted { station, read } => self.observe_whole_sii(station, read, effects),
             Observation::Started => self.start_all(effects),
-            Observation::Delayed => self.delay_all(),
             Observation::OfMember { index, attempt, finding } => {
                 self.observe_finding((index, attempt), finding, now, effects);
             }

@@ -7,7 +7,8 @@ use ringcat_wire::address::StationAddress;
 
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::segment::effect::{Effect, Effects};
+use crate::segment::effect::{Effect, Effects, Task, Watch};
+use crate::segment::idle::Comparison;
 use crate::segment::model::{Declared, Segment};
 use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
@@ -22,6 +23,7 @@ impl Segment {
             self.addresses.change();
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning;
+            self.idle.compared = Comparison::Open;
         }
     }
 
@@ -45,7 +47,7 @@ impl Segment {
 
     /// The segment was scanned again without an application. A result from before a scan or an application is refused.
     pub(in crate::segment) fn find_again(&mut self, versions: Versions, found: Rc<Found>) {
-        let is_valid = versions.addresses == self.addresses.version();
+        let is_valid = self.are_addresses_as_in(versions);
         if let Stage::Scanned(scanned) = &mut self.stage
             && is_valid
         {
@@ -89,6 +91,28 @@ impl Segment {
         effects.0.push(Effect::Occupants(self.occupants()));
     }
 
+    /// The procedures of the application begin.
+    pub(in crate::segment) fn begin_procedures(&mut self, effects: &mut Effects) {
+        let (has_clocks, is_supervised) = (self.clocks.are_declared(), self.choices.supervision);
+        let watches = [
+            (Watch::Clocks, has_clocks),
+            (Watch::Supervision, is_supervised),
+            (Watch::Registers, is_supervised),
+            (Watch::Errors, is_supervised),
+            (Watch::Siis, true),
+            (Watch::Mail, true),
+            (Watch::Requests, true),
+            (Watch::Statistics, true),
+        ];
+        for (watch, _) in watches.into_iter().filter(|(_, is_needed)| *is_needed) {
+            effects.start(Task::Watch(watch));
+        }
+        match has_clocks {
+            true => self.delay_all(),
+            false => self.start_all(effects),
+        }
+    }
+
     /// The application ends, or a scan is given up. What the last scan has found stays, and another declaration may
     /// follow at once.
     pub(in crate::segment) fn deactivate(&mut self) {
@@ -112,11 +136,13 @@ impl Segment {
             declared.subdevices = declared.subdevices.keeping(before);
         }
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
+        let idle = self.idle.renewed();
         *self = Segment {
             stage,
             addresses,
             keeping,
             slot,
+            idle,
             frames_tested_until,
             first_attempt,
             ..Segment::of(declared, choices)

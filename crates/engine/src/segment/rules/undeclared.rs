@@ -101,7 +101,7 @@ impl Segment {
     }
 
     /// Each undeclared SubDevice without a requested state is to go to PREOP.
-    fn take_over(&mut self, now: Instant) {
+    pub(in crate::segment) fn take_over(&mut self, now: Instant) {
         self.touch();
         for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
             if it.is_untouched(knowledge) {
@@ -152,7 +152,7 @@ impl Segment {
         effects: &mut Effects,
     ) {
         let key = match subdevice {
-            Addressed::Member(index) => return self.request(index, state),
+            Addressed::Member(index) => return self.request(index, state, effects),
             Addressed::Undeclared(key) => key,
         };
         self.touch();
@@ -209,7 +209,7 @@ impl Segment {
     }
 
     /// States were read. SubDevices that left theirs without a request are brought back.
-    fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
         if !self.keeping.is_on {
             return;
         }
