@@ -129,10 +129,11 @@ pub enum Observation<'a> {
         /// The SubDevices.
         found: Rc<Found>,
     },
-    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part.
+    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part. It is refused if another
+    /// SubDevice has got the address since.
     SiiCompleted {
-        /// Its station address.
-        station: StationAddress,
+        /// The SubDevice at the request.
+        key: SubDeviceKey,
         /// Its data.
         read: &'a SubDeviceInfo,
     },
@@ -211,21 +212,26 @@ pub enum Observation<'a> {
     },
     /// An unassigned SubDevice matches no declaration.
     Unexpected(SubDeviceKey),
-    /// An unassigned SubDevice is a member but does not fit its declaration.
+    /// An unassigned SubDevice is a member but does not fit its declaration. It is refused if the member has come back
+    /// since.
     Misfit {
         /// The unassigned SubDevice.
         key: SubDeviceKey,
         /// The member.
         index: usize,
+        /// The member's attempt when it was compared.
+        attempt: u32,
         /// Why.
         reason: String,
     },
-    /// An unassigned SubDevice may be this member, or another one of the same kind.
+    /// An unassigned SubDevice may be this member, or another one of the same kind. It is refused as a misfit is.
     Held {
         /// The unassigned SubDevice.
         key: SubDeviceKey,
         /// The member.
         index: usize,
+        /// The member's attempt when it was compared.
+        attempt: u32,
     },
     /// An unassigned SubDevice was identified as a member and has got its address.
     Admitted {

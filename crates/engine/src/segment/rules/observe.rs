@@ -38,7 +38,7 @@ impl Segment {
             Observation::Activated(declared) => self.activate(*declared, effects),
             Observation::Attached => self.begin_procedures(effects),
             Observation::Deactivated => self.deactivate(),
-            Observation::SiiCompleted { station, read } => self.observe_whole_sii(station, read, effects),
+            Observation::SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
             Observation::Started => self.start_all(effects),
             Observation::OfMember { index, attempt, finding } => {
                 self.observe_finding((index, attempt), finding, now, effects);
@@ -55,8 +55,10 @@ impl Segment {
             Observation::Searched(result) => self.observe_search(result, effects),
             Observation::Read { key, read } => self.observe_read(key, read, effects),
             Observation::Unexpected(key) => self.observe_unexpected(key, effects),
-            Observation::Misfit { key, index, reason } => self.observe_misfit(key, index, reason, effects),
-            Observation::Held { key, index } => self.hold(key, index, now, effects),
+            Observation::Misfit { key, index, attempt, reason } => {
+                self.observe_misfit(key, (index, attempt), reason, effects);
+            }
+            Observation::Held { key, index, attempt } => self.hold(key, (index, attempt), now, effects),
             Observation::Admitted { key, index, attempt, info } => {
                 self.observe_admitted(key, (index, attempt), *info, effects);
             }

@@ -3,12 +3,11 @@
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 
-use ringcat_wire::address::StationAddress;
-
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Effect, Effects, Task, Watch};
 use crate::segment::idle::Comparison;
+use crate::segment::key::SubDeviceKey;
 use crate::segment::model::{Declared, Segment};
 use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
@@ -61,13 +60,16 @@ impl Segment {
     /// there is other data since then.
     pub(in crate::segment) fn observe_whole_sii(
         &mut self,
-        station: StationAddress,
+        key: SubDeviceKey,
         read: &SubDeviceInfo,
         effects: &mut Effects,
     ) {
+        if self.subdevices.at(key.station).is_none_or(|it| it.key != key) {
+            return;
+        }
         let Some(scanned) = self.stage.scanned_mut() else { return };
         let found = Rc::make_mut(&mut scanned.found);
-        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == station) else { return };
+        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == key.station) else { return };
         let mut info = (**known).clone();
         for warning in info.extend(read) {
             effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
