@@ -42,8 +42,8 @@ impl MainDevice {
         let scan = self.found_to_begin().ok_or(ActivateError::NoScan)?;
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
-        let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;
-        let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
+        let (found, unassigned) = match_declaration(&self.segment, &declaration, &scan)?;
+        let topology = loaded.topology((&bus, &self.segment), self.options.junctions, &scan, &found)?;
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
@@ -55,7 +55,7 @@ impl MainDevice {
         let subdevices = SubDevices::new(members, unassigned);
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &subdevices);
         let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
-        report_oddities(&bus, &subdevices, &layout);
+        report_oddities(&self.segment, &subdevices, &layout);
         let count = subdevices.member_count();
         let optional = subdevices.members().map(|member| member.config.optional).collect();
         let addresses = subdevices.members().map(|member| member.station).collect();

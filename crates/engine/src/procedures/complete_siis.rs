@@ -13,7 +13,7 @@ use super::scan::read_whole;
 use super::services::ServiceError;
 use super::shared_segment::SharedSegment;
 use super::sii;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::segment::member::Phase;
 use crate::segment::{Observation, SubDeviceKey};
@@ -59,7 +59,7 @@ pub(crate) async fn complete_in_background(bus: Bus, segment: SharedSegment) {
         if attempt == ATTEMPTS {
             for (position, error) in failed {
                 let what = alloc::format!("the rest of the SII, with its names, cannot be read: {error}");
-                bus.report(Event::SiiOddity { position, what });
+                bus.notice(Notice::SiiOddity { position, what });
             }
             return;
         }

@@ -63,8 +63,8 @@ pub(super) async fn watch_errors(bus: Bus, segment: SharedSegment) {
         let now = bus.now();
         let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
             watched.iter_mut().map(|watched| watched.close(now)).unzip();
-        segment.observe(Observation::CableErrors { versions, fresh: &fresh });
-        events.into_iter().flatten().for_each(|event| bus.report(event));
+        let rising = events.into_iter().flatten().collect();
+        segment.observe(Observation::CableErrors { versions, fresh: &fresh, rising });
     }
 }
 

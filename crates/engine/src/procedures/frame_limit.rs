@@ -12,7 +12,6 @@ use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
 use super::shared_segment::SharedSegment;
-use crate::event::Event;
 use crate::ring::FrameLimit;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
@@ -85,7 +84,6 @@ pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
     // Set first: the calling procedure may end before the result arrives.
     segment.observe(Observation::FramesTested(bus.now() + PAUSE));
     if let Some(limit) = probe(bus).await {
-        segment.observe(Observation::FramesTested(Instant::NEVER));
-        bus.report(Event::FrameLimit { limit });
+        segment.observe(Observation::FramesLimited(limit));
     }
 }

@@ -22,7 +22,7 @@ pub(crate) use changes::{nothing, scan_again};
 pub(crate) use rescue::rescue;
 
 use super::inspect::read_subdevice;
-use super::scan::{ScanError, ScanOptions, scan};
+use super::scan::{ScanError, ScanOptions, end_scan, scan};
 use super::shared_segment::{SharedSegment, until_active};
 use crate::board::{RingWord, Supervision};
 use crate::event::Subject;
@@ -76,7 +76,7 @@ async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32) {
 pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: ScanOptions) {
     until_active(&segment, async {
         let ended = scan(&bus, &options).await.map_err(|error| error.to_string());
-        segment.observe(Observation::ScanEnded(ended));
+        end_scan(&segment, ended);
         segment.observe_idle(IdleObservation::Scanned);
     })
     .await;

@@ -3,9 +3,10 @@
 use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::String;
+use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
@@ -26,7 +27,10 @@ use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
+use crate::declared::SubDeviceId;
+use crate::event::Event;
 use crate::info::SubDeviceInfo;
+use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::time::Instant;
 use crate::topology::NodeStatus;
@@ -87,6 +91,10 @@ pub enum MemberFinding<'a> {
     Refused(AlState),
     /// Its SII was read again.
     ReadAgain(&'a SubDeviceInfo),
+    /// It cannot be read again; the reason.
+    NotReadAgain(String),
+    /// What it refuses differs from its own description.
+    Oddity(String),
 }
 
 /// An observation.
@@ -115,11 +123,15 @@ pub enum Observation<'a> {
     RoundWanted,
     /// Another round is requested after a pause.
     RoundWantedIn(Duration),
-    /// It was tested how many datagrams a frame may hold. Until this time no other test is necessary.
+    /// It is tested how many datagrams a frame may hold. Until this time no other test is necessary.
     FramesTested(Instant),
+    /// A frame may hold this number of datagrams: no other test is necessary.
+    FramesLimited(FrameLimit),
 
     /// A scan of the segment begins, with new station addresses.
     ScanBegun,
+    /// What it has found, in events; refused if it was given up.
+    ScanShows(Vec<Event>),
     /// It has ended; the reason if it failed.
     ScanEnded(Result<Scan, String>),
     /// The segment was scanned again without an application; SubDevices in place have kept their addresses.
@@ -137,6 +149,8 @@ pub enum Observation<'a> {
         /// Its data.
         read: &'a SubDeviceInfo,
     },
+    /// What the comparison of a declaration with the scan shows.
+    Compared(Event),
     /// An application declares SubDevices.
     Activated(Box<Declared>),
     /// Both halves know the declaration: the procedures of the application begin. The configuration begins at once, or
@@ -163,6 +177,15 @@ pub enum Observation<'a> {
         index: usize,
         /// Number of the mapping for which they were read.
         mapping: u32,
+    },
+    /// A member does not deliver its inputs.
+    NotProven {
+        /// The member.
+        index: usize,
+        /// Number of the mapping for which they were read.
+        mapping: u32,
+        /// What is missing.
+        what: String,
     },
     /// The application requests a state of a SubDevice.
     Requested {
@@ -254,6 +277,13 @@ pub enum Observation<'a> {
         /// The redundant link was down during the check.
         in_control: bool,
     },
+    /// Declared SubDevices that a rescan has found at other positions: from, and to.
+    Moved {
+        /// Version of the model at the request.
+        versions: Versions,
+        /// Index in the declaration, position before, position now.
+        moved: Vec<(SubDeviceId, Position, Position)>,
+    },
     /// A rescan of the whole segment has ended.
     Rescanned {
         /// Version of the model at the request.
@@ -271,6 +301,8 @@ pub enum Observation<'a> {
         versions: Versions,
         /// The new errors.
         fresh: &'a [CableErrors],
+        /// What is to be reported of them.
+        rising: Vec<Event>,
     },
 
     /// Clocks were measured, written, read or lost.

@@ -13,7 +13,6 @@ use ringcat_wire::sii::Identity;
 
 use super::address::view;
 use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
@@ -98,8 +97,8 @@ impl Rescan {
 /// Scans until the segment is stable and all are identified, or until the limit; then returns the last result. Moves
 /// are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
-    let (rescan, _) = scan_until(bus, segment, limit).await?;
-    report_moved(bus, &rescan);
+    let (rescan, versions, _) = scan_until(bus, segment, limit).await?;
+    observe_moved(segment, versions, &rescan);
     Ok(rescan)
 }
 
@@ -124,19 +123,21 @@ async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> 
     if !segment.view().is_whole(&segment.words()) {
         return false;
     }
-    let Ok((rescan, true)) = scan_until(bus, segment, limit).await else { return false };
-    report_moved(bus, &rescan);
+    let Ok((rescan, versions, true)) = scan_until(bus, segment, limit).await else { return false };
+    observe_moved(segment, versions, &rescan);
     true
 }
 
-fn report_moved(bus: &Bus, rescan: &Rescan) {
-    for (subdevice, from, to) in rescan.moved() {
-        bus.report(Event::Moved { subdevice, from, to });
-    }
+fn observe_moved(segment: &SharedSegment, versions: Versions, rescan: &Rescan) {
+    segment.observe(Observation::Moved { versions, moved: rescan.moved().collect() });
 }
 
-/// Also returns whether the cabling was taken over.
-async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
+/// Also returns the versions at its begin, and whether the cabling was taken over.
+async fn scan_until(
+    bus: &Bus,
+    segment: &SharedSegment,
+    limit: Duration,
+) -> Result<(Rescan, Versions, bool), ServiceError> {
     let until = bus.now() + limit;
     segment.observe(Observation::RoundWanted);
     loop {
@@ -151,7 +152,7 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
         match scanned {
             Ok(Some(rescan)) if is_last || (rescan.is_complete() && segment.view().are_places_valid(versions)) => {
                 let is_adopted = rescan.is_complete() && adopt(segment, versions, &rescan);
-                return Ok((rescan, is_adopted));
+                return Ok((rescan, versions, is_adopted));
             }
             Ok(None) if is_last => return Err(ServiceError::Unsteady),
             Err(error) if is_last => return Err(error.into()),

@@ -3,7 +3,7 @@
 
 use alloc::format;
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use core::time::Duration;
 
 use ringcat_wire::address::Wkc;
@@ -262,6 +262,8 @@ impl Segment {
             }
             MemberFinding::Refused(before) => self.refuse(index, before),
             MemberFinding::ReadAgain(info) => self.observe_info(index, info, effects),
+            MemberFinding::NotReadAgain(reason) => effects.report(Event::ScanFailed { reason }),
+            MemberFinding::Oddity(what) => effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what }),
         }
     }
 
@@ -366,6 +368,18 @@ impl Segment {
     pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
         if self.member(index).is_some_and(|member| member.mapping == mapping) {
             self.board.set_unproven(index, false);
+        }
+    }
+
+    /// A member does not deliver the inputs of a mapping.
+    pub(in crate::segment) fn observe_missing_inputs(
+        &mut self,
+        (index, mapping): (usize, u32),
+        what: String,
+        effects: &mut Effects,
+    ) {
+        if self.member(index).is_some_and(|member| member.is_mapped_as(mapping)) {
+            effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
         }
     }
 

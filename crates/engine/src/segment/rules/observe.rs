@@ -1,5 +1,8 @@
 //! Dispatch of observations.
 
+use alloc::vec::Vec;
+
+use crate::event::Event;
 use crate::ring_status::CableErrors;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
@@ -32,7 +35,13 @@ impl Segment {
             Observation::RoundWanted => self.attention.want(),
             Observation::RoundWantedIn(pause) => self.attention.again_in(pause, now),
             Observation::FramesTested(until) => self.frames_tested_until = until,
+            Observation::FramesLimited(limit) => {
+                self.frames_tested_until = Instant::NEVER;
+                effects.report(Event::FrameLimit { limit });
+            }
             Observation::ScanBegun => self.begin_scan(),
+            Observation::ScanShows(findings) => self.report_findings(findings, effects),
+            Observation::Compared(event) => effects.report(event),
             Observation::ScanEnded(result) => self.end_scan(result, effects),
             Observation::FoundAgain { versions, found } => self.find_again(versions, found),
             Observation::Activated(declared) => self.activate(*declared, effects),
@@ -44,6 +53,9 @@ impl Segment {
                 self.observe_finding((index, attempt), finding, now, effects);
             }
             Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
+            Observation::NotProven { index, mapping, what } => {
+                self.observe_missing_inputs((index, mapping), what, effects);
+            }
             Observation::Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
             Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
             Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
@@ -68,7 +80,10 @@ impl Segment {
             }
             Observation::Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
-            Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
+            Observation::Moved { versions, moved } => self.observe_moved(versions, moved, effects),
+            Observation::CableErrors { versions, fresh, rising } => {
+                self.observe_cable_errors(versions, (fresh, rising), effects);
+            }
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
             Observation::Wanted(wanted) => self.slot.want(wanted),
             Observation::Undisturbed(number) => self.slot.end(number),
@@ -83,7 +98,12 @@ impl Segment {
         }
     }
 
-    fn observe_cable_errors(&mut self, versions: Versions, fresh: &[CableErrors]) {
+    fn observe_cable_errors(
+        &mut self,
+        versions: Versions,
+        (fresh, rising): (&[CableErrors], Vec<Event>),
+        effects: &mut Effects,
+    ) {
         // If the cabling was replaced since, the counts belong to other cables.
         if versions.cabling != self.cabling.version {
             return;
@@ -91,6 +111,7 @@ impl Segment {
         for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
             *total = total.plus(*fresh);
         }
+        rising.into_iter().for_each(|event| effects.report(event));
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {

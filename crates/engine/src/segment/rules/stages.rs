@@ -2,6 +2,7 @@
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -23,6 +24,13 @@ impl Segment {
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning;
             self.idle.compared = Comparison::Open;
+        }
+    }
+
+    /// What the scan under way has found.
+    pub(in crate::segment) fn report_findings(&self, findings: Vec<Event>, effects: &mut Effects) {
+        if self.is_scanning() {
+            findings.into_iter().for_each(|event| effects.report(event));
         }
     }
 

@@ -115,6 +115,9 @@ impl Segment {
         self.touch();
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             let Some(kept) = kept.iter().find(|kept| kept.station == key.station) else { continue };
+            if let Some((status, code)) = kept.has_left {
+                effects.report(Event::UndeclaredState { position: it.position, status, code });
+            }
             let upkeep = it.upkeep.insert(Upkeep::handed_over(kept.target, kept.progress));
             if (kept.target, kept.progress) == (AlState::Op, UpkeepProgress::Reached) {
                 effects.start(Task::KeepOutputs { key, attempt: upkeep.attempt });

@@ -299,6 +299,46 @@ fn a_rescan_is_not_taken_over_after_the_cabling_or_an_address_has_changed() {
 }
 
 #[test]
+fn cable_errors_moves_and_missing_inputs_from_before_a_change_are_not_reported() {
+    let moved = || vec![(SubDeviceId(1), Position(1), Position(2))];
+    for is_stale in [true, false] {
+        let mut ring = Ring::closed(3);
+        let attempt = ring.member(0).attempt;
+        ring.observe(of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Mapped)));
+        let (versions, mapping) = (ring.segment.versions(), ring.member(0).mapping);
+        let (cable, _) = ring.segment.cabling.cables[0];
+        let rising = vec![Event::CableErrors { cable, errors: CableErrors::default() }];
+        if is_stale {
+            recable(&mut ring);
+            ring.observe(Observation::Readdressing(&[]));
+            ring.observe(of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Mapped)));
+        }
+        let missing = Observation::NotProven { index: 0, mapping, what: "no inputs".into() };
+        let shown = [
+            ring.observe(Observation::CableErrors { versions, fresh: &[], rising }),
+            ring.observe(Observation::Moved { versions, moved: moved() }),
+            ring.observe(missing),
+        ];
+        let reported = shown.map(|effects| reports(&effects).len());
+        assert_eq!(reported, if is_stale { [0; 3] } else { [1; 3] }, "stale: {is_stale}");
+    }
+}
+
+#[test]
+fn what_a_scan_has_found_is_not_reported_after_it_was_given_up() {
+    for is_given_up in [true, false] {
+        let mut ring = Ring::closed(2);
+        ring.observe(Observation::Deactivated);
+        ring.observe(Observation::ScanBegun);
+        if is_given_up {
+            ring.observe(Observation::Deactivated);
+        }
+        let effects = ring.observe(Observation::ScanShows(vec![Event::ScanFinished { subdevices: 2 }]));
+        assert_eq!(reports(&effects).len(), usize::from(!is_given_up), "given up: {is_given_up}");
+    }
+}
+
+#[test]
 fn temporary_addresses_are_used_in_turn_and_without_those_in_use() {
     let mut ring = Ring::closed(3);
     let next = |ring: &mut Ring| {
