@@ -15,7 +15,6 @@ use super::shared_segment::SharedSegment;
 use crate::ring::FrameLimit;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
-use crate::time::Instant;
 
 /// Largest number of datagrams tested: with a byte of data each, they nearly fill a frame.
 const MOST: usize = 110;

@@ -25,7 +25,7 @@ use crate::topology::Topology;
 
 /// Pause between two scans.
 const PAUSE: Duration = Duration::from_millis(10);
-/// Maximum wait of a scan for the end of a disturbance; then it is repeated.
+/// Shortest wait for the end of other disturbances; otherwise a scan waits as long as its limit lasts.
 const LIMIT: Duration = Duration::from_millis(100);
 
 /// Maximum time for the segment to become stable after a group has joined or left.
@@ -142,7 +142,7 @@ async fn scan_until(
     segment.observe(Observation::RoundWanted);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
-        let turn = segment.disturb(Disturbance::Rescan, LIMIT).await;
+        let turn = segment.disturb(Disturbance::Rescan, LIMIT.max(until.since(bus.now()))).await;
         let versions = segment.view().versions();
         let scanned = if turn.is_some() { scan_once(bus, segment).await } else { Ok(None) };
         drop(turn);

@@ -134,7 +134,7 @@ fn a_member_that_came_back_by_itself_is_reported_neither_as_held_nor_as_unfit() 
             false => Observation::Misfit { key, index: 0, attempt, reason: "a reason".into() },
         };
         // Held SubDevices are reported after a second.
-        let mut observe = |ring: &mut Ring, attempt| {
+        let observe = |ring: &mut Ring, attempt| {
             let first = ring.observe(seen(attempt));
             ring.now += Duration::from_secs(2);
             reports(&[first, ring.observe(seen(attempt))].concat())
