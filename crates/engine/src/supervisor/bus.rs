@@ -100,7 +100,7 @@ impl Bus {
     }
 
     /// Reports an event: an effect of an observation. Procedures report [`Notice`]s.
-    pub(crate) fn report(&self, event: Event) {
+    pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
     }
