@@ -86,6 +86,9 @@ pub(crate) async fn resume(
     let reached = kept.iter().filter(|kept| kept.progress == KnownProgress::Reached);
     let (subdevices, in_state) = (found.subdevices.len(), reached.count());
     bus.report(Event::Resumed { subdevices, in_state, differs });
+    if before.handover == Handover::Orderly {
+        before.all.iter().for_each(|known| report_cut(bus, known, &found.subdevices));
+    }
     left.into_iter().for_each(|(position, status, code)| bus.report(Event::UndeclaredState { position, status, code }));
     go_on(bus, segment, &kept, before.handover);
     if before.handover == Handover::AfterCrash {
@@ -93,6 +96,15 @@ pub(crate) async fn resume(
         clear(bus, left.cloned().collect()).await;
     }
     Ok(())
+}
+
+/// Reports conversations with a mailbox that the hand-over has cut.
+fn report_cut(bus: &Bus, known: &Known, found: &[Rc<SubDeviceInfo>]) {
+    let position = found.iter().find(|info| info.station == known.info.station).map(|info| info.position);
+    let protocols = known.mailbox.iter().flat_map(KnownMailbox::cut_protocols);
+    for (protocol, position) in protocols.filter_map(|protocol| Some((protocol, position?))) {
+        bus.report(Event::ConversationCut { position, protocol });
+    }
 }
 
 /// Tells the model which SubDevices go on as they are, and their mailboxes their counters.
