@@ -56,7 +56,9 @@ impl MainDevice {
         let (was_active, was_scanning) = (self.active().is_some(), self.segment.view().is_scanning());
         let (kept, mailboxes) = self.left();
         let rings = core::mem::take(&mut *self.emergencies.borrow_mut());
+        let carriers = self.supervisor.bus().carriers();
         self.end_application(self.supervisor.bus().now());
+        self.supervisor.set_carriers(carriers);
         if !was_active {
             *self.emergencies.borrow_mut() = rings;
         }

@@ -56,7 +56,7 @@ impl Host {
     }
 
     /// The reference clock's true time minus the application's.
-    fn error_ns(&self, world: &World) -> i64 {
+    pub fn error_ns(&self, world: &World) -> i64 {
         let network = world.network();
         network.device(DeviceIndex(0)).controller.system_time(network.now()).wrapping_sub(self.time(world)) as i64
     }

@@ -134,6 +134,11 @@ impl Clocks {
         Link::ALL.into_iter().filter(|link| links[link.index()]).collect()
     }
 
+    /// Number of SubDevices that were measured last.
+    pub fn measured_count(&self) -> Option<usize> {
+        self.last.as_ref().map(|measured| measured.stations.len())
+    }
+
     /// What is known for the next set-up, if the last measurement is that of the segment.
     pub(in crate::segment) fn known(&self) -> Option<KnownClocks> {
         let Running { delays: Delays::Valid, unwritten, .. } = self.running()? else { return None };

@@ -115,9 +115,9 @@ fn signals_of_absent_subdevices_are_no_obstacle_without_any_clock() {
     for (count, mut ecrt) in requested().filter(|(count, _)| *count > 1) {
         ecrt.network().apply(Fault::PowerOff(DeviceIndex(0)));
         ecrt.pause(std::time::Duration::from_millis(500));
-        let config = ecrt.slave_config(0, 0, identity(KINDS[0])).expect("it is new");
+        let domain = ecrt.create_domain().expect("it is requested");
+        let config = configure_named(&mut ecrt, 0, KINDS[0], domain);
         ecrt.dc(config, 0x0300, 1_000_000, 0);
-        ecrt.with_clocks();
         ecrt.activate().expect("it is absent");
         ecrt.cycles(300);
         ecrt.network().apply(Fault::PowerOn(DeviceIndex(0)));

@@ -6,6 +6,7 @@ use ringcat::{Limits, Pending, SdoAddress, SdoError};
 use ringcat_engine::mail::Mailbox;
 use ringcat_engine::mail::foe::{self, FoeOptions};
 use ringcat_engine::mail::stream::{Bounded, Bytes};
+use ringcat_sim::application::foe::firmware;
 use ringcat_wire::mailbox::Protocol;
 use scenarios::segments::describe;
 
@@ -34,7 +35,8 @@ fn file_options() -> FoeOptions {
 /// Writes a file with the work of a procedure.
 fn write_file(mailbox: Mailbox, name: &'static str) {
     mailbox.bus().clone().spawn(async move {
-        let mut source = Bytes::new(&[0x5A; FILE]);
+        let image = firmware::image("2.6", &[0x5A; FILE]);
+        let mut source = Bytes::new(&image);
         let _ = foe::write(&mailbox, name, file_options(), &mut source, |_| ()).await;
     });
 }
@@ -121,17 +123,17 @@ fn a_handover_of_a_subdevice_in_boot_keeps_it_there_with_its_mailbox() {
         for after_us in after_us() {
             let mut former = owner(is_ring);
             former.subdevice(DRIVE).request_state(AlState::Boot).expect("it follows");
-            write_file(mailbox(&former), "firmware");
+            write_file(mailbox(&former), "firmware.bin");
             former.attend(Duration::from_micros(after_us));
             let mut next = hand_over(former, Handover::Orderly);
             let text = format!("ring {is_ring}, after {after_us} us");
             assert_eq!(statuses(&mut next)[1], AlStatus::new(AlState::Boot), "{text}");
-            let is_named = cut(&mut next);
-            assert_eq!(is_named, [Protocol::Foe], "{text}");
+            assert_eq!(cut(&mut next), [Protocol::Foe], "{text}");
             let handle = mailbox(&next);
             let mut work = next.engine_mut().start(async move {
-                let mut source = Bytes::new(&[0x11; 2_000]);
-                let done = foe::write(&handle, "firmware", file_options(), &mut source, |_| ()).await;
+                let image = firmware::image("2.7", &[0x11; 2_000]);
+                let mut source = Bytes::new(&image);
+                let done = foe::write(&handle, "firmware.bin", file_options(), &mut source, |_| ()).await;
                 done.map_err(|error| error.to_string())
             });
             next.attend(Duration::from_secs(5));
