@@ -83,7 +83,7 @@ impl MainDevice {
                 _ if is_reached => UpkeepProgress::Reached,
                 _ => UpkeepProgress::Due(self.supervisor.bus().now()),
             };
-            states.push(KeptState { station: key.station, target: upkeep.target, progress });
+            states.push(KeptState { station: key.station, target: upkeep.target, progress, has_left: None });
             let mailbox = self.segment.undeclared.of(key).filter(|_| is_reached);
             mailboxes.extend(mailbox.and_then(|mailbox| mailbox.in_use().zip(mailbox.known())));
         }

@@ -37,6 +37,7 @@ mod explorer;
 mod failures;
 mod fairness;
 mod false_crossings;
+mod flapping;
 mod frame_limits;
 mod freshness;
 mod hot_connect;
