@@ -80,9 +80,8 @@ impl Measured {
         {
             (Some(before), Some(now)) => {
                 let both = before.iter().zip(port_times(now)).zip(ports);
-                both.filter(|(_, arrives)| **arrives).all(|((before, now), _)| {
-                    now.wrapping_sub(*before).wrapping_add(SAME_NS) <= 2 * SAME_NS
-                })
+                both.filter(|(_, arrives)| **arrives)
+                    .all(|((before, now), _)| now.wrapping_sub(*before).wrapping_add(SAME_NS) <= 2 * SAME_NS)
             }
             (before, now) => before.is_none() && now.is_none(),
         };

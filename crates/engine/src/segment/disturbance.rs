@@ -215,7 +215,7 @@ mod tests {
                 }
             }
         }
-        println!("at most {most} turns of others, at least {fewest} turns of each kind");
+        std::println!("at most {most} turns of others, at least {fewest} turns of each kind");
         assert!(fewest >= 100, "{fewest}");
     }
 
