@@ -120,7 +120,7 @@ fn a_handover_within_a_file_is_named_and_another_file_can_be_written_at_once() {
     }
 }
 
-// covers: mailbox, foe, boot, states
+// covers: mailbox, foe, states
 #[test]
 fn a_handover_of_a_subdevice_in_boot_keeps_it_there_with_its_mailbox() {
     for is_ring in [false, true] {
