@@ -9,7 +9,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use super::cable_ends::{End, Ends, ends};
-use super::measured::KnownCable;
+use super::known_cable::KnownCable;
 use super::sums::{Sum, solve};
 
 /// Sums of cables that are kept: many more than a segment has forks without a clock.

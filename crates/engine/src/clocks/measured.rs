@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use super::cable_ends::End;
 use super::delay::Passage;
 use super::delays::Delays;
+use super::known_cable::KnownCable;
 use super::measurement::Latched;
 use super::wiring::Wiring;
 
@@ -33,17 +33,6 @@ pub struct Measured {
     pub wiring: Wiring,
     /// Times of the ports after that of the processing unit as one frame latched them, by position.
     pub port_times: Vec<Option<[u32; 4]>>,
-}
-
-/// The measured time of one cable, or of several together.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct KnownCable {
-    /// Both ends of each cable; a cable counts as often as it is listed.
-    pub ends: Vec<(End, End)>,
-    /// The time, with fraction.
-    pub time: i64,
-    /// A cable was disconnected since the measurement.
-    pub is_old: bool,
 }
 
 /// What is known of the clocks of a segment, for their next set-up.
@@ -80,9 +69,8 @@ impl Measured {
         {
             (Some(before), Some(now)) => {
                 let both = before.iter().zip(port_times(now)).zip(ports);
-                both.filter(|(_, arrives)| **arrives).all(|((before, now), _)| {
-                    now.wrapping_sub(*before).wrapping_add(SAME_NS) <= 2 * SAME_NS
-                })
+                both.filter(|(_, arrives)| **arrives)
+                    .all(|((before, now), _)| now.wrapping_sub(*before).wrapping_add(SAME_NS) <= 2 * SAME_NS)
             }
             (before, now) => before.is_none() && now.is_none(),
         };

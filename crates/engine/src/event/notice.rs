@@ -47,11 +47,11 @@ pub(crate) enum Notice {
         /// The segment was not as known.
         differs: bool,
     },
-    /// The hand-over has cut a conversation with a mailbox: known from the bytes of the former owner.
+    /// The hand-over has cut a conversation of the former owner: said once.
     ConversationCut {
         /// Position.
         position: Position,
-        /// Protocol of the conversation.
+        /// Its protocol.
         protocol: Protocol,
     },
     /// The link layer has refused an order.

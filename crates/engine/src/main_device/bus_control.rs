@@ -51,8 +51,7 @@ impl MainDevice {
 
     /// Ends all procedures.
     fn end_all(&mut self) {
-        let denied =
-            |function| NotPermitted { function, role: MainDeviceRole::Inactive, denial: Denial::NeedsTheBus };
+        let denied = |function| NotPermitted { function, role: MainDeviceRole::Inactive, denial: Denial::NeedsTheBus };
         let (was_active, was_scanning) = (self.active().is_some(), self.segment.view().is_scanning());
         let (kept, mailboxes) = self.left();
         let rings = core::mem::take(&mut *self.emergencies.borrow_mut());

@@ -29,7 +29,8 @@ const UNEVEN_NS: u64 = 1_500;
 // covers: 7.2, 7.3, dc-reference, dc-sync
 #[test]
 fn no_pulse_is_missing_while_a_jump_is_made_up_and_all_are_together_after_5_s() {
-    for (kind, count, jump) in SEGMENTS.iter().flat_map(|(kind, count, all)| all.iter().map(|it| (*kind, *count, *it)))
+    for (kind, count, jump) in
+        SEGMENTS.iter().flat_map(|(kind, count, all)| all.iter().map(move |it| (*kind, *count, *it)))
     {
         let config = config().with_bus_shift(true).with_pulse_grid(PulseGrid::FirstApplicationTime);
         let mut host = Host { base: EPOCH };

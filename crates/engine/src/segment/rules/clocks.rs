@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 
 use crate::board::clocks::References;
-use crate::clocks::{Cables, Measured, extend};
+use crate::clocks::{Cables, KnownClocks, Measured, extend};
 use crate::config::ReferenceClock;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
@@ -35,11 +35,7 @@ impl Segment {
             ClockObservation::Cables(cables) => self.clocks.cables = cables,
             ClockObservation::OpenedWithoutResult(wiring) => self.clocks.opened_without_result = wiring,
             ClockObservation::Known(known) => self.known_clocks = Some(Rc::new(known)),
-            ClockObservation::Recalled(known) => {
-                self.clocks.cables = Cables::of(&known.cables);
-                let modes: Vec<(StationAddress, bool)> = known.backwards.iter().map(|it| (*it, true)).collect();
-                self.observe_latch_modes(&modes);
-            }
+            ClockObservation::Recalled(known) => self.observe_recall(known),
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
             ClockObservation::SetUp => self.observe_set_up(effects),
@@ -127,6 +123,13 @@ impl Segment {
             Life::NotSetUp(reported) => *reported = None,
             Life::Undeclared | Life::Starting | Life::StartingWithoutBranches | Life::Running(_) => {}
         }
+    }
+
+    /// Cable times and latch modes are those of a former measurement.
+    fn observe_recall(&mut self, known: &KnownClocks) {
+        self.clocks.cables = Cables::of(&known.cables);
+        let modes: Vec<(StationAddress, bool)> = known.backwards.iter().map(|it| (*it, true)).collect();
+        self.observe_latch_modes(&modes);
     }
 
     fn observe_latch_modes(&mut self, modes: &[(StationAddress, bool)]) {

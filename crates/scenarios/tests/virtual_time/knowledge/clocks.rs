@@ -97,7 +97,8 @@ fn has_clock(application: &Application<Watched>, at: usize) -> bool {
 fn left(application: Application<Watched>, handover: Handover) -> (Tap, Vec<u8>) {
     let (links, bytes) = match handover {
         Handover::Orderly => {
-            let main_device = application.deactivate(LastOutputs::Zero, LIMIT).map_err(Error::from).expect("all follow");
+            let main_device =
+                application.deactivate(LastOutputs::Zero, LIMIT).map_err(Error::from).expect("all follow");
             let bytes = main_device.knowledge().expect("it is scanned").to_bytes();
             (main_device.into_links(), bytes)
         }

@@ -67,9 +67,13 @@ fn check(main_device: &mut MainDevice<Tap>, text: &str) {
     let handle = mailbox(main_device);
     let work = main_device.engine_mut().start(async move {
         let mut source = Bytes::new(&[0xA5; 3_000]);
-        foe::write(&handle, "settings.bin", file_options(), &mut source, |_| ()).await.map_err(|error| error.to_string())?;
+        foe::write(&handle, "settings.bin", file_options(), &mut source, |_| ())
+            .await
+            .map_err(|error| error.to_string())?;
         let mut sink = Bounded::new(10_000);
-        foe::read(&handle, "settings.bin", file_options(), &mut sink, |_| ()).await.map_err(|error| error.to_string())?;
+        foe::read(&handle, "settings.bin", file_options(), &mut sink, |_| ())
+            .await
+            .map_err(|error| error.to_string())?;
         Ok::<_, String>(sink.into_bytes())
     });
     main_device.attend(Duration::from_secs(5));
@@ -116,7 +120,7 @@ fn a_handover_within_a_file_is_named_and_another_file_can_be_written_at_once() {
     }
 }
 
-// covers: mailbox, foe, boot, states
+// covers: mailbox, foe, states
 #[test]
 fn a_handover_of_a_subdevice_in_boot_keeps_it_there_with_its_mailbox() {
     for is_ring in [false, true] {
