@@ -36,7 +36,7 @@ impl Mailbox {
         let shared = self.shared();
         let (state, now) = (shared.state(), shared.bus.now());
         let session = state.session.filter(|_| state.open)?;
-        let late = (0_u8..).zip(&state.lanes).filter_map(|(lane, state)| {
+        let late = state.lanes.numbered().filter_map(|(lane, state)| {
             let limit_ms = u32::try_from(state.still_expected(now)?.as_millis()).unwrap_or(u32::MAX);
             Some(LateAnswer { lane, mark: state.mark, limit_ms })
         });
@@ -72,7 +72,7 @@ impl SharedMailbox {
                 state.repeat = known.repeat;
                 state.recent = Recent::of(&known.recent, now);
                 for late in &known.late {
-                    if let Some(lane) = state.lanes.get_mut(usize::from(late.lane)) {
+                    if let Some(lane) = state.lanes.at_mut(usize::from(late.lane)) {
                         lane.mark = late.mark;
                         lane.late_from(now, Duration::from_millis(late.limit_ms.into()));
                     }
@@ -80,7 +80,7 @@ impl SharedMailbox {
             }
             Handover::AfterCrash => {
                 let answering = Lane::ALL.into_iter().filter(|lane| *lane != Lane::Frames);
-                answering.for_each(|lane| state.lanes[lane.index()].late_from(now, AFTER_CRASH));
+                answering.for_each(|lane| state.lanes.of_mut(lane).late_from(now, AFTER_CRASH));
             }
         }
     }
