@@ -8,6 +8,7 @@
 use alloc::rc::Rc;
 use core::cell::RefCell;
 use core::future::Future;
+use core::pin::pin;
 
 use ringcat_wire::al::AlState;
 
@@ -80,7 +81,7 @@ fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, resul
             let attempt = attempt_of(segment, index);
             let (bus, segment, result) = (bus.clone(), segment.clone(), result.clone());
             bus.clone().spawn(async move {
-                let procedure = go(&bus, &segment, (index, attempt), before, &result);
+                let procedure = pin!(go(&bus, &segment, (index, attempt), before, &result));
                 while_current(&segment, index, attempt, procedure).await;
             });
         }
