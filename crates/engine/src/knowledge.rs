@@ -19,6 +19,7 @@ use ringcat_wire::sii::{CategoryKind, SiiHeader};
 
 use crate::clocks::KnownClocks;
 use crate::info::{SiiExtent, SubDeviceInfo};
+use crate::order::InOrder;
 use crate::ring::RingState;
 use crate::topology::Topology;
 use code::{Code, Input, choice, fields};
@@ -265,7 +266,7 @@ impl Knowledge {
     fn are_stations_unique(&self) -> bool {
         let all = self.subdevices.iter().chain(&self.others);
         let mut stations: Vec<u16> = all.map(|known| known.info.station.0).collect();
-        stations.sort_unstable();
+        stations.put_in_order();
         stations.first() != Some(&0) && stations.windows(2).all(|pair| pair[0] != pair[1])
     }
 }

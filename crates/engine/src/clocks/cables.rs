@@ -11,6 +11,7 @@ use alloc::vec::Vec;
 use super::cable_ends::{End, Ends, ends};
 use super::known_cable::KnownCable;
 use super::sums::{Sum, solve};
+use crate::order::InOrder;
 
 /// Sums of cables that are kept: many more than a segment has forks without a clock.
 const MOST_SUMS: usize = 256;
@@ -119,7 +120,7 @@ impl Cables {
 
 fn sorted(cables: &[Ends]) -> Vec<Ends> {
     let mut cables = cables.to_vec();
-    cables.sort_unstable();
+    cables.put_in_order();
     cables
 }
 

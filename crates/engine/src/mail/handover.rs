@@ -44,12 +44,12 @@ impl Mailbox {
         let shared = self.shared();
         let (state, now) = (shared.state(), shared.bus.now());
         let session = state.session.filter(|_| state.open)?;
-        let late = (0_u8..).zip(&state.lanes).filter_map(|(lane, state)| {
+        let late = state.lanes.numbered().filter_map(|(lane, state)| {
             let limit_ms = u32::try_from(state.still_expected(now)?.as_millis()).unwrap_or(u32::MAX);
             Some(LateAnswer { lane, mark: state.mark, limit_ms })
         });
         let is_under_way = |(_, state): &(Lane, &LaneState)| !state.turns.is_empty();
-        let lanes = Lane::ALL.into_iter().map(|lane| (lane, &state.lanes[lane.index()]));
+        let lanes = Lane::ALL.into_iter().filter_map(|lane| Some((lane, state.lanes.of(lane)?)));
         // Ethernet frames have no beginning and no end.
         let under_way = lanes.filter(|(lane, _)| *lane != Lane::Frames).filter(is_under_way);
         Some(KnownMailbox {
@@ -106,7 +106,7 @@ impl SharedMailbox {
         let mut payload = [0; ABORT_BYTES];
         let length = match lane {
             Lane::Coe => {
-                let index = self.state().lanes[lane.index()].mark;
+                let index = self.state().lanes.of(lane).map_or(0, |lane| lane.mark);
                 SdoRequest::Abort { index, sub_index: 0, code: AbortCode::GENERAL }.encode(&mut payload)
             }
             Lane::Foe => {
@@ -128,7 +128,7 @@ impl SharedMailbox {
                 state.repeat = known.repeat;
                 state.recent = Recent::of(&known.recent, now);
                 for late in &known.late {
-                    if let Some(lane) = state.lanes.get_mut(usize::from(late.lane)) {
+                    if let Some(lane) = state.lanes.at_mut(usize::from(late.lane)) {
                         lane.mark = late.mark;
                         lane.late_from(now, Duration::from_millis(late.limit_ms.into()));
                     }
@@ -136,7 +136,7 @@ impl SharedMailbox {
             }
             Handover::AfterCrash => {
                 let answering = Lane::ALL.into_iter().filter(|lane| *lane != Lane::Frames);
-                answering.for_each(|lane| state.lanes[lane.index()].late_from(now, AFTER_CRASH));
+                answering.for_each(|lane| state.lanes.of_mut(lane).late_from(now, AFTER_CRASH));
             }
         }
     }

@@ -21,6 +21,7 @@ use crate::clocks::wiring::{TREES, Wiring};
 use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passage, Segment, branches, port_times};
 use crate::event::Subject;
 use crate::link::{Link, LinkSet};
+use crate::order::InOrder;
 use crate::procedures::latch::{self as frames, Pauses};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
@@ -432,7 +433,7 @@ pub(super) async fn latch(
 /// The present loop settings of the SubDevices that have these ports.
 async fn controls(bus: &Bus, ports: &[(StationAddress, u8)]) -> Result<Vec<(StationAddress, DlControl)>, BusError> {
     let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
-    stations.sort_unstable();
+    stations.put_in_order();
     stations.dedup();
     let mut controls = Vec::new();
     for station in stations {
