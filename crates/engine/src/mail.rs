@@ -43,7 +43,7 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
-pub use conversation::{Conversation, Limits};
+pub use conversation::{Conversation, Limits, MailboxSizes};
 pub use counters::MailCounters;
 pub use emergencies::EmergencyRing;
 pub(crate) use emergencies::EmergencyRings;

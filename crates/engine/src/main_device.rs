@@ -59,16 +59,16 @@ use ringcat_wire::al::AlState;
 
 pub use activate_error::ActivateError;
 pub use active::Active;
-pub use areas::{AreaEntries, Directory};
+pub use areas::{AreaEntries, Directory, PlacedEntry};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
-pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
+pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;
-pub use registered_area::RegisteredArea;
+pub use registered_area::{EntryPlace, RegisteredArea};
 pub use sent_once::SentOnce;
 pub use states::{GroupState, SubDeviceState};
 

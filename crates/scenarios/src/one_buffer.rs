@@ -31,7 +31,7 @@ pub fn one_buffer(mut description: DeviceDescription) -> DeviceDescription {
 
 /// As [`ringcat::automatic`]; SubDevices with one buffer keep it.
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
-    let mut declaration = Declaration::with_period(period);
+    let mut declaration = Declaration::new(period);
     for info in subdevices {
         let config = SubDeviceConfig::from_info(info);
         let has_one = info.sync_managers.iter().any(|sm| role(sm).is_some_and(is_process_data) && has_one_buffer(sm));

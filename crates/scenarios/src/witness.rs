@@ -69,7 +69,7 @@ impl<L: Links> Links for Witness<L> {
         self.links.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.links.addresses()
     }
 

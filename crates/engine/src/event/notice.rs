@@ -1,5 +1,5 @@
-//! Notices: the only events that procedures report themselves. They tell the progress of one procedure, or what it was
-//! told, and nothing of the model follows from them. All other events are effects of observations (`segment`).
+//! Notices: the only events that procedures report themselves. They have the progress of one procedure, or what it was
+//! asked, and nothing of the model follows from them. All other events are effects of observations (`segment`).
 
 use alloc::string::String;
 use alloc::vec::Vec;

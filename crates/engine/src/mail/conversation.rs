@@ -75,6 +75,16 @@ fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
     shared.changed.notify();
 }
 
+/// Lengths of the mailboxes of a SubDevice in bytes, header included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MailboxSizes {
+    /// The mailbox that the SubDevice receives.
+    pub receive: usize,
+    /// The mailbox that the SubDevice sends.
+    pub send: usize,
+}
+
 impl Conversation {
     /// Waits until the lane is free, and takes it.
     pub(super) async fn take(
@@ -125,10 +135,12 @@ impl Conversation {
         state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
     }
 
-    /// Lengths of the receive and the send mailbox, header included.
-    pub fn mailbox_sizes(&self) -> (usize, usize) {
+    /// Lengths of the mailboxes; zero while they are not in use.
+    pub fn mailbox_sizes(&self) -> MailboxSizes {
         let state = self.shared.state();
-        state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
+        let sizes = state.session.map(|session| (session.layout.receive_size, session.layout.send_size));
+        let (receive, send) = sizes.unwrap_or_default();
+        MailboxSizes { receive: receive.into(), send: send.into() }
     }
 
     /// Whether another conversation waits for the lane.

@@ -1,6 +1,6 @@
 //! A mailbox in use that another process goes on with: its counters, and answers that may still arrive.
 //!
-//! The SubDevice is not told: it stays in its state, with its session.
+//! The SubDevice is not informed: it stays in its state, with its session.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

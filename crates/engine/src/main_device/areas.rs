@@ -39,8 +39,20 @@ pub struct AreaEntries {
     pub placed: PlacedArea,
     /// Direction.
     pub direction: Direction,
-    /// Index, subindex, place; without gaps.
-    pub entries: Vec<(u16, u8, Entry)>,
+    /// Its entries; without gaps.
+    pub entries: Vec<PlacedEntry>,
+}
+
+/// A PDO entry with its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PlacedEntry {
+    /// Index of the object.
+    pub index: u16,
+    /// Subindex.
+    pub sub_index: u8,
+    /// Place in the image of the domain.
+    pub place: Entry,
 }
 
 impl Directory {
@@ -103,8 +115,8 @@ impl Directory {
         };
         self.subdevices.iter().enumerate().find_map(|(subdevice, areas)| {
             let mut entries = areas.iter().flat_map(|area| &area.entries);
-            let (index, sub_index, _) = entries.find(|(_, _, entry)| covers(entry))?;
-            Some((SubDeviceId(subdevice), *index, *sub_index))
+            let found = entries.find(|entry| covers(&entry.place))?;
+            Some((SubDeviceId(subdevice), found.index, found.sub_index))
         })
     }
 
@@ -136,7 +148,7 @@ impl Directory {
     /// The place of a PDO entry; the first one if it is mapped more than once.
     pub fn entry(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Option<Entry> {
         let entries = self.areas(subdevice).iter().flat_map(|area| &area.entries);
-        entries.into_iter().find(|(i, s, _)| (*i, *s) == (index, sub_index)).map(|(_, _, entry)| *entry)
+        entries.into_iter().find(|it| (it.index, it.sub_index) == (index, sub_index)).map(|it| it.place)
     }
 }
 
@@ -206,7 +218,7 @@ impl Areas {
             let entries = self.mapped(sync_manager).into_iter().filter(|entry| entry.index != 0).map(|entry| {
                 let bit_offset = placed.image_offset * 8 + entry.bit_offset;
                 let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
-                (entry.index, entry.sub_index, place)
+                PlacedEntry { index: entry.index, sub_index: entry.sub_index, place }
             });
             found.push(AreaEntries { domain, placed, direction, entries: entries.collect() });
         }

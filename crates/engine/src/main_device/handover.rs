@@ -72,7 +72,7 @@ impl MainDevice {
 
     /// Goes on with the segment that another process has known, without a scan: no SII is read. First the number of
     /// SubDevices, their station addresses, ports, AL states and mailbox SyncManagers are compared with the knowledge.
-    /// What differs is scanned as after a change of the segment; [`Event::Resumed`](crate::event::Event::Resumed) tells
+    /// What differs is scanned as after a change of the segment; [`Event::Resumed`](crate::event::Event::Resumed) has
     /// the result. [`MainDevice::scan_result`] has the SubDevices afterwards, and their mailboxes are in use again.
     /// Without idle operation SubDevices stay in their states; with it all are brought to their states. Refused while
     /// active or while a scan runs.

@@ -7,7 +7,7 @@ use ringcat_wire::register::SyncManagerDirection;
 use super::areas::place;
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedPdo, SmPlan};
-use crate::config::{DeclaredSyncManager, SyncManagerRole};
+use crate::config::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 use crate::info::{Direction, SubDeviceInfo};
 use crate::order::InOrder;
 
@@ -47,7 +47,7 @@ pub(super) fn managers<'d>(
 }
 
 fn area(sm: &DeclaredSyncManager, info: &SubDeviceInfo) -> Result<Option<AreaPlan>, PlanProblem> {
-    let Some((sync_manager, direction, length)) = sm.area() else { return Ok(None) };
+    let Some(DeclaredArea { sync_manager, direction, length }) = sm.area() else { return Ok(None) };
     let mut bit = 0;
     let mut pdos = Vec::with_capacity(sm.pdos.len());
     for pdo in &sm.pdos {

@@ -105,7 +105,7 @@ fn report_cut(bus: &Bus, known: &Known, found: &[Rc<SubDeviceInfo>]) {
     }
 }
 
-/// Tells the model which SubDevices go on as they are, and their mailboxes their counters.
+/// Reports to the model which SubDevices go on as they are; sets the counters of their mailboxes.
 fn go_on(bus: &Bus, segment: &SharedSegment, kept: &[Kept], handover: Handover) {
     let state = |kept: &Kept| KeptState {
         station: kept.station,

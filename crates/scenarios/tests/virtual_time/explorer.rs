@@ -113,7 +113,7 @@ fn mend(world: &mut World, broken: Broken) {
 fn segment(dice: &mut Dice, seed: u64) -> (Network, bool) {
     let kinds: Vec<&str> = (0..3 + dice.below(8)).map(|_| *dice.pick(&KINDS)).collect();
     let detection = Duration::from_micros(*dice.pick(&[10, 300, 2_000, 10_000]));
-    let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
+    let options = NetworkOptions::default().with_seed(seed).with_detection_delay(detection);
     let closed = !dice.one_in(4);
     let mut described = descriptions(&kinds);
     for (number, description) in described.iter_mut().enumerate().filter(|(number, _)| seeds::one_buffer(seed, *number))
@@ -136,7 +136,7 @@ fn run(seed: u64) {
     let (network, closed) = segment(&mut dice, seed);
     let options = Options::default().with_sii_cache(!dice.one_in(2));
     let mut world = World::with(seed, network, &options, |scan| {
-        automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed))
+        automatic(&scan.subdevices, CYCLE).with_sends_again(seeds::sends_again(seed))
     })
     .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Late and duplicated frames change the devices.

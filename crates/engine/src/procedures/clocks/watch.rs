@@ -85,7 +85,7 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
     let mut seen = (segment.board.ring().changes, answering(segment));
     let mut has_answered = seen.1 != (0, 0);
-    let mut seen_times = segment.board.clocks.times.news();
+    let mut seen_times = segment.board.clocks.times.posted();
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
     loop {
@@ -104,7 +104,7 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
             next_measurement = bus.now() + SETTLE;
         }
         let were_locked = segment.view().clocks().are_locked();
-        let times = segment.board.clocks.times.news();
+        let times = segment.board.clocks.times.posted();
         if times != seen_times {
             (seen_times, next_read) = (times, bus.now());
         }

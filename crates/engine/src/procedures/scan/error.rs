@@ -74,7 +74,15 @@ impl fmt::Display for ScanError {
     }
 }
 
-impl core::error::Error for ScanError {}
+impl core::error::Error for ScanError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ScanError::Bus(error) => Some(error),
+            ScanError::Sii { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for ScanError {
     fn from(error: BusError) -> ScanError {

@@ -226,7 +226,7 @@ fn ends(topology: &Topology) -> Vec<[End; 2]> {
     if let Some(first) = topology.nodes.first().filter(|_| topology.main_count > 0) {
         ends.push([None, Some(PortOf { node: 0, port: first.entry_port })]);
     }
-    let inner = (0..topology.nodes.len()).filter_map(|node| topology.connection_to(node));
+    let inner = (0..topology.nodes.len()).filter_map(|node| topology.cable_to(node));
     ends.extend(inner.map(|cable| [Some(cable.near), Some(cable.far)]));
     ends.extend(topology.local_rings.iter().map(|ring| [Some(ring.closing.tail), Some(ring.closing.head)]));
     ends
