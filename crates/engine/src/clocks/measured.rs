@@ -51,6 +51,17 @@ pub fn port_times(latched: &Latched) -> [u32; 4] {
     latched.ports.map(|time| time.wrapping_sub(latched.unit as u32))
 }
 
+/// Whether two frames have taken as long from port to port of a SubDevice, at the ports at which frames come in.
+fn are_same(before: Option<[u32; 4]>, now: Option<Latched>, arrives: [bool; 4]) -> bool {
+    match (before, now) {
+        (Some(before), Some(now)) => {
+            let mut ports = before.into_iter().zip(port_times(&now)).zip(arrives).filter(|(_, arrives)| *arrives);
+            ports.all(|((before, now), _)| now.wrapping_sub(before).wrapping_add(SAME_NS) <= 2 * SAME_NS)
+        }
+        (before, now) => before.is_none() && now.is_none(),
+    }
+}
+
 impl Measured {
     /// Whether the segment is the one that was measured: `latched` has the times of one frame, by position.
     pub fn is_of(
@@ -65,18 +76,8 @@ impl Measured {
         }
         let (arrivals, _) = wiring.arrival_ports();
         let count = self.port_times.len();
-        let is_same = |((before, now), ports): ((&Option<[u32; 4]>, &Option<Latched>), &[bool; 4])| match (before, now)
-        {
-            (Some(before), Some(now)) => {
-                let both = before.iter().zip(port_times(now)).zip(ports);
-                both.filter(|(_, arrives)| **arrives)
-                    .all(|((before, now), _)| now.wrapping_sub(*before).wrapping_add(SAME_NS) <= 2 * SAME_NS)
-            }
-            (before, now) => before.is_none() && now.is_none(),
-        };
-        latched.len() == count
-            && arrivals.len() == count
-            && self.port_times.iter().zip(latched).zip(&arrivals).all(is_same)
+        let is_same = |at: usize| are_same(self.port_times[at], latched[at], arrivals[at]);
+        latched.len() == count && arrivals.len() == count && (0..count).all(is_same)
     }
 
     /// The same, with drifts against another reference.

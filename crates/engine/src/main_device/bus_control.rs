@@ -70,17 +70,21 @@ impl MainDevice {
     }
 
     /// The requested states of SubDevices without a declaration, and their mailboxes in use. Outputs in OP have to be
-    /// written: such a SubDevice is brought to OP again.
+    /// written: such a SubDevice is brought to OP again. PREOP is requested of those that the application has declared.
     fn left(&self) -> (Vec<KeptState>, Vec<(InUse, KnownMailbox)>) {
         let view = self.segment.view();
-        let (mut states, mut mailboxes) = (Vec::new(), Vec::new());
+        let due = UpkeepProgress::Due(self.supervisor.bus().now());
+        let to_preop = |station| KeptState { station, target: AlState::PreOp, progress: due, has_left: None };
+        let members = view.members().filter(|member| member.info.is_some());
+        let mut states: Vec<KeptState> = members.map(|member| to_preop(member.station)).collect();
+        let mut mailboxes = Vec::new();
         for key in view.subdevices().unassigned().map(|it| it.key) {
             let Some(upkeep) = view.upkeep(key) else { continue };
             let is_reached = upkeep.progress == UpkeepProgress::Reached && upkeep.target != AlState::Op;
             let progress = match upkeep.progress {
                 UpkeepProgress::Left => UpkeepProgress::Left,
                 _ if is_reached => UpkeepProgress::Reached,
-                _ => UpkeepProgress::Due(self.supervisor.bus().now()),
+                _ => due,
             };
             states.push(KeptState { station: key.station, target: upkeep.target, progress, has_left: None });
             let mailbox = self.segment.undeclared.of(key).filter(|_| is_reached);

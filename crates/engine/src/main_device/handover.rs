@@ -89,7 +89,7 @@ impl MainDevice {
         self.emergencies.borrow_mut().forget_positions();
         self.cache.learn(siis);
         if let Some(known) = clocks {
-            self.segment.observe_clocks(ClockObservation::Known(known));
+            self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
         }
         self.begin_idle();
         self.go_on(sequence, activations, offered, handover);

@@ -1,6 +1,7 @@
 //! Observations of clocks.
 
 use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
 use alloc::string::String;
 
 use ringcat_wire::address::StationAddress;
@@ -27,7 +28,7 @@ pub enum ClockObservation<'a> {
     /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
     OpenedWithoutResult(Option<Wiring>),
     /// What another process knows of the clocks.
-    Known(KnownClocks),
+    Known(Rc<KnownClocks>),
     /// The segment is the one that was measured before: cable times and latch modes are those of that measurement.
     Recalled(&'a KnownClocks),
     /// The delays of all clocks, for their set-up.

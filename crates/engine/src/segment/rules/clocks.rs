@@ -4,7 +4,6 @@ mod answers;
 mod delays;
 mod times;
 
-use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -34,7 +33,7 @@ impl Segment {
             ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
             ClockObservation::Cables(cables) => self.clocks.cables = cables,
             ClockObservation::OpenedWithoutResult(wiring) => self.clocks.opened_without_result = wiring,
-            ClockObservation::Known(known) => self.known_clocks = Some(Rc::new(known)),
+            ClockObservation::Known(known) => self.known_clocks = Some(known),
             ClockObservation::Recalled(known) => self.observe_recall(known),
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
