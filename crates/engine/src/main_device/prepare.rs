@@ -39,7 +39,11 @@ const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<SubDevice>);
 
 /// Matches SubDevices with the declaration.
-pub(super) fn match_declaration(segment: &SharedSegment, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
+pub(super) fn match_declaration(
+    segment: &SharedSegment,
+    declaration: &Declaration,
+    scan: &Found,
+) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
     let mut owners = vec![None; scan.subdevices.len()];
     let mut extra = Vec::new();
