@@ -35,10 +35,10 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["order", "info", "link"]),
-    ("knowledge", &["order", "direction", "info", "ring", "topology"]),
     ("ring_status", &["declared", "time", "link", "ring", "topology"]),
     ("config", &["order", "declared", "info"]),
     ("clocks", &["order", "topology"]),
+    ("knowledge", &["order", "direction", "info", "ring", "topology", "clocks"]),
     ("plan", &["order", "info", "topology", "config"]),
     ("layout", &["order", "declared", "link", "ring", "direction", "domain"]),
     // what happened
