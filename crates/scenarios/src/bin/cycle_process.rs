@@ -61,7 +61,7 @@ fn run(threads: &str, mode: &str, period_us: &str, cycles: &str, resend: &str) -
             let (cyclic, acyclic) = PacketLinks::open_halves("near0", None, mode).map_err(said)?;
             let supervisor = SupervisorThread::start(acyclic, &options, realtime::precise_timers).map_err(said)?;
             let scan = supervisor.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
+            let declaration = automatic(&scan.subdevices, period).with_sends_again(resend == "always");
             drop(scan);
             let mut application = supervisor.activate(declaration, cyclic).map_err(|refused| said(refused.error))?;
             exchange(&mut application, cycles)?;
@@ -71,7 +71,7 @@ fn run(threads: &str, mode: &str, period_us: &str, cycles: &str, resend: &str) -
             let links = PacketLinks::open("near0", None, mode).map_err(said)?;
             let mut main_device = MainDevice::request(links, &options);
             let scan = main_device.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
+            let declaration = automatic(&scan.subdevices, period).with_sends_again(resend == "always");
             drop(scan);
             let mut application = main_device.activate(declaration).map_err(|refused| said(refused.error))?;
             exchange(&mut application, cycles)?;

@@ -129,7 +129,7 @@ fn a_snapshot_has_identity_and_mailbox_of_subdevices_without_a_declaration() {
         assert_eq!((without.mailbox_bytes, without.protocols, without.mailbox_open), ([0; 2], 0, false), "{text}");
     };
     check(&main_device.engine_mut().snapshot(), 3, "idle");
-    let declaration = Declaration::with_period(scenarios::world::CYCLE);
+    let declaration = Declaration::new(scenarios::world::CYCLE);
     let mut application = main_device.activate(declaration).map_err(Error::from).expect("it names none");
     (0..200).for_each(|_| application.cycle(|_| ()));
     check(&application.engine_mut().snapshot(), 3, "beside an application");

@@ -98,8 +98,8 @@ fn a_subdevice_with_other_pdos_than_those_of_its_place_fails_alone() {
 #[test]
 fn configurations_without_a_domain_are_activated() {
     for (count, mut ecrt) in requested() {
-        for position in 0..count {
-            let _ = ecrt.slave_config(0, position as u16, identity(KINDS[position])).expect("it is new");
+        for (position, kind) in (0..).zip(&KINDS[..count]) {
+            let _ = ecrt.slave_config(0, position, identity(kind)).expect("it is new");
         }
         ecrt.activate().expect("no domain is no error");
         ecrt.cycles(500);
