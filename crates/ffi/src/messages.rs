@@ -173,11 +173,11 @@ impl Messenger {
         let (end, ends) = channel();
         let body = move || {
             be_an_ordinary_thread();
-            let (mut lines, mut looks) = (Lines::default(), 0);
+            let (mut lines, mut looks) = (Lines::default(), 0_u32);
             loop {
                 let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
                 looks += 1;
-                look(&supervisor, &mut lines, looks % LOOKS_PER_SUMMARY == 0 || is_last);
+                look(&supervisor, &mut lines, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
                 for line in lines.pop() {
                     match master {
                         0 => report(format_args!("{line}")),
