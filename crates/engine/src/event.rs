@@ -5,6 +5,7 @@ mod cyclic;
 pub mod history;
 mod log;
 mod messages;
+mod notice;
 mod subject;
 mod timed;
 
@@ -22,6 +23,7 @@ pub use clients::{ClientEvents, ClientId};
 pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
 pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
+pub(crate) use notice::Notice;
 pub use subject::{Subject, Subjects};
 pub use timed::TimedEvent;
 

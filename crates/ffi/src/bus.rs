@@ -105,7 +105,8 @@ impl Bus {
         let _messenger = messenger.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
-        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, is_ring, is_reserved: AtomicBool::new(false) })
+        let is_reserved = AtomicBool::new(false);
+        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, is_ring, is_reserved })
     }
 
     /// Number of the master.

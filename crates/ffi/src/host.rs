@@ -20,7 +20,8 @@ extern "C" fn begin_generation() {
 /// From now on a child made by `fork` is a new generation.
 pub fn watch_forks() {
     static WATCHED: Once = Once::new();
-    // SAFETY: the handler is a function of this library, which stays loaded (`-z nodelete`), and touches an atomic only.
+    // SAFETY: the handler is a function of this library, which stays loaded (`-z nodelete`), and touches an atomic
+    // only.
     WATCHED.call_once(|| unsafe {
         libc::pthread_atfork(None, None, Some(begin_generation));
     });

@@ -1,8 +1,8 @@
 //! Lines for the operator about a bus, as users search for them: link, SubDevices, states, scans, working counters, and
 //! once a second what was lost.
 //!
-//! [`Lines`] decides from samples and events what is worth a line; [`Messenger`] takes both ten times a second in a thread
-//! of its own and prints. Neither touches the cyclic path.
+//! [`Lines`] decides from samples and events what is worth a line; [`Messenger`] takes both ten times a second in a
+//! thread of its own and prints. Neither touches the cyclic path.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};

@@ -12,7 +12,7 @@ use super::protocol_error;
 use super::recent::ReadKind;
 use super::shared::{MailboxState, SharedMailbox};
 use super::unsolicited::{Unclaimed, Unsolicited};
-use crate::event::{Event, Subject};
+use crate::event::{Notice, Subject};
 use crate::time::Instant;
 
 /// SoE services that are answers; the others are unsolicited (protocol 6.6).
@@ -112,7 +112,7 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
             };
             let emergency = Emergency::decode(bytes);
             state.emergencies.push(shared.bus.now(), &emergency);
-            shared.bus.report(Event::Emergency { subdevice: shared.subdevice.get(), emergency });
+            shared.bus.notice(Notice::Emergency { subdevice: shared.subdevice.get(), emergency });
             false
         }
         // An abort has the service of a request in both directions.

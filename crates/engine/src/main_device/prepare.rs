@@ -4,7 +4,7 @@ use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::format;
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -27,10 +27,10 @@ use crate::link::LinkSet;
 use crate::plan::{PlanFault, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::member::MemberView;
 use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
-use crate::segment::{Found, Owners, SubDevice, SubDevices};
-use crate::supervisor::Bus;
+use crate::segment::{Found, Observation, Owners, SubDevice, SubDevices};
 
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
@@ -39,7 +39,7 @@ const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<SubDevice>);
 
 /// Matches SubDevices with the declaration.
-pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
+pub(super) fn match_declaration(segment: &SharedSegment, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
     let mut owners = vec![None; scan.subdevices.len()];
     let mut extra = Vec::new();
@@ -50,10 +50,10 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Fou
                 found[config] = Some(scan.subdevices[info].clone());
             }
             Resolution::Absent { config, error } if declaration.required != Required::All => {
-                report_absence(bus, config, true, error);
+                report_absence(segment, config, true, error);
             }
             Resolution::Failed { config, error } if declaration.required == Required::Nothing => {
-                report_absence(bus, config, false, error);
+                report_absence(segment, config, false, error);
             }
             Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
                 return Err(ActivateError::Config { subdevice: SubDeviceId(config), error });
@@ -64,7 +64,8 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Fou
     let owners = Owners::new(owners, |index| declaration.subdevices[index].group.is_some());
     let unassigned = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
-        bus.report(Event::Unexpected { position: info.position, identity: info.identity });
+        let (position, identity) = (info.position, info.identity);
+        segment.observe(Observation::Compared(Event::Unexpected { position, identity }));
         SubDevice::undeclared(info, &owners, scan.main_count)
     });
     Ok((found, unassigned.collect()))
@@ -84,15 +85,16 @@ pub(super) fn check_clocks(
     Ok(())
 }
 
-fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigError) {
-    bus.report(match error {
+fn report_absence(segment: &SharedSegment, subdevice: usize, optional: bool, error: ConfigError) {
+    let shown = match error {
         ConfigError::Mismatch { position, field, expected, got } => {
             Event::Mismatch { subdevice: SubDeviceId(subdevice), position, field, expected, got }
         }
         ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
             Event::Missing { subdevice: SubDeviceId(subdevice), optional }
         }
-    });
+    };
+    segment.observe(Observation::Compared(shown));
 }
 
 pub(super) fn plan_all(
@@ -255,20 +257,23 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 }
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
-pub(super) fn report_oddities(bus: &Bus, subdevices: &SubDevices, layout: &Layout) {
+pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
+    let oddity = |subdevice: usize, what: String| {
+        segment.observe(Observation::Compared(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what }));
+    };
     for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: warning.to_string() });
+            oddity(subdevice, warning.to_string());
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
             let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
             let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what });
+            oddity(subdevice, what);
         }
         if member.info.is_none() && declared_areas(&member.config).is_none() {
             let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: what.to_owned() });
+            oddity(subdevice, what.to_owned());
         }
     }
 }

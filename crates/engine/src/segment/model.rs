@@ -15,6 +15,7 @@ use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
+use super::idle::Idle;
 use super::key::SubDeviceKey;
 use super::local_rings::LocalRings;
 use super::member::MemberView;
@@ -97,6 +98,7 @@ pub struct Segment {
     pub(super) slot: Slot,
     pub(super) addresses: Addresses,
     pub(super) keeping: Keeping,
+    pub(super) idle: Idle,
     /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
     /// Until this time it is not necessary to test how many datagrams a frame may hold.
@@ -124,6 +126,7 @@ impl Segment {
             slot: Slot::default(),
             addresses: Addresses::default(),
             keeping: Keeping::default(),
+            idle: Idle::default(),
             adoptions: 0,
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),
@@ -252,10 +255,15 @@ impl Segment {
         }
     }
 
+    /// Whether station addresses are those of this version.
+    pub(super) fn are_addresses_as_in(&self, versions: Versions) -> bool {
+        versions.addresses == self.addresses.version()
+    }
+
     /// Whether positions and station addresses that were requested in this version are still those of the segment.
     pub fn are_places_valid(&self, versions: Versions) -> bool {
         let is_isolating = self.slot.running() == Some(Disturbance::IsolateRings);
-        !is_isolating && versions.isolations == self.slot.isolations() && versions.addresses == self.addresses.version()
+        !is_isolating && versions.isolations == self.slot.isolations() && self.are_addresses_as_in(versions)
     }
 
     /// Whether enough searches for SubDevices have failed for a test of the number of datagrams per frame.

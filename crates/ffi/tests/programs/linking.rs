@@ -42,9 +42,9 @@ fn both_command_lines_of_the_manual_link_without_a_further_library() {
         run(dynamic.arg("-Wl,--rpath").arg(format!("-Wl,{}", lib.display())));
         counts_five(&program);
     }
-    for (arguments, name) in [(&["-static"][..], "static"), (&[][..], "archive"), (&["-static-pie"][..], "static-pie")] {
-        let program = target(name);
-        run(cc(prefix).args(arguments).arg("-o").arg(&program).arg(lib.join("libethercat.a")));
+    for kind in ["-static", "-pie", "-static-pie"] {
+        let program = target(&kind[1..]);
+        run(cc(prefix).arg(kind).arg("-o").arg(&program).arg(lib.join("libethercat.a")));
         counts_five(&program);
     }
 }
@@ -53,7 +53,8 @@ fn both_command_lines_of_the_manual_link_without_a_further_library() {
 #[test]
 fn the_archive_shows_the_functions_of_ecrt_h_only() {
     let Some(prefix) = installed() else { return };
-    let symbols = run(Command::new("nm").args(["--extern-only", "--defined-only"]).arg(prefix.join("lib/libethercat.a")));
+    let archive = prefix.join("lib/libethercat.a");
+    let symbols = run(Command::new("nm").args(["--extern-only", "--defined-only"]).arg(archive));
     let names: BTreeSet<&str> = symbols.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
     assert!(names.len() == 103 && names.iter().all(|name| name.starts_with("ecrt_")), "{names:?}");
 }
@@ -81,15 +82,16 @@ fn the_archive_works_inside_another_shared_object_and_beside_another_rust_librar
         return;
     }
     let archive_of_other = workshop().join("libother.a");
-    run(Command::new(compiler).args(["--edition=2024", "--crate-type=staticlib", "-o"]).arg(&archive_of_other).arg(other));
+    let mut rustc = Command::new(compiler);
+    run(rustc.args(["--edition=2024", "--crate-type=staticlib", "-o"]).arg(&archive_of_other).arg(other));
     let both = workshop().join("both.c");
     let text = "#include \"manual.h\"\nint other(void); int main(void) { return other() ? 9 : smallest(); }\n";
     std::fs::write(&both, text).expect("a file");
     let source = std::fs::read_to_string(here().join("tests/c/manual.c")).expect("the source");
     std::fs::write(workshop().join("manual.h"), source.replace("int main(void)", "static int smallest(void)"))
         .expect("a file");
-    for (order, program) in [([&archive, &archive_of_other], target("both")), ([&archive_of_other, &archive], target("both2"))]
-    {
+    let orders = [[&archive, &archive_of_other], [&archive_of_other, &archive]];
+    for (order, program) in orders.into_iter().zip([target("both"), target("both2")]) {
         let mut link = Command::new("cc");
         link.arg(&both).arg("-I").arg(prefix.join("include")).arg("-o").arg(&program).args(order);
         run(&mut link);

@@ -36,6 +36,7 @@ mod explorer;
 mod failures;
 mod fairness;
 mod false_crossings;
+mod flapping;
 mod frame_limits;
 mod freshness;
 mod hot_connect;

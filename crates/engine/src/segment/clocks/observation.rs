@@ -52,6 +52,13 @@ pub enum ClockObservation<'a> {
         /// The number of stops of the distribution when it began.
         holds: u32,
     },
+    /// A member goes on although the clocks were not locked in time.
+    WentOnUnlocked {
+        /// Its index in the declaration.
+        member: usize,
+        /// The clock that is not locked.
+        reason: String,
+    },
     /// Filter depths are written.
     FiltersWritten(&'a [(StationAddress, [u8; 2])]),
 

@@ -11,6 +11,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use crate::board::clocks::References;
 use crate::clocks::extend;
 use crate::config::ReferenceClock;
+use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::link::Link;
 use crate::segment::clocks::{
@@ -40,6 +41,9 @@ impl Segment {
             ClockObservation::DelaysNotWritten(reason) => effects.report(Event::ClocksFailed { reason }),
             ClockObservation::MeasurementEnded { failed, holds } => {
                 self.observe_end_of_measurement(failed, holds, effects);
+            }
+            ClockObservation::WentOnUnlocked { member, reason } => {
+                effects.report(Event::WentOnUnlocked { subdevice: SubDeviceId(member), reason });
             }
             ClockObservation::FiltersWritten(filters) => self.observe_filters(filters),
 

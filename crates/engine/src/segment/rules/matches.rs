@@ -66,7 +66,16 @@ impl Segment {
     }
 
     /// The SubDevice is not configured until it is known which of several members it is; if this lasts, it is reported.
-    pub(in crate::segment) fn hold(&mut self, key: SubDeviceKey, index: usize, now: Instant, effects: &mut Effects) {
+    pub(in crate::segment) fn hold(
+        &mut self,
+        key: SubDeviceKey,
+        (index, attempt): (usize, u32),
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        if self.current(index, attempt).is_none() {
+            return;
+        }
         let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
         let since = *it.held_since.get_or_insert(now);
         if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
