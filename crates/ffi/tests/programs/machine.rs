@@ -70,6 +70,24 @@ fn delays_are_measured_in_loops_of_1_to_50_ms() {
     }
 }
 
+/// Watchdog, SYNC signals, control of SyncManagers.
+// covers: c-interface
+#[test]
+fn what_was_configured_is_in_the_registers_of_the_subdevices() {
+    let Some(effects) = program(&here().join("tests/c/effects.c"), &[]) else { return };
+    let (output, ended) = on_segment(&effects, &here().join("tests/c/effects.toml"), &["usual"]);
+    assert_eq!(ended, Ok(()), "{output}");
+}
+
+// covers: c-interface
+#[test]
+fn a_state_change_that_takes_longer_than_its_limit_fails_and_a_line_says_so() {
+    let Some(effects) = program(&here().join("tests/c/effects.c"), &[]) else { return };
+    let (said, reported, status) = outputs(&effects, &here().join("tests/c/effects.toml"), &["short"]);
+    assert!(status.success(), "{said}\n{reported}");
+    assert!(reported.contains("EtherCAT: Slave configuration 0 failed: "), "{reported}");
+}
+
 // covers: c-interface
 #[test]
 fn each_service_does_its_work_on_simulated_subdevices() {
