@@ -66,6 +66,15 @@ pub fn be_an_ordinary_thread() {
     }
 }
 
+/// The process calls this function when it ends by `exit` or by a return of `main`. Only the first function counts.
+pub fn at_exit(end: extern "C" fn()) {
+    static REGISTERED: Once = Once::new();
+    // SAFETY: a function of this library, which stays loaded.
+    REGISTERED.call_once(|| unsafe {
+        libc::atexit(end);
+    });
+}
+
 /// What a program with locked memory has to do if there was not enough; empty without a limit.
 pub fn memory_hint() -> String {
     let mut limit = MaybeUninit::<libc::rlimit>::zeroed();

@@ -1,6 +1,6 @@
 /*
  * Programs of several kinds on one library: hosts MODE. "locked": little memory may be locked. "fork":
- * a child beside the application. "threads": signals. "open": only requests a master.
+ * a child beside the application. "threads": signals. "exit": ends without a release. "open": only requests a master.
  */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -157,6 +157,8 @@ int main(int argc, char **argv)
         return with_child();
     if (!strcmp(argv[1], "threads"))
         return threads();
+    if (!strcmp(argv[1], "exit"))
+        return begin();
     CHECK(master = ecrt_request_master(0));
     ecrt_release_master(master);
     return 0;

@@ -4,7 +4,7 @@
 use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 
-use crate::library::{here, installed, on_segment, program};
+use crate::library::{here, installed, on_segment, outputs, program};
 
 fn ends_well(mode: &[&str]) {
     let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
@@ -30,6 +30,17 @@ fn handles_of_a_parent_are_refused_in_a_child_which_may_open_a_master_of_its_own
 #[test]
 fn threads_of_the_library_block_all_signals_install_no_handler_and_end_at_release() {
     ends_well(&["threads"]);
+}
+
+// covers: c-interface
+#[test]
+fn a_program_that_ends_without_a_release_leaves_all_subdevices_in_preop() {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    let (said, reported, status) = outputs(&hosts, &here().join("tests/c/services.toml"), &["exit"]);
+    assert!(status.success(), "{said}\n{reported}");
+    let states = reported.lines().filter_map(|line| line.split_once("Slave states: "));
+    let states: Vec<&str> = states.map(|(_, states)| states).collect();
+    assert!(states.contains(&"PREOP, OP.") && states.last() == Some(&"PREOP."), "{reported}");
 }
 
 // covers: c-interface
