@@ -8,6 +8,7 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod bus_control;
 mod clients;
 mod clocks;
 mod commands;
@@ -77,10 +78,11 @@ pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
+use crate::knowledge::KnownMailbox;
 use crate::link::{Link, LinkSet};
-use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
+use crate::mail::{EmergencyRings, InUse};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::{Companions, reconcile_without_application};
@@ -143,6 +145,8 @@ pub struct MainDevice {
     own_objects: OwnObjects,
     /// A link that was taken down by command.
     disconnected: Option<Link>,
+    /// Mailboxes that were in use when the role became INACTIVE.
+    left_mailboxes: Vec<(InUse, KnownMailbox)>,
 }
 
 impl MainDevice {
@@ -178,6 +182,7 @@ impl MainDevice {
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
+            left_mailboxes: Vec::new(),
             options,
         };
         main_device.start_reconciler();

@@ -34,10 +34,10 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["info", "link"]),
-    ("knowledge", &["direction", "info", "ring", "topology"]),
     ("ring_status", &["declared", "time", "link", "ring", "topology"]),
     ("config", &["declared", "info"]),
     ("clocks", &["topology"]),
+    ("knowledge", &["direction", "info", "ring", "topology", "clocks"]),
     ("plan", &["info", "topology", "config"]),
     ("layout", &["declared", "link", "ring", "direction", "domain"]),
     // what happened

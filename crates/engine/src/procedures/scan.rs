@@ -29,13 +29,13 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, SyncManager, map};
 use ringcat_wire::sii::SiiHeader;
 
-use self::cabling::locate_crossings;
 pub(crate) use self::cabling::cabling_findings;
-pub(crate) use self::end::end_scan;
-use self::scanned::Scanned;
+use self::cabling::locate_crossings;
 use self::count::Count;
+pub(crate) use self::end::end_scan;
 pub use self::error::ScanError;
 pub use self::options::ScanOptions;
+use self::scanned::Scanned;
 pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
 use super::dictionary::complete;

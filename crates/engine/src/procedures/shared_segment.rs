@@ -142,7 +142,7 @@ impl SharedSegment {
     }
 
     /// Passes an observation of clocks to the model.
-    pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
+    pub(crate) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
     }
 
