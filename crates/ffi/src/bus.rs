@@ -15,7 +15,8 @@ use ringcat::{Activity, Links, Options, RawDatagram, Retries, Services, SubDevic
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome, report};
 use crate::environment::source;
-use crate::host::{HeldSignals, be_an_ordinary_thread, variable};
+use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable, watch_forks};
+use crate::messages::Messenger;
 
 /// Longest wait of a request for the scan and for PREOP of all SubDevices.
 const READY_LIMIT: Duration = Duration::from_secs(20);
@@ -34,6 +35,10 @@ static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
 #[derive(Debug)]
 pub struct Bus {
     master: u32,
+    /// In a child of the process it is not used: its thread is in the parent.
+    generation: u64,
+    /// Ends before the acyclic half.
+    _messenger: Messenger,
     supervisor: SupervisorThread,
     /// Links of the cyclic half while no application uses them.
     cyclic_links: Mutex<Option<AnyLinks>>,
@@ -70,14 +75,19 @@ impl Bus {
     /// # Errors
     /// What is wrong, for the operator.
     pub fn open(master: u32) -> Result<Arc<Bus>, String> {
+        watch_forks();
         let mut buses = locked(&BUSES);
         buses.retain(|bus| bus.strong_count() > 0);
-        if let Some(bus) = buses.iter().filter_map(Weak::upgrade).find(|bus| bus.master == master) {
+        if let Some(bus) = buses.iter().filter_map(Weak::upgrade).find(|bus| bus.is(master)) {
             return Ok(bus);
         }
         let bus = Arc::new(Bus::start(master)?);
         buses.push(Arc::downgrade(&bus));
         Ok(bus)
+    }
+
+    fn is(&self, master: u32) -> bool {
+        self.master == master && self.generation == generation()
     }
 
     fn start(master: u32) -> Result<Bus, String> {
@@ -90,9 +100,13 @@ impl Bus {
         let is_ring = cyclic.addresses().redundant.is_some();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
-        let supervisor = started.map_err(|error| error.to_string())?;
+        let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
+        let messenger = Messenger::begin(master, supervisor.clone());
+        let _messenger = messenger.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
-        Ok(Bus { master, supervisor, cyclic_links, is_ring, is_reserved: AtomicBool::new(false) })
+        let generation = generation();
+        let is_reserved = AtomicBool::new(false);
+        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, is_ring, is_reserved })
     }
 
     /// Number of the master.

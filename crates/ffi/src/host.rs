@@ -1,6 +1,31 @@
-//! The host: threads of the library, and whether the process runs with the rights of another user.
+//! The host: threads of the library, children of the process, and whether it runs with the rights of another user.
 
 use std::mem::MaybeUninit;
+use std::sync::Once;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+static GENERATION: AtomicU64 = AtomicU64::new(0);
+
+/// How many times the process is the child of another one that had opened a master. What was opened in an earlier
+/// generation belongs to the parent.
+#[inline(always)]
+pub fn generation() -> u64 {
+    GENERATION.load(Ordering::Relaxed)
+}
+
+extern "C" fn begin_generation() {
+    GENERATION.fetch_add(1, Ordering::Relaxed);
+}
+
+/// From now on a child made by `fork` is a new generation.
+pub fn watch_forks() {
+    static WATCHED: Once = Once::new();
+    // SAFETY: the handler is a function of this library, which stays loaded (`-z nodelete`), and touches an atomic
+    // only.
+    WATCHED.call_once(|| unsafe {
+        libc::pthread_atfork(None, None, Some(begin_generation));
+    });
+}
 
 /// Signals of the calling thread are blocked until this is dropped. Threads that it starts inherit that.
 pub struct HeldSignals(libc::sigset_t);
@@ -39,6 +64,30 @@ pub fn be_an_ordinary_thread() {
         }
         libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const processors);
     }
+}
+
+/// The process calls this function when it ends by `exit` or by a return of `main`. Only the first function counts.
+pub fn at_exit(end: extern "C" fn()) {
+    static REGISTERED: Once = Once::new();
+    // SAFETY: a function of this library, which stays loaded.
+    REGISTERED.call_once(|| unsafe {
+        libc::atexit(end);
+    });
+}
+
+/// What a program with locked memory has to do if there was not enough; empty without a limit.
+pub fn memory_hint() -> String {
+    let mut limit = MaybeUninit::<libc::rlimit>::zeroed();
+    // SAFETY: memory of this function, in which zeros are a valid value.
+    let limit = unsafe {
+        libc::getrlimit(libc::RLIMIT_MEMLOCK, limit.as_mut_ptr());
+        limit.assume_init()
+    };
+    if limit.rlim_cur == libc::RLIM_INFINITY {
+        return String::new();
+    }
+    let kib = limit.rlim_cur / 1024;
+    format!("; where memory is locked (mlockall), expected a limit of 16384 KiB at least, got {kib} (ulimit -l)")
 }
 
 /// A variable of the environment. In a process with more rights than its user (set-uid) none is given.

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | return codes, structures of C | `code`, `types` |
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
+//! | lines for the operator about a bus | `messages` |
 //! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
 //! | a handle of a master: reservation, activation, cyclic calls | `master`, `claim`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
@@ -27,6 +28,7 @@ mod host;
 mod information;
 mod mailbox;
 mod master;
+mod messages;
 mod request;
 mod settings;
 mod types;

@@ -81,7 +81,10 @@ pub struct Master {
     draft: Mutex<Draft>,
     application: Claim<Option<Active>>,
     live: RwLock<LiveStatus>,
+    /// The last time of the application; 0 before.
     application_time: AtomicU64,
+    /// When it was given, before activation.
+    given_at: Mutex<Option<std::time::Instant>>,
     is_ring: bool,
     /// Memory of images that no application uses.
     memory: Mutex<Vec<&'static mut [u8]>>,
@@ -105,6 +108,7 @@ impl Master {
             application: Claim::new(None),
             live: RwLock::new(live),
             application_time: AtomicU64::new(0),
+            given_at: Mutex::default(),
             is_ring,
             memory: Mutex::default(),
         })
@@ -229,8 +233,10 @@ impl Master {
             }
         };
         application.exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
-        let (time, now) = (self.application_time.load(Ordering::Relaxed), application.now());
-        if time != 0 {
+        let now = application.now();
+        if let Some(given_at) = locked(&self.given_at).take() {
+            let passed = u64::try_from(given_at.elapsed().as_nanos()).unwrap_or(u64::MAX);
+            let time = self.application_time.load(Ordering::Relaxed).wrapping_add(passed);
             application.exchange_mut().set_application_time(time, now);
         }
         self.follow_live_status(bus);
@@ -283,6 +289,7 @@ impl Master {
         *draft = Draft::default();
         draft.set_found(bus.found()?);
         self.application_time.store(0, Ordering::Relaxed);
+        *locked(&self.given_at) = None;
         self.follow_live_status(&bus);
         self.is_active.store(false, Ordering::Release);
         Ok(())
@@ -360,6 +367,9 @@ impl Master {
     pub fn set_application_time(&self, time: u64) -> Outcome {
         self.check_reserved()?;
         self.application_time.store(time, Ordering::Relaxed);
+        if !self.is_active() {
+            *locked(&self.given_at) = (time != 0).then(std::time::Instant::now);
+        }
         self.cycle(|Active { application, .. }| {
             let now = application.now();
             application.exchange_mut().set_application_time(time, now);

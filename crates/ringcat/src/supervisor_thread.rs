@@ -43,6 +43,10 @@ use crate::subdevice::SubDeviceName;
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
+/// Stack of the thread, whose procedures are on the heap. A program that has locked its memory has all of it locked,
+/// usually of 8 MiB.
+const STACK_BYTES: usize = 512 << 10;
+
 /// Interval of other work in a thread that waits for a scan.
 const MEANWHILE: Duration = Duration::from_millis(10);
 
@@ -90,7 +94,8 @@ impl SupervisorThread {
             let engine = options.engine(&links);
             Worker::new(links, engine, windows, outgoing, shared).run(&incoming);
         };
-        let thread = std::thread::Builder::new().name("supervisor".into()).spawn(body).map_err(Error::Thread)?;
+        let builder = std::thread::Builder::new().name("supervisor".into()).stack_size(STACK_BYTES);
+        let thread = builder.spawn(body).map_err(Error::Thread)?;
         let (requests, events) = (Some(requests), Mutex::new(events));
         Ok(SupervisorThread(Arc::new(Handle {
             requests,

@@ -71,11 +71,30 @@ fn is_random(bytes: &[u8]) -> bool {
     let bytes = &bytes[..bytes.len().min(*LOOKED_AT.end())];
     let mut counts = [0_u32; 256];
     bytes.iter().for_each(|byte| counts[usize::from(*byte)] += 1);
-    let total = bytes.len() as f64;
-    let entropy = |count: &u32| f64::from(*count) / total * (total / f64::from(*count)).log2();
-    let bits: f64 = counts.iter().filter(|count| **count > 0).map(entropy).sum();
+    let total = bytes.len() as u64;
+    let all = counts.iter().map(|count| u64::from(*count)).filter(|count| *count > 0);
+    let bits = all.map(|count| count * log2(total, count)).sum::<u64>() as f64 / (total.max(1) << FRACTION) as f64;
     // 256 random bytes have 7.2 bits each, text has less than 6.
     LOOKED_AT.contains(&bytes.len()) && bits > 6.8
+}
+
+/// Fractional bits of [`log2`].
+const FRACTION: u32 = 16;
+
+/// The logarithm of a ratio of at least 1, by squaring: libm would have to be linked into programs in C for this alone.
+fn log2(total: u64, count: u64) -> u64 {
+    let ratio = (total << 32) / count;
+    let whole = ratio.ilog2();
+    // Between 1 and 2, with 31 fractional bits.
+    let mut mantissa = (ratio << (63 - whole)) >> 32;
+    let mut log = u64::from(whole.saturating_sub(32));
+    for _ in 0..FRACTION {
+        mantissa = (mantissa * mantissa) >> 31;
+        let is_two = mantissa >> 32;
+        mantissa >>= is_two;
+        log = log << 1 | is_two;
+    }
+    log
 }
 
 /// Whether a root `EtherCATConfig` names the schema of device descriptions.

@@ -248,7 +248,8 @@ impl Clocks {
         let [main, redundant] = self.times;
         let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
         let unread = || self.application_time(now).wrapping_sub(self.slide.in_effect());
-        own.or(other).or(self.last).map_or_else(unread, |time| time.at(now))
+        let read = own.or(other).or(self.last).map(|time| time.at(now));
+        read.or_else(|| self.slide.posted_time(now)).unwrap_or_else(unread)
     }
 
     /// Content of the copies of a frame that leaves now.

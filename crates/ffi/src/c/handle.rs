@@ -1,5 +1,6 @@
 //! Handles of C: a mark in front of an object. The mark goes when the handle ends; the memory is kept for a while, so
-//! that late calls find the missing mark.
+//! that late calls find the missing mark. It includes the generation of the process: in a child made by `fork` no
+//! handle of its parent is alive, since the threads behind it are missing there.
 
 use std::collections::VecDeque;
 use std::ffi::c_int;
@@ -8,6 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::bus::locked;
 use crate::code::{Code, Outcome, number};
+use crate::host::generation;
 
 /// Handles that have ended and whose memory is kept.
 const KEPT: usize = 4096;
@@ -39,7 +41,7 @@ static ENDED_HANDLES: Mutex<VecDeque<Ending>> = Mutex::new(VecDeque::new());
 
 /// Makes a handle.
 pub fn give<T: Kind>(object: T) -> *mut Handle<T> {
-    Box::into_raw(Box::new(Handle { mark: AtomicU64::new(T::MARK), object }))
+    Box::into_raw(Box::new(Handle { mark: AtomicU64::new(T::MARK.wrapping_add(generation())), object }))
 }
 
 /// How a handle ends; to be kept by its owner.
@@ -86,7 +88,7 @@ pub unsafe fn alive<'a, T: Kind>(handle: *const Handle<T>) -> Outcome<&'a T> {
     // SAFETY: the caller's promise: memory of `give`, which also stays readable after the end. All kinds begin with the
     // mark, so a handle of another kind is found out.
     let mark = unsafe { (*handle.cast::<AtomicU64>()).load(Ordering::Acquire) };
-    if mark != T::MARK {
+    if mark != T::MARK.wrapping_add(generation()) {
         return Err(Code::INVALID);
     }
     // SAFETY: the mark shows the type.

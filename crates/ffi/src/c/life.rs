@@ -2,16 +2,31 @@
 
 use std::ffi::{c_int, c_uint};
 use std::ptr::null_mut;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use super::handle::{alive, bury, call, ending, give};
 use super::objects::{DomainObject, MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
+use crate::bus::locked;
 use crate::code::{Outcome, report};
+use crate::host::at_exit;
 use crate::master::Master;
 use crate::settings::Name;
 
 /// Version of the interface: 1.6.
 const VERSION_MAGIC: c_uint = 1 << 8 | 6;
+
+/// Masters that were not released.
+static OPENED: Mutex<Vec<usize>> = Mutex::new(Vec::new());
+
+/// At `exit` everything is released, as the kernel does for a program that ends.
+extern "C" fn release_all() {
+    // In a child made by `fork` another thread may have had the list.
+    let opened = OPENED.try_lock().map(|mut opened| std::mem::take(&mut *opened)).unwrap_or_default();
+    for address in opened {
+        // SAFETY: handles of the library that were not released; those of a parent process are found out.
+        unsafe { ecrt_release_master(address as *mut ec_master_t) };
+    }
+}
 
 #[unsafe(no_mangle)]
 extern "C" fn ecrt_version_magic() -> c_uint {
@@ -21,7 +36,12 @@ extern "C" fn ecrt_version_magic() -> c_uint {
 #[unsafe(no_mangle)]
 extern "C" fn ecrt_open_master(master_index: c_uint) -> *mut ec_master_t {
     match Master::open(master_index) {
-        Ok(master) => give(MasterObject(Arc::new(Owner::new(master)))),
+        Ok(master) => {
+            let master = give(MasterObject(Arc::new(Owner::new(master))));
+            at_exit(release_all);
+            locked(&OPENED).push(master as usize);
+            master
+        }
         Err(message) => {
             report(format_args!("Failed to open master {master_index}: {message}"));
             null_mut()
@@ -60,6 +80,7 @@ unsafe extern "C" fn ecrt_release_master(master: *mut ec_master_t) {
     // SAFETY: a handle of the library (ecrt.h).
     if let Ok(MasterObject(owner)) = unsafe { alive(master) } {
         let owner = owner.clone();
+        locked(&OPENED).retain(|opened| *opened != master as usize);
         // The handle ends first: a second release at the same time does nothing.
         bury(ending(master));
         owner.end_children();

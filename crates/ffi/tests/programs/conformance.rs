@@ -50,3 +50,19 @@ fn each_function_returns_the_code_of_the_table_in_each_phase() {
     let good = ["EINVAL", "NULL", "ERROR", "0", "positive"];
     assert!(released.clone().all(|line| good.iter().any(|good| line.ends_with(good))), "{output}");
 }
+
+// covers: c-interface
+#[test]
+fn memcheck_finds_nothing_while_each_function_is_called_in_each_phase() {
+    let Some(calls) = program(&here().join("tests/c/conformance.c"), &[]) else { return };
+    if std::process::Command::new("valgrind").arg("--version").output().is_err() {
+        println!("skipped: there is no valgrind");
+        return;
+    }
+    let suppressions = format!("--suppressions={}", here().join("tests/c/memcheck.supp").display());
+    let arguments = ["--quiet", "--error-exitcode=9", "--leak-check=no", &suppressions];
+    let calls = calls.to_str().expect("a path");
+    let (all, segment) = ([&arguments[..], &[calls]].concat(), here().join("tests/c/services.toml"));
+    let (output, ended) = on_segment("valgrind".as_ref(), &segment, &all);
+    assert_eq!(ended, Ok(()), "{output}");
+}

@@ -1,8 +1,9 @@
 //! The library as the tests link it, and programs that run with it.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, ExitStatus, Output};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The directory of this crate.
 pub fn here() -> &'static Path {
@@ -15,7 +16,7 @@ pub fn root() -> PathBuf {
 }
 
 /// A directory for what the tests make.
-fn workshop() -> PathBuf {
+pub fn workshop() -> PathBuf {
     let place = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("ffi");
     std::fs::create_dir_all(&place).expect("a directory for the tests");
     place
@@ -44,44 +45,53 @@ pub fn run(command: &mut Command) -> String {
     text
 }
 
-/// The shared library; `None` without a C compiler.
-pub fn library() -> Option<&'static Path> {
-    static LIBRARY: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let linked = LIBRARY.get_or_init(|| {
+/// Where `crates/ffi/install` has put everything; `None` without a C compiler.
+pub fn installed() -> Option<&'static Path> {
+    static PREFIX: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let installed = PREFIX.get_or_init(|| {
         if Command::new("cc").arg("--version").output().is_err() {
             println!("skipped: there is no C compiler");
             return None;
         }
-        let library = workshop().join("libethercat.so.1");
-        let mut cc = Command::new("cc");
-        cc.args(["-shared", "-Wl,--whole-archive"]).arg(archive()).arg("-Wl,--no-whole-archive");
-        cc.arg(format!("-Wl,--version-script={}", here().join("libethercat.map").display()));
-        cc.args(["-Wl,-soname,libethercat.so.1", "-Wl,-z,nodelete", "-Wl,-z,defs", "-Wl,--gc-sections"]);
-        cc.arg("-o").arg(&library).args(["-lpthread", "-ldl", "-lm", "-lgcc_s", "-lc"]);
-        run(&mut cc);
-        Some(library)
+        let prefix = workshop().join("prefix");
+        let mut install = Command::new(here().join("install"));
+        run(install.arg("--archive").arg(archive()).arg("--prefix").arg(&prefix));
+        Some(prefix)
     });
-    linked.as_deref()
+    installed.as_deref()
+}
+
+/// The shared library; `None` without a C compiler.
+pub fn library() -> Option<PathBuf> {
+    Some(installed()?.join("lib/libethercat.so.1"))
 }
 
 /// Compiles a C program with strict warnings; `None` without a C compiler.
 pub fn program(source: &Path, arguments: &[&str]) -> Option<PathBuf> {
-    let library = library()?;
-    let name = source.file_stem().expect("a file name");
-    let program = workshop().join(name);
+    let prefix = installed()?;
+    // Tests beside each other compile the same source.
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let (name, number) = (source.file_stem().expect("a file name"), COUNT.fetch_add(1, Ordering::Relaxed));
+    let program = workshop().join(format!("{}-{number}", name.display()));
     let mut cc = Command::new("cc");
     cc.args(["-std=gnu11", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]).args(arguments);
-    cc.arg("-I").arg(here().join("include")).arg(source).arg("-o").arg(&program);
-    cc.arg(library).arg(format!("-Wl,-rpath,{}", workshop().display())).arg("-lpthread");
+    cc.arg("-I").arg(prefix.join("include")).arg(source).arg("-o").arg(&program);
+    let lib = prefix.join("lib");
+    cc.arg("-L").arg(&lib).arg(format!("-Wl,-rpath,{}", lib.display())).args(["-lethercat", "-lpthread", "-ldl"]);
     run(&mut cc);
     Some(program)
 }
 
 /// Runs a program on a simulated segment; its output, and whether it succeeded with its errors.
 pub fn on_segment(program: &Path, segment: &Path, arguments: &[&str]) -> (String, Result<(), String>) {
+    let (said, reported, status) = outputs(program, segment, arguments);
+    (said, if status.success() { Ok(()) } else { Err(format!("{status}\n{reported}")) })
+}
+
+/// Runs a program on a simulated segment; what it says and reports, and how it ends.
+pub fn outputs(program: &Path, segment: &Path, arguments: &[&str]) -> (String, String, ExitStatus) {
     let mut command = Command::new("timeout");
     command.arg("120").arg(program).args(arguments).env("RINGCAT_SIM", segment);
     let Output { status, stdout, stderr } = command.output().expect("the program runs");
-    let errors = format!("{status}\n{}", String::from_utf8_lossy(&stderr));
-    (String::from_utf8_lossy(&stdout).into_owned(), if status.success() { Ok(()) } else { Err(errors) })
+    (String::from_utf8_lossy(&stdout).into_owned(), String::from_utf8_lossy(&stderr).into_owned(), status)
 }

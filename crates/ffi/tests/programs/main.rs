@@ -1,8 +1,11 @@
 //! C programs that are compiled against `ecrt.h` and the archive of this crate, and run on simulated segments.
 //!
-//! The shared library is linked as `crates/ffi/install` does it. Without a C compiler the tests print a line and pass.
+//! The libraries are installed by `crates/ffi/install`. Without a C compiler the tests print a line and pass.
 
 mod conformance;
+mod fake;
+mod hosts;
 mod library;
+mod linking;
 mod machine;
 mod shape;

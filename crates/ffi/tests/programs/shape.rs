@@ -1,30 +1,40 @@
 //! Symbols with their versions, layout of the structures, and the header in several languages.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::Command;
 
 use crate::library::{here, library, program, run};
 
-// covers: c-interface
-#[test]
-fn the_library_exports_the_103_functions_with_their_versions_and_nothing_else() {
-    let Some(library) = library() else { return };
-    let facts = include_str!("../facts/ecrt_symbol_versions.csv");
-    let wanted: BTreeMap<&str, &str> = facts.lines().skip(1).filter_map(|line| line.split_once(',')).collect();
-    assert_eq!(wanted.len(), 103);
+/// Exported functions with their versions.
+fn exported(library: &Path) -> BTreeMap<String, String> {
     let symbols = run(Command::new("nm").args(["-D", "--defined-only", "--with-symbol-versions"]).arg(library));
-    let mut got = BTreeMap::new();
+    let mut exported = BTreeMap::new();
     for line in symbols.lines() {
         let (kind, name) = line.split_once(' ').and_then(|(_, rest)| rest.split_once(' ')).expect(line);
         if kind == "A" {
             continue;
         }
         let (name, version) = name.split_once("@@").expect(line);
-        got.insert(name, version);
+        exported.insert(name.to_owned(), version.to_owned());
     }
-    assert_eq!(got, wanted);
-    let headers = run(Command::new("readelf").arg("-d").arg(library));
-    assert!(headers.contains("[libethercat.so.1]") && headers.contains("NODELETE"), "{headers}");
+    exported
+}
+
+// covers: c-interface
+#[test]
+fn both_libraries_export_the_103_functions_with_their_versions_and_nothing_else() {
+    let Some(library) = library() else { return };
+    let facts = include_str!("../facts/ecrt_symbol_versions.csv");
+    let facts = facts.lines().skip(1).filter_map(|line| line.split_once(','));
+    let wanted: BTreeMap<String, String> = facts.map(|(name, version)| (name.into(), version.into())).collect();
+    assert_eq!(wanted.len(), 103);
+    for name in ["libethercat.so.1", "libfakeethercat.so.1"] {
+        let library = library.with_file_name(name);
+        assert_eq!(exported(&library), wanted, "{name}");
+        let headers = run(Command::new("readelf").arg("-d").arg(library));
+        assert!(headers.contains(&format!("[{name}]")) && headers.contains("NODELETE"), "{headers}");
+    }
 }
 
 // covers: c-interface

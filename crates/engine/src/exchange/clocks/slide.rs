@@ -26,6 +26,8 @@ pub(super) struct Slide {
     at: Instant,
     /// Remainder of the last step, in nanoseconds of host time.
     rest: u64,
+    /// System time of the reference clock at host time zero when the system time was posted; `None` before.
+    epoch: Option<u64>,
 }
 
 impl Slide {
@@ -35,8 +37,9 @@ impl Slide {
         let jump = timeline.jumped.wrapping_sub(self.jumped);
         if timeline.number != self.number {
             let continued = wanted.map(|epoch| epoch.wrapping_sub(timeline.epoch));
-            let Timeline { number, jumped, shift, .. } = timeline;
-            *self = Slide { number, jumped, shift, in_effect: continued.unwrap_or(shift), at: now, rest: 0 };
+            let Timeline { number, jumped, shift, epoch } = timeline;
+            let in_effect = continued.unwrap_or(shift);
+            *self = Slide { number, jumped, shift, in_effect, at: now, rest: 0, epoch: Some(epoch) };
         }
         jump
     }
@@ -44,6 +47,11 @@ impl Slide {
     /// Application time minus system time, once all is made up.
     pub const fn shift(&self) -> u64 {
         self.shift
+    }
+
+    /// The system time as it was posted; `None` before.
+    pub fn posted_time(&self, now: Instant) -> Option<u64> {
+        self.epoch.map(|epoch| epoch.wrapping_add(now.0))
     }
 
     /// The shift in effect.

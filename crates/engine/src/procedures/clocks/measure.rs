@@ -30,6 +30,7 @@ use crate::segment::Observation;
 use crate::segment::clocks::{ClockObservation, Clocks, Node};
 use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// Bytes from DC_RECEIVE_TIME to the end of DC_RECEIVE_TIME_EPU.
@@ -257,7 +258,7 @@ async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey
     // Receive times show the port at which frames enter a SubDevice.
     let latched = match latch(bus, segment, &before.stations, None).await {
         Err(BusError::Wkc { .. }) => return Ok(None),
-        other => other?,
+        other => other?.latched,
     };
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
         Ok::<_, BusError>(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?))
@@ -313,7 +314,7 @@ async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Mea
     let mut failures = 0;
     while measurements.count() < count {
         match latch(bus, segment, &survey.stations, survey.no_return).await {
-            Ok(latched) => measurements.add(latched),
+            Ok(frame) => measurements.add(frame.latched),
             Err(error @ (BusError::Busy { .. } | BusError::Disturbed { .. })) => return Err(error.to_string()),
             Err(error) if failures >= MOST_FAILURES => return Err(error.to_string()),
             Err(_) => failures += 1,
@@ -390,6 +391,14 @@ async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[Station
     false
 }
 
+/// One frame that clocks have latched.
+pub(super) struct Frame {
+    /// When the host sent it.
+    pub sent_at: Instant,
+    /// The times of each SubDevice that was asked; `None` without a clock or an answer.
+    pub latched: Vec<Option<Latched>>,
+}
+
 /// Latches one frame in all clocks and reads the receive times of these SubDevices. Copies on the link `no_return` do
 /// not return.
 pub(super) async fn latch(
@@ -397,7 +406,7 @@ pub(super) async fn latch(
     segment: &SharedSegment,
     stations: &[StationAddress],
     no_return: Option<Link>,
-) -> Result<Vec<Option<Latched>>, BusError> {
+) -> Result<Frame, BusError> {
     let (targets, pauses): (Vec<(StationAddress, bool)>, Pauses) = {
         let view = segment.view();
         let clocks = view.clocks();
@@ -427,7 +436,7 @@ pub(super) async fn latch(
         let target = Target::Broadcast(map::DC_RECEIVE_TIME);
         return Err(BusError::Wkc { target, expected: answered, got: latches.answered });
     }
-    Ok(read)
+    Ok(Frame { sent_at: latches.sent_at, latched: read })
 }
 
 /// The present loop settings of the SubDevices that have these ports.

@@ -14,6 +14,7 @@ use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::clocks::{ClockObservation, LatchedTimes, Node};
 use crate::supervisor::{Bus, BusError};
+use crate::time::Instant;
 
 /// Reset value of DC_SPEED_COUNTER_START; writing it restarts the filters.
 const SPEED_COUNTER_START: u16 = 0x1000;
@@ -32,8 +33,9 @@ pub(super) async fn set_up(bus: &Bus, segment: &SharedSegment, opening: Opening)
         (view.clocks().stations(), view.clocks().epoch)
     };
     bus.step(Subject::Clocks, || format!("delays measured; offsets of {} clocks follow", stations.len()));
-    let wanted = bus.now().0.wrapping_add(epoch);
-    let latched = latched_times(bus, segment, &stations).await.map_err(text)?;
+    // The frame may have waited for an empty wire: its time counts.
+    let (sent_at, latched) = latched_times(bus, segment, &stations).await.map_err(text)?;
+    let wanted = sent_at.0.wrapping_add(epoch);
     segment.observe_clocks(ClockObservation::Latched { latched: &latched, wanted });
     set_filters(bus, segment).await;
     write_all(bus, segment).await.map_err(text)
@@ -102,27 +104,26 @@ pub(super) async fn write_delays(bus: &Bus, segment: &SharedSegment, link: Link)
     Ok(())
 }
 
-/// Latches one frame in all clocks.
+/// Latches one frame in all clocks; when it was sent.
 async fn latched_times(
     bus: &Bus,
     segment: &SharedSegment,
     stations: &[StationAddress],
-) -> Result<LatchedTimes, BusError> {
-    let latched = latch(bus, segment, stations, None).await?;
-    let times = stations.iter().zip(latched);
-    Ok(times.filter_map(|(station, latched)| Some((*station, latched?))).collect())
+) -> Result<(Instant, LatchedTimes), BusError> {
+    let frame = latch(bus, segment, stations, None).await?;
+    let times = stations.iter().zip(frame.latched);
+    Ok((frame.sent_at, times.filter_map(|(station, latched)| Some((*station, latched?))).collect()))
 }
 
 /// Sets up one clock that has lost its registers: its offset is computed from a frame that it and its reference latch,
 /// or from the time of the host without a reference.
 pub(super) async fn set_up_one(bus: &Bus, segment: &SharedSegment, station: StationAddress) -> Result<(), BusError> {
-    let host = bus.now().0;
     let stations = segment.view().clocks().stations();
-    let latched = latched_times(bus, segment, &stations).await?;
+    let (sent_at, latched) = latched_times(bus, segment, &stations).await?;
     if !latched.contains_key(&station) {
         return Ok(());
     }
-    segment.observe_clocks(ClockObservation::LatchedFor { station, latched: &latched, host });
+    segment.observe_clocks(ClockObservation::LatchedFor { station, latched: &latched, host: sent_at.0 });
     let Some(registers) = segment.view().clocks().node_at(station).map(registers) else { return Ok(()) };
     write(bus, station, registers).await?;
     segment.observe_clocks(ClockObservation::OneSetUp(station));

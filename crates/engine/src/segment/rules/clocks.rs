@@ -108,6 +108,9 @@ impl Segment {
 
     fn observe_set_up(&mut self, effects: &mut Effects) {
         self.clocks.life = Life::Running(Running::default());
+        // What the exchange predicts until it has read a reference: the application's time may be another one by now.
+        let epoch = self.clocks.epoch;
+        self.board.clocks.times.post_timeline(self.clocks.times.turn(0, 0, epoch));
         self.board.clocks.post_references(self.clocks.references());
         self.report_reference(effects);
         self.report_hidden(effects);

@@ -2,11 +2,14 @@
 //! the application.
 
 use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::register::{DcSystemTimeDifference, map};
 use scenarios::calls::errno::Errno;
 use scenarios::calls::master::Ecrt;
 use scenarios::pulses::Pulses;
+use scenarios::segments::{descriptions, line, ring};
 
-use super::{assert_idle, configure, requested, run_all};
+use super::{KINDS, assert_idle, configure, requested, run_all};
 
 /// Longest start with clocks: 5 s without a lock, as with IgH.
 const WITH_CLOCKS: std::time::Duration = std::time::Duration::from_secs(12);
@@ -61,6 +64,103 @@ fn sync_pulses_run_with_the_application_and_end_with_it() {
         assert_eq!(ecrt.reference_clock_time(), Err(Errno::NxIo));
         ecrt.deactivate().expect("all follow");
         assert_idle(&mut ecrt, "without clocks");
+    }
+}
+
+/// Devices with a clock.
+fn with_clock(ecrt: &mut Ecrt) -> Vec<usize> {
+    let found = ecrt.side.engine().subdevices();
+    (0..found.len()).filter(|at| found[*at].controller.features.dc).collect()
+}
+
+/// |0x092C| of a device.
+fn difference_ns(ecrt: &mut Ecrt, device: usize) -> u32 {
+    let bytes = ecrt.network().device(DeviceIndex(device)).controller.register(map::DC_SYSTEM_TIME_DIFFERENCE, 4);
+    DcSystemTimeDifference::decode(&[bytes[0], bytes[1], bytes[2], bytes[3]]).signed_ns().unsigned_abs()
+}
+
+/// Masters of segments whose clocks drift by up to 30 ppm.
+fn drifting() -> impl Iterator<Item = (usize, Ecrt)> {
+    [2, 5, 12].into_iter().flat_map(|count| {
+        let drifting = || {
+            let mut devices = descriptions(&KINDS[..count]);
+            for (number, device) in devices.iter_mut().enumerate() {
+                device.clock_drift_ppb = (number as i64 * 7_919 % 61 - 30) * 1_000 + 500;
+            }
+            devices
+        };
+        let options = NetworkOptions::default;
+        [line(drifting(), options()), ring(drifting(), options())].map(|network| {
+            let mut ecrt = Ecrt::new(network);
+            ecrt.request().expect("it is free");
+            (count, ecrt)
+        })
+    })
+}
+
+/// Runs the acyclic half without a cycle until the clocks are set up.
+fn set_up_without_a_cycle(ecrt: &mut Ecrt, clocks: &[usize]) {
+    let mut rounds_after = 0;
+    for _ in 0..20_000 {
+        ecrt.receive();
+        ecrt.pause(std::time::Duration::from_micros(50));
+        let network = ecrt.network();
+        let offset = |at: usize| network.device(DeviceIndex(at)).controller.register(map::DC_SYSTEM_TIME_OFFSET, 8);
+        rounds_after += u32::from(clocks.iter().all(|at| offset(*at) != [0; 8]));
+        if rounds_after == 20 {
+            return;
+        }
+    }
+    panic!("the clocks are not set up before the first cycle");
+}
+
+/// In the next cycles all clocks are together, the reference has the application's phase, and no register shows more.
+fn assert_together(ecrt: &mut Ecrt, clocks: &[usize], reference: usize, text: &str) {
+    let cycle = i64::from(CYCLE_NS);
+    for _ in 0..500 {
+        ecrt.cycle();
+        let application = ecrt.application_clock();
+        let network = ecrt.network();
+        let time = |at: usize| network.device(DeviceIndex(at)).controller.system_time(network.now());
+        let phase = (time(reference).wrapping_sub(application) as i64).rem_euclid(cycle);
+        let off = phase.min(cycle - phase);
+        assert!(off <= 20_000, "{text}: the reference is {off} ns from its phase");
+        for device in clocks.iter().copied() {
+            let apart = i64::from((time(device) as u32).wrapping_sub(time(reference) as u32) as i32);
+            assert!(apart.abs() <= 1_000, "{text}: clock {device} is {apart} ns from its reference");
+        }
+        for device in clocks.iter().copied() {
+            let shown = difference_ns(ecrt, device);
+            assert!(shown <= 20_000, "{text}: clock {device} shows {shown} ns");
+        }
+    }
+}
+
+/// As with an acyclic half of its own thread: the clocks are set up before the program gives a time and sends its first
+/// frame. The first time then differs from that of the set-up by anything.
+// covers: 7.2, api, dc-reference
+#[test]
+fn a_first_time_between_the_set_up_and_the_first_cycle_moves_all_clocks() {
+    let bases = [(FAR_NS, false), (FAR_NS, true), (30_000_000, true), (FAR_NS.wrapping_neg(), false)];
+    for (count, mut ecrt) in drifting() {
+        for (base, chooses_last) in bases {
+            let text = format!("{count}, {} ns, last chosen {chooses_last}", base as i64);
+            let clocks = with_clock(&mut ecrt);
+            let (_, configs) = configure(&mut ecrt, 0..count);
+            ecrt.dc(configs[0], ASSIGN, CYCLE_NS, 250_000);
+            let reference = if chooses_last { clocks[clocks.len() - 1] } else { clocks[0] };
+            ecrt.select_reference_clock(configs[reference]);
+            ecrt.clock_base = base;
+            ecrt.activate().expect("it fits");
+            set_up_without_a_cycle(&mut ecrt, &clocks);
+            let time = ecrt.application_clock();
+            ecrt.application_time(time);
+            ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{text}: {error}"));
+            ecrt.cycles(10_000);
+            assert_together(&mut ecrt, &clocks, reference, &text);
+            ecrt.deactivate().expect("all follow");
+            assert_idle(&mut ecrt, &text);
+        }
     }
 }
 

@@ -1,0 +1,88 @@
+//! Programs of several kinds: with locked memory, with children, with the rights of another user, that unload the
+//! library.
+
+use std::os::unix::fs::PermissionsExt;
+use std::process::Command;
+
+use crate::library::{here, installed, on_segment, outputs, program};
+
+fn ends_well(mode: &[&str]) {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    let (output, ended) = on_segment(&hosts, &here().join("tests/c/services.toml"), mode);
+    assert_eq!(ended, Ok(()), "{mode:?}\n{output}");
+    println!("{output}");
+}
+
+/// The simulated segment in it included; 8 MiB are usual.
+// covers: c-interface
+#[test]
+fn a_program_that_locks_its_memory_needs_at_most_6_mib_for_the_library() {
+    ends_well(&["locked", "6"]);
+}
+
+// covers: c-interface
+#[test]
+fn handles_of_a_parent_are_refused_in_a_child_which_may_open_a_master_of_its_own() {
+    ends_well(&["fork"]);
+}
+
+// covers: c-interface
+#[test]
+fn threads_of_the_library_block_all_signals_install_no_handler_and_end_at_release() {
+    ends_well(&["threads"]);
+}
+
+// covers: c-interface
+#[test]
+fn a_program_that_ends_without_a_release_leaves_all_subdevices_in_preop() {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    let (said, reported, status) = outputs(&hosts, &here().join("tests/c/services.toml"), &["exit"]);
+    assert!(status.success(), "{said}\n{reported}");
+    let states = reported.lines().filter_map(|line| line.split_once("Slave states: "));
+    let states: Vec<&str> = states.map(|(_, states)| states).collect();
+    assert!(states.contains(&"PREOP, OP.") && states.last() == Some(&"PREOP."), "{reported}");
+}
+
+// covers: c-interface
+#[test]
+fn the_library_is_opened_and_closed_a_hundred_times_in_one_process() {
+    let Some(unloaded) = program(&here().join("tests/c/unloaded.c"), &["-Wl,--as-needed"]) else { return };
+    let library = installed().expect("it was compiled").join("lib/libethercat.so.1");
+    let segment = here().join("tests/c/services.toml");
+    let (output, ended) = on_segment(&unloaded, &segment, &[library.to_str().expect("a path")]);
+    assert_eq!((output.as_str(), ended), ("100 rounds\n", Ok(())));
+}
+
+/// Needs root, to make a program that runs with other rights than its user, and `setpriv`.
+// covers: c-interface
+#[test]
+fn a_set_uid_program_ignores_the_variables_of_its_user() {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    let place = std::env::temp_dir().join(format!("ringcat-set-uid-{}", std::process::id()));
+    std::fs::copy(&hosts, &place).expect("a copy");
+    std::fs::set_permissions(&place, PermissionsExt::from_mode(0o4755)).expect("permissions");
+    let library = std::fs::canonicalize(installed().expect("it was compiled").join("lib/libethercat.so.1"));
+    let segment = here().join("tests/c/services.toml");
+    let as_other = |program: &str| {
+        let mut command = Command::new("setpriv");
+        command.args(["--reuid", "65534", "--clear-groups", program, "open"]).env("RINGCAT_SIM", &segment);
+        command.output()
+    };
+    let is_root = std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").expect("proc")) == 0;
+    let usual = as_other(hosts.to_str().expect("a path"));
+    let (true, Ok(usual), Ok(_)) = (is_root, usual, library) else {
+        let _ = std::fs::remove_file(&place);
+        println!("skipped: needs root and setpriv");
+        return;
+    };
+    let secure = as_other(place.to_str().expect("a path"));
+    let _ = std::fs::remove_file(&place);
+    let secure = secure.expect("setpriv");
+    let said = String::from_utf8_lossy(&secure.stderr);
+    if !usual.status.success() || said.contains("error while loading") {
+        println!("skipped: another user cannot read this directory: {said}");
+        return;
+    }
+    assert_eq!(secure.status.code(), Some(1), "{said}");
+    assert!(said.contains("expected RINGCAT_MAIN"), "{said}");
+}

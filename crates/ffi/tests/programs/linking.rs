@@ -1,0 +1,144 @@
+//! What `crates/ffi/install` installs, and the ways in which programs link it.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::library::{here, installed, on_segment, run, workshop};
+
+/// A C compiler for the smallest program, in a directory of its own.
+fn cc(prefix: &Path) -> Command {
+    let mut cc = Command::new("cc");
+    cc.arg(here().join("tests/c/manual.c")).arg("-I").arg(prefix.join("include"));
+    cc
+}
+
+fn counts_five(program: &Path) {
+    let (output, ended) = on_segment(program, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!((output.as_str(), ended), ("5\n", Ok(())));
+}
+
+fn has(tool: &str) -> bool {
+    let found = Command::new(tool).arg("--version").output().is_ok();
+    if !found {
+        println!("skipped: there is no {tool}");
+    }
+    found
+}
+
+fn target(name: &str) -> PathBuf {
+    workshop().join(format!("linked-{name}"))
+}
+
+// covers: c-interface
+#[test]
+fn both_command_lines_of_the_manual_link_without_a_further_library() {
+    let Some(prefix) = installed() else { return };
+    let lib = prefix.join("lib");
+    for name in ["ethercat", "ethercat_rtdm"] {
+        let program = target(name);
+        let mut dynamic = cc(prefix);
+        dynamic.arg("-o").arg(&program).arg("-L").arg(&lib).arg(format!("-l{name}"));
+        run(dynamic.arg("-Wl,--rpath").arg(format!("-Wl,{}", lib.display())));
+        counts_five(&program);
+    }
+    for kind in ["-static", "-pie", "-static-pie"] {
+        let program = target(&kind[1..]);
+        run(cc(prefix).arg(kind).arg("-o").arg(&program).arg(lib.join("libethercat.a")));
+        counts_five(&program);
+    }
+}
+
+// covers: c-interface
+#[test]
+fn the_archive_shows_the_functions_of_ecrt_h_only() {
+    let Some(prefix) = installed() else { return };
+    let archive = prefix.join("lib/libethercat.a");
+    let symbols = run(Command::new("nm").args(["--extern-only", "--defined-only"]).arg(archive));
+    let names: BTreeSet<&str> = symbols.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
+    assert!(names.len() == 103 && names.iter().all(|name| name.starts_with("ecrt_")), "{names:?}");
+}
+
+// covers: c-interface
+#[test]
+fn the_archive_works_inside_another_shared_object_and_beside_another_rust_library() {
+    let Some(prefix) = installed() else { return };
+    let archive = prefix.join("lib/libethercat.a");
+    let (object, program) = (workshop().join("libinside.so"), target("inside"));
+    let mut shared = cc(prefix);
+    shared.args(["-shared", "-fPIC", "-Dmain=inside", "-o"]).arg(&object).arg(&archive);
+    run(&mut shared);
+    let main = workshop().join("calls_inside.c");
+    std::fs::write(&main, "int inside(void); int main(void) { return inside(); }\n").expect("a file");
+    run(Command::new("cc").arg(&main).arg("-o").arg(&program).arg(&object));
+    counts_five(&program);
+
+    // An archive of Rust that shows all its symbols.
+    let other = workshop().join("other.rs");
+    let text = "#[unsafe(no_mangle)] pub extern \"C\" fn other() -> i32 { vec![1; 3].iter().sum::<i32>() - 3 }\n";
+    std::fs::write(&other, text).expect("a file");
+    let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
+    if !has(&compiler) {
+        return;
+    }
+    let archive_of_other = workshop().join("libother.a");
+    let mut rustc = Command::new(compiler);
+    run(rustc.args(["--edition=2024", "--crate-type=staticlib", "-o"]).arg(&archive_of_other).arg(other));
+    let both = workshop().join("both.c");
+    let text = "#include \"manual.h\"\nint other(void); int main(void) { return other() ? 9 : smallest(); }\n";
+    std::fs::write(&both, text).expect("a file");
+    let source = std::fs::read_to_string(here().join("tests/c/manual.c")).expect("the source");
+    std::fs::write(workshop().join("manual.h"), source.replace("int main(void)", "static int smallest(void)"))
+        .expect("a file");
+    let orders = [[&archive, &archive_of_other], [&archive_of_other, &archive]];
+    for (order, program) in orders.into_iter().zip([target("both"), target("both2")]) {
+        let mut link = Command::new("cc");
+        link.arg(&both).arg("-I").arg(prefix.join("include")).arg("-o").arg(&program).args(order);
+        run(&mut link);
+        counts_five(&program);
+    }
+}
+
+// covers: c-interface
+#[test]
+fn pkg_config_libtool_and_cmake_find_version_1_6_2() {
+    let Some(prefix) = installed() else { return };
+    let lib = prefix.join("lib");
+    for name in ["libethercat.la", "libethercat_rtdm.la"] {
+        let text = std::fs::read_to_string(lib.join(name)).expect("the file");
+        assert!(text.contains("old_library='libethercat.a'") && text.contains("dlname='libethercat.so.1'"), "{text}");
+        assert!(text.contains(&format!("libdir='{}'", lib.display())), "{text}");
+    }
+    if has("pkg-config") {
+        let ask = |question: &[&str]| {
+            let mut pkg_config = Command::new("pkg-config");
+            run(pkg_config.env("PKG_CONFIG_PATH", lib.join("pkgconfig")).args(question).arg("libethercat"))
+        };
+        assert_eq!(ask(&["--modversion"]).trim(), "1.6.2");
+        let program = target("pkg-config");
+        let mut link = Command::new("cc");
+        link.arg(here().join("tests/c/manual.c")).arg("-o").arg(&program);
+        link.args(ask(&["--cflags", "--libs"]).split_whitespace()).arg(format!("-Wl,-rpath,{}", lib.display()));
+        run(&mut link);
+        counts_five(&program);
+    }
+    if !has("cmake") {
+        return;
+    }
+    for (number, find) in ["EtherCAT REQUIRED", "ethercat 1.6 CONFIG REQUIRED"].into_iter().enumerate() {
+        let place = target(&format!("cmake{number}"));
+        let _ = std::fs::remove_dir_all(&place);
+        std::fs::create_dir_all(&place).expect("a directory");
+        let text = format!(
+            "cmake_minimum_required(VERSION 3.10)\nproject(smallest C)\nfind_package({find})\n\
+             add_executable(smallest {})\ntarget_link_libraries(smallest EtherLab::ethercat)\n",
+            here().join("tests/c/manual.c").display()
+        );
+        std::fs::write(place.join("CMakeLists.txt"), text).expect("a file");
+        let mut configure = Command::new("cmake");
+        configure.arg("-S").arg(&place).arg("-B").arg(place.join("build"));
+        run(configure.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display())));
+        run(Command::new("cmake").arg("--build").arg(place.join("build")));
+        counts_five(&place.join("build/smallest"));
+    }
+}
