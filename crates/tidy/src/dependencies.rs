@@ -11,7 +11,7 @@ use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each one alone.
-pub const FEATURE_SETS: [&str; 7] = ["", "packet", "sim", "eni", "gateway", "eoe", "tracing"];
+pub const FEATURE_SETS: [&str; 8] = ["", "packet", "sim", "eni", "gateway", "eoe", "daemon", "tracing"];
 
 /// Sets for an application on network interfaces, with few dependencies.
 const SMALL: [&str; 2] = ["", "packet"];
