@@ -6,13 +6,14 @@
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
-//! * [`daemon`]: all of it.
+//! * [`daemon`]: all of it; [`log`]: lines for the operator.
 //!
 //! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to 0076.
 #![forbid(unsafe_code)]
 
 pub mod daemon;
 pub mod listening;
+pub mod log;
 pub mod master;
 pub mod owner;
 pub mod process_state;

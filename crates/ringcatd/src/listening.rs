@@ -11,6 +11,7 @@ use std::thread;
 use ringcat_control::{Connection, Content, Refusal, Right};
 use ringcat_link::process::Peer;
 
+use crate::log::say;
 use crate::rights::Rights;
 use crate::session::{self, Masters};
 
@@ -128,7 +129,7 @@ fn accept(listener: &UnixListener, rights: Rights, masters: &Arc<Masters>) {
             drop(place);
         };
         if let Err(error) = thread::Builder::new().name("client".into()).spawn(serve) {
-            eprintln!("ringcatd: a client is not served: {error}");
+            say(format_args!("a client is not served: {error}"));
         }
     }
 }

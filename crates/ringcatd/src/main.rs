@@ -8,6 +8,7 @@ use clap::Parser;
 use ringcat_control::DEFAULT_SOCKET;
 use ringcat_link::HeldSignals;
 use ringcatd::daemon::Daemon;
+use ringcatd::log::say;
 use ringcatd::master::Master;
 use ringcatd::rights::{Rights, group, mode};
 use ringcatd::segment_process;
@@ -56,7 +57,7 @@ fn main() -> ExitCode {
         // The daemon says what its segment has said.
         Err(_) if arguments.simulate.is_some() => ExitCode::from(2),
         Err(error) => {
-            eprintln!("ringcatd: {error}");
+            say(format_args!("{error}"));
             ExitCode::from(2)
         }
     }
@@ -73,7 +74,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let rights = Rights { group: arguments.group, mode: arguments.mode };
     let stop_limit = Duration::from_millis(arguments.stop_limit);
     let daemon = Daemon::start(masters, &arguments.socket, rights, stop_limit)?;
-    eprintln!("ringcatd: listens at {}", arguments.socket.display());
+    say(format_args!("listens at {}", arguments.socket.display()));
     while held.wait(LOOK).is_none() {
         daemon.look_after();
     }

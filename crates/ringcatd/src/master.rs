@@ -11,6 +11,7 @@ use ringcat::{Activity, Handover, Knowledge, Options, Retries, SupervisorThread}
 use ringcat_control::message::{Ask, MasterState};
 use ringcat_control::{Content, Message, Refusal};
 
+use crate::log::say;
 use crate::owner::{Answered, OwnerLink};
 use crate::wires::{Opened, Wires};
 
@@ -76,7 +77,7 @@ impl Master {
         self.number
     }
 
-    /// Who drives it.
+    /// Its links, and what drives it.
     pub fn state(&self) -> MasterState {
         let (owner, fault) = match &*locked(&self.driver) {
             Driver::Owner(owner) => (Some(owner.owner().clone()), None),
@@ -185,7 +186,7 @@ impl Master {
             Ok((supervisor, opened)) => Driver::Daemon(supervisor, opened),
             Err(cause) => {
                 if !matches!(&*locked(&self.driver), Driver::Fault(before) if *before == cause) {
-                    eprintln!("ringcatd: master {} is not driven: {cause}", self.number);
+                    say(format_args!("master {} is not driven: {cause}", self.number));
                 }
                 Driver::Fault(cause)
             }

@@ -8,6 +8,7 @@ use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, Owner};
 use ringcat_control::{Connection, Limits, ReceiveError, Refusal, Right};
 use ringcat_link::process::Peer;
 
+use crate::log::say;
 use crate::master::Master;
 use crate::owner::{Answered, OwnerLink};
 use crate::tenure;
@@ -108,10 +109,10 @@ fn expected(expected: &str) -> Refusal {
 fn own(connection: &Arc<Connection>, masters: &Masters, master: &Master, owner: Owner) -> Result<(), Refusal> {
     let owner = Arc::new(OwnerLink::new(master.number(), owner, connection.clone()));
     let opened = master.hand_over(&owner)?;
-    eprintln!("ringcatd: master {}: driven by {}", master.number(), owner.owner());
+    say(format_args!("master {}: driven by {}", master.number(), owner.owner()));
     let (end, why) = tenure::serve(master, &owner, masters.stop_limit);
     master.take_back(&opened, end);
-    eprintln!("ringcatd: master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner());
+    say(format_args!("master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner()));
     reply(connection, Content::Released.into());
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! The shared library is linked as `crates/ffi/install` does it. Without a C compiler the tests print a line and pass.
 
 mod conformance;
+mod daemon;
 mod library;
 mod machine;
 mod shape;

@@ -94,6 +94,47 @@ fn an_application_that_does_not_answer_is_named_within_a_second() {
     assert_eq!(client.ask(0, VENDOR, Vec::new()).expect("it goes on").0, Answer::Data);
 }
 
+/// Clients, and their questions in a second.
+const CLIENTS: u64 = 50;
+const RATE: u64 = 100;
+
+// covers: daemon
+#[test]
+fn fifty_clients_at_100_hz_are_answered_beside_an_application_in_op() {
+    let bench = Bench::start(4);
+    let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    let begin = Instant::now();
+    let ask_often = |number: u64| {
+        let mut client = Client::connect(&bench.socket, "often").expect("there is room");
+        let mut refused = 0_u64;
+        for round in 0..2 * RATE {
+            let at = Duration::from_micros((round * CLIENTS + number) * 1_000_000 / (RATE * CLIENTS));
+            std::thread::sleep(at.saturating_sub(begin.elapsed()));
+            match client.ask(0, Ask::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
+                Ok((answer, _)) => assert_eq!(answer, Answer::AlStatus { status: 8, code: 0 }),
+                // The owner has as many questions as it may have.
+                Err(ClientError::Refused(Refusal::TooManyQuestions { .. })) => refused += 1,
+                Err(error) => panic!("{error}"),
+            }
+        }
+        refused
+    };
+    let refused: u64 = std::thread::scope(|scope| {
+        let all: Vec<_> = (0..CLIENTS).map(|number| {
+                let ask_often = &ask_often;
+                scope.spawn(move || ask_often(number))
+            }).collect();
+        all.into_iter().map(|one| one.join().expect("no panic")).sum()
+    });
+    let (asked, took) = (CLIENTS * 2 * RATE, begin.elapsed());
+    println!("{asked} questions of {CLIENTS} clients in {took:?}, {refused} refused because others were under way");
+    assert!(bench.are_in(AlState::Op), "{:?}", bench.states());
+    assert!(refused < asked / 2, "{refused} of {asked}");
+    owner.input_ends();
+    println!("{}", owner.wait_for("cycles: "));
+    assert_eq!(owner.wait_for("ended"), "ended: Ok(()), lost false");
+}
+
 /// Socket for the process of another user.
 const SOCKET: &str = "RINGCAT_TEST_READER";
 

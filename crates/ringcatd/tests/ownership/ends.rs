@@ -77,6 +77,26 @@ fn an_application_that_ends_without_a_release_leaves_the_bus_to_the_daemon() {
 
 // covers: daemon
 #[test]
+fn a_core_dump_does_not_delay_the_daemon() {
+    let bench = Bench::start(4);
+    let directory = crate::bench::directory();
+    let mut times = Vec::new();
+    for _ in 0..5 {
+        let owner = OwnerProcess::start_with_core(&bench.socket, &directory);
+        let at = now_ns();
+        owner.signal("-QUIT");
+        times.push(wait_for_first_frame(&bench, at));
+        bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+    }
+    times.sort_unstable();
+    println!("SIGQUIT with a core of 64 MB to the first frame of the daemon: median {:?}, all {times:?}", times[2]);
+    std::fs::remove_dir_all(directory).expect("it is there");
+    // The time includes that of starting the program `kill`.
+    assert!(times[2] <= FIRST_FRAME[1], "{times:?}");
+}
+
+// covers: daemon
+#[test]
 fn a_stopped_application_loses_the_bus_after_the_limit_and_sends_nothing_later() {
     let bench = Bench::with_limit(4, Duration::from_millis(100));
     let owner = OwnerProcess::start(&bench.socket, Work::Cycle);

@@ -13,6 +13,9 @@ const SOCKET: &str = "RINGCAT_TEST_OWNER";
 /// What it does with the bus.
 const WORK: &str = "RINGCAT_TEST_WORK";
 
+/// Bytes of memory that an application has in use.
+const MEMORY: usize = 64 << 20;
+
 /// What an application does with its bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Work {
@@ -32,8 +35,18 @@ pub struct OwnerProcess {
 impl OwnerProcess {
     /// Starts one; it has the bus, and with [`Work::Cycle`] all SubDevices in OP, when this returns.
     pub fn start(socket: &Path, work: Work) -> OwnerProcess {
-        let program = std::env::current_exe().expect("it is known");
-        let mut command = Command::new(program);
+        OwnerProcess::start_by(Command::new(std::env::current_exe().expect("it is known")), socket, work)
+    }
+
+    /// Starts one that writes its core where a signal asks for that, into this directory.
+    pub fn start_with_core(socket: &Path, directory: &Path) -> OwnerProcess {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "ulimit -c unlimited; exec \"$0\" \"$@\""]).current_dir(directory);
+        shell.arg(std::env::current_exe().expect("it is known"));
+        OwnerProcess::start_by(shell, socket, Work::Cycle)
+    }
+
+    fn start_by(mut command: Command, socket: &Path, work: Work) -> OwnerProcess {
         command.args(["--exact", "owner_process::an_application_drives_the_bus_until_its_input_ends", "--nocapture"]);
         command.env(SOCKET, socket).env(WORK, format!("{work:?}"));
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -65,9 +78,14 @@ impl OwnerProcess {
         assert!(sent.is_ok_and(|status| status.success()));
     }
 
+    /// Tells it to end in order.
+    pub fn input_ends(&mut self) {
+        self.input = None;
+    }
+
     /// Tells it to end in order, and waits.
     pub fn end(mut self) -> String {
-        self.input = None;
+        self.input_ends();
         let said = self.wait_for("ended");
         self.child.wait().expect("it ends");
         said
@@ -117,6 +135,8 @@ fn run(socket: &Path, work: Work) {
     let options = Options::default();
     let mut bus = OwnedBus::take(socket, 0, "application", &options, || ()).expect("the daemon drives it");
     let ended = ended();
+    // The kernel tears the memory of a killed process down before its descriptors are closed.
+    let memory = std::hint::black_box(vec![1_u8; MEMORY]);
     match work {
         Work::Hold => {
             say("ready");
@@ -135,8 +155,10 @@ fn run(socket: &Path, work: Work) {
             while ended.try_recv().is_err() {
                 application.cycle(|_| ());
             }
+            say(&format!("cycles: {:?}", application.pace()));
         }
     }
+    drop(memory);
     let lost = bus.is_lost();
     let released = bus.release().map_err(|error| error.to_string());
     say(&format!("ended: {released:?}, lost {lost}"));
