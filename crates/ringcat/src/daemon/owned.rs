@@ -180,18 +180,20 @@ impl Receiver {
             match self.connection.receive(Limits::OWNER, Some(LOOK)) {
                 Ok((message, _)) => match message.content {
                     Content::Ask(question) => self.questions.take(question, message.bytes),
-                    Content::Released => return,
+                    Content::Released => return self.end(),
                     // A daemon of this version says nothing else.
                     _ => {}
                 },
                 Err(ReceiveError::TimedOut) => self.tell_knowledge(),
-                Err(_) => {
-                    let is_over = self.shared.is_over.load(Ordering::Acquire);
-                    self.shared.is_lost.store(!is_over, Ordering::Release);
-                    return;
-                }
+                Err(_) => return self.end(),
             }
         }
+    }
+
+    /// The daemon drives the bus from now on, or is gone. Without a release the bus is lost.
+    fn end(&self) {
+        let is_over = self.shared.is_over.load(Ordering::Acquire);
+        self.shared.is_lost.store(!is_over, Ordering::Release);
     }
 
     /// Tells the daemon what is known, if a scan has ended since the last time.
