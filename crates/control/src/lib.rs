@@ -14,6 +14,7 @@
 pub mod client;
 pub mod connection;
 pub mod message;
+mod owner;
 pub mod refusal;
 pub mod wire;
 

@@ -5,6 +5,7 @@
 pub use ringcat_engine::main_device::snapshot::Snapshot;
 use serde::{Deserialize, Serialize};
 
+pub use crate::owner::Owner;
 use crate::refusal::Refusal;
 
 /// A message.
@@ -57,7 +58,8 @@ pub enum Content {
     Taken(HandedLinks),
     /// An owner tells what it knows after a scan, in the bytes.
     Knowledge,
-    /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is nothing.
+    /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
+    /// nothing.
     Release,
     /// The daemon drives the master again.
     Released,
@@ -214,15 +216,6 @@ pub struct MasterState {
     pub owner: Option<Owner>,
     /// Why nothing drives it; `None` while it is driven.
     pub fault: Option<String>,
-}
-
-/// The application that drives a master.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Owner {
-    /// Its process id; 0 if it is not known here.
-    pub pid: u32,
-    /// Its name as it said it.
-    pub program: String,
 }
 
 /// An event.

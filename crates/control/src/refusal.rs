@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::message::Owner;
+use crate::owner::Owner;
 
 /// Why a question has no answer, or a connection ends.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,12 +73,6 @@ pub enum Refusal {
         /// The owner.
         owner: Owner,
     },
-}
-
-impl fmt::Display for Owner {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?} (process {})", self.program, self.pid)
-    }
 }
 
 impl fmt::Display for Refusal {

@@ -1,4 +1,4 @@
-//! Links of one half: network interfaces, a segment that is simulated in this process, or what a daemon has handed over.
+//! Links of one half: network interfaces, a segment that is simulated in this process, or those of a daemon.
 
 use std::path::Path;
 use std::task::Waker;

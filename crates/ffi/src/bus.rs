@@ -123,7 +123,14 @@ impl Bus {
     fn with(master: u32, supervisor: SupervisorThread, cyclic: AnyLinks, owned: Option<OwnedBus>) -> Bus {
         let is_ring = cyclic.addresses().1.is_some();
         let cyclic_links = Mutex::new(Some(cyclic));
-        Bus { master, supervisor, cyclic_links, _owned: Mutex::new(owned), is_ring, is_reserved: AtomicBool::new(false) }
+        Bus {
+            master,
+            supervisor,
+            cyclic_links,
+            _owned: Mutex::new(owned),
+            is_ring,
+            is_reserved: AtomicBool::new(false),
+        }
     }
 
     /// Number of the master.

@@ -8,7 +8,8 @@
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
 //! * [`daemon`]: all of it; [`log`]: lines for the operator.
 //!
-//! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to 0076.
+//! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to
+//! 0076.
 #![forbid(unsafe_code)]
 
 pub mod daemon;

@@ -49,8 +49,10 @@ enum Driver {
 pub enum End {
     /// It has given the master back.
     Released,
-    /// It has ended without, or lost the master.
+    /// It has ended without.
     Lost,
+    /// It is stopped, and may go on later.
+    Stopped,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -165,10 +167,20 @@ impl Master {
         if let Driver::Owner(owner) = std::mem::replace(&mut *locked(&self.driver), Driver::Changing) {
             owner.end();
         }
-        opened.revoke();
-        self.drive(match end {
+        let handover = match end {
             End::Released => Handover::Orderly,
-            End::Lost => Handover::AfterCrash,
+            End::Lost | End::Stopped => Handover::AfterCrash,
+        };
+        if end == End::Stopped {
+            // Before the daemon's first frame, so that no frame of the owner comes between.
+            opened.revoke();
+            self.drive(handover);
+            return;
+        }
+        // It sends nothing more, but a child may have its links. The kernel takes milliseconds to take them away.
+        std::thread::scope(|scope| {
+            scope.spawn(|| opened.revoke());
+            self.drive(handover);
         });
     }
 

@@ -49,7 +49,7 @@ pub fn serve(master: &Master, owner: &OwnerLink, stop_limit: Duration) -> (End, 
             Some(ProcessState::Ends) => return (End::Lost, "a signal has ended its process"),
             Some(ProcessState::Stopped) => {
                 if stopped.get_or_insert_with(Instant::now).elapsed() >= stop_limit {
-                    return (End::Lost, "its process was stopped");
+                    return (End::Stopped, "its process was stopped");
                 }
             }
             Some(ProcessState::Runs) | None => stopped = None,

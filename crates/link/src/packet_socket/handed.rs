@@ -89,8 +89,8 @@ impl PacketSocket {
     }
 }
 
-/// Takes the interface away from a socket of which another process may have a duplicate: what it still sends goes to the
-/// loopback interface, and it receives nothing.
+/// Takes the interface away from a socket of which another process may have a duplicate: what it still sends goes to
+/// the loopback interface, and it receives nothing.
 ///
 /// # Errors
 /// The descriptor is no packet socket.

@@ -34,7 +34,9 @@ impl fmt::Display for DaemonError {
             DaemonError::Links(error) => error.fmt(f),
             DaemonError::Knowledge(error) => write!(f, "what ringcatd knows of the segment: {error}"),
             DaemonError::Bus(error) => error.fmt(f),
-            DaemonError::Lost => f.write_str("ringcatd has ended, or drives the bus again because this process was stopped"),
+            DaemonError::Lost => {
+                f.write_str("ringcatd has ended, or drives the bus again because this process was stopped")
+            }
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::piped::PipedLinks;
 
 /// Links of one half that a daemon has handed over.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum DaemonLinks {
     /// Network interfaces.
     Packet(Box<PacketLinks>),

@@ -126,8 +126,8 @@ impl OwnedBus {
         self.shared.is_lost.load(Ordering::Acquire)
     }
 
-    /// Gives the bus back, and waits until the daemon has it. An active application is to be ended before; otherwise its
-    /// outputs last until the daemon has its SubDevices in PREOP.
+    /// Gives the bus back, and waits until the daemon has it. An active application is to be ended before; otherwise
+    /// its outputs last until the daemon has its SubDevices in PREOP.
     ///
     /// # Errors
     /// The daemon has ended, or has the bus already.

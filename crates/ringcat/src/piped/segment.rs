@@ -42,6 +42,7 @@ struct Far {
 
 /// The near ends for a process that drives the segment, to be adopted by [`crate::piped::PipedLinks`].
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct NearEnds {
     /// Pipes of the cyclic half: main, redundant.
     pub cyclic: (OwnedFd, Option<OwnedFd>),

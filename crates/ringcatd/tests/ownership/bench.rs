@@ -5,6 +5,7 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -23,6 +24,14 @@ use ringcatd::wires::Wires;
 /// SubDevices reach PREOP within this time on a busy machine.
 pub const LONG: Duration = Duration::from_secs(20);
 
+/// One daemon at a time: the tests measure times, and count descriptors.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Waits for the turn of a test.
+pub fn turn() -> MutexGuard<'static, ()> {
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 type Look = Box<dyn FnOnce(&mut PipedSegment) + Send>;
 
 /// A daemon with master 0.
@@ -32,6 +41,7 @@ pub struct Bench {
     looks: Option<Sender<Look>>,
     segment: Option<JoinHandle<()>>,
     directory: PathBuf,
+    _turn: MutexGuard<'static, ()>,
 }
 
 /// A ring of SubDevices of different kinds.
@@ -61,6 +71,7 @@ impl Bench {
 
     /// The same where an owner may be stopped for this time.
     pub fn with_limit(count: usize, stop_limit: Duration) -> Bench {
+        let turn = turn();
         let (near, far) = UnixStream::pair().expect("a pair");
         let (looks, asked) = channel::<Look>();
         let segment = std::thread::spawn(move || simulate(count, &far, &asked));
@@ -70,8 +81,8 @@ impl Bench {
         let master = Master::new(0, "test".to_owned(), wires);
         let rights = Rights { group: None, mode: 0o666 };
         let daemon = Daemon::start(vec![master], &socket, rights, stop_limit).expect("it listens");
-        let bench =
-            Bench { socket, daemon: Some(daemon), looks: Some(looks), segment: Some(segment), directory };
+        let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));
+        let bench = Bench { socket, daemon, looks, segment, directory, _turn: turn };
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
         bench.wait_until("scanned", |bench| {
             let Answer::State(state) = ask(&mut bench.client(), Ask::State) else { return false };

@@ -92,9 +92,7 @@ fn clients_that_neither_speak_nor_read_keep_only_their_own_places() {
     let (message, _) = last.receive(Limits::OWNER, Some(Duration::from_secs(5))).expect("the daemon says why");
     assert_eq!(message, Message::from(Content::Refused(Refusal::TooManyClients { limit: MOST_CLIENTS })));
     drop(silent);
-    bench.wait_until("places are free", |bench| {
-        ringcat::daemon::Client::connect(&bench.socket, "next").is_ok()
-    });
+    bench.wait_until("places are free", |bench| ringcat::daemon::Client::connect(&bench.socket, "next").is_ok());
     is_answered(&bench);
 }
 

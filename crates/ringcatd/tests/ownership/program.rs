@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::MutexGuard;
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{Answer, Ask, Client};
 use ringcat_control::message::Snapshot;
 
-use crate::bench::{LONG, ask, directory, ring};
+use crate::bench::{LONG, ask, directory, ring, turn};
 use crate::owner_process::{OwnerProcess, Work};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_ringcatd");
@@ -17,11 +18,13 @@ struct Running {
     child: Child,
     socket: PathBuf,
     directory: PathBuf,
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Running {
     /// With masters on simulated rings of so many SubDevices.
     fn start(counts: &[usize]) -> Running {
+        let turn = turn();
         let directory = directory();
         let socket = directory.join("socket");
         let mut command = Command::new(PROGRAM);
@@ -31,7 +34,7 @@ impl Running {
             command.arg("--master").arg(format!("{master}=sim:{}", file.display()));
         }
         let child = command.arg("--socket").arg(&socket).stderr(Stdio::null()).spawn().expect("it starts");
-        Running { child, socket, directory }
+        Running { child, socket, directory, _turn: turn }
     }
 
     fn client(&self) -> Client {
