@@ -1,6 +1,6 @@
 //! Messages as bytes.
 //!
-//! A header of 16 bytes, then the content as JSON, then the bytes of the message. The header has the magic `RCTL`, the
+//! A header of 16 bytes, then the content as CBOR (RFC 8949), then the bytes of the message. The header has the magic `RCTL`, the
 //! version, two zero bytes, and both lengths, little endian. It is the same in all versions, so that each side can tell
 //! the other's. Any bytes are allowed: decoding never panics, and takes no more memory than a small multiple of the
 //! limits.
@@ -118,7 +118,12 @@ impl Header {
 /// # Errors
 /// It is none of this version.
 pub fn decode_content(content: &[u8]) -> Result<Content, WireError> {
-    serde_json::from_slice(content).map_err(|error| WireError::Malformed(error.to_string()))
+    let mut rest = content;
+    let content = ciborium::from_reader(&mut rest).map_err(|error| WireError::Malformed(error.to_string()))?;
+    if rest.is_empty() {
+        return Ok(content);
+    }
+    Err(WireError::Malformed(format!("{} bytes behind the content", rest.len())))
 }
 
 /// A message as bytes.
@@ -127,7 +132,8 @@ pub fn decode_content(content: &[u8]) -> Result<Content, WireError> {
 /// It is longer than 4 GiB.
 pub fn encode(message: &Message) -> Result<Vec<u8>, WireError> {
     let mut out = vec![0; HEADER];
-    serde_json::to_writer(&mut out, &message.content).map_err(|error| WireError::Malformed(error.to_string()))?;
+    let written = ciborium::into_writer(&message.content, &mut out);
+    written.map_err(|error| WireError::Malformed(error.to_string()))?;
     let content = length(out.len() - HEADER)?;
     let bytes = length(message.bytes.len())?;
     out[..4].copy_from_slice(&MAGIC);

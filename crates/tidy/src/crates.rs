@@ -55,7 +55,7 @@ const RULES: &[CrateRule] = &[
     CrateRule {
         directory: "control",
         internal: Internal::Only(&["ringcat-engine", "ringcat-link"]),
-        external: External::Only(&["serde", "serde_json"]),
+        external: External::Only(&["ciborium", "serde"]),
     },
     CrateRule { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     CrateRule {

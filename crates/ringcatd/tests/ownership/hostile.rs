@@ -30,7 +30,7 @@ fn attacks() -> Vec<Vec<u8>> {
     header.extend([0xFF; 8]);
     let mut deep = hello.clone();
     deep.extend(b"RCTL\x01\0\0\0\xA0\x0F\0\0\0\0\0\0");
-    deep.extend([b'['; 4000]);
+    deep.extend([0x81; 4000]);
     let take = ringcat_control::wire::encode(&Content::Take { master: 0 }.into()).expect("short");
     let answer = Content::Answer(Numbered { id: 1, master: 0, what: Ok(Answer::Done) });
     let answer = ringcat_control::wire::encode(&answer.into()).expect("short");
