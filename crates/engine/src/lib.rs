@@ -34,6 +34,7 @@ pub mod layout;
 pub mod link;
 pub mod mail;
 pub mod main_device;
+mod order;
 pub(crate) mod plan;
 pub(crate) mod procedures;
 pub(crate) mod queue;

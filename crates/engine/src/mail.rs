@@ -26,6 +26,7 @@ mod error;
 pub mod foe;
 mod handover;
 mod lane;
+mod lanes;
 mod mailbox;
 mod protocol_error;
 pub mod raw;

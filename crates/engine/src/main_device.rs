@@ -8,6 +8,7 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod bus_control;
 mod clients;
 mod clocks;
 mod commands;
@@ -77,13 +78,14 @@ pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
+use crate::knowledge::KnownMailbox;
 use crate::link::{Link, LinkSet};
-use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
+use crate::mail::{EmergencyRings, InUse};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
-use crate::procedures::reconcile::reconcile_without_application;
+use crate::procedures::reconcile::{Companions, reconcile_without_application};
 use crate::procedures::scan::ScanError;
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
@@ -143,6 +145,8 @@ pub struct MainDevice {
     own_objects: OwnObjects,
     /// A link that was taken down by command.
     disconnected: Option<Link>,
+    /// Mailboxes that were in use when the role became INACTIVE.
+    left_mailboxes: Vec<(InUse, KnownMailbox)>,
 }
 
 impl MainDevice {
@@ -178,6 +182,7 @@ impl MainDevice {
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
+            left_mailboxes: Vec::new(),
             options,
         };
         main_device.start_reconciler();
@@ -238,8 +243,14 @@ impl MainDevice {
 
     /// Starts procedures that the model requests without an application.
     fn start_reconciler(&mut self) {
-        let bus = self.supervisor.bus();
-        self.supervisor.spawn(reconcile_without_application(bus, self.segment.clone()));
+        let (bus, companions) = (self.supervisor.bus(), self.companions());
+        self.supervisor.spawn(reconcile_without_application(bus, self.segment.clone(), companions));
+    }
+
+    /// What the procedures of the model need beside it.
+    fn companions(&self) -> Companions {
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        Companions { options, requests: self.requests.clone() }
     }
 
     /// The result of [`MainDevice::start_stop`], once it has ended.
@@ -429,6 +440,7 @@ fn choices(options: &Options) -> Choices {
         enhanced_line_crossed: options.enhanced_line_crossed,
         junctions: options.junctions,
         idle_operation: options.idle_operation,
+        supervision: options.supervision,
         retries: options.retries,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,

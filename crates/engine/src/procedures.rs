@@ -3,6 +3,7 @@
 //! They access the bus and the time only through [`crate::supervisor::Bus`].
 
 pub mod al_state;
+mod attempt_results;
 mod cabling;
 pub mod clocks;
 pub(crate) mod command_watch;

@@ -10,6 +10,7 @@
 
 mod addressed;
 mod addresses;
+mod ascent;
 mod attention;
 mod breaks;
 mod cabling;
@@ -20,6 +21,7 @@ mod damper;
 pub mod disturbance;
 pub mod effect;
 mod hot_connect;
+mod idle;
 mod key;
 mod knowledge;
 mod local_rings;
@@ -50,15 +52,17 @@ mod versions;
 pub mod view;
 
 pub use addressed::Addressed;
+pub use ascent::longest_ascent;
 pub use cabling::{Cabling, stations_by_position};
 pub use choices::{Choices, Retries};
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use hot_connect::counts;
+pub use idle::{Change, Differences, IdleObservation};
 pub use key::SubDeviceKey;
 
 pub use local_rings::is_down;
 pub use model::{Declared, Segment};
-pub use observation::{MemberFinding, Observation, ProcessDataStep};
+pub use observation::{MemberFinding, Observation, Problem, ProcessDataStep};
 pub use owners::Owners;
 pub use port_control::BlockedPort;
 pub use reading::Reading;

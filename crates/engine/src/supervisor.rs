@@ -198,9 +198,12 @@ impl Supervisor {
 
     /// Reports whether an order was carried out.
     pub fn answer_link_order(&mut self, done: bool) {
-        let order = &mut self.shared.borrow_mut().link_order;
-        if *order == LinkOrder::Fetched {
-            *order = LinkOrder::Answered(done);
+        let shared = &mut *self.shared.borrow_mut();
+        if shared.link_order == LinkOrder::Fetched {
+            shared.link_order = LinkOrder::Answered(done);
+            if let Some(task) = shared.awaits_link.take() {
+                shared.wake(task);
+            }
         }
     }
 

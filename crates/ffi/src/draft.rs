@@ -147,7 +147,8 @@ impl Draft {
                 declaration.subdevices[index] = config;
             }
         }
-        if self.has_clock() {
+        // Those with SYNC signals may come later.
+        if self.has_clock() || declaration.subdevices.iter().any(|config| config.sync.is_some()) {
             let reference = match self.reference {
                 None => ReferenceClock::FirstWithClock,
                 Some(index) => ReferenceClock::Declared(SubDeviceId(index)),

@@ -55,6 +55,7 @@ pub mod non_exhaustive;
 pub mod paths;
 pub mod protocol;
 pub mod publishing;
+pub mod reports;
 pub mod rules;
 pub mod safety;
 pub mod tokens;

@@ -5,7 +5,7 @@ use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
     Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, modules, non_exhaustive, paths, protocol, publishing, safety, toolchain, words,
+    interface, modules, non_exhaustive, paths, protocol, publishing, reports, safety, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -74,6 +74,18 @@ fn examples_and_the_program_use_the_library_alone() {
 #[test]
 fn modules_of_the_engine_name_each_other_as_the_map_says() {
     none(modules::forbidden_arrows_in_engine(&tree()));
+}
+
+// covers: tree
+#[test]
+fn events_are_effects_of_the_model_or_listed_notices() {
+    none(reports::past_the_model(&tree()));
+}
+
+// covers: tree
+#[test]
+fn one_reconciler_starts_the_procedures_of_the_model() {
+    none(reports::started_elsewhere(&tree()));
 }
 
 #[test]

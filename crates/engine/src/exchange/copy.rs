@@ -14,6 +14,7 @@ use super::domain::Domain;
 use super::entry::Entry;
 use super::flight::CyclicFrame;
 use super::image::InputNumber;
+use crate::order::InOrder;
 
 /// Value of the outputs while their source is stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -173,7 +174,7 @@ impl Copies {
                 last: 0,
             }));
         }
-        pieces.sort_by_key(|piece| (piece.to.domain, piece.to.bit_offset));
+        pieces.put_in_order_by_key(|piece| (piece.to.domain, piece.to.bit_offset));
         let overlap = pieces.windows(2).find(|pair| {
             let [first, second] = [pair[0].to, pair[1].to];
             first.domain == second.domain && first.bit_offset + u32::from(first.bit_length) > second.bit_offset
@@ -238,7 +239,7 @@ fn find(domain: usize, subdevice: usize, domains: &[Domain], frames: &[CyclicFra
     let of = domains.get(domain)?;
     let mut inputs: Vec<InputNumber> = of.frames().flat_map(|frame| frames[frame].inputs_of(subdevice)).collect();
     // Each is there once per cycle that may be on the wire.
-    inputs.sort_unstable_by_key(|input| (input.datagram, input.part));
+    inputs.put_in_order_by_key(|input| (input.datagram, input.part));
     inputs.dedup();
     Some(Source { domain, subdevice, inputs: inputs.into(), age: u64::MAX })
 }

@@ -71,7 +71,7 @@ impl Drop for Turn {
 }
 
 fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
-    shared.state_mut().lanes[lane.index()].turns.retain(|other| *other != turn);
+    shared.state_mut().lanes.of_mut(lane).turns.retain(|other| *other != turn);
     shared.changed.notify();
 }
 
@@ -89,7 +89,8 @@ impl Conversation {
                 return Err(MailboxError::Closed);
             }
             state.next_id = state.next_id.wrapping_add(1);
-            state.lanes[lane.index()].turns.push_back(state.next_id);
+            let next_id = state.next_id;
+            state.lanes.of_mut(lane).turns.push_back(next_id);
             (Turn { shared: shared.clone(), lane, turn: state.next_id, kept: false }, state.epoch)
         };
         let ready = || {
@@ -97,7 +98,8 @@ impl Conversation {
             if state.epoch != epoch {
                 return Some(Err(MailboxError::Closed));
             }
-            (state.lanes[lane.index()].turns.front() == Some(&turn.turn)).then_some(Ok(()))
+            let front = state.lanes.of(lane).and_then(|lane| lane.turns.front());
+            (front == Some(&turn.turn)).then_some(Ok(()))
         };
         shared.changed.until(ready).await?;
         turn.kept = true;
@@ -106,11 +108,7 @@ impl Conversation {
 
     fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
         let state = &mut *self.shared.state_mut();
-        if state.epoch != self.epoch {
-            Err(MailboxError::Closed)
-        } else {
-            Ok(work(&mut state.lanes[self.lane.index()]))
-        }
+        if state.epoch != self.epoch { Err(MailboxError::Closed) } else { Ok(work(state.lanes.of_mut(self.lane))) }
     }
 
     /// Largest payload of a message in both directions, in bytes.
@@ -390,7 +388,7 @@ impl Conversation {
         if state.epoch != self.epoch {
             return;
         }
-        while let Some(arrival) = state.lanes[self.lane.index()].take() {
+        while let Some(arrival) = state.lanes.of_mut(self.lane).take() {
             delivery::keep_unclaimed(state, self.lane, arrival);
         }
     }

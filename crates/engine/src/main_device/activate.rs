@@ -23,17 +23,9 @@ use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
-use crate::procedures::clocks;
-use crate::procedures::complete_siis::complete_in_background;
 use crate::procedures::error_statistics::ErrorStatistics;
-use crate::procedures::error_watch::watch_errors;
-use crate::procedures::mail_watch::watch_mail;
 use crate::procedures::reconcile::reconcile;
-use crate::procedures::serve_requests::serve_requests;
-use crate::procedures::services::statistics::collect;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
-use crate::procedures::supervise::supervise;
-use crate::procedures::verify::verify;
 use crate::queue::{Producer, queue};
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
@@ -50,8 +42,8 @@ impl MainDevice {
         let scan = self.found_to_begin().ok_or(ActivateError::NoScan)?;
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
-        let (found, unassigned) = match_declaration(&bus, &declaration, &scan)?;
-        let topology = loaded.topology(&bus, self.options.junctions, &scan, &found)?;
+        let (found, unassigned) = match_declaration(&self.segment, &declaration, &scan)?;
+        let topology = loaded.topology((&bus, &self.segment), self.options.junctions, &scan, &found)?;
         check_clocks(&declaration, &found)?;
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
@@ -63,7 +55,7 @@ impl MainDevice {
         let subdevices = SubDevices::new(members, unassigned);
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &subdevices);
         let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
-        report_oddities(&bus, &subdevices, &layout);
+        report_oddities(&self.segment, &subdevices, &layout);
         let count = subdevices.member_count();
         let optional = subdevices.members().map(|member| member.config.optional).collect();
         let addresses = subdevices.members().map(|member| member.station).collect();
@@ -97,7 +89,7 @@ impl MainDevice {
         segment.observe(Observation::Activated(declared));
         self.supervisor.attach(board);
         self.supervisor.attach_bell(self.requests.bell().clone());
-        self.start_procedures(segment, clock_config.is_some());
+        self.start_procedures(segment);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
@@ -137,36 +129,9 @@ impl MainDevice {
     }
 
     /// Starts configuration, supervision and all other procedures of an active MainDevice.
-    fn start_procedures(&mut self, segment: SharedSegment, with_clocks: bool) {
-        let bus = self.supervisor.bus();
-        self.supervisor.spawn(reconcile(bus.clone(), segment.clone()));
-        if with_clocks {
-            // An answer while clocks are measured is not a return of the SubDevice: its configuration begins
-            // afterwards.
-            segment.observe(Observation::Delayed);
-            let (bus, segment) = (bus.clone(), segment.clone());
-            // Receive times are latched before other frames are sent (protocol 7.1).
-            self.supervisor.spawn(async move {
-                clocks::begin(&bus, &segment).await;
-                segment.observe(Observation::Started);
-                clocks::keep(bus, segment).await;
-            });
-        } else {
-            segment.observe(Observation::Started);
-        }
-        if self.options.supervision {
-            let (own_bus, own) = (bus.clone(), segment.clone());
-            self.supervisor.spawn(async move {
-                own.until(|segment| (!segment.clocks().are_branches_closed()).then_some(())).await;
-                own_bus.spawn(verify(own_bus.clone(), own.clone()));
-                own_bus.spawn(watch_errors(own_bus.clone(), own.clone()));
-                supervise(own_bus, own).await;
-            });
-        }
-        self.supervisor.spawn(complete_in_background(bus.clone(), segment.clone()));
-        self.supervisor.spawn(watch_mail(bus.clone(), segment.clone()));
-        self.supervisor.spawn(serve_requests(bus.clone(), segment.clone(), self.requests.clone()));
-        self.supervisor.spawn(collect(bus, segment.clone()));
+    fn start_procedures(&mut self, segment: SharedSegment) {
+        self.supervisor.spawn(reconcile(self.supervisor.bus(), segment.clone(), self.companions()));
+        segment.observe(Observation::Attached);
         self.statistics = Some(segment.statistics.clone());
         self.segment = segment;
     }

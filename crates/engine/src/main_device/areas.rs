@@ -13,6 +13,7 @@ use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Layout, PlacedArea};
+use crate::order::InOrder;
 use crate::plan::{MappedEntry, SubDevicePlan};
 use crate::segment::setup::{SetupError, declared_areas, planned_areas};
 
@@ -76,7 +77,7 @@ impl Directory {
             (area.domain, start..start + u64::from(area.placed.area.length) * 8)
         };
         let mut ranges: Vec<_> = areas.map(range).filter(|(_, bits)| !bits.is_empty()).collect();
-        ranges.sort_unstable_by_key(|(domain, bits)| (*domain, bits.start));
+        ranges.put_in_order_by_key(|(domain, bits)| (*domain, bits.start));
         ranges.dedup_by(|(domain, bits), (domain_before, before)| {
             let continues = domain == domain_before && bits.start <= before.end;
             if continues {
@@ -122,7 +123,7 @@ impl Directory {
     pub fn expected_wkc_as_igh(&self, domain: DomainId) -> u32 {
         let areas = self.subdevices.iter().flatten().filter(|area| area.domain == domain);
         let mut placed: Vec<PlacedArea> = areas.map(|area| area.placed).collect();
-        placed.sort_unstable_by_key(|placed| placed.image_offset);
+        placed.put_in_order_by_key(|placed| placed.image_offset);
         let area = |placed: PlacedArea| (SubDeviceId(placed.area.subdevice), placed.area.direction, placed.area.length);
         expected_as_igh(placed.into_iter().map(area))
     }
@@ -199,7 +200,7 @@ impl Areas {
         // In the order of the SyncManagers; the places of one in the order of the domains.
         let listed = self.list();
         let rank = |placed: &PlacedArea| listed.iter().position(|(number, ..)| *number == placed.area.sync_manager);
-        places.sort_by_key(|(_, placed)| rank(placed).unwrap_or(listed.len()));
+        places.put_in_order_by_key(|(_, placed)| rank(placed).unwrap_or(listed.len()));
         for (domain, placed) in places {
             let (sync_manager, direction) = (placed.area.sync_manager, placed.area.direction);
             let entries = self.mapped(sync_manager).into_iter().filter(|entry| entry.index != 0).map(|entry| {

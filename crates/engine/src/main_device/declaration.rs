@@ -113,7 +113,8 @@ pub enum Required {
     /// Those that are not optional.
     #[default]
     Mandatory,
-    /// None.
+    /// None. A present one that cannot be set up as declared (PDOs, SDOs, SYNC signals, places of its process data)
+    /// is no obstacle either: its own configuration fails, and all others go on.
     Nothing,
 }
 

@@ -7,11 +7,9 @@ use core::time::Duration;
 use super::MainDevice;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
-use crate::procedures::idle::watch;
 use crate::procedures::services::ServiceError;
-use crate::procedures::undeclared::{keep, watch_undeclared_mail};
 use crate::role::{Function, MainDevicePhase};
-use crate::segment::{Addressed, Found, Observation, Scan, UndeclaredObservation};
+use crate::segment::{Addressed, Found, IdleObservation, Observation, Scan, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -57,12 +55,8 @@ impl MainDevice {
         if !self.options.idle_operation || self.segment.view().keeps_undeclared() {
             return;
         }
-        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
-        let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
-        segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
-        self.supervisor.spawn(keep(bus.clone(), segment.clone()));
-        self.supervisor.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
-        self.supervisor.spawn(watch(bus, segment, options));
+        self.segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
+        self.segment.observe_idle(IdleObservation::Begun);
     }
 
     /// What the last scan has found. With idle operation an application may begin before the first scan has ended: it
@@ -97,9 +91,7 @@ impl MainDevice {
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {
-                bus.spawn(keep(bus.clone(), segment.clone()));
-                bus.spawn(watch_undeclared_mail(bus.clone(), segment.undeclared.clone()));
-                watch(bus, segment, options).await;
+                segment.observe_idle(IdleObservation::Begun);
             }
         });
         Ok(())

@@ -12,9 +12,9 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
-use crate::procedures::scan::{Scan, node_status, report_cabling};
-use crate::segment::Found;
-use crate::segment::SubDevices;
+use crate::procedures::scan::{Scan, cabling_findings, node_status};
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::{Found, Observation, SubDevices};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -29,7 +29,7 @@ impl Loaded {
     /// The topology with the declared local rings, if any; otherwise that of the scan.
     pub(super) fn topology(
         &self,
-        bus: &Bus,
+        (bus, segment): (&Bus, &SharedSegment),
         mode: JunctionMode,
         scan: &Found,
         found: &[Option<Rc<SubDeviceInfo>>],
@@ -46,7 +46,7 @@ impl Loaded {
                 Ok(closing) => closings.push(closing),
                 Err(subdevice) => {
                     let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
-                    bus.report(Event::PlanOddity { subdevice, what });
+                    segment.observe(Observation::Compared(Event::PlanOddity { subdevice, what }));
                 }
             }
         }
@@ -54,7 +54,9 @@ impl Loaded {
         let topology = Topology::with_local_rings(&nodes, scan.main_count, &closings);
         if mode == JunctionMode::Strict {
             // The scan has not reported it.
-            report_cabling(bus, &Scan { topology: topology.clone(), ..scan.scan() }, false);
+            let scan = Scan { topology: topology.clone(), ..scan.scan() };
+            let findings = cabling_findings(bus, &scan, false);
+            findings.into_iter().for_each(|event| segment.observe(Observation::Compared(event)));
         }
         Ok(topology)
     }

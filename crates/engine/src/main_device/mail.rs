@@ -45,7 +45,7 @@ impl MainDevice {
         }
         match self.find(subdevice) {
             Ok(Addressed::Member(index)) => {
-                let requested = request_state(&self.supervisor.bus(), &self.segment, index, state);
+                let requested = request_state(&self.segment, index, state);
                 self.start(requested)
             }
             Ok(Addressed::Undeclared(key)) => {

@@ -4,7 +4,7 @@ use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::format;
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -17,20 +17,21 @@ use super::activate_error::ActivateError;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
 use super::registered;
-use crate::config::{ConfigError, Resolution, can_be_head, groups, resolve};
+use super::registered_area::RegisteredArea;
+use crate::config::{ConfigError, Resolution, SubDeviceConfig, can_be_head, groups, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
-use crate::plan::{PlanFault, plan};
+use crate::plan::{PlanFault, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::member::MemberView;
-use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
-use crate::segment::{Found, Owners, SubDevice, SubDevices};
-use crate::supervisor::Bus;
+use crate::segment::setup::{Setup, SetupError, declared_areas, planned_areas, presence};
+use crate::segment::{Found, Observation, Owners, SubDevice, SubDevices};
 
 /// Period of the domain that only carries the supervision datagram.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
@@ -39,7 +40,11 @@ const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<SubDevice>);
 
 /// Matches SubDevices with the declaration.
-pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Found) -> Result<Matched, ActivateError> {
+pub(super) fn match_declaration(
+    segment: &SharedSegment,
+    declaration: &Declaration,
+    scan: &Found,
+) -> Result<Matched, ActivateError> {
     let mut found = vec![None; declaration.subdevices.len()];
     let mut owners = vec![None; scan.subdevices.len()];
     let mut extra = Vec::new();
@@ -50,10 +55,10 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Fou
                 found[config] = Some(scan.subdevices[info].clone());
             }
             Resolution::Absent { config, error } if declaration.required != Required::All => {
-                report_absence(bus, config, true, error);
+                report_absence(segment, config, true, error);
             }
             Resolution::Failed { config, error } if declaration.required == Required::Nothing => {
-                report_absence(bus, config, false, error);
+                report_absence(segment, config, false, error);
             }
             Resolution::Absent { config, error } | Resolution::Failed { config, error } => {
                 return Err(ActivateError::Config { subdevice: SubDeviceId(config), error });
@@ -64,19 +69,20 @@ pub(super) fn match_declaration(bus: &Bus, declaration: &Declaration, scan: &Fou
     let owners = Owners::new(owners, |index| declaration.subdevices[index].group.is_some());
     let unassigned = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
-        bus.report(Event::Unexpected { position: info.position, identity: info.identity });
+        let (position, identity) = (info.position, info.identity);
+        segment.observe(Observation::Compared(Event::Unexpected { position, identity }));
         SubDevice::undeclared(info, &owners, scan.main_count)
     });
     Ok((found, unassigned.collect()))
 }
 
-/// SYNC signals need a clock, and clocks that are synchronized.
+/// SYNC signals need a clock, and clocks that are synchronized. A SubDevice without a clock may fail alone.
 pub(super) fn check_clocks(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<(), ActivateError> {
     for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
-        let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
+        let has_clock = fails_alone(declaration) || info.as_ref().is_none_or(|info| info.controller.features.dc);
         if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
             return Err(ActivateError::NoClock { subdevice: SubDeviceId(subdevice), has_clock });
         }
@@ -84,15 +90,21 @@ pub(super) fn check_clocks(
     Ok(())
 }
 
-fn report_absence(bus: &Bus, subdevice: usize, optional: bool, error: ConfigError) {
-    bus.report(match error {
+fn report_absence(segment: &SharedSegment, subdevice: usize, optional: bool, error: ConfigError) {
+    let shown = match error {
         ConfigError::Mismatch { position, field, expected, got } => {
             Event::Mismatch { subdevice: SubDeviceId(subdevice), position, field, expected, got }
         }
         ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
             Event::Missing { subdevice: SubDeviceId(subdevice), optional }
         }
-    });
+    };
+    segment.observe(Observation::Compared(shown));
+}
+
+/// Whether a present SubDevice that does not fit its declaration fails alone, when its configuration begins.
+fn fails_alone(declaration: &Declaration) -> bool {
+    declaration.required == Required::Nothing
 }
 
 pub(super) fn plan_all(
@@ -101,20 +113,43 @@ pub(super) fn plan_all(
 ) -> Result<Vec<Areas>, ActivateError> {
     let pairs = declaration.subdevices.iter().zip(found).enumerate();
     pairs
-        .map(|(subdevice, (config, info))| match info {
-            Some(info) => match plan(config, info) {
-                Ok(plan) => Ok(Areas::Planned(exchanges(config.target).then_some(plan))),
-                // A bad EEPROM fails only its own SubDevice.
-                Err(error) if error.fault == PlanFault::Sii => {
-                    Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
-                }
-                Err(error) => {
-                    Err(ActivateError::Setup { subdevice: SubDeviceId(subdevice), error: SetupError::Plan(error) })
-                }
-            },
+        .map(|(index, (config, info))| match info {
+            Some(info) => plan_one(declaration, SubDeviceId(index), config, info),
             None => Ok(Areas::Declared(Declared::absent(config))),
         })
         .collect()
+}
+
+fn plan_one(
+    declaration: &Declaration,
+    subdevice: SubDeviceId,
+    config: &SubDeviceConfig,
+    info: &SubDeviceInfo,
+) -> Result<Areas, ActivateError> {
+    let unfit = |error| Ok(Areas::Declared(Declared::unfit(config, info, error)));
+    match plan(config, info) {
+        Ok(_) if !exchanges(config.target) => Ok(Areas::Planned(None)),
+        Ok(plan) => match misplaced(declaration, subdevice, &plan) {
+            Some(error) if fails_alone(declaration) => unfit(error),
+            _ => Ok(Areas::Planned(Some(plan))),
+        },
+        // A bad EEPROM fails only its own SubDevice.
+        Err(error) if error.fault == PlanFault::Sii || fails_alone(declaration) => unfit(SetupError::Plan(error)),
+        Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
+    }
+}
+
+/// A registered area of a SubDevice that has another size or direction than its process data now.
+fn misplaced(declaration: &Declaration, subdevice: SubDeviceId, plan: &SubDevicePlan) -> Option<SetupError> {
+    let now = planned_areas(plan);
+    let all = declaration.domains.iter().flat_map(|domain| &domain.registered);
+    all.filter(|area| area.subdevice == subdevice).find_map(|area| {
+        let RegisteredArea { sync_manager, direction, length: expected, .. } = *area;
+        let listed = now.iter().find(|(number, ..)| *number == sync_manager);
+        let got = listed.map_or(0, |(.., length)| *length);
+        let is_same = listed == Some(&(sync_manager, direction, expected));
+        (!is_same).then_some(SetupError::Area { sync_manager, expected, got })
+    })
 }
 
 /// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
@@ -180,8 +215,12 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
     Ok(())
 }
 
-/// Process data without any domain would never be exchanged.
+/// Process data without any domain would never be exchanged. Without a required SubDevice this is no obstacle: its
+/// outputs stay where its watchdog has them.
 pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
+    if fails_alone(declaration) {
+        return Ok(());
+    }
     let has_data = |areas: &Areas| areas.list().iter().any(|(.., length)| *length > 0);
     match plans.iter().position(has_data) {
         Some(subdevice) if declaration.domains.is_empty() => {
@@ -255,20 +294,23 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 }
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
-pub(super) fn report_oddities(bus: &Bus, subdevices: &SubDevices, layout: &Layout) {
+pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
+    let oddity = |subdevice: usize, what: String| {
+        segment.observe(Observation::Compared(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what }));
+    };
     for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: warning.to_string() });
+            oddity(subdevice, warning.to_string());
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
             let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
             let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what });
+            oddity(subdevice, what);
         }
         if member.info.is_none() && declared_areas(&member.config).is_none() {
             let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what: what.to_owned() });
+            oddity(subdevice, what.to_owned());
         }
     }
 }
@@ -294,20 +336,22 @@ pub(super) fn members(
     layout: &Layout,
 ) -> Result<Vec<SubDevice>, ActivateError> {
     let count = found.len();
+    let is_alone = fails_alone(&declaration);
     let mut members = Vec::with_capacity(count);
     for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
         let unfit = plans.get(index).and_then(Areas::unfit).cloned();
         let setup = match &info {
-            Some(info) if unfit.is_none() => Some(Rc::new(
-                Setup::new(index, &config, info, layout)
-                    .map_err(|error| ActivateError::Setup { subdevice: SubDeviceId(index), error })?,
-            )),
-            Some(_) | None => None,
+            Some(info) if unfit.is_none() => match Setup::new(index, &config, info, layout) {
+                Ok(setup) => Ok(Rc::new(setup)),
+                Err(error) if is_alone => Err(Some(error)),
+                Err(error) => return Err(ActivateError::Setup { subdevice: SubDeviceId(index), error }),
+            },
+            Some(_) | None => Err(unfit),
         };
         // An absent SubDevice gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(SubDevice::declared(config, info, station, setup.ok_or(unfit)));
+        members.push(SubDevice::declared(config, info, station, setup));
     }
     Ok(members)
 }

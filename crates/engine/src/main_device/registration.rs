@@ -16,6 +16,7 @@ use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 use crate::plan::{MappedEntry, plan};
 use crate::segment::setup::declared_areas;
 
@@ -68,7 +69,7 @@ impl Declaration {
     ) -> Result<Entry, RegisterError> {
         let areas = self.areas(subdevice, found)?;
         let mut listed = areas.list();
-        listed.sort_unstable_by_key(|(sync_manager, ..)| *sync_manager);
+        listed.put_in_order_by_key(|(sync_manager, ..)| *sync_manager);
         let is_wanted = |entry: &MappedEntry| (entry.index, entry.sub_index) == (index, sub_index);
         let mapped = listed.iter().find_map(|(sync_manager, ..)| {
             let entry = areas.mapped(*sync_manager).into_iter().find(is_wanted)?;
@@ -194,7 +195,7 @@ impl Declaration {
         });
         let mut places: Vec<(usize, u8)> = registered.collect();
         places.push((domain.0, sync_manager));
-        places.sort_unstable();
+        places.put_in_order();
         places.dedup();
         let areas = listed.iter().filter(|(.., length)| *length > 0);
         areas.map(|(number, ..)| places.iter().filter(|(_, other)| other == number).count().max(1)).sum()

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use super::MainDevice;
 use super::activate_error::ActivateError;
 use crate::info::{SiiExtent, SubDeviceInfo};
-use crate::procedures::scan::{Scan, ScanError, ScanOptions, scan};
+use crate::procedures::scan::{Scan, ScanError, ScanOptions, end_scan, scan};
 use crate::role::Function;
 use crate::segment::Observation;
 
@@ -36,7 +36,7 @@ impl MainDevice {
             let result = scan(&bus, &options).await;
             requested.set(false);
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
-            segment.observe(Observation::ScanEnded(ended));
+            end_scan(&segment, ended);
         });
         self.begin_idle();
         Ok(())

@@ -173,8 +173,8 @@ impl MainDevice {
     /// they follow the previous cabling.
     ///
     /// Without an application it needs idle operation. SubDevices that have kept their station addresses are left in
-    /// their states, their mailboxes stay open, and no word of their EEPROMs is read; others get addresses, are read
-    /// and brought to PREOP. The result has the differences from the scan before ([`Rescan::added`], `removed`,
+    /// their states, their mailboxes stay open, and no word of their EEPROMs is read, except the identities of those
+    /// that are at another place; others get addresses, are read and brought to PREOP. The result has the differences from the scan before ([`Rescan::added`], `removed`,
     /// `moved_from`).
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::Rescan));

@@ -21,7 +21,7 @@ use ringcat_wire::register::{DcReceiveTimes, DlStatus, PortKind, map};
 use super::latch::latch_anyway;
 use super::shared_segment::SharedSegment;
 use super::unassigned::view;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::segment::disturbance::Disturbance;
@@ -82,7 +82,7 @@ pub(super) async fn cabling(
     reported: &LineCheck,
 ) -> Option<LineCheck> {
     if in_control && !bus.force_disconnect(Link::Redundant, true).await {
-        bus.report(Event::CannotDisconnect { link: Link::Redundant });
+        bus.notice(Notice::CannotDisconnect { link: Link::Redundant });
         return scan_until_confirmed(bus, known, reported).await;
     }
     if !in_control {

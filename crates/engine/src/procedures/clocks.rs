@@ -23,4 +23,4 @@ pub(super) use drift::compensate_drift;
 pub use not_locked::NotLocked;
 pub(super) use not_locked::SignalsError;
 pub(super) use signals::{restore, start_signals, wait_for_lock};
-pub(crate) use watch::{begin, keep};
+pub(super) use watch::keep_clocks;

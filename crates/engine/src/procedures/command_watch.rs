@@ -13,7 +13,7 @@ use super::shared_segment::SharedSegment;
 use crate::board::Board;
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::layout::PlannedDatagram;
 use crate::segment::Segment;
 use crate::supervisor::Bus;
@@ -71,7 +71,7 @@ impl Counted {
         let view = segment.view();
         let all: Vec<((usize, usize), &PlannedDatagram)> = places(&view).collect();
         let begin = self.next.checked_rem(all.len()).unwrap_or_default();
-        let (mut events, mut named) = (Vec::new(), Vec::new());
+        let (mut notices, mut named) = (Vec::new(), Vec::new());
         for (at, (place, datagram)) in (0..all.len()).map(|step| (begin + step) % all.len()).map(|at| (at, all[at])) {
             let now = board.commands.read(place.0, place.1);
             let (reported, last) = self.reported.entry(place).or_default();
@@ -79,7 +79,7 @@ impl Counted {
             if now.cycles == *reported || !is_due {
                 continue;
             }
-            if events.len() == MOST {
+            if notices.len() == MOST {
                 self.next = at;
                 break;
             }
@@ -89,7 +89,7 @@ impl Counted {
             let subdevices: Vec<usize> =
                 datagram.contributions.iter().map(|(index, _)| *index).filter(has_errors).collect();
             named.extend_from_slice(&subdevices);
-            events.push(Event::CyclicCommand {
+            notices.push(Notice::CyclicCommand {
                 domain: DomainId(place.0),
                 command: datagram.command,
                 logical: datagram.logical,
@@ -106,7 +106,7 @@ impl Counted {
             }
         }
         drop(view);
-        events.into_iter().for_each(|event| bus.report(event));
+        notices.into_iter().for_each(|notice| bus.notice(notice));
     }
 }
 

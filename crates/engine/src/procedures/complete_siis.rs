@@ -13,10 +13,10 @@ use super::scan::read_whole;
 use super::services::ServiceError;
 use super::shared_segment::SharedSegment;
 use super::sii;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::info::{SiiExtent, SubDeviceInfo};
-use crate::segment::Observation;
 use crate::segment::member::Phase;
+use crate::segment::{Observation, SubDeviceKey};
 use crate::supervisor::Bus;
 
 /// How long SubDevices are waited for that do not reach their target state, before it reads the others.
@@ -59,7 +59,7 @@ pub(crate) async fn complete_in_background(bus: Bus, segment: SharedSegment) {
         if attempt == ATTEMPTS {
             for (position, error) in failed {
                 let what = alloc::format!("the rest of the SII, with its names, cannot be read: {error}");
-                bus.report(Event::SiiOddity { position, what });
+                bus.notice(Notice::SiiOddity { position, what });
             }
             return;
         }
@@ -80,19 +80,23 @@ async fn settled(bus: &Bus, segment: &SharedSegment) {
     let _ = bus.within(PATIENCE, settled).await;
 }
 
-/// Positions and station addresses of the SubDevices of whose SIIs only a part is known.
-fn incomplete(segment: &SharedSegment) -> Vec<(Position, StationAddress)> {
+/// A SubDevice of whose SII only a part is known: position, station address, and its key unless it has left.
+type Incomplete = (Position, StationAddress, Option<SubDeviceKey>);
+
+fn incomplete(segment: &SharedSegment) -> Vec<Incomplete> {
     let view = segment.view();
     let found = view.found().into_iter().flat_map(|found| &found.subdevices);
-    found.filter(|info| info.extent < SiiExtent::Complete).map(|info| (info.position, info.station)).collect()
+    let key = |station: StationAddress| view.subdevices().at(station).map(|it| it.key);
+    let incomplete = found.filter(|info| info.extent < SiiExtent::Complete);
+    incomplete.map(|info| (info.position, info.station, key(info.station))).collect()
 }
 
 /// Reads each SII of which only a part is known.
 async fn read_rest(bus: &Bus, segment: &SharedSegment, of_pdi: OfPdi) -> Vec<(Position, Result<(), ServiceError>)> {
     let wanted = incomplete(segment);
-    let read = |bus: Bus, (position, station)| {
+    let read = |bus: Bus, incomplete: Incomplete| {
         let segment = segment.clone();
-        async move { (position, read_one(&bus, &segment, (position, station), of_pdi).await) }
+        async move { (incomplete.0, read_one(&bus, &segment, incomplete, of_pdi).await) }
     };
     match of_pdi {
         OfPdi::Read => bus.gather(wanted, read).await,
@@ -103,7 +107,7 @@ async fn read_rest(bus: &Bus, segment: &SharedSegment, of_pdi: OfPdi) -> Vec<(Po
 async fn read_one(
     bus: &Bus,
     segment: &SharedSegment,
-    (position, station): (Position, StationAddress),
+    (position, station, key): Incomplete,
     of_pdi: OfPdi,
 ) -> Result<(), ServiceError> {
     let _turn = segment.eeproms.take(station).await;
@@ -117,6 +121,9 @@ async fn read_one(
     if before.offer_pdi {
         sii::assign(bus, station, true).await?;
     }
-    segment.observe(Observation::SiiCompleted { station, read: &read? });
+    let read = read?;
+    if let Some(key) = key {
+        segment.observe(Observation::SiiCompleted { key, read: &read });
+    }
     Ok(())
 }

@@ -9,7 +9,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 use super::al_state::read_status;
-use super::idle::scan_again;
+use super::idle::{nothing, scan_again};
 use super::scan::ScanOptions;
 use super::shared_segment::SharedSegment;
 use super::stop::{StopError, ToStop, all_known, stop};
@@ -90,8 +90,9 @@ async fn scan_until(
     until: Instant,
 ) {
     while bus.now() < until {
-        let versions = segment.view().versions();
-        if let Ok(Some(found)) = scan_again(bus, segment, options, known).await {
+        let (versions, last) = (segment.view().versions(), segment.view().found().cloned());
+        let last = last.unwrap_or_else(|| Rc::new(nothing()));
+        if let Ok(Some(found)) = scan_again(bus, segment, options, (known, &last)).await {
             return segment.observe(Observation::FoundAgain { versions, found: Rc::new(found) });
         }
         bus.sleep(PAUSE).await;

@@ -14,7 +14,7 @@ use ringcat_wire::sii::{CategoryKind, SiiSyncManager, SyncManagerKind};
 use super::scan::Scan;
 use super::visit::visit;
 use crate::config::{PdoEntry, PdoMapping};
-use crate::event::Event;
+use crate::event::Notice;
 use crate::info::{Direction, InfoWarning, PdoEntryInfo, PdoInfo, SiiProblem, SubDeviceInfo};
 use crate::mail::coe::{SdoFailure, pdo};
 use crate::mail::{Limits, Mailbox};
@@ -55,13 +55,13 @@ pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
             Ok(assignments) => {
                 for assignment in assignments {
                     let Some(warning) = merge(info, assignment) else { continue };
-                    bus.report(Event::SiiOddity { position, what: warning.to_string() });
+                    bus.notice(Notice::SiiOddity { position, what: warning.to_string() });
                     info.warnings.push(warning);
                 }
             }
             Err(reason) => {
                 let what = alloc::format!("the PDOs in its dictionary cannot be read: {reason}");
-                bus.report(Event::SiiOddity { position, what });
+                bus.notice(Notice::SiiOddity { position, what });
             }
         }
     }

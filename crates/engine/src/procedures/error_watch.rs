@@ -29,7 +29,8 @@ const AGAIN: Duration = Duration::from_secs(10);
 const FULL: u8 = 128;
 
 /// Runs until the MainDevice stops.
-pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
+pub(super) async fn watch_errors(bus: Bus, segment: SharedSegment) {
+    segment.until_branches_are_open().await;
     let count = segment.view().subdevices().member_count();
     let mut last = vec![None; count];
     let mut versions = segment.view().versions();
@@ -62,8 +63,8 @@ pub(crate) async fn watch_errors(bus: Bus, segment: SharedSegment) {
         let now = bus.now();
         let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
             watched.iter_mut().map(|watched| watched.close(now)).unzip();
-        segment.observe(Observation::CableErrors { versions, fresh: &fresh });
-        events.into_iter().flatten().for_each(|event| bus.report(event));
+        let rising = events.into_iter().flatten().collect();
+        segment.observe(Observation::CableErrors { versions, fresh: &fresh, rising });
     }
 }
 

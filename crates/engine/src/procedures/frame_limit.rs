@@ -12,11 +12,9 @@ use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
 use super::shared_segment::SharedSegment;
-use crate::event::Event;
 use crate::ring::FrameLimit;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
-use crate::time::Instant;
 
 /// Largest number of datagrams tested: with a byte of data each, they nearly fill a frame.
 const MOST: usize = 110;
@@ -85,7 +83,6 @@ pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
     // Set first: the calling procedure may end before the result arrives.
     segment.observe(Observation::FramesTested(bus.now() + PAUSE));
     if let Some(limit) = probe(bus).await {
-        segment.observe(Observation::FramesTested(Instant::NEVER));
-        bus.report(Event::FrameLimit { limit });
+        segment.observe(Observation::FramesLimited(limit));
     }
 }

@@ -1,10 +1,11 @@
-//! Operation without an application: watches links, number and states of the SubDevices, scans after changes.
+//! Operation without an application: passes links, number and states of the SubDevices to the model, scans after
+//! changes.
 //!
 //! One broadcast read of AL status per period shows how many SubDevices are on each link, the OR of their states, and
 //! whether a port has changed. Other datagrams are sent only after a change, and once a second.
 
 mod changes;
-pub(super) mod requests;
+mod places;
 mod rescue;
 
 use alloc::format;
@@ -15,248 +16,117 @@ use core::time::Duration;
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlStatus;
-use ringcat_wire::register::{DlStatus, EcatEvent, map};
+use ringcat_wire::register::{DlStatus, map};
 
-use changes::nothing;
-pub(crate) use changes::scan_again;
-use rescue::differences;
+pub(crate) use changes::{nothing, scan_again};
 pub(crate) use rescue::rescue;
 
 use super::inspect::read_subdevice;
-use super::scan::{ScanOptions, scan};
+use super::scan::{ScanError, ScanOptions, end_scan, scan};
 use super::shared_segment::{SharedSegment, until_active};
-use crate::event::{Event, Subject};
-use crate::link::{Link, LinkSet};
-use crate::ring::RingState;
-use crate::segment::{Observation, Reading, StateRead, UndeclaredObservation};
+use crate::board::{RingWord, Supervision};
+use crate::event::Subject;
+use crate::segment::{Change, Found, IdleObservation, Observation, StateRead, Words};
 use crate::supervisor::Bus;
-use crate::time::Instant;
 
 /// Interval of the broadcast: a change is detected within it.
 const PERIOD: Duration = Duration::from_millis(20);
-/// Interval of reads of all states: an OR can hide one state behind others.
-const ROUTINE: Duration = Duration::from_secs(1);
-/// Consecutive broadcasts without an answer after which no SubDevice is connected.
-const SILENT: u8 = 3;
-/// Consecutive failures of a scan after which they are reported.
-const PATIENCE: u32 = 20;
-
-/// What the last broadcast showed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Seen {
-    counts: (Wkc, Wkc),
-    al_status: u8,
-    ports_changed: bool,
-}
 
 /// Watches the segment until an application is activated, or the MainDevice stops.
-pub(crate) async fn watch(bus: Bus, segment: SharedSegment, options: ScanOptions) {
-    let mut watch = Watch {
-        carriers: bus.carriers(),
-        ring: bus.ring(),
-        counts: None,
-        is_stale: false,
-        silent: 0,
-        failures: 0,
-        next_routine: Instant::default(),
-        bus: bus.clone(),
-        segment: segment.clone(),
-        options,
-    };
-    until_active(&segment, async move {
+pub(crate) async fn watch(bus: Bus, segment: SharedSegment) {
+    until_active(&segment, async {
+        segment.observe_idle(IdleObservation::Watched(bus.carriers(), bus.ring()));
+        let mut number = 0;
         loop {
-            watch.turn().await;
+            broadcast(&bus, &segment, number).await;
+            segment.until(|model| (!model.is_idle_busy()).then_some(())).await;
             bus.sleep(PERIOD).await;
+            number = number.wrapping_add(1);
         }
     })
     .await;
 }
 
-struct Watch {
-    bus: Bus,
-    segment: SharedSegment,
-    options: ScanOptions,
-    carriers: [Option<bool>; 2],
-    ring: RingState,
-    /// SubDevices on each link at the last scan.
-    counts: Option<(Wkc, Wkc)>,
-    /// The last scan does not show the present segment.
-    is_stale: bool,
-    silent: u8,
-    failures: u32,
-    next_routine: Instant,
+/// The links and the ring, without the answer to a broadcast.
+fn words(bus: &Bus) -> Words {
+    let ring = RingWord { state: bus.ring(), ..RingWord::default() };
+    Words { links: bus.links(), carriers: bus.carriers(), ring, supervision: None, cycles: 0 }
 }
 
-impl Watch {
-    async fn turn(&mut self) {
-        self.report_carriers();
-        if self.segment.view().is_scanning() {
-            self.counts = None;
-            return;
-        }
-        let Some(seen) = self.broadcast().await else { return };
-        // The application may have begun a scan meanwhile.
-        if self.segment.view().is_scanning() {
-            self.counts = None;
-            return;
-        }
-        self.report_ring(seen);
-        if self.segment.view().found().is_none() {
-            return self.scan_anew(seen).await;
-        }
-        self.take_over();
-        let is_first = self.counts.is_none();
-        if is_first {
-            self.counts = Some(self.scanned_counts());
-        }
-        let wanted = self.segment.idle_rescans.wanted();
-        if self.counts != Some(seen.counts) || seen.ports_changed || self.is_stale || wanted.is_some() {
-            return self.follow(seen, wanted).await;
-        }
-        let is_unexpected = {
-            let view = self.segment.view();
-            let is_other = view.expected_states().is_some_and(|expected| seen.al_status != expected);
-            is_other && view.are_undeclared_settled()
+/// One broadcast, unless a scan is under way or no link has a carrier.
+async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32) {
+    let before = words(bus);
+    segment.observe(Observation::Words(before));
+    if segment.view().is_scanning() {
+        return;
+    }
+    if before.is_unplugged() {
+        return segment.observe_idle(IdleObservation::Unanswered(before));
+    }
+    let reply = bus.brd(map::AL_STATUS, AlStatus::LEN).await;
+    let now = Words { ring: words(bus).ring, ..before };
+    let Ok(reply) = reply else { return segment.observe_idle(IdleObservation::Unanswered(now)) };
+    let al_status = [reply.data.first().copied().unwrap_or_default(), 0];
+    let (main, redundant, irq) = (reply.main, reply.redundant, reply.irq);
+    let supervision = Supervision { main, redundant, al_status, irq, returned: false };
+    segment.observe(Observation::Words(Words { supervision: Some((number, supervision)), ..now }));
+}
+
+/// The first scan, as soon as a SubDevice answers.
+pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: ScanOptions) {
+    until_active(&segment, async {
+        let ended = scan(&bus, &options).await.map_err(|error| error.to_string());
+        end_scan(&segment, ended);
+        segment.observe_idle(IdleObservation::Scanned);
+    })
+    .await;
+}
+
+/// A scan after a change, or on request.
+pub(super) async fn follow_change(bus: Bus, segment: SharedSegment, options: ScanOptions, change: Change) {
+    until_active(&segment, async {
+        let versions = segment.view().versions();
+        let seen = match follow(&bus, &segment, &options, change).await {
+            Ok(Some(found)) => IdleObservation::Followed { versions, found: Rc::new(found), wanted: change.wanted },
+            Ok(None) => IdleObservation::NotFollowed(None),
+            Err(error) => IdleObservation::NotFollowed(Some(error.to_string())),
         };
-        if self.bus.now() >= self.next_routine || is_unexpected {
-            self.read_states().await;
-        }
-    }
+        segment.observe_idle(seen);
+    })
+    .await;
+}
 
-    /// SubDevices of the last scan are kept in their states from now on.
-    fn take_over(&self) {
-        if self.segment.view().has_untouched() {
-            self.segment.observe_undeclared(UndeclaredObservation::TakenOver);
-        }
+/// `None` if the segment has changed meanwhile.
+async fn follow(
+    bus: &Bus,
+    segment: &SharedSegment,
+    options: &ScanOptions,
+    Change { counts, ports_changed, is_unplugged, .. }: Change,
+) -> Result<Option<Found>, ScanError> {
+    bus.step(Subject::Scan, || {
+        let (main, redundant) = (Wkc(counts.main), Wkc(counts.redundant));
+        format!("the segment has changed: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+    });
+    // Clears the ECAT events of the ports. Changes from now on set them again.
+    if ports_changed && bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
+        return Ok(None);
     }
-
-    fn scanned_counts(&self) -> (Wkc, Wkc) {
-        let view = self.segment.view();
-        let Some(found) = view.found() else { return (Wkc(0), Wkc(0)) };
-        let redundant = found.subdevices.len().saturating_sub(found.main_count);
-        (Wkc(found.main_count as u16), Wkc(redundant as u16))
+    if is_unplugged {
+        return Ok(Some(nothing()));
     }
+    let before = segment.view().found().cloned().unwrap_or_else(|| Rc::new(nothing()));
+    scan_again(bus, segment, options, (&before.subdevices, &before)).await
+}
 
-    fn report_carriers(&mut self) {
-        let carriers = self.bus.carriers();
-        for link in Link::ALL {
-            match (self.carriers[link.index()], carriers[link.index()]) {
-                (before, Some(false)) if before != Some(false) => self.bus.report(Event::LinkDown { link }),
-                (Some(false), Some(true)) => self.bus.report(Event::LinkUp { link }),
-                _ => {}
-            }
-        }
-        self.carriers = carriers;
-    }
-
-    fn report_ring(&mut self, seen: Seen) {
-        let (main, redundant) = (seen.counts.0.0, seen.counts.1.0);
-        match (core::mem::replace(&mut self.ring, self.bus.ring()), self.ring) {
-            (RingState::Closed | RingState::Unknown, RingState::Open) => {
-                self.bus.report(Event::RingOpened { main, redundant });
-            }
-            (RingState::Open, RingState::Closed) => {
-                self.bus.report(Event::RingClosed { main, redundant, place: None });
-            }
-            _ => {}
-        }
-    }
-
-    /// No link has a carrier.
-    fn is_unplugged(&self) -> bool {
-        let links = if self.bus.links() == LinkSet::Ring { 2 } else { 1 };
-        self.carriers.iter().take(links).all(|carrier| *carrier == Some(false))
-    }
-
-    /// One broadcast; `None` if a lost frame is no evidence yet.
-    async fn broadcast(&mut self) -> Option<Seen> {
-        if self.is_unplugged() {
-            return Some(Seen::default());
-        }
-        match self.bus.brd(map::AL_STATUS, AlStatus::LEN).await {
-            Ok(reply) => {
-                self.silent = 0;
-                let al_status = reply.data.first().copied().unwrap_or_default();
-                let ports_changed = EcatEvent::from_bits(reply.irq).dl_status;
-                Some(Seen { counts: (reply.main, reply.redundant), al_status, ports_changed })
-            }
-            Err(_) => {
-                self.silent = self.silent.saturating_add(1);
-                (self.silent >= SILENT).then(Seen::default)
-            }
-        }
-    }
-
-    /// The first scan, as soon as a SubDevice answers.
-    async fn scan_anew(&mut self, seen: Seen) {
-        if seen.counts == (Wkc(0), Wkc(0)) {
-            return;
-        }
-        self.segment.observe(Observation::ScanBegun);
-        let ended = scan(&self.bus, &self.options).await.map_err(|error| error.to_string());
-        self.segment.observe(Observation::ScanEnded(ended));
-        self.counts = None;
-    }
-
-    /// The segment has changed, or a rescan is requested.
-    async fn follow(&mut self, seen: Seen, wanted: Option<u64>) {
-        if self.counts != Some(seen.counts) && !self.is_stale {
-            self.bus.report(Event::Counted { main: seen.counts.0.0, redundant: seen.counts.1.0 });
-        }
-        self.bus.step(Subject::Scan, || {
-            let (main, redundant) = (seen.counts.0, seen.counts.1);
-            format!("the segment has changed: {main} SubDevices on MAIN, {redundant} on REDUNDANT")
+/// Reads the state of each SubDevice, also of those that have failed: they may have lost their addresses.
+pub(super) async fn read_states(bus: Bus, segment: SharedSegment) {
+    until_active(&segment, async {
+        let kept = segment.view().kept();
+        let read = bus.gather(kept, |bus, (key, attempt)| async move {
+            StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
         });
-        self.is_stale = true;
-        // Clears the ECAT events of the ports. Changes from now on set them again.
-        if seen.ports_changed && self.bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_err() {
-            return;
-        }
-        let versions = self.segment.view().versions();
-        let before = self.segment.view().found().cloned().unwrap_or_else(|| Rc::new(nothing()));
-        let known = before.subdevices.clone();
-        let found = match self.is_unplugged() {
-            true => Ok(Some(nothing())),
-            false => scan_again(&self.bus, &self.segment, &self.options, &known).await,
-        };
-        match found {
-            Ok(Some(found)) => {
-                let differences = differences(&before, &found);
-                let (added, removed) = (differences.added.len(), differences.removed.len());
-                let subdevices = found.subdevices.len();
-                self.segment.observe(Observation::FoundAgain { versions, found: Rc::new(found) });
-                (self.is_stale, self.failures) = (false, 0);
-                self.counts = Some(self.scanned_counts());
-                self.take_over();
-                if added + removed > 0 {
-                    self.bus.report(Event::SegmentChanged { subdevices, added, removed });
-                }
-                if let Some(number) = wanted {
-                    self.segment.idle_rescans.end(number, differences);
-                }
-            }
-            Ok(None) => self.failures += 1,
-            Err(error) => {
-                self.failures += 1;
-                if self.failures == PATIENCE {
-                    self.bus.report(Event::ScanFailed { reason: error.to_string() });
-                }
-            }
-        }
-    }
-
-    /// Reads the state of each SubDevice, also of those that have failed: they may have lost their addresses.
-    async fn read_states(&mut self) {
-        self.next_routine = self.bus.now() + ROUTINE;
-        let kept = self.segment.view().kept();
-        let readings: Vec<StateRead> = self
-            .bus
-            .gather(kept, |bus, (key, attempt)| async move {
-                StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
-            })
-            .await;
-        // A SubDevice without its station address has lost its power.
-        self.is_stale |= readings.iter().any(|read| matches!(read.reading, Reading::Silent | Reading::Doubled));
-        self.segment.observe_undeclared(UndeclaredObservation::StatesRead(&readings));
-    }
+        let read: Vec<StateRead> = read.await;
+        segment.observe_idle(IdleObservation::StatesRead(&read));
+    })
+    .await;
 }

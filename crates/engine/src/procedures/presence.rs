@@ -6,8 +6,6 @@ use core::time::Duration;
 use ringcat_wire::address::RegisterAddress;
 
 use super::shared_segment::SharedSegment;
-use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::info::Direction;
 use crate::plan::AreaPlan;
 use crate::segment::Observation;
@@ -47,7 +45,7 @@ pub(super) async fn prove_inputs(bus: Bus, segment: SharedSegment, index: usize,
                 "SyncManager {sync_manager} gives no inputs yet, {} ms after its FMMU",
                 LATE.as_millis()
             );
-            bus.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
+            segment.observe(Observation::NotProven { index, mapping, what });
         }
         missing = left;
         bus.sleep(pause).await;

@@ -5,7 +5,6 @@ use alloc::string::ToString;
 use super::scan::read_one;
 use super::shared_segment::SharedSegment;
 use super::sii::{self, SiiCache};
-use crate::event::Event;
 use crate::segment::MemberFinding;
 use crate::supervisor::Bus;
 
@@ -25,6 +24,6 @@ pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, (index, attem
             info.keep_read_online(&known);
             segment.observe_member((index, attempt), MemberFinding::ReadAgain(&info));
         }
-        Err(error) => bus.report(Event::ScanFailed { reason: error.to_string() }),
+        Err(error) => segment.observe_member((index, attempt), MemberFinding::NotReadAgain(error.to_string())),
     }
 }

@@ -1,10 +1,11 @@
 //! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
 //! continues.
 
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
-use core::pin::pin;
+use core::pin::{Pin, pin};
 use core::task::Poll;
 use core::time::Duration;
 
@@ -18,8 +19,7 @@ use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
-use crate::declared::SubDeviceId;
-use crate::event::{Event, Subject};
+use crate::event::Subject;
 use crate::mail::MailboxError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
@@ -27,7 +27,7 @@ use crate::mail::soe::SoeFailure;
 use crate::segment::effect::{Check, Shown};
 use crate::segment::member::Member;
 use crate::segment::start::Start;
-use crate::segment::{MemberFinding, ProcessDataStep, Retries};
+use crate::segment::{MemberFinding, Problem, ProcessDataStep, Retries};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before the first repeated attempt to configure a SubDevice; it doubles with every failure.
@@ -72,19 +72,20 @@ pub(super) async fn keep_up(
                     bus.sleep(READ_PAUSE).await;
                     continue;
                 }
-                frame_limit::explain(bus, segment).await;
-                bus.report(failure(index, &error));
+                Box::pin(frame_limit::explain(bus, segment)).await;
+                segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
             // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back, or on
             // request.
             Err(error @ ConfigureError::Unfit(_)) => {
-                bus.report(failure(index, &error));
+                segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
                 segment.until_retried(index).await;
-                read_again(bus, segment, (index, attempt)).await;
+                // In a box: it needs the most memory, and is rare.
+                Box::pin(read_again(bus, segment, (index, attempt))).await;
                 continue;
             }
             Err(error) => {
-                bus.report(failure(index, &error));
+                segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
                 if segment.view().retries() == Retries::OnRequest {
                     segment.until_retried(index).await;
                     continue;
@@ -136,15 +137,12 @@ async fn is_there(bus: &Bus, segment: &SharedSegment, index: usize) -> bool {
     false
 }
 
-pub(super) fn failure(index: usize, error: &ConfigureError) -> Event {
+pub(super) fn problem(error: &ConfigureError) -> Problem {
     match error {
-        ConfigureError::State(al_state::StateError::Refused { requested, status, code }) => Event::StateError {
-            subdevice: SubDeviceId(index),
-            requested: Some(*requested),
-            status: *status,
-            code: *code,
-        },
-        error => Event::ConfigurationFailed { subdevice: SubDeviceId(index), reason: error.to_string() },
+        ConfigureError::State(al_state::StateError::Refused { requested, status, code }) => {
+            Problem::Refused { requested: *requested, shown: (*status, *code) }
+        }
+        error => Problem::Other(error.to_string()),
     }
 }
 
@@ -199,7 +197,7 @@ async fn try_once(
 /// A SubDevice that only fell from OP to SAFEOP still has its configuration: after an acknowledgement it may go back to
 /// OP. Its error is reported, unless it is the error reported before.
 async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<bool, ConfigureError> {
-    let BringUp { bus, segment, index, station, setup, target, mailbox, .. } = bring_up;
+    let BringUp { bus, segment, index, attempt, station, setup, target, mailbox, .. } = bring_up;
     let (status, code) = al_state::read_status(bus, *station).await?;
     if !status.error && status.al_state() == Some(*target) {
         if segment.view().member(*index).is_some_and(|member| member.exchanges(*target)) {
@@ -220,7 +218,7 @@ async fn quick(bring_up: &BringUp<'_>, reported: &mut Option<Shown>) -> Result<b
     mailbox.resume();
     if status.error {
         if reported.replace((status, code)) != Some((status, code)) {
-            bus.report(Event::StateError { subdevice: SubDeviceId(*index), requested: None, status, code });
+            segment.observe_member((*index, *attempt), MemberFinding::Shows((status, code)));
         }
         al_state::acknowledge(bus, *station, setup.emulated).await?;
     }
@@ -239,7 +237,7 @@ pub(super) async fn bring_up_member(
     reported: Option<Shown>,
     check: Check,
 ) {
-    let procedure = async {
+    let procedure = pin!(async {
         if check == Check::None {
             return keep_up(&bus, &segment, (index, attempt), from, reported).await;
         }
@@ -247,10 +245,10 @@ pub(super) async fn bring_up_member(
             return;
         }
         if segment.view().member(index).is_some_and(|member| member.unfit.is_some()) {
-            read_again(&bus, &segment, (index, attempt)).await;
+            Box::pin(read_again(&bus, &segment, (index, attempt))).await;
         }
         keep_up(&bus, &segment, (index, attempt), from, reported).await;
-    };
+    });
     while_current(&segment, index, attempt, procedure).await;
 }
 
@@ -297,14 +295,14 @@ async fn is_the_lost_one(
     })
 }
 
-/// Runs a procedure for a SubDevice until another one begins or the SubDevice is lost.
+/// Runs a procedure for a SubDevice until another one begins or the SubDevice is lost. It is pinned by the caller: a
+/// future that an async function takes by value is in that function's memory twice.
 pub(super) async fn while_current(
     segment: &SharedSegment,
     index: usize,
     attempt: u32,
-    procedure: impl Future<Output = ()>,
+    mut procedure: Pin<&mut impl Future<Output = ()>>,
 ) {
-    let mut procedure = pin!(procedure);
     poll_fn(|context| {
         if segment.view().member(index).is_none_or(|member| member.attempt != attempt) {
             return Poll::Ready(());

@@ -5,15 +5,14 @@
 //! domain expects it meanwhile. A SubDevice that loses its power is brought back to the last requested state. After a
 //! refusal it is brought back to its previous state.
 
-use alloc::rc::Rc;
-use core::cell::RefCell;
 use core::future::Future;
+use core::pin::pin;
 
 use ringcat_wire::al::AlState;
 
 use super::configure::{BringUp, ConfigureError};
 use super::read_again::read_again;
-use super::recover::{bring_up, failure, is_of_bus, keep_up, no_setup, while_current};
+use super::recover::{bring_up, is_of_bus, keep_up, no_setup, problem, while_current};
 use super::shared_segment::SharedSegment;
 use crate::segment::member::Phase;
 use crate::segment::start::Start;
@@ -27,30 +26,25 @@ pub(crate) const fn exchanges(state: AlState) -> bool {
 
 /// Brings a SubDevice to a state. The procedure continues also if its result is not awaited.
 pub(crate) fn request_state(
-    bus: &Bus,
     segment: &SharedSegment,
     index: usize,
     state: AlState,
 ) -> impl Future<Output = Result<(), ConfigureError>> + use<> {
+    let mut decided = match check(segment, index, state) {
+        Ok(()) => begin(segment, index, state),
+        Err(error) => Some(Err(error)),
+    };
     let segment = segment.clone();
-    let result = Slot::default();
-    match check(&segment, index, state) {
-        Ok(()) => begin(bus, &segment, index, state, &result),
-        Err(error) => *result.borrow_mut() = Some(Err(error)),
-    }
-    let attempt = attempt_of(&segment, index);
+    let attempt = segment.view().member(index).map_or(0, |member| member.attempt);
     async move {
         segment
             .until(|model| {
                 let is_over = model.member(index).is_none_or(|member| member.attempt != attempt);
-                result.borrow_mut().take().or_else(|| is_over.then_some(Err(ConfigureError::Interrupted)))
+                let result = decided.take().or_else(|| segment.results.of(index, attempt));
+                result.or_else(|| is_over.then_some(Err(ConfigureError::Interrupted)))
             })
             .await
     }
-}
-
-fn attempt_of(segment: &SharedSegment, index: usize) -> u32 {
-    segment.view().member(index).map_or(0, |member| member.attempt)
 }
 
 /// Errors that are detected before anything is changed.
@@ -64,44 +58,38 @@ fn check(segment: &SharedSegment, index: usize, state: AlState) -> Result<(), Co
     }
 }
 
-type Slot = Rc<RefCell<Option<Result<(), ConfigureError>>>>;
-
-fn begin(bus: &Bus, segment: &SharedSegment, index: usize, state: AlState, result: &Slot) {
-    let (phase, before) = {
-        let view = segment.view();
-        let Some(member) = view.member(index) else { return };
-        (member.phase, member.target)
-    };
+/// The result, if it is known at once.
+fn begin(segment: &SharedSegment, index: usize, state: AlState) -> Option<Result<(), ConfigureError>> {
+    let phase = segment.view().member(index).map(|member| member.phase);
     segment.observe(Observation::Requested { subdevice: Addressed::Member(index), state });
-    match phase {
-        Phase::Absent => *result.borrow_mut() = Some(Err(ConfigureError::Absent)),
-        Phase::Settled(is) if is == state => *result.borrow_mut() = Some(Ok(())),
-        Phase::Settled(_) | Phase::Configuring => {
-            let attempt = attempt_of(segment, index);
-            let (bus, segment, result) = (bus.clone(), segment.clone(), result.clone());
-            bus.clone().spawn(async move {
-                let procedure = go(&bus, &segment, (index, attempt), before, &result);
-                while_current(&segment, index, attempt, procedure).await;
-            });
-        }
+    match phase? {
+        Phase::Absent => Some(Err(ConfigureError::Absent)),
+        Phase::Settled(is) if is == state => Some(Ok(())),
+        Phase::Settled(_) | Phase::Configuring => None,
     }
 }
 
-async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), before: AlState, result: &Slot) {
+/// Changes a member to its new target state while the attempt is the current one; after a refusal back to the state
+/// before.
+pub(super) async fn change_state(bus: Bus, segment: SharedSegment, (index, attempt): (usize, u32), before: AlState) {
+    let procedure = pin!(go(&bus, &segment, (index, attempt), before));
+    while_current(&segment, index, attempt, procedure).await;
+}
+
+async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), before: AlState) {
     match travel(bus, segment, (index, attempt), before).await {
         Ok(state) => {
-            *result.borrow_mut() = Some(Ok(()));
+            segment.results.end(index, attempt, Ok(()));
             segment.observe_member((index, attempt), MemberFinding::Reached(state));
         }
         Err(error) => {
-            bus.report(failure(index, &error));
             // A SubDevice that the frames did not reach has not refused.
             let has_refused = !is_of_bus(&error);
-            *result.borrow_mut() = Some(Err(error));
+            let failed = MemberFinding::Failed(problem(&error));
+            segment.results.end(index, attempt, Err(error));
+            segment.observe_member((index, attempt), failed);
             if has_refused {
                 segment.observe_member((index, attempt), MemberFinding::Refused(before));
-            } else {
-                segment.notify();
             }
             keep_up(bus, segment, (index, attempt), Start::Unknown, None).await;
         }

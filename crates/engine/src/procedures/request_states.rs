@@ -61,7 +61,7 @@ pub(crate) fn request_states(
 ) -> impl Future<Output = Result<(), StatesError>> + use<> {
     let followers = match state {
         AlState::Boot => Err(StatesError::Boot),
-        _ if segment.view().is_active() => Ok(members(bus, segment, state, scope)),
+        _ if segment.view().is_active() => Ok(members(segment, state, scope)),
         _ => scanned(segment, state),
     };
     let (bus, until) = (bus.clone(), bus.now() + limit);
@@ -91,7 +91,7 @@ async fn at_the_limit(bus: &Bus, station: StationAddress, optional: bool) -> Out
     }
 }
 
-fn members(bus: &Bus, segment: &SharedSegment, state: AlState, scope: StateScope) -> Vec<Follower> {
+fn members(segment: &SharedSegment, state: AlState, scope: StateScope) -> Vec<Follower> {
     let count = segment.view().subdevices().member_count();
     let mut followers = Vec::with_capacity(count);
     for index in 0..count {
@@ -103,7 +103,7 @@ fn members(bus: &Bus, segment: &SharedSegment, state: AlState, scope: StateScope
         let outcome: Pin<Box<dyn Future<Output = Outcome>>> = if in_boot {
             Box::pin(core::future::ready(Err(NotFollowedReason::InBoot)))
         } else {
-            Box::pin(follow_member(segment.clone(), index, goal, request_state(bus, segment, index, goal)))
+            Box::pin(follow_member(segment.clone(), index, goal, request_state(segment, index, goal)))
         };
         let absent = segment.view().member(index).is_some_and(|member| member.phase == Phase::Absent);
         let counts = match scope {

@@ -21,10 +21,11 @@ use super::scan::{ScanError, ScanOptions};
 use super::shared_segment::SharedSegment;
 use super::sii;
 use super::undeclared::unmap;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::info::SubDeviceInfo;
 use crate::knowledge::{Handover, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::mail::InUse;
+use crate::segment::effect::Shown;
 use crate::segment::{Found, KeptState, Observation, UndeclaredObservation, UpkeepProgress};
 use crate::supervisor::{Bus, BusError};
 
@@ -63,6 +64,8 @@ struct Kept {
     progress: KnownProgress,
     /// Its mailbox, if it can be used without INIT.
     mailbox: Option<(InUse, KnownMailbox)>,
+    /// What it shows instead of the state that it has left.
+    has_left: Option<Shown>,
 }
 
 /// Goes on with the segment. Ends the stage of scanning in the model.
@@ -75,18 +78,16 @@ pub(crate) async fn resume(
     let (found, places, differs) = verified(bus, segment, options, &before).await?;
     segment.observe(Observation::ScanEnded(Ok(found.scan())));
     let mut kept = Vec::new();
-    let mut left = Vec::new();
     for (place, info) in places.iter().zip(&found.subdevices) {
         let Some(known) = before.all.iter().find(|known| known.info.station == info.station) else { continue };
-        if let Some((now, has_left)) = keep(known, info, place, before.handover) {
-            kept.push(now);
-            left.extend(has_left.then_some((info.position, place.status, place.code)));
-        }
+        kept.extend(keep(known, info, place, before.handover));
     }
     let reached = kept.iter().filter(|kept| kept.progress == KnownProgress::Reached);
     let (subdevices, in_state) = (found.subdevices.len(), reached.count());
-    bus.report(Event::Resumed { subdevices, in_state, differs });
-    left.into_iter().for_each(|(position, status, code)| bus.report(Event::UndeclaredState { position, status, code }));
+    bus.notice(Notice::Resumed { subdevices, in_state, differs });
+    if before.handover == Handover::Orderly {
+        before.all.iter().for_each(|known| report_cut(bus, known, &found.subdevices));
+    }
     go_on(bus, segment, &kept, before.handover);
     if before.handover == Handover::AfterCrash {
         let left = found.subdevices.iter().filter(|info| kept.iter().any(|kept| is_in_place(kept, info)));
@@ -95,11 +96,21 @@ pub(crate) async fn resume(
     Ok(())
 }
 
+/// Reports conversations with a mailbox that the hand-over has cut.
+fn report_cut(bus: &Bus, known: &Known, found: &[Rc<SubDeviceInfo>]) {
+    let position = found.iter().find(|info| info.station == known.info.station).map(|info| info.position);
+    let protocols = known.mailbox.iter().flat_map(KnownMailbox::cut_protocols);
+    for (protocol, position) in protocols.filter_map(|protocol| Some((protocol, position?))) {
+        bus.notice(Notice::ConversationCut { position, protocol });
+    }
+}
+
 /// Tells the model which SubDevices go on as they are, and their mailboxes their counters.
 fn go_on(bus: &Bus, segment: &SharedSegment, kept: &[Kept], handover: Handover) {
     let state = |kept: &Kept| KeptState {
         station: kept.station,
         target: kept.target,
+        has_left: kept.has_left,
         progress: match kept.progress {
             KnownProgress::Reached => UpkeepProgress::Reached,
             KnownProgress::Left => UpkeepProgress::Left,
@@ -145,7 +156,7 @@ async fn verified(
                     true => all.collect(),
                     false => all.filter(|info| !replaced.contains(&info.station)).collect(),
                 };
-                match scan_again(bus, segment, options, &known).await {
+                match scan_again(bus, segment, options, (&known, &before.found)).await {
                     Ok(Some(now)) if !now.subdevices.is_empty() => {
                         found = now;
                         continue;
@@ -185,8 +196,8 @@ async fn clear(bus: &Bus, left: Vec<Rc<SubDeviceInfo>>) {
     cleared.await;
 }
 
-/// How a known SubDevice goes on, and whether it has left its state meanwhile.
-fn keep(known: &Known, info: &SubDeviceInfo, place: &Place, handover: Handover) -> Option<(Kept, bool)> {
+/// How a known SubDevice goes on.
+fn keep(known: &Known, info: &SubDeviceInfo, place: &Place, handover: Handover) -> Option<Kept> {
     let is_handed = handover == Handover::Orderly;
     let target = if is_handed { known.target } else { AlState::PreOp };
     let is_there = !place.status.error && place.status.al_state() == Some(target);
@@ -208,5 +219,6 @@ fn keep(known: &Known, info: &SubDeviceInfo, place: &Place, handover: Handover) 
     };
     let mailbox = mailbox.filter(|_| progress != KnownProgress::Due);
     let has_left = known.progress == KnownProgress::Reached && progress == KnownProgress::Due;
-    Some((Kept { station: info.station, target, progress, mailbox }, has_left))
+    let has_left = has_left.then_some((place.status, place.code));
+    Some(Kept { station: info.station, target, progress, mailbox, has_left })
 }

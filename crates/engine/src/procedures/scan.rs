@@ -4,9 +4,11 @@
 
 mod cabling;
 mod count;
+mod end;
 mod error;
 mod identification;
 mod options;
+mod scanned;
 mod stations;
 
 use alloc::format;
@@ -27,11 +29,13 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, EcatEvent, Fmmu, Information, SyncManager, map};
 use ringcat_wire::sii::SiiHeader;
 
+pub(crate) use self::cabling::cabling_findings;
 use self::cabling::locate_crossings;
-pub(crate) use self::cabling::report_cabling;
 use self::count::Count;
+pub(crate) use self::end::end_scan;
 pub use self::error::ScanError;
 pub use self::options::ScanOptions;
+use self::scanned::Scanned;
 pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
 use super::dictionary::complete;
@@ -41,7 +45,7 @@ use super::services::ServiceError;
 use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
-use crate::event::{Event, Subject};
+use crate::event::{Event, Notice, Subject};
 use crate::info::{InfoWarning, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
@@ -67,7 +71,7 @@ const SIZE_AT: usize = 2 * 0x3E;
 ///
 /// While the count settles, present SubDevices are read already. Each SubDevice that appears later restarts the scan
 /// until the count has settled.
-pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
+pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError> {
     let begin = bus.now();
     let mut attempts = 1;
     bus.step(Subject::Scan, || "scan begins: SubDevices are counted".to_string());
@@ -78,10 +82,11 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scan, ScanError> {
             format!("scan: {main} SubDevices on MAIN, {redundant} on REDUNDANT; they go to INIT and get addresses")
         });
         expected = match attempt(bus, options, expected).await {
-            Ok(mut scan) => {
-                complete(bus, &mut scan, options.pdos).await;
-                bus.report(Event::ScanFinished { subdevices: scan.subdevices.len() });
-                return Ok(scan);
+            Ok(mut scanned) => {
+                complete(bus, &mut scanned.scan, options.pdos).await;
+                let subdevices = scanned.scan.subdevices.len();
+                scanned.findings.push(Event::ScanFinished { subdevices });
+                return Ok(scanned);
             }
             Err(Failure::Unsettled(now)) => {
                 bus.step(Subject::Scan, || "scan: the count has changed, the scan begins again".to_string());
@@ -129,7 +134,7 @@ impl<E: Into<ScanError>> From<E> for Failure {
     }
 }
 
-async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Scan, Failure> {
+async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Scanned, Failure> {
     let total = expected.total();
     if total > u32::from(MAX_SUBDEVICES) {
         return Err(ScanError::TooMany { count: total }.into());
@@ -151,19 +156,17 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
     let Learned { topology, closings, not_learned } = connect(bus, options.junctions, &subdevices, main_count).await?;
     let mut scan = Scan { subdevices, topology, main_count, redundant_count };
-    report_findings(bus, &scan);
+    let mut findings = findings_of(&scan);
     // Declared connections are not known yet.
     if options.junctions != JunctionMode::Strict {
         let exact = options.enhanced_line_crossed && locate_crossings(bus, &mut scan).await;
-        report_cabling(bus, &scan, exact);
+        findings.extend(cabling_findings(bus, &scan, exact));
     }
-    for closing in closings {
-        bus.report(Event::JunctionLearned { closing });
-    }
+    findings.extend(closings.into_iter().map(|closing| Event::JunctionLearned { closing }));
     if not_learned > 0 {
-        bus.report(Event::JunctionsNotLearned { rings: not_learned });
+        findings.push(Event::JunctionsNotLearned { rings: not_learned });
     }
-    Ok(scan)
+    Ok(Scanned { scan, findings })
 }
 
 /// Reads the data of the counted SubDevices while the count settles. A changed count ends the attempt at once,
@@ -323,7 +326,7 @@ async fn read_all(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Sa
             let result = ask(&bus, position, station_at(position), &cache, extent).await;
             done.set(done.get() + 1);
             if done.get().is_multiple_of(step) || done.get() == total {
-                bus.report(Event::ScanProgress { done: done.get(), total });
+                bus.notice(Notice::ScanProgress { done: done.get(), total });
             }
             result
         }
@@ -348,7 +351,7 @@ pub(super) async fn ask(
         Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
         // A broken EEPROM fails only its own SubDevice.
         Err(error) => {
-            bus.report(Event::SiiOddity { position, what: error.to_string() });
+            bus.notice(Notice::SiiOddity { position, what: error.to_string() });
             return Ok((SiiContents::unreadable(), None));
         }
     };
@@ -446,13 +449,15 @@ pub(super) fn describe(readout: Readout, (contents, identification): &Said) -> S
     info
 }
 
-fn report_findings(bus: &Bus, scan: &Scan) {
+fn findings_of(scan: &Scan) -> Vec<Event> {
+    let mut findings = Vec::new();
     for info in &scan.subdevices {
-        for warning in &info.warnings {
-            bus.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
-        }
+        let oddity = |warning: &InfoWarning| Event::SiiOddity { position: info.position, what: warning.to_string() };
+        findings.extend(info.warnings.iter().map(oddity));
     }
     for duplicate in duplicate_aliases(&scan.subdevices) {
-        bus.report(Event::DuplicateAlias { alias: duplicate.alias, first: duplicate.first, second: duplicate.second });
+        let (first, second) = (duplicate.first, duplicate.second);
+        findings.push(Event::DuplicateAlias { alias: duplicate.alias, first, second });
     }
+    findings
 }

@@ -11,8 +11,8 @@ use core::pin::pin;
 use core::task::Poll;
 use core::time::Duration;
 
+use super::attempt_results::AttemptResults;
 use super::error_statistics::ErrorStatistics;
-use super::idle::requests::IdleRescans;
 use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
@@ -20,7 +20,7 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Addressed, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
+use crate::segment::{Addressed, IdleObservation, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -44,10 +44,10 @@ pub struct SharedSegment {
     pub eeproms: EepromTurns,
     /// Error counters.
     pub statistics: ErrorStatistics,
+    /// Results of requested states of members.
+    pub(super) results: AttemptResults,
     /// Mailboxes of SubDevices without a declaration.
     pub(crate) undeclared: UndeclaredMailboxes,
-    /// Rescans that are requested without an application.
-    pub(crate) idle_rescans: IdleRescans,
 }
 
 /// Data beside the model.
@@ -72,7 +72,8 @@ impl SharedSegment {
     pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
         let Beside { mailboxes, cache, statistics } = beside;
         let eeproms = EepromTurns::new(bus);
-        SharedSegment { mailboxes: mailboxes.into(), cache, statistics, board, eeproms, ..self.clone() }
+        let (mailboxes, results) = (mailboxes.into(), AttemptResults::default());
+        SharedSegment { mailboxes, results, cache, statistics, board, eeproms, ..self.clone() }
     }
 
     /// The same model, without an application and on another bus.
@@ -98,8 +99,8 @@ impl SharedSegment {
             cache,
             eeproms: EepromTurns::new(bus),
             statistics: ErrorStatistics::new(bus, 0, None),
+            results: AttemptResults::default(),
             undeclared,
-            idle_rescans: IdleRescans::new(bus),
         }
     }
 
@@ -140,14 +141,14 @@ impl SharedSegment {
         self.observe(Observation::OfMember { index, attempt, finding });
     }
 
-    /// Makes waiting procedures check their conditions again, for changes outside the model.
-    pub(super) fn notify(&self) {
-        self.changed.notify();
+    /// Passes an observation of clocks to the model.
+    pub(crate) fn observe_clocks(&self, seen: ClockObservation<'_>) {
+        self.observe(Observation::Clocks(seen));
     }
 
-    /// Passes an observation of clocks to the model.
-    pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
-        self.observe(Observation::Clocks(seen));
+    /// Passes an observation without an application to the model.
+    pub(crate) fn observe_idle(&self, seen: IdleObservation<'_>) {
+        self.observe(Observation::Idle(seen));
     }
 
     /// Passes an observation of SubDevices without a declaration to the model.
@@ -181,6 +182,11 @@ impl SharedSegment {
     /// Waits until the model satisfies a condition.
     pub(crate) async fn until<T>(&self, mut ready: impl FnMut(&Segment) -> Option<T>) -> T {
         self.changed.until(|| ready(&self.segment.borrow())).await
+    }
+
+    /// Waits until no branch of the segment is closed for a measurement.
+    pub(super) async fn until_branches_are_open(&self) {
+        self.until(|model| (!model.clocks().are_branches_closed()).then_some(())).await;
     }
 
     /// The next procedure to be started.

@@ -26,7 +26,8 @@ const REPEAT_PAUSE: Duration = Duration::from_millis(2);
 const SEARCH_PAUSE: Duration = Duration::from_millis(10);
 
 /// Passes posted words to the model, whenever they change or the model requests it. Runs until the MainDevice stops.
-pub(crate) async fn supervise(bus: Bus, segment: SharedSegment) {
+pub(super) async fn supervise(bus: Bus, segment: SharedSegment) {
+    segment.until_branches_are_open().await;
     loop {
         let posted = bus.posted();
         segment.observe(Observation::Words(segment.words()));

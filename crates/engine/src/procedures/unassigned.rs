@@ -128,7 +128,7 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
     let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
     let attempts: Vec<u32> = segment.view().members().map(|member| member.attempt).collect();
     for (key, index) in held {
-        segment.observe(Observation::Held { key, index });
+        segment.observe(Observation::Held { key, index, attempt: attempts[index] });
     }
     for (key, member) in matched {
         match member {
@@ -173,7 +173,7 @@ async fn admit(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey, (index, at
     let fitted = segment.view().as_member(key, index);
     let info = match fitted {
         Some(Ok(info)) => info,
-        Some(Err(reason)) => return segment.observe(Observation::Misfit { key, index, reason }),
+        Some(Err(reason)) => return segment.observe(Observation::Misfit { key, index, attempt, reason }),
         None => return,
     };
     let written = bus.fpwr(key.station, map::STATION_ADDRESS, &info.station.0.to_le_bytes()).await;

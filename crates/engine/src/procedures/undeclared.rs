@@ -10,7 +10,7 @@ mod request;
 
 pub(super) use attempt::bring_undeclared;
 pub(super) use bring::{keep_outputs, unmap};
-pub(crate) use keep::{keep, settle};
-pub(crate) use mail::watch_undeclared_mail;
+pub(super) use keep::{keep, settle};
+pub(super) use mail::watch_undeclared_mail;
 pub(crate) use mailboxes::UndeclaredMailboxes;
 pub(crate) use request::{request, until_decided};

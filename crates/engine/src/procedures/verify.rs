@@ -40,7 +40,8 @@ enum Found {
 }
 
 /// Runs until the MainDevice stops.
-pub(crate) async fn verify(bus: Bus, segment: SharedSegment) {
+pub(super) async fn verify(bus: Bus, segment: SharedSegment) {
+    segment.until_branches_are_open().await;
     loop {
         bus.sleep(PAUSE).await;
         let all = bus.gather_in_turns(settled(&segment), check).await;

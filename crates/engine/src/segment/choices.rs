@@ -24,6 +24,8 @@ pub struct Choices {
     pub follow_groups: bool,
     /// SubDevices without a declaration are kept in their requested states.
     pub idle_operation: bool,
+    /// The exchange sends a supervision datagram: changes are detected.
+    pub supervision: bool,
     /// What follows a failed configuration.
     pub retries: Retries,
 }

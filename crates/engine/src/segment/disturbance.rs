@@ -2,8 +2,10 @@
 //! purpose, and procedures that need all of this unchanged. Only one runs at a time.
 //!
 //! A running disturbance cannot be cancelled: it runs until it is undone. If several are requested, the most urgent one
-//! is next. Each ends within its own time limit, and earlier if a more urgent one waits, so that none waits for ever in
-//! a segment that changes repeatedly.
+//! is next. Each ends within its own time limit, and earlier if a more urgent one waits. In a segment that changes
+//! repeatedly the more urgent ones may be requested again and again: a kind that [`MOST_PASSED`] others have passed is
+//! next, and its turn is not shortened. So each kind waits for at most [`LONGEST_WAIT`] turns of others, also if its
+//! procedure gives up waiting and requests it again.
 
 use alloc::vec::Vec;
 
@@ -22,6 +24,24 @@ pub enum Disturbance {
     Rescan,
 }
 
+/// Number of kinds.
+const KINDS: usize = 5;
+/// Turns of other kinds after which a waiting kind is next, whatever its urgency.
+const MOST_PASSED: u8 = 3;
+/// Turns of other kinds that a waiting kind waits for at most: those that pass it, and the other kinds that were passed
+/// as often.
+#[cfg(test)]
+const LONGEST_WAIT: usize = MOST_PASSED as usize + KINDS - 1;
+
+/// How a disturbance has got its turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Claim {
+    /// It was the most urgent one.
+    Urgency,
+    /// Others have passed it too often.
+    Patience,
+}
+
 /// A request for a disturbance with the procedure's number: several procedures may request the same kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wanted {
@@ -34,8 +54,10 @@ pub struct Wanted {
 /// The disturbance under way, and the waiting ones.
 #[derive(Debug, Default)]
 pub(super) struct Slot {
-    running: Option<Wanted>,
+    running: Option<(Wanted, Claim)>,
     waiting: Vec<Wanted>,
+    /// By kind, how often others have passed it since its last turn, while it waited.
+    passed: [u8; KINDS],
     /// How often SubDevices were put out of reach.
     isolations: u32,
     /// Number of the next request.
@@ -45,17 +67,18 @@ pub(super) struct Slot {
 impl Slot {
     /// The disturbance under way.
     pub fn running(&self) -> Option<Disturbance> {
-        self.running.map(|running| running.disturbance)
+        self.running.map(|(running, _)| running.disturbance)
     }
 
     /// Whether the disturbance under way has this number.
     pub fn is_granted(&self, number: u32) -> bool {
-        self.running.is_some_and(|running| running.number == number)
+        self.running.is_some_and(|(running, _)| running.number == number)
     }
 
-    /// Whether a more urgent disturbance waits.
+    /// Whether a more urgent disturbance waits that may shorten the turn of the running one.
     pub fn is_outranked(&self) -> bool {
-        self.running().is_some_and(|running| self.waiting.iter().any(|waiting| waiting.disturbance < running))
+        let Some((running, Claim::Urgency)) = self.running else { return false };
+        self.waiting.iter().any(|waiting| waiting.disturbance < running.disturbance)
     }
 
     /// How often SubDevices were put out of reach: a scan during such a time does not show which SubDevices answer.
@@ -71,7 +94,7 @@ impl Slot {
     /// An empty slot, with other numbers than before.
     pub fn emptied(&self) -> Slot {
         let isolations = self.isolations.wrapping_add(1);
-        Slot { running: None, waiting: Vec::new(), isolations, next_number: self.next_number }
+        Slot { isolations, next_number: self.next_number, ..Slot::default() }
     }
 
     /// Requests a disturbance. It is under way at once if no other is.
@@ -90,13 +113,29 @@ impl Slot {
         }
     }
 
+    /// The most urgent one, unless others have passed one too often.
+    fn next(&self) -> Option<(Wanted, Claim)> {
+        let passed = |waiting: &Wanted| self.passed[waiting.disturbance as usize];
+        let late = self.waiting.iter().copied().filter(|waiting| passed(waiting) >= MOST_PASSED);
+        let late = late.min_by_key(|waiting| (u8::MAX - passed(waiting), waiting.disturbance));
+        let urgent = || self.waiting.iter().copied().min_by_key(|waiting| waiting.disturbance);
+        late.map(|late| (late, Claim::Patience)).or_else(|| Some((urgent()?, Claim::Urgency)))
+    }
+
     fn grant(&mut self) {
         if self.running.is_some() {
             return;
         }
-        let Some(next) = self.waiting.iter().copied().min_by_key(|waiting| waiting.disturbance) else { return };
+        let Some((next, claim)) = self.next() else { return };
         self.waiting.retain(|waiting| waiting.number != next.number);
-        self.running = Some(next);
+        self.running = Some((next, claim));
+        let mut is_passed = [false; KINDS];
+        self.waiting.iter().for_each(|waiting| is_passed[waiting.disturbance as usize] = true);
+        is_passed[next.disturbance as usize] = false;
+        self.passed[next.disturbance as usize] = 0;
+        for (passed, _) in self.passed.iter_mut().zip(is_passed).filter(|(_, is)| *is) {
+            *passed = passed.saturating_add(1);
+        }
         let is_isolation = next.disturbance == Disturbance::IsolateRings;
         self.isolations = self.isolations.wrapping_add(u32::from(is_isolation));
     }
@@ -104,8 +143,98 @@ impl Slot {
 
 #[cfg(test)]
 mod tests {
-    use super::Disturbance::{IsolateRings, OpenByLink, OpenByPort, Rescan};
+    use super::Disturbance::{IsolateRings, OpenByLink, OpenByPort, Readdress, Rescan};
     use super::*;
+
+    const ALL: [Disturbance; KINDS] = [IsolateRings, OpenByPort, Readdress, OpenByLink, Rescan];
+
+    /// Kinds that are requested every so many steps, last this many steps, and give up waiting after this many.
+    #[derive(Clone, Copy)]
+    struct Rate {
+        every: u64,
+        lasts: u64,
+        patience: u64,
+    }
+
+    /// A segment in which all kinds are requested again and again. Returns the most turns of other kinds that one of
+    /// them has waited for, and how often each had its turn.
+    fn flap(rates: [Rate; KINDS], steps: u64) -> (usize, [usize; KINDS]) {
+        let mut slot = Slot::default();
+        let (mut requested, mut ends, mut number) = ([None::<(u32, u64)>; KINDS], 0, 0);
+        // By kind: turns of others since it began to wait, given-up requests included.
+        let (mut waited, mut most, mut turns) = ([None::<usize>; KINDS], 0, [0; KINDS]);
+        let mut running = None;
+        for now in 0..steps {
+            for (kind, rate) in rates.into_iter().enumerate() {
+                match requested[kind] {
+                    None if now % rate.every == 0 && running != Some(kind) => {
+                        slot.want(Wanted { disturbance: ALL[kind], number });
+                        requested[kind] = Some((number, now));
+                        waited[kind].get_or_insert(0);
+                        number += 1;
+                    }
+                    Some((number, since)) if !slot.is_granted(number) && now - since >= rate.patience => {
+                        slot.end(number);
+                        requested[kind] = None;
+                    }
+                    _ => {}
+                }
+            }
+            if let Some(kind) = running
+                && now >= ends
+            {
+                let (number, _) = requested[kind].take().expect("it runs");
+                slot.end(number);
+                running = None;
+            }
+            if running.is_none()
+                && let Some(kind) = slot.running().map(|it| it as usize)
+            {
+                (running, ends) = (Some(kind), now + rates[kind].lasts);
+                most = most.max(waited[kind].take().unwrap_or(0));
+                turns[kind] += 1;
+                let waiting = waited.iter_mut().zip(&requested).filter(|(_, requested)| requested.is_some());
+                waiting.filter_map(|(waited, _)| waited.as_mut()).for_each(|waited| *waited += 1);
+            }
+        }
+        (most.max(waited.into_iter().flatten().max().unwrap_or(0)), turns)
+    }
+
+    // covers: ring-flap
+    #[test]
+    fn a_segment_that_flaps_at_any_rate_lets_no_disturbance_wait_for_ever() {
+        let (mut most, mut fewest) = (0, usize::MAX);
+        for every in [1, 2, 7, 40, 250] {
+            for lasts in [1, 3, 20, 90] {
+                for patience in [lasts * KINDS as u64, 1_000, u64::MAX] {
+                    let rate = |kind: u64| Rate { every: every + kind, lasts: lasts + kind, patience };
+                    let (waited, turns) = flap([rate(0), rate(1), rate(2), rate(3), rate(4)], 100_000);
+                    most = most.max(waited);
+                    fewest = fewest.min(turns.into_iter().min().unwrap_or(0));
+                    assert!(waited <= LONGEST_WAIT, "every {every}, {lasts}, {patience}: {waited} turns, {turns:?}");
+                }
+            }
+        }
+        assert!(most > MOST_PASSED.into() && fewest >= 100, "{most} turns of others, {fewest} of each kind");
+    }
+
+    #[test]
+    fn a_turn_by_patience_is_not_shortened_and_the_next_is_by_urgency_again() {
+        let mut slot = Slot::default();
+        slot.want(Wanted { disturbance: IsolateRings, number: 0 });
+        slot.want(Wanted { disturbance: Rescan, number: 1 });
+        for number in 2..=1 + u32::from(MOST_PASSED) {
+            slot.want(Wanted { disturbance: IsolateRings, number });
+            slot.end(slot.running.expect("one runs").0.number);
+            assert_eq!(slot.running(), Some(IsolateRings), "request {number}");
+        }
+        slot.want(Wanted { disturbance: IsolateRings, number: 9 });
+        slot.end(1 + u32::from(MOST_PASSED));
+        assert!(slot.is_granted(1) && !slot.is_outranked());
+        slot.want(Wanted { disturbance: Rescan, number: 10 });
+        slot.end(1);
+        assert!(slot.is_granted(9));
+    }
 
     fn want(slot: &mut Slot, wanted: impl IntoIterator<Item = Disturbance>) {
         for (number, disturbance) in (0..).zip(wanted) {

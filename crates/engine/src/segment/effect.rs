@@ -4,8 +4,9 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::Position;
-use ringcat_wire::al::{AlStatus, AlStatusCode};
+use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
+use super::idle::Change;
 use super::key::SubDeviceKey;
 use super::start::Start;
 use crate::declared::SubDeviceId;
@@ -49,6 +50,33 @@ pub enum Check {
     Return,
 }
 
+/// A procedure that runs as long as the application, or as long as there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watch {
+    /// Sets up the clocks and supervises them.
+    Clocks,
+    /// Passes posted words to the model.
+    Supervision,
+    /// Compares registers with the written values.
+    Registers,
+    /// Reads error counters.
+    Errors,
+    /// Reads in the background what the scan left out of the SIIs.
+    Siis,
+    /// Reads the mail status of mailboxes.
+    Mail,
+    /// Serves requests of the cyclic thread.
+    Requests,
+    /// Reads the statistics of all SubDevices.
+    Statistics,
+    /// Without an application: broadcasts.
+    Idle,
+    /// Tells when attempts of undeclared SubDevices are due.
+    Undeclared,
+    /// Reads the mail status of undeclared SubDevices.
+    UndeclaredMail,
+}
+
 /// A procedure on the bus. It returns its result as an observation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
@@ -69,6 +97,15 @@ pub enum Task {
         reported: Option<Shown>,
         /// The check before it.
         check: Check,
+    },
+    /// Brings a member to a state that the application requests; after a refusal back to the state before.
+    ChangeState {
+        /// The member.
+        index: usize,
+        /// Number of the attempt.
+        attempt: u32,
+        /// Its target state before.
+        before: AlState,
     },
     /// Reads a member's inputs until all have been delivered.
     ProveInputs {
@@ -96,6 +133,14 @@ pub enum Task {
         /// Number of the attempt that has reached OP.
         attempt: u32,
     },
+    /// Scans the segment without an application for the first time.
+    ScanSegment,
+    /// Scans it again after a change, or on request.
+    FollowChange(Change),
+    /// Reads the states of all SubDevices that are kept in their states.
+    ReadStates,
+    /// Runs as long as the application, or as long as there is none.
+    Watch(Watch),
     /// Scans the segment for crossed lines.
     ExamineCabling {
         /// In a closed ring the redundant link may be taken down for it (LC-03).

@@ -15,6 +15,7 @@ use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
+use super::idle::Idle;
 use super::key::SubDeviceKey;
 use super::local_rings::LocalRings;
 use super::member::MemberView;
@@ -29,6 +30,7 @@ use super::undeclared::Keeping;
 use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
+use crate::clocks::KnownClocks;
 use crate::declared::SubDeviceId;
 use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
@@ -88,6 +90,8 @@ pub struct Segment {
     pub(super) choices: Choices,
     pub(super) ring: Ring,
     pub(super) clocks: Clocks,
+    /// What is known of the clocks from a former application or another process.
+    pub(super) known_clocks: Option<Rc<KnownClocks>>,
     pub(super) breaks: Breaks,
     pub(super) local_rings: LocalRings,
     pub(super) silence: Silence,
@@ -97,6 +101,7 @@ pub struct Segment {
     pub(super) slot: Slot,
     pub(super) addresses: Addresses,
     pub(super) keeping: Keeping,
+    pub(super) idle: Idle,
     /// How often the cabling of a rescan was taken over.
     pub(super) adoptions: u32,
     /// Until this time it is not necessary to test how many datagrams a frame may hold.
@@ -124,6 +129,7 @@ impl Segment {
             slot: Slot::default(),
             addresses: Addresses::default(),
             keeping: Keeping::default(),
+            idle: Idle::default(),
             adoptions: 0,
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),
@@ -133,6 +139,7 @@ impl Segment {
             layout,
             cabling,
             clocks,
+            known_clocks: None,
             board,
             choices,
         }
@@ -212,6 +219,11 @@ impl Segment {
         &self.clocks
     }
 
+    /// What is known of the clocks for their next set-up.
+    pub fn known_clocks(&self) -> Option<Rc<KnownClocks>> {
+        self.clocks.known().map(Rc::new).or_else(|| self.known_clocks.clone())
+    }
+
     /// The references that the exchange distributes; `None` while they are outdated or the distribution is stopped.
     pub fn references_in_use(&self) -> Option<References> {
         let (references, _) = self.board.clocks.references();
@@ -252,10 +264,15 @@ impl Segment {
         }
     }
 
+    /// Whether station addresses are those of this version.
+    pub(super) fn are_addresses_as_in(&self, versions: Versions) -> bool {
+        versions.addresses == self.addresses.version()
+    }
+
     /// Whether positions and station addresses that were requested in this version are still those of the segment.
     pub fn are_places_valid(&self, versions: Versions) -> bool {
         let is_isolating = self.slot.running() == Some(Disturbance::IsolateRings);
-        !is_isolating && versions.isolations == self.slot.isolations() && versions.addresses == self.addresses.version()
+        !is_isolating && versions.isolations == self.slot.isolations() && self.are_addresses_as_in(versions)
     }
 
     /// Whether enough searches for SubDevices have failed for a test of the number of datagrams per frame.

@@ -3,9 +3,10 @@
 use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::string::String;
+use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
@@ -13,6 +14,8 @@ use super::addressed::Addressed;
 use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
+use super::effect::Shown;
+use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
 use super::model::Declared;
 use super::port_control::BlockedPort;
@@ -24,7 +27,10 @@ use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
+use crate::declared::SubDeviceId;
+use crate::event::Event;
 use crate::info::SubDeviceInfo;
+use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::time::Instant;
 use crate::topology::NodeStatus;
@@ -42,6 +48,21 @@ pub enum ProcessDataStep {
     Mapped,
     /// The working counter expects it; its inputs as soon as they were proven.
     Joined,
+}
+
+/// Why an attempt to bring up a member has failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Problem {
+    /// It refused a state.
+    Refused {
+        /// The requested state.
+        requested: AlState,
+        /// Its AL status and code.
+        shown: Shown,
+    },
+    /// Another reason, in words.
+    Other(String),
 }
 
 /// What an attempt to bring up a member has found.
@@ -63,17 +84,27 @@ pub enum MemberFinding<'a> {
     Held,
     /// How it takes part in process data from now on.
     ProcessData(ProcessDataStep),
+    /// The attempt has failed; it is repeated, or given up.
+    Failed(Problem),
+    /// It shows an error that is not reported yet.
+    Shows(Shown),
     /// It refused the requested state; the previous target state.
     Refused(AlState),
     /// Its SII was read again.
     ReadAgain(&'a SubDeviceInfo),
+    /// It cannot be read again; the reason.
+    NotReadAgain(String),
+    /// What it refuses differs from its own description.
+    Oddity(String),
 }
 
 /// An observation.
 #[derive(Debug)]
 pub enum Observation<'a> {
-    /// Words posted by the exchange, and carriers of the links.
+    /// Words posted by the exchange, or without an application the answer to a broadcast, and carriers of the links.
     Words(Words),
+    /// Observations without an application.
+    Idle(IdleObservation<'a>),
     /// Intermediate result of a round of reads. `others`: answers of SubDevices without a declaration.
     PartOfRound {
         /// Version of the model at the request.
@@ -93,11 +124,15 @@ pub enum Observation<'a> {
     RoundWanted,
     /// Another round is requested after a pause.
     RoundWantedIn(Duration),
-    /// It was tested how many datagrams a frame may hold. Until this time no other test is necessary.
+    /// It is tested how many datagrams a frame may hold. Until this time no other test is necessary.
     FramesTested(Instant),
+    /// A frame may hold this number of datagrams: no other test is necessary.
+    FramesLimited(FrameLimit),
 
     /// A scan of the segment begins, with new station addresses.
     ScanBegun,
+    /// What it has found, in events; refused if it was given up.
+    ScanShows(Vec<Event>),
     /// It has ended; the reason if it failed.
     ScanEnded(Result<Scan, String>),
     /// The segment was scanned again without an application; SubDevices in place have kept their addresses.
@@ -107,22 +142,26 @@ pub enum Observation<'a> {
         /// The SubDevices.
         found: Rc<Found>,
     },
-    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part.
+    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part. It is refused if another
+    /// SubDevice has got the address since.
     SiiCompleted {
-        /// Its station address.
-        station: StationAddress,
+        /// The SubDevice at the request.
+        key: SubDeviceKey,
         /// Its data.
         read: &'a SubDeviceInfo,
     },
+    /// What the comparison of a declaration with the scan shows.
+    Compared(Event),
     /// An application declares SubDevices.
     Activated(Box<Declared>),
+    /// Both halves know the declaration: the procedures of the application begin. The configuration begins at once, or
+    /// with clocks when they are set up: an answer meanwhile is not a return.
+    Attached,
     /// The application ends. The result of the scan stays.
     Deactivated,
 
     /// The configuration of all present members may begin.
     Started,
-    /// They will be configured later: an answer meanwhile is not a return.
-    Delayed,
     /// A finding of an attempt to bring up a member. It is refused if that is no longer the current attempt: the member
     /// was lost, or another attempt has begun.
     OfMember {
@@ -139,6 +178,15 @@ pub enum Observation<'a> {
         index: usize,
         /// Number of the mapping for which they were read.
         mapping: u32,
+    },
+    /// A member does not deliver its inputs.
+    NotProven {
+        /// The member.
+        index: usize,
+        /// Number of the mapping for which they were read.
+        mapping: u32,
+        /// What is missing.
+        what: String,
     },
     /// The application requests a state of a SubDevice.
     Requested {
@@ -188,21 +236,26 @@ pub enum Observation<'a> {
     },
     /// An unassigned SubDevice matches no declaration.
     Unexpected(SubDeviceKey),
-    /// An unassigned SubDevice is a member but does not fit its declaration.
+    /// An unassigned SubDevice is a member but does not fit its declaration. It is refused if the member has come back
+    /// since.
     Misfit {
         /// The unassigned SubDevice.
         key: SubDeviceKey,
         /// The member.
         index: usize,
+        /// The member's attempt when it was compared.
+        attempt: u32,
         /// Why.
         reason: String,
     },
-    /// An unassigned SubDevice may be this member, or another one of the same kind.
+    /// An unassigned SubDevice may be this member, or another one of the same kind. It is refused as a misfit is.
     Held {
         /// The unassigned SubDevice.
         key: SubDeviceKey,
         /// The member.
         index: usize,
+        /// The member's attempt when it was compared.
+        attempt: u32,
     },
     /// An unassigned SubDevice was identified as a member and has got its address.
     Admitted {
@@ -225,6 +278,13 @@ pub enum Observation<'a> {
         /// The redundant link was down during the check.
         in_control: bool,
     },
+    /// Declared SubDevices that a rescan has found at other positions: from, and to.
+    Moved {
+        /// Version of the model at the request.
+        versions: Versions,
+        /// Index in the declaration, position before, position now.
+        moved: Vec<(SubDeviceId, Position, Position)>,
+    },
     /// A rescan of the whole segment has ended.
     Rescanned {
         /// Version of the model at the request.
@@ -242,6 +302,8 @@ pub enum Observation<'a> {
         versions: Versions,
         /// The new errors.
         fresh: &'a [CableErrors],
+        /// What is to be reported of them.
+        rising: Vec<Event>,
     },
 
     /// Clocks were measured, written, read or lost.

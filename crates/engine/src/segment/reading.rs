@@ -25,6 +25,11 @@ pub enum Reading {
 }
 
 impl Reading {
+    /// Its station address is not, or not only, its own.
+    pub const fn is_elsewhere(&self) -> bool {
+        matches!(self, Reading::Silent | Reading::Doubled)
+    }
+
     /// It answered.
     pub const fn is_answer(&self) -> bool {
         matches!(self, Reading::Answer { .. })

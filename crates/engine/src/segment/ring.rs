@@ -13,7 +13,7 @@ use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
-use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
+use crate::ring_status::{Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus};
 use crate::time::Instant;
 use crate::topology::{Topology, are_doubtful};
 
@@ -23,7 +23,7 @@ const PAUSE: Duration = Duration::from_micros(500);
 /// required. At the moment of a cut one copy may be processed by fewer SubDevices than are connected to its side.
 const SETTLING_RESULTS: u32 = 20;
 
-/// Words posted by the exchange, and the carriers of the links.
+/// Words posted by the exchange, or without an application the answer to a broadcast, and the carriers of the links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
     /// The links in use.
@@ -32,10 +32,18 @@ pub struct Words {
     pub carriers: [Option<bool>; 2],
     /// The state of the ring.
     pub ring: RingWord,
-    /// The latest supervision result and its number.
+    /// The latest supervision result and its number; without an application a new one, or none.
     pub supervision: Option<(u32, Supervision)>,
     /// Cycles that the exchange has sent.
     pub cycles: u64,
+}
+
+impl Words {
+    /// No link has a carrier.
+    pub fn is_unplugged(&self) -> bool {
+        let links = if self.links == LinkSet::Ring { 2 } else { 1 };
+        self.carriers.iter().take(links).all(|carrier| *carrier == Some(false))
+    }
 }
 
 /// State of the ring, and what was reported of it.
@@ -126,7 +134,7 @@ impl Ring {
     }
 
     /// Reports changes of carriers. Returns when a change that is held back may be reported.
-    fn observe_carriers(
+    pub fn observe_carriers(
         &mut self,
         carriers: [Option<bool>; 2],
         now: Instant,
@@ -193,19 +201,45 @@ impl Ring {
             return false;
         }
         let Some((main, redundant)) = self.counts(word, number, supervision) else { return false };
-        let place = self.status.place;
-        let event = match (core::mem::replace(&mut self.reported, word.state), word.state) {
-            (_, RingState::Open) => Event::RingOpened { main, redundant },
-            (RingState::Open, RingState::Closed) => Event::RingClosed { main, redundant, place },
-            (_, RingState::Closed | RingState::Unknown) => return false,
-        };
-        effects.report(event);
+        if !self.report_edge(word.state, (main, redundant), effects) {
+            return false;
+        }
         effects.0.push(Effect::MainCount(main));
         self.place_at_host(word, (main, redundant), cabled, effects);
         if self.damper.count_report(now) {
             effects.report(Event::RingUnsteady { changes: word.changes });
         }
         false
+    }
+
+    /// Reports another state of the ring; false if there is nothing to report.
+    fn report_edge(&mut self, state: RingState, (main, redundant): (u16, u16), effects: &mut Effects) -> bool {
+        let place = self.status.place;
+        effects.report(match (core::mem::replace(&mut self.reported, state), state) {
+            (_, RingState::Open) => Event::RingOpened { main, redundant },
+            (RingState::Open, RingState::Closed) => Event::RingClosed { main, redundant, place },
+            (_, RingState::Closed | RingState::Unknown) => return false,
+        });
+        true
+    }
+
+    /// Begins to follow a ring without an application: its present state is not reported.
+    pub fn begin_idle(&mut self, carriers: [Option<bool>; 2], state: RingState) {
+        *self = Ring { reported: state, ..Ring::new(RingStatus { state, ..self.status }, carriers) };
+    }
+
+    /// Processes a broadcast without an application. Its counts are those of one frame: nothing has to settle.
+    pub fn observe_broadcast(&mut self, state: RingState, counts: LinkCounts, now: Instant, effects: &mut Effects) {
+        if core::mem::replace(&mut self.status.state, state) != state {
+            self.damper.changed(now);
+            self.changes = self.changes.wrapping_add(1);
+        }
+        if state == self.reported || !self.damper.may_report(now) {
+            return;
+        }
+        if self.report_edge(state, (counts.main, counts.redundant), effects) && self.damper.count_report(now) {
+            effects.report(Event::RingUnsteady { changes: self.changes });
+        }
     }
 
     /// If all SubDevices answer on one side, the break is at the cable of the other interface; no SubDevice has to be

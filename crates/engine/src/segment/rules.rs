@@ -5,6 +5,7 @@ mod clocks;
 mod crossings;
 mod fit;
 mod group_matching;
+mod idle;
 mod matches;
 mod members;
 mod neighbours;

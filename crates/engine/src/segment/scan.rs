@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 
 use crate::info::SubDeviceInfo;
+use crate::ring_status::LinkCounts;
 use crate::topology::Topology;
 
 /// Result of a scan.
@@ -45,6 +46,12 @@ impl Found {
     /// Station addresses by position.
     pub fn stations(&self) -> Vec<StationAddress> {
         self.subdevices.iter().map(|info| info.station).collect()
+    }
+
+    /// SubDevices on each link.
+    pub fn counts(&self) -> LinkCounts {
+        let redundant = self.subdevices.len().saturating_sub(self.main_count);
+        LinkCounts { main: self.main_count as u16, redundant: redundant as u16 }
     }
 
     /// The result of the scan.

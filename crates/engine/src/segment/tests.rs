@@ -2,6 +2,7 @@
 
 mod addressed;
 mod clocks;
+mod idle;
 mod stages;
 mod stale;
 mod undeclared;
@@ -109,6 +110,7 @@ impl Ring {
             junctions: JunctionMode::Disabled,
             follow_groups: false,
             idle_operation: false,
+            supervision: true,
             retries: Retries::Always,
         };
         let mut segment = Segment::new(choices);

@@ -11,8 +11,10 @@ mod latch;
 mod send;
 
 use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 use core::time::Duration;
 
+use super::task::TaskId;
 use super::transfer::TransferId;
 use crate::board::Board;
 use crate::link::LinkSet;
@@ -47,6 +49,8 @@ pub(crate) struct Alone {
     departures: (u32, Instant),
     /// A procedure has the exclusive right to latch.
     is_taken: bool,
+    /// Procedures that wait for it.
+    want_turn: Vec<TaskId>,
 }
 
 impl Alone {

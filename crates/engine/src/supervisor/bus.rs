@@ -27,7 +27,7 @@ use super::signal::Signal;
 use super::transfer::Request;
 use crate::board::Board;
 use crate::event::history::History;
-use crate::event::{Event, Occupant, Subject};
+use crate::event::{Event, Notice, Occupant, Subject};
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::role::{Function, NotPermitted};
@@ -94,7 +94,12 @@ impl Bus {
         }
     }
 
-    /// Reports an event.
+    /// Reports a notice of a procedure.
+    pub(crate) fn notice(&self, notice: Notice) {
+        self.report(notice.into());
+    }
+
+    /// Reports an event: an effect of an observation. Procedures report [`Notice`]s.
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);

@@ -53,6 +53,8 @@ pub(crate) struct Shared {
     /// The first datagram of the outbox and since when it waits, if it is too long for the send window.
     pub(crate) blocked: Option<(TransferId, Instant)>,
     pub(crate) link_order: LinkOrder,
+    /// The procedure that waits for its answer.
+    pub(crate) awaits_link: Option<TaskId>,
     pub(super) watchers: Watchers,
     pub(super) bell: Bell,
     /// Largest number of datagrams in a frame.
@@ -87,6 +89,7 @@ impl Shared {
             main_count: 0,
             blocked: None,
             link_order: LinkOrder::default(),
+            awaits_link: None,
             watchers: Watchers::default(),
             bell: Bell::default(),
             max_datagrams: usize::MAX,

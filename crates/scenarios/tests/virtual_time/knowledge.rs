@@ -4,9 +4,11 @@
 mod bars;
 mod bytes;
 mod changes;
+mod clocks;
 mod crashes;
 mod mail;
 mod rounds;
+mod under_way;
 
 use std::time::Duration;
 

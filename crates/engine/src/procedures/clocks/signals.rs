@@ -10,8 +10,6 @@ use super::not_locked::{NotLocked, SignalsError};
 use super::set_up::set_up_one;
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
 use crate::config::{PulseGrid, SyncSignals, WhenUnlocked};
-use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::clocks::{ClockObservation, Clocks, Node};
@@ -76,7 +74,7 @@ pub(in crate::procedures) async fn start_signals(
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
     segment.observe_clocks(ClockObservation::Signals { station, are_starting: false });
     let result = wait_until_about_right(bus, segment, member, limit).await;
-    or_go_on(bus, segment, member, result).map_err(SignalsError::NotLocked)?;
+    or_go_on(segment, member, result).map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = signals.active_sync1_ns();
     let mut cycles = [0; 8];
@@ -107,12 +105,12 @@ fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
 
 /// What follows from clocks that are not locked in time. A SubDevice with an unknown delay never goes on: its time may
 /// be wrong by any amount.
-fn or_go_on(bus: &Bus, segment: &SharedSegment, member: usize, result: Result<(), NotLocked>) -> Result<(), NotLocked> {
+fn or_go_on(segment: &SharedSegment, member: usize, result: Result<(), NotLocked>) -> Result<(), NotLocked> {
     let choice = segment.view().clocks().config.when_unlocked;
     match (result, choice) {
         (Err(not_locked), WhenUnlocked::GoOn) if not_locked.hidden.is_none() => {
-            let (subdevice, reason) = (SubDeviceId(member), not_locked.to_string());
-            bus.report(Event::WentOnUnlocked { subdevice, reason });
+            let reason = not_locked.to_string();
+            segment.observe_clocks(ClockObservation::WentOnUnlocked { member, reason });
             Ok(())
         }
         (result, WhenUnlocked::GoOn | WhenUnlocked::StayInSafeOp) => result,
@@ -165,7 +163,7 @@ pub(in crate::procedures) async fn wait_for_lock(
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
     };
     let result = wait(bus, segment, limit, check).await;
-    or_go_on(bus, segment, member, result)
+    or_go_on(segment, member, result)
 }
 
 /// Waits until clocks pass a check; the error is the result of the check at the time limit.

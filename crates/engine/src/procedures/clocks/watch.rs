@@ -23,6 +23,7 @@ use super::offsets::{write_missed, write_offsets};
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::Observation;
 use crate::segment::clocks::{Answer, Answers, ClockObservation, Difference, Due, Node};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
@@ -45,9 +46,12 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Clocks before a reference that are read with it in one frame.
 const IN_A_FRAME: usize = 32;
 
-/// The first attempt to set the clocks up, before other frames are sent.
-pub(crate) async fn begin(bus: &Bus, segment: &SharedSegment) {
-    try_set_up(bus, segment, Opening::Branches).await;
+/// Sets the clocks up before other frames are sent, because receive times are latched (protocol 7.1); then the
+/// configuration begins. Runs until the MainDevice stops.
+pub(in crate::procedures) async fn keep_clocks(bus: Bus, segment: SharedSegment) {
+    try_set_up(&bus, &segment, Opening::Branches).await;
+    segment.observe(Observation::Started);
+    keep(bus, segment).await;
 }
 
 async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
@@ -59,7 +63,7 @@ async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
 }
 
 /// Runs until the MainDevice stops.
-pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
+async fn keep(bus: Bus, segment: SharedSegment) {
     // The first clock may be added by a hot connect group.
     segment.until(|segment| segment.clocks().is_any().then_some(())).await;
     let mut pause = RETRY;
@@ -80,13 +84,16 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
 async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
     let mut seen = (segment.board.ring().changes, answering(segment));
+    let mut has_answered = seen.1 != (0, 0);
     let mut seen_times = segment.board.clocks.times.news();
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
     loop {
         wait(bus, segment, next_read, next_measurement, bus.now() < explained_until).await;
         let now = (segment.board.ring().changes, answering(segment));
-        let changed = now != seen;
+        let is_beginning = !has_answered && is_as_measured(segment, now.1);
+        has_answered |= now.1 != (0, 0);
+        let changed = now != seen && !is_beginning;
         if now.0 != seen.0 {
             explained_until = bus.now() + EXPLAINED;
         }
@@ -117,6 +124,11 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
             next_measurement = bus.now() + AGAIN;
         }
     }
+}
+
+/// Whether as many SubDevices answer as were measured: so it is when cycles begin, which is not a change.
+fn is_as_measured(segment: &SharedSegment, (main, redundant): (u16, u16)) -> bool {
+    segment.view().clocks().measured_count() == Some(usize::from(main) + usize::from(redundant))
 }
 
 fn doubtful_since(segment: &SharedSegment) -> Option<Instant> {

@@ -5,11 +5,10 @@ use alloc::format;
 use ringcat_wire::al::AlStatusCode;
 
 use super::{BringUp, ConfigureError};
-use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::mail::Limits;
 use crate::mail::coe::pdo;
 use crate::procedures::al_state::StateError;
+use crate::segment::MemberFinding;
 
 /// AL status codes that may be due to wrong sizes (protocol 5.5).
 const OF_SIZES: [AlStatusCode; 5] = [
@@ -40,7 +39,7 @@ impl BringUp<'_> {
                     area.length,
                     bits.div_ceil(8)
                 );
-                self.bus.report(Event::PlanOddity { subdevice: SubDeviceId(self.index), what });
+                self.segment.observe_member((self.index, self.attempt), MemberFinding::Oddity(what));
             }
         }
     }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use super::{BringUp, ConfigureError, StartupError};
 use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
 use crate::declared::SubDeviceId;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::mail::Limits;
 use crate::mail::coe::{self, SdoAddress};
 use crate::mail::eoe;
@@ -82,7 +82,7 @@ impl BringUp<'_> {
             Some(_) => Ok(()),
             None => {
                 let (subdevice, comment) = (self.index, command.comment.clone());
-                self.bus.report(Event::StartupRead {
+                self.bus.notice(Notice::StartupRead {
                     subdevice: SubDeviceId(subdevice),
                     number,
                     index,

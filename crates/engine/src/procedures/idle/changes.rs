@@ -7,6 +7,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
 
+use super::places::wrong_addresses;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::dictionary::complete;
 use crate::procedures::scan::{Learned, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
@@ -17,21 +18,23 @@ use crate::segment::view::View;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
-/// Scans the segment again; `None` while it changes. `known`: SubDevices with their station addresses.
+/// Scans the segment again; `None` while it changes. `known`: SubDevices with their station addresses; `last`: the
+/// places of the last scan.
 ///
 /// A SubDevice that lost its power has lost its station address, too. So an address that one SubDevice has shows which
-/// one it is.
+/// one it is, unless another program has written it: at another place the identity is read as well.
 pub(crate) async fn scan_again(
     bus: &Bus,
     segment: &SharedSegment,
     options: &ScanOptions,
-    known: &[Rc<SubDeviceInfo>],
+    (known, last): (&[Rc<SubDeviceInfo>], &Found),
 ) -> Result<Option<Found>, ScanError> {
     let Some(before) = seen(bus).await? else { return Ok(None) };
     if before.stations.is_empty() {
         return Ok(Some(nothing()));
     }
-    let others = unknown(&before, known);
+    let mut others = unknown(&before, known);
+    others.extend(wrong_addresses(bus, segment, (&before, last), known).await?);
     let (given, now) = if others.is_empty() {
         (Vec::new(), before)
     } else {
@@ -65,7 +68,7 @@ pub(crate) async fn scan_again(
 }
 
 /// A segment without SubDevices.
-pub(super) fn nothing() -> Found {
+pub(crate) fn nothing() -> Found {
     Found { subdevices: Vec::new(), topology: Topology::default(), main_count: 0 }
 }
 

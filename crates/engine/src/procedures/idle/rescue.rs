@@ -5,20 +5,22 @@ use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::Position;
 
-use super::requests::Differences;
 use crate::info::SubDeviceInfo;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::procedures::unassigned::rescan::{Found, Identified, Rescan, longest_ascent};
-use crate::ring_status::LinkCounts;
-use crate::segment::Found as Scanned;
+use crate::procedures::unassigned::rescan::{Found, Identified, Rescan};
+use crate::segment::{Differences, IdleObservation};
 use crate::supervisor::Bus;
 
 /// Scans the whole segment again and returns what is there, and what is different.
 pub(crate) async fn rescue(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
-    let differences = bus.within(limit, segment.idle_rescans.request()).await;
+    segment.observe_idle(IdleObservation::RescanAsked);
+    let number = segment.view().last_rescan_asked();
+    // The watch carries it out, so that it does not scan at the same time by itself.
+    let rescanned = segment.until(|model| model.rescanned(number).cloned());
+    let differences = bus.within(limit, rescanned).await;
     let Differences { counts, added, removed, moved } = differences.map_err(|_| ServiceError::Unsteady)?;
     let view = segment.view();
     let found = view.found().ok_or(ServiceError::Unsteady)?;
@@ -34,22 +36,4 @@ pub(crate) async fn rescue(bus: &Bus, segment: &SharedSegment, limit: Duration) 
     let subdevices = (0..).zip(&found.subdevices).map(at_place).collect();
     let topology = found.topology.clone();
     Ok(Rescan { counts, subdevices, missing: Vec::new(), topology, added, removed })
-}
-
-/// What is different from the scan before.
-pub(super) fn differences(before: &Scanned, now: &Scanned) -> Differences {
-    let (before, stations) = (before.stations(), now.stations());
-    let not_in = |all: &[StationAddress], others: &[StationAddress]| {
-        all.iter().copied().filter(|station| !others.contains(station)).collect()
-    };
-    let place = |station: &StationAddress| before.iter().position(|other| other == station);
-    let stayed = || stations.iter().filter_map(|station| Some((*station, place(station)?)));
-    let places: Vec<usize> = stayed().map(|(_, place)| place).collect();
-    let moved = stayed().zip(longest_ascent(&places)).filter(|(_, stays)| !stays);
-    let moved = moved.map(|((station, place), _)| (station, Position(place as u16))).collect();
-    let counts = LinkCounts {
-        main: now.main_count as u16,
-        redundant: now.subdevices.len().saturating_sub(now.main_count) as u16,
-    };
-    Differences { counts, added: not_in(&stations, &before), removed: not_in(&before, &stations), moved }
 }

@@ -9,6 +9,7 @@ use ringcat_wire::register::PortKind;
 use super::Scan;
 use crate::event::Event;
 use crate::link::LinkSet;
+use crate::order::InOrder;
 use crate::procedures::cabling::{Known, cabling, stays_closed};
 use crate::ring::RingState;
 use crate::segment::{LineCheck, is_swapped};
@@ -34,7 +35,7 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     }
     let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
     exact.extend(others);
-    exact.sort_by_key(Finding::node);
+    exact.put_in_order_by_key(Finding::node);
     scan.topology.findings = exact;
     true
 }
@@ -70,25 +71,26 @@ impl Known for Scan {
     }
 }
 
-/// Reports unusual cabling. `exact`: the places of crossings are known, also in a closed ring.
-pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
+/// Unusual cabling. `exact`: the places of crossings are known, also in a closed ring.
+pub(crate) fn cabling_findings(bus: &Bus, scan: &Scan, exact: bool) -> Vec<Event> {
+    let mut findings = Vec::new();
     let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
     if swapped {
-        bus.report(Event::InterfacesSwapped);
+        findings.push(Event::InterfacesSwapped);
     }
     let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
     for finding in &scan.topology.findings {
         match *finding {
-            Finding::UnconnectedPort0 { node } => bus.report(Event::UnconnectedPort0 { position: position(node) }),
+            Finding::UnconnectedPort0 { node } => findings.push(Event::UnconnectedPort0 { position: position(node) }),
             Finding::CrossedLine { .. } if swapped => {}
             Finding::CrossedLine { node, entry_port } => {
-                bus.report(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) })
+                findings.push(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) });
             }
             Finding::ForcedOpen { .. }
             | Finding::ClosedWithLink { .. }
             | Finding::LinkWithoutCommunication { .. }
             | Finding::Inconsistent { .. } => {
-                bus.report(Event::CablingOddity { position: position(finding.node()), what: finding.to_string() });
+                findings.push(Event::CablingOddity { position: position(finding.node()), what: finding.to_string() });
             }
         }
     }
@@ -101,6 +103,7 @@ pub(crate) fn report_cabling(bus: &Bus, scan: &Scan, exact: bool) {
         && !exact
         && !swapped
     {
-        bus.report(Event::LineCrossed { position: None, entry_port: None });
+        findings.push(Event::LineCrossed { position: None, entry_port: None });
     }
+    findings
 }

@@ -7,7 +7,7 @@ use ringcat_wire::register::map;
 
 use super::error::ScanError;
 use super::options::ScanOptions;
-use crate::event::Event;
+use crate::event::Notice;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
@@ -71,6 +71,6 @@ pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Res
         }
     }
     let (main, redundant) = expected.pair();
-    bus.report(Event::Counted { main, redundant });
+    bus.notice(Notice::Counted { main, redundant });
     Ok(())
 }

@@ -4,7 +4,6 @@
 //! It reads positions and no process data: no working counter changes. Supervision finds and reads SubDevices without
 //! an assigned station address; the rescan waits for this.
 
-use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -14,20 +13,19 @@ use ringcat_wire::sii::Identity;
 
 use super::address::view;
 use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::view::View;
-use crate::segment::{Observation, Seen, SubDevice, Versions, retrace};
+use crate::segment::{Observation, Seen, SubDevice, Versions, longest_ascent, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
 /// Pause between two scans.
 const PAUSE: Duration = Duration::from_millis(10);
-/// Maximum wait of a scan for the end of a disturbance; then it is repeated.
+/// Shortest wait for the end of other disturbances; otherwise a scan waits as long as its limit lasts.
 const LIMIT: Duration = Duration::from_millis(100);
 
 /// Maximum time for the segment to become stable after a group has joined or left.
@@ -99,8 +97,8 @@ impl Rescan {
 /// Scans until the segment is stable and all are identified, or until the limit; then returns the last result. Moves
 /// are reported.
 pub(crate) async fn rescan(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<Rescan, ServiceError> {
-    let (rescan, _) = scan_until(bus, segment, limit).await?;
-    report_moved(bus, &rescan);
+    let (rescan, versions, _) = scan_until(bus, segment, limit).await?;
+    observe_moved(segment, versions, &rescan);
     Ok(rescan)
 }
 
@@ -125,24 +123,26 @@ async fn follow_segment(bus: &Bus, segment: &SharedSegment, limit: Duration) -> 
     if !segment.view().is_whole(&segment.words()) {
         return false;
     }
-    let Ok((rescan, true)) = scan_until(bus, segment, limit).await else { return false };
-    report_moved(bus, &rescan);
+    let Ok((rescan, versions, true)) = scan_until(bus, segment, limit).await else { return false };
+    observe_moved(segment, versions, &rescan);
     true
 }
 
-fn report_moved(bus: &Bus, rescan: &Rescan) {
-    for (subdevice, from, to) in rescan.moved() {
-        bus.report(Event::Moved { subdevice, from, to });
-    }
+fn observe_moved(segment: &SharedSegment, versions: Versions, rescan: &Rescan) {
+    segment.observe(Observation::Moved { versions, moved: rescan.moved().collect() });
 }
 
-/// Also returns whether the cabling was taken over.
-async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Result<(Rescan, bool), ServiceError> {
+/// Also returns the versions at its begin, and whether the cabling was taken over.
+async fn scan_until(
+    bus: &Bus,
+    segment: &SharedSegment,
+    limit: Duration,
+) -> Result<(Rescan, Versions, bool), ServiceError> {
     let until = bus.now() + limit;
     segment.observe(Observation::RoundWanted);
     loop {
         // A disturbance puts SubDevices out of reach or changes their addresses, which would falsify the scan.
-        let turn = segment.disturb(Disturbance::Rescan, LIMIT).await;
+        let turn = segment.disturb(Disturbance::Rescan, LIMIT.max(until.since(bus.now()))).await;
         let versions = segment.view().versions();
         let scanned = if turn.is_some() { scan_once(bus, segment).await } else { Ok(None) };
         drop(turn);
@@ -152,7 +152,7 @@ async fn scan_until(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Resu
         match scanned {
             Ok(Some(rescan)) if is_last || (rescan.is_complete() && segment.view().are_places_valid(versions)) => {
                 let is_adopted = rescan.is_complete() && adopt(segment, versions, &rescan);
-                return Ok((rescan, is_adopted));
+                return Ok((rescan, versions, is_adopted));
             }
             Ok(None) if is_last => return Err(ServiceError::Unsteady),
             Err(error) if is_last => return Err(error.into()),
@@ -240,50 +240,5 @@ fn mark_moved(subdevices: &mut [Found], place_at_scan: impl Fn(usize) -> Option<
         if !stays {
             subdevices[at].moved_from = Some(Position(place as u16));
         }
-    }
-}
-
-/// Members of a longest ascending subsequence of distinct numbers.
-pub(in crate::procedures) fn longest_ascent(numbers: &[usize]) -> Vec<bool> {
-    // `ends[n]`: the place of the smallest last number of a subsequence of length n + 1. By place: its predecessor in
-    // the subsequence.
-    let mut ends: Vec<usize> = Vec::new();
-    let mut before: Vec<Option<usize>> = Vec::new();
-    for (at, number) in numbers.iter().enumerate() {
-        let length = ends.partition_point(|end| numbers[*end] < *number);
-        before.push(length.checked_sub(1).map(|shorter| ends[shorter]));
-        if length < ends.len() {
-            ends[length] = at;
-        } else {
-            ends.push(at);
-        }
-    }
-    let mut stays = vec![false; numbers.len()];
-    let mut at = ends.last().copied();
-    while let Some(place) = at {
-        stays[place] = true;
-        at = before[place];
-    }
-    stays
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn moved(places: &[usize]) -> Vec<usize> {
-        let stays = longest_ascent(places);
-        places.iter().zip(stays).filter(|(_, stays)| !stays).map(|(place, _)| *place).collect()
-    }
-
-    // covers: rescan
-    #[test]
-    fn as_few_as_possible_have_moved() {
-        assert_eq!(moved(&[]), []);
-        assert_eq!(moved(&[0, 2, 3, 7]), [], "gaps and what was put in between are no moves");
-        assert_eq!(moved(&[0, 1, 3, 4, 2]), [2]);
-        assert_eq!(moved(&[4, 0, 1, 2, 3]), [4]);
-        assert_eq!(moved(&[0, 3, 4, 1, 2, 5]).len(), 2);
-        assert_eq!(moved(&[3, 2, 1, 0]).len(), 3);
     }
 }

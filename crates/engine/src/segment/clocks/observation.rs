@@ -5,8 +5,7 @@ use alloc::string::String;
 
 use ringcat_wire::address::StationAddress;
 
-use super::measured::Measured;
-use crate::clocks::{Cables, Latched, Wiring};
+use crate::clocks::{Cables, KnownClocks, Latched, Measured, Wiring};
 use crate::config::ReferenceClock;
 use crate::link::Link;
 
@@ -27,6 +26,10 @@ pub enum ClockObservation<'a> {
     Cables(Cables),
     /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
     OpenedWithoutResult(Option<Wiring>),
+    /// What another process knows of the clocks.
+    Known(KnownClocks),
+    /// The segment is the one that was measured before: cable times and latch modes are those of that measurement.
+    Recalled(&'a KnownClocks),
     /// The delays of all clocks, for their set-up.
     Measured(&'a Measured),
     /// Local times latched by one frame, and the system time that they are to show.
@@ -51,6 +54,13 @@ pub enum ClockObservation<'a> {
         failed: Option<String>,
         /// The number of stops of the distribution when it began.
         holds: u32,
+    },
+    /// A member goes on although the clocks were not locked in time.
+    WentOnUnlocked {
+        /// Its index in the declaration.
+        member: usize,
+        /// The clock that is not locked.
+        reason: String,
     },
     /// Filter depths are written.
     FiltersWritten(&'a [(StationAddress, [u8; 2])]),

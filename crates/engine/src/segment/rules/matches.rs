@@ -10,6 +10,7 @@ use super::group_matching;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 use crate::segment::effect::Effects;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::matching::{Fit, assign};
@@ -24,7 +25,7 @@ impl Segment {
     /// proven by cables.
     pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned: Vec<UnassignedView<'_>> = self.subdevices.unassigned().collect();
-        unassigned.sort_by_key(|it| it.position);
+        unassigned.put_in_order_by_key(|it| it.position);
         let of_groups = group_matching::members(self, &mut unassigned, now);
         let by_cable = |it: &UnassignedView<'_>| identified.iter().find(|(station, _)| *station == it.key.station);
         let by_cables = unassigned.iter().filter_map(|it| Some((*it, by_cable(it)?.1)));
@@ -66,7 +67,16 @@ impl Segment {
     }
 
     /// The SubDevice is not configured until it is known which of several members it is; if this lasts, it is reported.
-    pub(in crate::segment) fn hold(&mut self, key: SubDeviceKey, index: usize, now: Instant, effects: &mut Effects) {
+    pub(in crate::segment) fn hold(
+        &mut self,
+        key: SubDeviceKey,
+        (index, attempt): (usize, u32),
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        if self.current(index, attempt).is_none() {
+            return;
+        }
         let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
         let since = *it.held_since.get_or_insert(now);
         if now.since(since) >= HOLD && !core::mem::replace(&mut it.reported, true) {
@@ -92,7 +102,7 @@ impl Segment {
             .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
             .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
             .collect();
-        absent.sort_by_key(|index| rank[*index]);
+        absent.put_in_order_by_key(|index| rank[*index]);
         absent
     }
 

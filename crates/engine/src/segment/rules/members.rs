@@ -3,7 +3,7 @@
 
 use alloc::format;
 use alloc::rc::Rc;
-use alloc::string::ToString;
+use alloc::string::{String, ToString};
 use core::time::Duration;
 
 use ringcat_wire::address::Wkc;
@@ -18,7 +18,7 @@ use crate::segment::attention::Round;
 use crate::segment::effect::{Check, Effect, Effects, Shown, Task};
 use crate::segment::member::{Incidents, Member, Mistaken, Phase};
 use crate::segment::model::Segment;
-use crate::segment::observation::{MemberFinding, ProcessDataStep};
+use crate::segment::observation::{MemberFinding, Problem, ProcessDataStep};
 use crate::segment::reading::{Reading, answers};
 use crate::segment::repair::Repair;
 use crate::segment::round_result::RoundResult;
@@ -256,8 +256,14 @@ impl Segment {
             }
             MemberFinding::Held => member.repair = Repair::default(),
             MemberFinding::ProcessData(step) => self.observe_process_data(index, step, effects),
+            MemberFinding::Failed(problem) => self.report_problem(index, problem, effects),
+            MemberFinding::Shows((status, code)) => {
+                effects.report(Event::StateError { subdevice: SubDeviceId(index), requested: None, status, code });
+            }
             MemberFinding::Refused(before) => self.refuse(index, before),
             MemberFinding::ReadAgain(info) => self.observe_info(index, info, effects),
+            MemberFinding::NotReadAgain(reason) => effects.report(Event::ScanFailed { reason }),
+            MemberFinding::Oddity(what) => effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what }),
         }
     }
 
@@ -292,21 +298,32 @@ impl Segment {
     }
 
     /// A member gets another target state.
-    pub(in crate::segment) fn request(&mut self, index: usize, state: AlState) {
+    pub(in crate::segment) fn request(&mut self, index: usize, state: AlState, effects: &mut Effects) {
         let Some(member) = self.subdevices.member_mut(index) else { return };
-        member.target = state;
+        let before = core::mem::replace(&mut member.target, state);
         let exchanges = member.exchanges(state);
         match member.phase {
             Phase::Absent => self.board.set_excused(index, !exchanges),
             Phase::Settled(is) if is == state => {}
             Phase::Settled(_) | Phase::Configuring => {
-                member.begin_attempt();
+                let attempt = member.begin_attempt();
+                effects.start(Task::ChangeState { index, attempt, before });
                 self.post_presence(index);
                 // On the way up its missing answers are excused until it has joined.
                 if !exchanges {
                     self.board.set_excused(index, true);
                 }
             }
+        }
+    }
+
+    fn report_problem(&mut self, index: usize, problem: Problem, effects: &mut Effects) {
+        match problem {
+            Problem::Refused { requested, shown: (status, code) } => {
+                let (subdevice, requested) = (SubDeviceId(index), Some(requested));
+                effects.report(Event::StateError { subdevice, requested, status, code });
+            }
+            Problem::Other(reason) => effects.failed(index, reason),
         }
     }
 
@@ -351,6 +368,18 @@ impl Segment {
     pub(in crate::segment) fn observe_proof(&mut self, index: usize, mapping: u32) {
         if self.member(index).is_some_and(|member| member.mapping == mapping) {
             self.board.set_unproven(index, false);
+        }
+    }
+
+    /// A member does not deliver the inputs of a mapping.
+    pub(in crate::segment) fn observe_missing_inputs(
+        &mut self,
+        (index, mapping): (usize, u32),
+        what: String,
+        effects: &mut Effects,
+    ) {
+        if self.member(index).is_some_and(|member| member.is_mapped_as(mapping)) {
+            effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
         }
     }
 

@@ -13,6 +13,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::fit::fit;
+use crate::order::InOrder;
 use crate::segment::knowledge::Knowledge;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
@@ -135,7 +136,7 @@ impl Present<'_> {
                 found.push((far.node, index));
             }
         }
-        found.sort_unstable();
+        found.put_in_order();
         found.dedup();
         found
     }

@@ -1,5 +1,8 @@
 //! Dispatch of observations.
 
+use alloc::vec::Vec;
+
+use crate::event::Event;
 use crate::ring_status::CableErrors;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
@@ -21,7 +24,9 @@ impl Segment {
     /// Processes an observation.
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         match seen {
-            Observation::Words(words) => self.observe_words(&words, now, effects),
+            Observation::Words(words) if self.is_active() => self.observe_words(&words, now, effects),
+            Observation::Words(words) => self.observe_idle_words(&words, now, effects),
+            Observation::Idle(seen) => self.observe_idle(seen, now, effects),
             Observation::PartOfRound { versions, readings, others, counted } => {
                 self.observe_part_of_round(versions, readings, others, counted);
             }
@@ -30,18 +35,27 @@ impl Segment {
             Observation::RoundWanted => self.attention.want(),
             Observation::RoundWantedIn(pause) => self.attention.again_in(pause, now),
             Observation::FramesTested(until) => self.frames_tested_until = until,
+            Observation::FramesLimited(limit) => {
+                self.frames_tested_until = Instant::NEVER;
+                effects.report(Event::FrameLimit { limit });
+            }
             Observation::ScanBegun => self.begin_scan(),
+            Observation::ScanShows(findings) => self.report_findings(findings, effects),
+            Observation::Compared(event) => effects.report(event),
             Observation::ScanEnded(result) => self.end_scan(result, effects),
             Observation::FoundAgain { versions, found } => self.find_again(versions, found),
             Observation::Activated(declared) => self.activate(*declared, effects),
+            Observation::Attached => self.begin_procedures(effects),
             Observation::Deactivated => self.deactivate(),
-            Observation::SiiCompleted { station, read } => self.observe_whole_sii(station, read, effects),
+            Observation::SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
             Observation::Started => self.start_all(effects),
-            Observation::Delayed => self.delay_all(),
             Observation::OfMember { index, attempt, finding } => {
                 self.observe_finding((index, attempt), finding, now, effects);
             }
             Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
+            Observation::NotProven { index, mapping, what } => {
+                self.observe_missing_inputs((index, mapping), what, effects);
+            }
             Observation::Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
             Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
             Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
@@ -53,8 +67,10 @@ impl Segment {
             Observation::Searched(result) => self.observe_search(result, effects),
             Observation::Read { key, read } => self.observe_read(key, read, effects),
             Observation::Unexpected(key) => self.observe_unexpected(key, effects),
-            Observation::Misfit { key, index, reason } => self.observe_misfit(key, index, reason, effects),
-            Observation::Held { key, index } => self.hold(key, index, now, effects),
+            Observation::Misfit { key, index, attempt, reason } => {
+                self.observe_misfit(key, (index, attempt), reason, effects);
+            }
+            Observation::Held { key, index, attempt } => self.hold(key, (index, attempt), now, effects),
             Observation::Admitted { key, index, attempt, info } => {
                 self.observe_admitted(key, (index, attempt), *info, effects);
             }
@@ -64,7 +80,10 @@ impl Segment {
             }
             Observation::Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
             Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
-            Observation::CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh),
+            Observation::Moved { versions, moved } => self.observe_moved(versions, moved, effects),
+            Observation::CableErrors { versions, fresh, rising } => {
+                self.observe_cable_errors(versions, (fresh, rising), effects);
+            }
             Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
             Observation::Wanted(wanted) => self.slot.want(wanted),
             Observation::Undisturbed(number) => self.slot.end(number),
@@ -79,7 +98,12 @@ impl Segment {
         }
     }
 
-    fn observe_cable_errors(&mut self, versions: Versions, fresh: &[CableErrors]) {
+    fn observe_cable_errors(
+        &mut self,
+        versions: Versions,
+        (fresh, rising): (&[CableErrors], Vec<Event>),
+        effects: &mut Effects,
+    ) {
         // If the cabling was replaced since, the counts belong to other cables.
         if versions.cabling != self.cabling.version {
             return;
@@ -87,6 +111,7 @@ impl Segment {
         for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
             *total = total.plus(*fresh);
         }
+        rising.into_iter().for_each(|event| effects.report(event));
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {

@@ -3,8 +3,10 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{Position, StationAddress};
 
+use crate::declared::SubDeviceId;
+use crate::event::Event;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables};
@@ -29,6 +31,19 @@ impl Segment {
 
     fn is_closed(&self, words: &Words) -> bool {
         words.ring.state == RingState::Closed && self.ring.status.state == RingState::Closed
+    }
+
+    /// Declared SubDevices are at other positions than at the scan.
+    pub(in crate::segment) fn observe_moved(
+        &self,
+        versions: Versions,
+        moved: Vec<(SubDeviceId, Position, Position)>,
+        effects: &mut Effects,
+    ) {
+        if self.are_places_valid(versions) {
+            let event = |(subdevice, from, to)| Event::Moved { subdevice, from, to };
+            moved.into_iter().map(event).for_each(|event| effects.report(event));
+        }
     }
 
     /// Takes over the cabling, unless the ring of two links is open, or a mandatory SubDevice does not answer: the

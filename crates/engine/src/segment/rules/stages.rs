@@ -2,12 +2,13 @@
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
-
-use ringcat_wire::address::StationAddress;
+use alloc::vec::Vec;
 
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
-use crate::segment::effect::{Effect, Effects};
+use crate::segment::effect::{Effect, Effects, Task, Watch};
+use crate::segment::idle::Comparison;
+use crate::segment::key::SubDeviceKey;
 use crate::segment::model::{Declared, Segment};
 use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
@@ -22,6 +23,14 @@ impl Segment {
             self.addresses.change();
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning;
+            self.idle.compared = Comparison::Open;
+        }
+    }
+
+    /// What the scan under way has found.
+    pub(in crate::segment) fn report_findings(&self, findings: Vec<Event>, effects: &mut Effects) {
+        if self.is_scanning() {
+            findings.into_iter().for_each(|event| effects.report(event));
         }
     }
 
@@ -45,7 +54,7 @@ impl Segment {
 
     /// The segment was scanned again without an application. A result from before a scan or an application is refused.
     pub(in crate::segment) fn find_again(&mut self, versions: Versions, found: Rc<Found>) {
-        let is_valid = versions.addresses == self.addresses.version();
+        let is_valid = self.are_addresses_as_in(versions);
         if let Stage::Scanned(scanned) = &mut self.stage
             && is_valid
         {
@@ -59,13 +68,16 @@ impl Segment {
     /// there is other data since then.
     pub(in crate::segment) fn observe_whole_sii(
         &mut self,
-        station: StationAddress,
+        key: SubDeviceKey,
         read: &SubDeviceInfo,
         effects: &mut Effects,
     ) {
+        if self.subdevices.at(key.station).is_none_or(|it| it.key != key) {
+            return;
+        }
         let Some(scanned) = self.stage.scanned_mut() else { return };
         let found = Rc::make_mut(&mut scanned.found);
-        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == station) else { return };
+        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == key.station) else { return };
         let mut info = (**known).clone();
         for warning in info.extend(read) {
             effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
@@ -89,6 +101,28 @@ impl Segment {
         effects.0.push(Effect::Occupants(self.occupants()));
     }
 
+    /// The procedures of the application begin.
+    pub(in crate::segment) fn begin_procedures(&mut self, effects: &mut Effects) {
+        let (has_clocks, is_supervised) = (self.clocks.are_declared(), self.choices.supervision);
+        let watches = [
+            (Watch::Clocks, has_clocks),
+            (Watch::Supervision, is_supervised),
+            (Watch::Registers, is_supervised),
+            (Watch::Errors, is_supervised),
+            (Watch::Siis, true),
+            (Watch::Mail, true),
+            (Watch::Requests, true),
+            (Watch::Statistics, true),
+        ];
+        for (watch, _) in watches.into_iter().filter(|(_, is_needed)| *is_needed) {
+            effects.start(Task::Watch(watch));
+        }
+        match has_clocks {
+            true => self.delay_all(),
+            false => self.start_all(effects),
+        }
+    }
+
     /// The application ends, or a scan is given up. What the last scan has found stays, and another declaration may
     /// follow at once.
     pub(in crate::segment) fn deactivate(&mut self) {
@@ -107,18 +141,22 @@ impl Segment {
         let mut keeping = core::mem::take(&mut self.keeping);
         keeping.is_on &= matches!(stage, Stage::Active(_));
         let before = core::mem::take(&mut self.subdevices);
+        let known_clocks = self.known_clocks();
         declared.subdevices = declared.subdevices.begun(addresses.change(), first_attempt);
         if keeping.is_on {
             declared.subdevices = declared.subdevices.keeping(before);
         }
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
+        let idle = self.idle.renewed();
         *self = Segment {
             stage,
             addresses,
             keeping,
             slot,
+            idle,
             frames_tested_until,
             first_attempt,
+            known_clocks,
             ..Segment::of(declared, choices)
         };
     }

@@ -145,10 +145,13 @@ impl Segment {
     pub(in crate::segment) fn observe_misfit(
         &mut self,
         key: SubDeviceKey,
-        subdevice: usize,
+        (subdevice, attempt): (usize, u32),
         reason: String,
         effects: &mut Effects,
     ) {
+        if self.current(subdevice, attempt).is_none() {
+            return;
+        }
         let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
         if !core::mem::replace(&mut it.reported, true) {
             effects.failed(subdevice, reason);

@@ -101,7 +101,7 @@ impl Segment {
     }
 
     /// Each undeclared SubDevice without a requested state is to go to PREOP.
-    fn take_over(&mut self, now: Instant) {
+    pub(in crate::segment) fn take_over(&mut self, now: Instant) {
         self.touch();
         for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
             if it.is_untouched(knowledge) {
@@ -115,6 +115,9 @@ impl Segment {
         self.touch();
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             let Some(kept) = kept.iter().find(|kept| kept.station == key.station) else { continue };
+            if let Some((status, code)) = kept.has_left {
+                effects.report(Event::UndeclaredState { position: it.position, status, code });
+            }
             let upkeep = it.upkeep.insert(Upkeep::handed_over(kept.target, kept.progress));
             if (kept.target, kept.progress) == (AlState::Op, UpkeepProgress::Reached) {
                 effects.start(Task::KeepOutputs { key, attempt: upkeep.attempt });
@@ -152,7 +155,7 @@ impl Segment {
         effects: &mut Effects,
     ) {
         let key = match subdevice {
-            Addressed::Member(index) => return self.request(index, state),
+            Addressed::Member(index) => return self.request(index, state, effects),
             Addressed::Undeclared(key) => key,
         };
         self.touch();
@@ -209,7 +212,7 @@ impl Segment {
     }
 
     /// States were read. SubDevices that left theirs without a request are brought back.
-    fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
         if !self.keeping.is_on {
             return;
         }

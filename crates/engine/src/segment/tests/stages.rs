@@ -10,6 +10,7 @@ pub(super) fn choices() -> Choices {
         junctions: JunctionMode::Disabled,
         follow_groups: false,
         idle_operation: false,
+        supervision: true,
         retries: Retries::Always,
     }
 }

@@ -4,6 +4,7 @@ use alloc::string::String;
 
 use ringcat_wire::sii::Identity;
 
+use crate::info::SiiExtent;
 use crate::segment::unassigned::UnassignedView;
 use crate::segment::view::View;
 
@@ -119,6 +120,54 @@ fn a_member_that_came_back_by_itself_is_not_replaced_by_an_admitted_subdevice() 
     assert_eq!(reports(&ring.observe(admitted())), []);
     assert_eq!((ring.member(0).attempt, ring.segment.subdevices.unassigned().count()), (back, 1));
     assert_eq!(ring.member(0).info.map(|info| info.identity.serial), Some(0));
+}
+
+#[test]
+fn a_member_that_came_back_by_itself_is_reported_neither_as_held_nor_as_unfit() {
+    for is_held in [false, true] {
+        let mut ring = Ring::closed(3);
+        lose(&mut ring);
+        let attempt = ring.member(0).attempt;
+        let key = SubDeviceKey { station: TEMPORARY, since: give(&mut ring) };
+        let seen = |attempt| match is_held {
+            true => Observation::Held { key, index: 0, attempt },
+            false => Observation::Misfit { key, index: 0, attempt, reason: "a reason".into() },
+        };
+        // Held SubDevices are reported after a second.
+        let observe = |ring: &mut Ring, attempt| {
+            let first = ring.observe(seen(attempt));
+            ring.now += Duration::from_secs(2);
+            reports(&[first, ring.observe(seen(attempt))].concat())
+        };
+        // It answers at its address.
+        ring.scan(&[PASS; 3]);
+        assert_eq!(observe(&mut ring, attempt), [], "held: {is_held}");
+        assert!(!first_unassigned(&ring).reported && first_unassigned(&ring).held_since.is_none());
+        let now = ring.member(0).attempt;
+        let failed = observe(&mut ring, now);
+        assert!(matches!(failed[..], [Event::ConfigurationFailed { subdevice: SubDeviceId(0), .. }]), "{failed:?}");
+    }
+}
+
+#[test]
+fn names_that_were_read_of_a_subdevice_are_not_stored_for_another_one_at_its_address() {
+    let whole = |serial: u32| SubDeviceInfo { name: "a name".into(), ..info(serial, station(0)) };
+    let mut ring = Ring::closed(3);
+    for known in &mut Rc::make_mut(&mut ring.segment.stage.scanned_mut().unwrap().found).subdevices {
+        Rc::make_mut(known).extent = SiiExtent::Operation;
+    }
+    let key = ring.segment.subdevices.at(station(0)).unwrap().key;
+    let cases = [
+        (SubDeviceKey { since: key.since.wrapping_sub(1), ..key }, 0, false),
+        (SubDeviceKey { station: TEMPORARY, ..key }, 0, false),
+        (key, 5, false),
+        (key, 0, true),
+    ];
+    for (key, serial, is_stored) in cases {
+        ring.observe(Observation::SiiCompleted { key, read: &whole(serial) });
+        let named = ring.segment.found().unwrap().subdevices[0].name == "a name";
+        assert_eq!(named, is_stored, "{key:?}, serial {serial}");
+    }
 }
 
 #[test]
@@ -246,6 +295,46 @@ fn a_rescan_is_not_taken_over_after_the_cabling_or_an_address_has_changed() {
         let seen = Seen { topology: &topology, stations: &stations, members: &[Some(1), Some(0), Some(2)] };
         ring.observe(Observation::Rescanned { versions, seen, words });
         assert_eq!((&ring.segment.cabling.stations, ring.segment.adoptions()), (&before, adoptions), "change {number}");
+    }
+}
+
+#[test]
+fn cable_errors_moves_and_missing_inputs_from_before_a_change_are_not_reported() {
+    let moved = || vec![(SubDeviceId(1), Position(1), Position(2))];
+    for is_stale in [true, false] {
+        let mut ring = Ring::closed(3);
+        let attempt = ring.member(0).attempt;
+        ring.observe(of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Mapped)));
+        let (versions, mapping) = (ring.segment.versions(), ring.member(0).mapping);
+        let (cable, _) = ring.segment.cabling.cables[0];
+        let rising = vec![Event::CableErrors { cable, errors: CableErrors::default() }];
+        if is_stale {
+            recable(&mut ring);
+            ring.observe(Observation::Readdressing(&[]));
+            ring.observe(of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Mapped)));
+        }
+        let missing = Observation::NotProven { index: 0, mapping, what: "no inputs".into() };
+        let shown = [
+            ring.observe(Observation::CableErrors { versions, fresh: &[], rising }),
+            ring.observe(Observation::Moved { versions, moved: moved() }),
+            ring.observe(missing),
+        ];
+        let reported = shown.map(|effects| reports(&effects).len());
+        assert_eq!(reported, if is_stale { [0; 3] } else { [1; 3] }, "stale: {is_stale}");
+    }
+}
+
+#[test]
+fn what_a_scan_has_found_is_not_reported_after_it_was_given_up() {
+    for is_given_up in [true, false] {
+        let mut ring = Ring::closed(2);
+        ring.observe(Observation::Deactivated);
+        ring.observe(Observation::ScanBegun);
+        if is_given_up {
+            ring.observe(Observation::Deactivated);
+        }
+        let effects = ring.observe(Observation::ScanShows(vec![Event::ScanFinished { subdevices: 2 }]));
+        assert_eq!(reports(&effects).len(), usize::from(!is_given_up), "given up: {is_given_up}");
     }
 }
 

@@ -4,6 +4,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 use super::upkeep::{AttemptFailure, UpkeepProgress};
+use crate::segment::effect::Shown;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::reading::Reading;
 
@@ -27,6 +28,8 @@ pub struct KeptState {
     pub target: AlState,
     /// Progress towards it.
     pub progress: UpkeepProgress,
+    /// What it shows, if it has left the state that it had reached.
+    pub has_left: Option<Shown>,
 }
 
 /// An observation of SubDevices without a declaration. Their requested states are observed as those of members.

@@ -3,7 +3,8 @@
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use core::future::Future;
+use core::future::{Future, poll_fn};
+use core::task::Poll;
 use core::time::Duration;
 
 use ringcat_wire::command::Command;
@@ -14,9 +15,6 @@ use crate::supervisor::bus::Bus;
 use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::Request;
-
-/// Pause between two checks whether another procedure has released the right to latch.
-const TURN_CHECK_PAUSE: Duration = Duration::from_micros(100);
 
 impl Bus {
     /// Sends a datagram once, alone on the wire, and returns the reply, whatever its working counter. Copies sent on
@@ -37,9 +35,18 @@ impl Bus {
 
     /// Waits for the exclusive right to latch receive times.
     pub(crate) async fn latch_turn(&self) -> Turn {
-        while core::mem::replace(&mut self.shared.borrow_mut().alone.is_taken, true) {
-            self.sleep(TURN_CHECK_PAUSE).await;
-        }
+        poll_fn(|_| {
+            let shared = &mut *self.shared.borrow_mut();
+            if !core::mem::replace(&mut shared.alone.is_taken, true) {
+                return Poll::Ready(());
+            }
+            let task = shared.current;
+            if !shared.alone.want_turn.contains(&task) {
+                shared.alone.want_turn.push(task);
+            }
+            Poll::Pending
+        })
+        .await;
         Turn { shared: self.shared.clone() }
     }
 
@@ -60,6 +67,10 @@ pub(crate) struct Turn {
 
 impl Drop for Turn {
     fn drop(&mut self) {
-        self.shared.borrow_mut().alone.is_taken = false;
+        let shared = &mut *self.shared.borrow_mut();
+        shared.alone.is_taken = false;
+        for task in core::mem::take(&mut shared.alone.want_turn) {
+            shared.wake(task);
+        }
     }
 }

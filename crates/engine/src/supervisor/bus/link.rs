@@ -1,13 +1,13 @@
 //! Disconnects a link for a procedure, and reconnects it.
 
+use core::future::poll_fn;
+use core::task::Poll;
 use core::time::Duration;
 
 use super::Bus;
 use crate::link::Link;
 use crate::supervisor::link_order::LinkOrder;
 
-/// Pause between two polls for the answer.
-const PAUSE: Duration = Duration::from_micros(100);
 /// Time limit of the runtime.
 const LIMIT: Duration = Duration::from_secs(1);
 
@@ -16,17 +16,17 @@ impl Bus {
     /// must reconnect it. For one procedure at a time.
     pub async fn force_disconnect(&self, link: Link, disconnect: bool) -> bool {
         self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect };
-        let until = self.now() + LIMIT;
-        while self.now() < until {
-            self.sleep(PAUSE).await;
-            let order = self.shared.borrow().link_order;
-            if let LinkOrder::Answered(done) = order {
-                self.shared.borrow_mut().link_order = LinkOrder::None;
-                return done;
+        let answered = poll_fn(|_| {
+            let shared = &mut *self.shared.borrow_mut();
+            if let LinkOrder::Answered(done) = shared.link_order {
+                return Poll::Ready(done);
             }
-        }
-        // The order was fetched but not answered: it may still be carried out, and its answer is dropped.
+            shared.awaits_link = Some(shared.current);
+            Poll::Pending
+        });
+        // If the order was fetched but not answered, it may still be carried out, and its answer is dropped.
+        let done = self.within(LIMIT, answered).await.unwrap_or(false);
         self.shared.borrow_mut().link_order = LinkOrder::None;
-        false
+        done
     }
 }

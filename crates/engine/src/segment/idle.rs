@@ -1,0 +1,79 @@
+//! Operation without an application: how the last scan compares with the broadcasts since, and rescans on request.
+//!
+//! One procedure at a time works on the segment; broadcasts are evaluated when it has ended.
+
+mod change;
+mod differences;
+mod observation;
+
+use core::time::Duration;
+
+pub use change::Change;
+pub use differences::Differences;
+pub use observation::IdleObservation;
+
+use crate::ring_status::LinkCounts;
+use crate::time::Instant;
+
+/// Interval of reads of all states: an OR can hide one state behind others.
+pub(super) const ROUTINE: Duration = Duration::from_secs(1);
+/// Consecutive broadcasts without an answer after which no SubDevice is connected.
+pub(super) const SILENT: u8 = 3;
+/// Consecutive failures of a scan after which they are reported.
+pub(super) const PATIENCE: u32 = 20;
+
+/// How the last scan compares with the broadcasts since.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Comparison {
+    /// No broadcast was compared with it yet.
+    #[default]
+    Open,
+    /// It shows the present segment, with these SubDevices on each link.
+    Same(LinkCounts),
+    /// The segment has changed since.
+    Changed {
+        /// Consecutive attempts to follow that have failed.
+        failures: u32,
+        /// The failures were reported.
+        is_reported: bool,
+    },
+}
+
+impl Comparison {
+    /// A change that no attempt has followed yet.
+    pub const CHANGED: Comparison = Comparison::Changed { failures: 0, is_reported: false };
+}
+
+/// Rescans on request.
+#[derive(Debug, Default)]
+pub(super) struct Rescans {
+    /// Number of the last request.
+    pub asked: u64,
+    /// Number of the last request with a result, and the result.
+    pub ended: (u64, Differences),
+}
+
+/// Operation without an application.
+#[derive(Debug, Default)]
+pub(super) struct Idle {
+    pub compared: Comparison,
+    /// Consecutive broadcasts without an answer.
+    pub silent: u8,
+    /// A procedure works on the segment: a scan, or reads of all states.
+    pub is_under_way: bool,
+    pub next_routine: Instant,
+    pub rescans: Rescans,
+}
+
+impl Idle {
+    /// A new beginning, with other numbers of requests than before.
+    pub fn renewed(&self) -> Idle {
+        let asked = self.rescans.asked;
+        Idle { rescans: Rescans { asked, ended: (asked, Differences::default()) }, ..Idle::default() }
+    }
+
+    /// The number of the last request for a rescan, if it has no result yet.
+    pub fn wanted(&self) -> Option<u64> {
+        Some(self.rescans.asked).filter(|asked| *asked > self.rescans.ended.0)
+    }
+}

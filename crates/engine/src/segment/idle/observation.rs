@@ -1,0 +1,38 @@
+//! Observations without an application.
+
+use alloc::rc::Rc;
+use alloc::string::String;
+
+use crate::ring::RingState;
+use crate::segment::ring::Words;
+use crate::segment::scan::Found;
+use crate::segment::undeclared::StateRead;
+use crate::segment::versions::Versions;
+
+/// An observation without an application. Answers of broadcasts are [`Words`].
+#[derive(Debug)]
+pub enum IdleObservation<'a> {
+    /// Idle operation begins: its watches are started.
+    Begun,
+    /// The watch begins, with these carriers, by [`crate::link::Link::index`], and this state of the ring.
+    Watched([Option<bool>; 2], RingState),
+    /// A broadcast has got no answer, or none was sent because no link has a carrier.
+    Unanswered(Words),
+    /// The first scan has ended.
+    Scanned,
+    /// A rescan is requested.
+    RescanAsked,
+    /// The scan after a change has ended.
+    Followed {
+        /// Version of the model at its begin.
+        versions: Versions,
+        /// The SubDevices.
+        found: Rc<Found>,
+        /// Number of the request that it answers.
+        wanted: Option<u64>,
+    },
+    /// It has failed; the reason, unless the segment has changed meanwhile.
+    NotFollowed(Option<String>),
+    /// The states of all SubDevices with a requested state were read.
+    StatesRead(&'a [StateRead]),
+}

@@ -1,0 +1,198 @@
+//! Without an application: changes of links, number and states of the SubDevices, and the scans and reads that follow.
+
+use alloc::rc::Rc;
+use alloc::string::String;
+
+use ringcat_wire::register::EcatEvent;
+
+use crate::event::Event;
+use crate::ring::RingState;
+use crate::ring_status::LinkCounts;
+use crate::segment::effect::{Effects, Task, Watch};
+use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, ROUTINE, SILENT};
+use crate::segment::model::Segment;
+use crate::segment::ring::Words;
+use crate::segment::scan::Found;
+use crate::segment::stage::Stage;
+use crate::segment::undeclared::StateRead;
+use crate::segment::versions::Versions;
+use crate::time::Instant;
+
+/// What a broadcast has shown.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown {
+    counts: LinkCounts,
+    al_status: u8,
+    ports_changed: bool,
+    is_unplugged: bool,
+}
+
+impl Segment {
+    /// Whether a procedure of idle operation works on the segment.
+    pub fn is_idle_busy(&self) -> bool {
+        self.idle.is_under_way
+    }
+
+    /// Number of the last request for a rescan.
+    pub fn last_rescan_asked(&self) -> u64 {
+        self.idle.rescans.asked
+    }
+
+    /// What the rescan with this number has found, or a later one.
+    pub fn rescanned(&self, number: u64) -> Option<&Differences> {
+        let (ended, differences) = &self.idle.rescans.ended;
+        (*ended >= number).then_some(differences)
+    }
+
+    /// Processes the answer to a broadcast. The word is compared with what the list of SubDevices lets expect; in
+    /// operation, where states change by the application's own steps, with the word of the last round (`attention`).
+    pub(in crate::segment) fn observe_idle_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
+        self.ring.observe_carriers(words.carriers, now, effects);
+        let Some((_, supervision)) = words.supervision else { return };
+        self.idle.silent = 0;
+        let shown = Shown {
+            counts: LinkCounts { main: supervision.main.0, redundant: supervision.redundant.0 },
+            al_status: supervision.al_status[0] | supervision.al_status[1],
+            ports_changed: EcatEvent::from_bits(supervision.irq).dl_status,
+            is_unplugged: false,
+        };
+        self.evaluate_broadcast(shown, words.ring.state, now, effects);
+    }
+
+    /// Processes an observation without an application.
+    pub(in crate::segment) fn observe_idle(&mut self, seen: IdleObservation<'_>, now: Instant, effects: &mut Effects) {
+        match seen {
+            IdleObservation::Begun => {
+                for watch in [Watch::Undeclared, Watch::UndeclaredMail, Watch::Idle] {
+                    effects.start(Task::Watch(watch));
+                }
+            }
+            IdleObservation::Watched(carriers, state) => {
+                self.idle = self.idle.renewed();
+                self.ring.begin_idle(carriers, state);
+            }
+            IdleObservation::Unanswered(words) => self.observe_silence_of_all(&words, now, effects),
+            IdleObservation::Scanned => self.idle.is_under_way = false,
+            IdleObservation::RescanAsked => self.idle.rescans.asked += 1,
+            IdleObservation::Followed { versions, found, wanted } => {
+                self.idle.is_under_way = false;
+                self.end_follow((versions, found), wanted, now, effects);
+            }
+            IdleObservation::NotFollowed(reason) => {
+                self.idle.is_under_way = false;
+                self.fail_to_follow(reason, effects);
+            }
+            IdleObservation::StatesRead(read) => {
+                self.idle.is_under_way = false;
+                self.observe_idle_states(read, now, effects);
+            }
+        }
+    }
+
+    /// A broadcast was lost, or no link has a carrier. A single lost frame is no evidence yet.
+    fn observe_silence_of_all(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
+        self.ring.observe_carriers(words.carriers, now, effects);
+        let is_unplugged = words.is_unplugged();
+        if !is_unplugged {
+            self.idle.silent = self.idle.silent.saturating_add(1);
+        }
+        if is_unplugged || self.idle.silent >= SILENT {
+            self.evaluate_broadcast(Shown { is_unplugged, ..Shown::default() }, words.ring.state, now, effects);
+        }
+    }
+
+    fn evaluate_broadcast(&mut self, shown: Shown, ring: RingState, now: Instant, effects: &mut Effects) {
+        if self.is_scanning() || self.is_active() || self.idle.is_under_way {
+            return;
+        }
+        self.ring.observe_broadcast(ring, shown.counts, now, effects);
+        let Some(scanned) = self.found().map(|found| found.counts()) else {
+            if shown.counts != LinkCounts::default() {
+                self.begin_scan();
+                self.begin_work(Task::ScanSegment, effects);
+            }
+            return;
+        };
+        // SubDevices of the last scan are kept in their states from now on.
+        if self.has_untouched() {
+            self.take_over(now);
+        }
+        if self.idle.compared == Comparison::Open {
+            self.idle.compared = Comparison::Same(scanned);
+        }
+        let wanted = self.idle.wanted();
+        if self.idle.compared != Comparison::Same(shown.counts) || shown.ports_changed || wanted.is_some() {
+            return self.follow_change(shown, wanted, effects);
+        }
+        let is_other = self.expected_states().is_some_and(|expected| shown.al_status != expected);
+        if now >= self.idle.next_routine || (is_other && self.are_undeclared_settled()) {
+            self.idle.next_routine = now + ROUTINE;
+            self.begin_work(Task::ReadStates, effects);
+        }
+    }
+
+    fn begin_work(&mut self, task: Task, effects: &mut Effects) {
+        self.idle.is_under_way = true;
+        effects.start(task);
+    }
+
+    /// The segment has changed, or a rescan is requested.
+    fn follow_change(&mut self, shown: Shown, wanted: Option<u64>, effects: &mut Effects) {
+        let Shown { counts, ports_changed, is_unplugged, .. } = shown;
+        if let Comparison::Same(before) = self.idle.compared {
+            if before != counts {
+                effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
+            }
+            self.idle.compared = Comparison::CHANGED;
+        }
+        self.begin_work(Task::FollowChange(Change { counts, ports_changed, is_unplugged, wanted }), effects);
+    }
+
+    /// The segment is known again. A result from before another scan is refused.
+    fn end_follow(
+        &mut self,
+        (versions, found): (Versions, Rc<Found>),
+        wanted: Option<u64>,
+        now: Instant,
+        effects: &mut Effects,
+    ) {
+        let Stage::Scanned(scanned) = &self.stage else { return };
+        if !self.are_addresses_as_in(versions) {
+            return;
+        }
+        let differences = Differences::between(&scanned.found, &found);
+        let (added, removed) = (differences.added.len(), differences.removed.len());
+        let (subdevices, counts) = (found.subdevices.len(), found.counts());
+        self.find_again(versions, found);
+        self.idle.compared = Comparison::Same(counts);
+        if self.has_untouched() {
+            self.take_over(now);
+        }
+        if added + removed > 0 {
+            effects.report(Event::SegmentChanged { subdevices, added, removed });
+        }
+        if let Some(number) = wanted {
+            self.idle.rescans.ended = (number, differences);
+        }
+    }
+
+    fn fail_to_follow(&mut self, reason: Option<String>, effects: &mut Effects) {
+        let Comparison::Changed { failures, is_reported } = &mut self.idle.compared else { return };
+        *failures = failures.saturating_add(1);
+        if let Some(reason) = reason
+            && *failures >= PATIENCE
+            && !core::mem::replace(is_reported, true)
+        {
+            effects.report(Event::ScanFailed { reason });
+        }
+    }
+
+    fn observe_idle_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
+        // A SubDevice without its station address has lost its power, or another program has written the address.
+        let has_lost = |read: &StateRead| read.reading.is_elsewhere() && self.unassigned(read.key).is_some();
+        if read.iter().any(has_lost) && matches!(self.idle.compared, Comparison::Same(_)) {
+            self.idle.compared = Comparison::CHANGED;
+        }
+        self.observe_states(read, now, effects);
+    }
+}
