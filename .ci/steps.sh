@@ -94,7 +94,7 @@ lints() {
 # The library with each of its features alone: what `--workspace` builds has them all.
 features() {
     local feature
-    for feature in "" packet sim eni network esi gateway eoe serde tracing; do
+    for feature in "" packet sim eni network esi gateway eoe daemon serde tracing; do
         echo "ringcat with \"$feature\""
         cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
     done

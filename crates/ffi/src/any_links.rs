@@ -1,8 +1,9 @@
-//! Links of one half: network interfaces, or a segment that is simulated in this process.
+//! Links of one half: network interfaces, a segment that is simulated in this process, or those of a daemon.
 
 use std::path::Path;
 use std::task::Waker;
 
+use ringcat::daemon::DaemonLinks;
 use ringcat::packet::{PacketLinks, ReceiveMode};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::sim::network::Network;
@@ -18,6 +19,8 @@ pub enum AnyLinks {
     Packet(Box<PacketLinks>),
     /// A simulated segment.
     Simulated(SharedSegment),
+    /// Links of a daemon.
+    Daemon(DaemonLinks),
 }
 
 impl AnyLinks {
@@ -47,6 +50,7 @@ macro_rules! either {
         match $self {
             AnyLinks::Packet($links) => $call,
             AnyLinks::Simulated($links) => $call,
+            AnyLinks::Daemon($links) => $call,
         }
     };
 }

@@ -1,12 +1,14 @@
 //! The buses of this process: one for each master that is open, shared by all its handles.
 //!
 //! A bus has its links and the thread of the acyclic half, which scans and keeps all SubDevices in PREOP while no
-//! application is active. One handle reserves it.
+//! application is active. One handle reserves it. It comes from a daemon where one answers, and goes back to it.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
+use ringcat::daemon::OwnedBus;
 use ringcat::wire::command::Command;
 use ringcat::wire::datagram::Target;
 use ringcat::wire::register::map;
@@ -14,7 +16,7 @@ use ringcat::{Activity, Links, Options, RawDatagram, Retries, Services, SubDevic
 
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome, report};
-use crate::environment::source;
+use crate::environment::{socket, source};
 use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable, watch_forks};
 use crate::messages::Messenger;
 
@@ -42,6 +44,8 @@ pub struct Bus {
     supervisor: SupervisorThread,
     /// Links of the cyclic half while no application uses them.
     cyclic_links: Mutex<Option<AnyLinks>>,
+    /// Gives the bus back to the daemon that it came from, when it is dropped.
+    _owned: Mutex<Option<OwnedBus>>,
     is_ring: bool,
     is_reserved: AtomicBool,
 }
@@ -69,6 +73,17 @@ pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Takes a master from the daemon at this socket. `None` if no variable names the socket and no daemon answers there.
+fn take(socket: &Path, master: u32, options: &Options) -> Result<Option<OwnedBus>, String> {
+    let program = std::env::args_os().next().unwrap_or_default();
+    let program = Path::new(&program).file_name().unwrap_or(program.as_os_str()).to_string_lossy();
+    match OwnedBus::take(socket, master, &program, options, be_an_ordinary_thread) {
+        Ok(owned) => Ok(Some(owned)),
+        Err(error) if error.is_no_daemon() && variable("RINGCAT_SOCKET").is_none() => Ok(None),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 impl Bus {
     /// The bus of a master; opened if no handle has it open.
     ///
@@ -91,22 +106,45 @@ impl Bus {
     }
 
     fn start(master: u32) -> Result<Bus, String> {
+        let _held = HeldSignals::hold();
+        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
+        let socket = socket(master, variable);
+        if let Some(owned) = socket.as_deref().map(|path| take(path, master, &options)).transpose()?.flatten() {
+            return Bus::of_daemon(master, owned);
+        }
         let suffix = if master == 0 { String::new() } else { format!("_{master}") };
         let source = source(master, variable).ok_or_else(|| {
-            format!("expected RINGCAT_MAIN{suffix} (an interface) or RINGCAT_SIM{suffix} (a segment file), got neither")
+            format!(
+                "expected a daemon (ringcatd), or RINGCAT_MAIN{suffix} (an interface) or RINGCAT_SIM{suffix} (a \
+                 segment file), got neither"
+            )
         })?;
-        let _held = HeldSignals::hold();
         let (cyclic, acyclic) = AnyLinks::open(&source)?;
-        let is_ring = cyclic.addresses().redundant.is_some();
-        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
+        Bus::with(master, supervisor, cyclic, None)
+    }
+
+    /// The bus that a daemon has handed over.
+    fn of_daemon(master: u32, mut owned: OwnedBus) -> Result<Bus, String> {
+        let links = owned.take_links().ok_or("the daemon has handed over no links")?;
+        Bus::with(master, owned.supervisor().clone(), AnyLinks::Daemon(links), Some(owned))
+    }
+
+    fn with(
+        master: u32,
+        supervisor: SupervisorThread,
+        cyclic: AnyLinks,
+        owned: Option<OwnedBus>,
+    ) -> Result<Bus, String> {
+        let is_ring = cyclic.addresses().redundant.is_some();
         let messenger = Messenger::begin(master, supervisor.clone());
         let _messenger = messenger.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
         let is_reserved = AtomicBool::new(false);
-        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, is_ring, is_reserved })
+        let _owned = Mutex::new(owned);
+        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, _owned, is_ring, is_reserved })
     }
 
     /// Number of the master.

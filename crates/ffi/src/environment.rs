@@ -1,8 +1,25 @@
 //! Which links a master has: from variables of the environment.
 //!
-//! Without a daemon the library opens the links itself. Master 0 takes `RINGCAT_SIM` (a segment file that is simulated
-//! in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces); master 1 takes `RINGCAT_SIM_1`,
-//! `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes first.
+//! `RINGCAT_SOCKET` names the socket of a daemon, and comes first. Without it the library opens links itself that
+//! variables name; where none does, it asks the daemon at the default socket. Master 0 takes `RINGCAT_SIM` (a segment
+//! file that is simulated in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces); master 1
+//! takes `RINGCAT_SIM_1`, `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes before
+//! `RINGCAT_MAIN`.
+
+use std::path::PathBuf;
+
+use ringcat::daemon::DEFAULT_SOCKET;
+
+/// The socket of a daemon that `RINGCAT_SOCKET` names, or the default one if no variable names links. An empty variable
+/// counts as missing.
+pub fn socket(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
+    let named = variable("RINGCAT_SOCKET").filter(|path| !path.is_empty());
+    match (named, source(master, variable)) {
+        (Some(path), _) => Some(path.into()),
+        (None, Some(_)) => None,
+        (None, None) => Some(DEFAULT_SOCKET.into()),
+    }
+}
 
 /// Links of a master.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +46,19 @@ pub fn source(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // covers: c-interface, daemon
+    #[test]
+    fn a_named_daemon_comes_first_and_the_default_one_last() {
+        let set = [("RINGCAT_SOCKET", "/tmp/s"), ("RINGCAT_SIM", "ring.toml")];
+        let of = |set: &[(&str, &str)], master| {
+            socket(master, |name| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+        };
+        assert_eq!(of(&set, 0), Some("/tmp/s".into()));
+        assert_eq!(of(&set[1..], 0), None);
+        assert_eq!(of(&set[1..], 1), Some(DEFAULT_SOCKET.into()));
+        assert_eq!(of(&[("RINGCAT_SOCKET", "")], 0), Some(DEFAULT_SOCKET.into()));
+    }
 
     // covers: c-interface
     #[test]

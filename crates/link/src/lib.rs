@@ -2,6 +2,8 @@
 //!
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`descriptors`]: sockets that another process has opened, passed over a Unix socket;
+//! * [`frame_pipe`]: frames over a pair of Unix sockets, to a simulated segment in another process;
+//! * [`process`]: the peer of a Unix socket, the end of a process;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
@@ -22,6 +24,7 @@ pub mod carrier;
 pub mod descriptors;
 mod error;
 pub mod filter;
+pub mod frame_pipe;
 pub mod interface;
 mod kernel;
 pub mod listener;
@@ -29,6 +32,7 @@ pub mod monotonic;
 pub mod packet_socket;
 pub mod pcapng;
 mod permission;
+pub mod process;
 pub mod realtime;
 mod receive_mode;
 pub mod recorder;
@@ -42,8 +46,9 @@ pub mod wake_up;
 pub use carrier::{Carrier, CarrierWatch};
 pub use error::LinkError;
 pub use filter::ClassFilter;
+pub use frame_pipe::{FramePipe, wait_pipes};
 pub use listener::{Listener, Sender};
-pub use packet_socket::handed::HandedSocket;
+pub use packet_socket::handed::{HandedSocket, revoke};
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use receive_mode::ReceiveMode;
 pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};

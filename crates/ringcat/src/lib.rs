@@ -49,6 +49,7 @@
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
+//! | `daemon` | applications get their bus from the daemon `ringcatd` |
 //! | `serde` | the types of `Snapshot` in any format of serde |
 //! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
@@ -59,6 +60,8 @@ pub mod application;
 mod bring_up;
 mod cyclic;
 pub mod cyclic_thread;
+#[cfg(feature = "daemon")]
+pub mod daemon;
 #[cfg(feature = "eni")]
 pub mod eni;
 #[cfg(feature = "eoe")]
@@ -91,6 +94,8 @@ mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
 mod parts;
+#[cfg(feature = "packet")]
+pub mod piped;
 mod probe;
 mod process_data;
 mod readiness;
@@ -99,6 +104,8 @@ pub mod services;
 pub mod shared_segment;
 #[cfg(feature = "sim")]
 pub mod simulated;
+#[cfg(any(feature = "packet", feature = "sim"))]
+mod simulated_addresses;
 mod states;
 mod stop;
 mod subdevice;

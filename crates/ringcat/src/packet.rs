@@ -120,10 +120,29 @@ impl PacketLinks {
     /// # Errors
     /// A descriptor is no packet socket with a ring of this size, or it is bound to another interface.
     pub fn adopt(main: HandedLink, redundant: Option<HandedLink>) -> Result<PacketLinks, LinkError> {
+        PacketLinks::adopt_class(main, redundant)?.watch_own_carriers()
+    }
+
+    /// Goes on with sockets of each class: links for the cyclic half and for the acyclic half, as
+    /// [`PacketLinks::open_halves`] has them.
+    ///
+    /// # Errors
+    /// As [`PacketLinks::adopt`], or the process has no more descriptors.
+    pub fn adopt_halves(
+        cyclic: PerLink<HandedLink>,
+        acyclic: PerLink<HandedLink>,
+    ) -> Result<(PacketLinks, PacketLinks), LinkError> {
+        Ok((
+            PacketLinks::adopt_class(cyclic.main, cyclic.redundant)?,
+            PacketLinks::adopt_class(acyclic.main, acyclic.redundant)?.watch_own_carriers()?.with_wake_up()?,
+        ))
+    }
+
+    fn adopt_class(main: HandedLink, redundant: Option<HandedLink>) -> Result<PacketLinks, LinkError> {
         let names = [Some(main.1.interface.clone()), redundant.as_ref().map(|(_, it)| it.interface.clone())];
         let mode = main.1.receive;
         let adopt = |(fd, handed): HandedLink| PacketSocket::adopt(fd, &handed);
-        let links = PacketLinks {
+        Ok(PacketLinks {
             main: adopt(main)?,
             redundant: redundant.map(adopt).transpose()?,
             taken_from: Link::Main,
@@ -132,12 +151,16 @@ impl PacketLinks {
             has_sent: false,
             carriers: None,
             wake_up: None,
-            names: names.clone(),
+            names,
             disconnected: [false; 2],
             is_searching: true,
-        };
+        })
+    }
+
+    fn watch_own_carriers(self) -> Result<PacketLinks, LinkError> {
+        let names = self.names.clone();
         let [main, redundant] = names.each_ref().map(|name| name.as_deref());
-        links.watch_carriers(main.unwrap_or_default(), redundant)
+        self.watch_carriers(main.unwrap_or_default(), redundant)
     }
 
     /// What another process must know to go on with the sockets, beside duplicates of their descriptors.

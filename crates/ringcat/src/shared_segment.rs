@@ -16,7 +16,8 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::frame::MacAddress;
 
 use crate::links::{Links, PerLink};
-use crate::simulated::{MAIN, REDUNDANT, host_link};
+use crate::simulated::host_link;
+use crate::simulated_addresses::{MAIN, REDUNDANT};
 use crate::window::Half;
 
 /// The other thread's frames may be due at any time: the segment is polled again after this.

@@ -15,11 +15,8 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::frame::MacAddress;
 
 use crate::links::{Links, PerLink};
+use crate::simulated_addresses::{MAIN, REDUNDANT};
 
-/// Address of the main interface: not locally administered, because controllers set that bit.
-pub(crate) const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
-/// Address of the redundant interface.
-pub(crate) const REDUNDANT: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x02]);
 /// No sleep while virtual time is ahead of the wall clock by less than this.
 const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
 

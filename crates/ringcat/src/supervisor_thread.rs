@@ -5,6 +5,7 @@
 //! leaves ([`crate::window`]). So neither half waits for the other, and supervision goes on for an application that
 //! only runs its cycles.
 
+mod handover;
 mod worker;
 
 use std::future::Future;
@@ -21,7 +22,6 @@ use ringcat_engine::Scan;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
@@ -79,6 +79,18 @@ impl SupervisorThread {
     where
         L: Links + Send + 'static,
     {
+        Self::start_with(links, options, prepare, |_| ())
+    }
+
+    fn start_with<L>(
+        links: L,
+        options: &Options,
+        prepare: impl FnOnce() + Send + 'static,
+        begin: impl FnOnce(&mut Engine) + Send + 'static,
+    ) -> Result<Self, Error>
+    where
+        L: Links + Send + 'static,
+    {
         let (requests, incoming) = channel();
         let (outgoing, events) = channel();
         let published = Arc::new(Published::default());
@@ -91,7 +103,8 @@ impl SupervisorThread {
         let body = move || {
             prepare();
             // The engine is created in this thread, because its procedures cannot move to another one.
-            let engine = options.engine(&links);
+            let mut engine = options.engine(&links);
+            begin(&mut engine);
             Worker::new(links, engine, windows, outgoing, shared).run(&incoming);
         };
         let builder = std::thread::Builder::new().name("supervisor".into()).stack_size(STACK_BYTES);
@@ -235,23 +248,6 @@ impl SupervisorThread {
         };
         meanwhile();
         Ok(result?)
-    }
-
-    /// Goes on with a segment that another process has known, as [`crate::MainDevice::resume`].
-    ///
-    /// # Errors
-    /// As [`crate::MainDevice::resume`].
-    pub fn resume(&self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
-        self.with(move |engine| engine.resume(knowledge, handover))??;
-        Ok(self.ask(|engine| engine.scan_result()).wait()??)
-    }
-
-    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
-    ///
-    /// # Errors
-    /// The thread has ended.
-    pub fn knowledge(&self) -> Result<Option<Knowledge>, Error> {
-        self.with(|engine| engine.knowledge())
     }
 
     /// Lays out process data, starts the configuration of all SubDevices, and returns the running application. Its

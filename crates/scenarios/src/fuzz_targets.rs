@@ -1,10 +1,12 @@
 //! Fuzz targets for arbitrary bytes: one per mailbox decoder (protocol 6, 10.1), and one each for ENI, ESI
-//! and network files (protocol 8, 12), and for knowledge of a segment (decision 0061).
+//! and network files (protocol 8, 12), for knowledge of a segment (decision 0061), and for messages of the
+//! daemon (decision 0074).
 //!
 //! A target is a plain function. It panics if a decoder panics, or if a decoded value changes when it is encoded and
 //! decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus` and mutants
 //! of them ([`mutate`]); the corpora are made by the encoders of `ringcat-wire` ([`seeds`]).
 
+pub mod control;
 pub mod eni;
 pub mod esi;
 pub mod knowledge;
@@ -29,7 +31,7 @@ use crate::dice::Dice;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 17] = [
+pub const TARGETS: [(&str, Target); 18] = [
     ("mailbox", mailbox),
     ("error_reply", error_reply),
     ("coe", coe),
@@ -47,6 +49,7 @@ pub const TARGETS: [(&str, Target); 17] = [
     ("esi", esi::target),
     ("network", network::target),
     ("knowledge", knowledge::target),
+    ("control", control::target),
 ];
 
 /// Buffer size for any message: more than a mailbox, and the largest prefix of an encoder.

@@ -52,6 +52,11 @@ const RULES: &[CrateRule] = &[
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
         external: External::Only(&["mio"]),
     },
+    CrateRule {
+        directory: "control",
+        internal: Internal::Only(&["ringcat-engine", "ringcat-link"]),
+        external: External::Only(&["ciborium", "serde"]),
+    },
     CrateRule { directory: "link", internal: Internal::Only(&[]), external: External::Only(&["libc"]) },
     CrateRule {
         directory: "ringcat",
@@ -59,6 +64,7 @@ const RULES: &[CrateRule] = &[
         internal: Internal::Only(&[
             "ringcat",
             "ringcat-config",
+            "ringcat-control",
             "ringcat-engine",
             "ringcat-gateway",
             "ringcat-link",
@@ -68,7 +74,17 @@ const RULES: &[CrateRule] = &[
         // Disabled unless an application enables its feature.
         external: External::Only(&["tracing"]),
     },
-    CrateRule { directory: "ffi", internal: Internal::Only(&["ringcat"]), external: External::Only(&["libc"]) },
+    CrateRule {
+        directory: "ringcatd",
+        internal: Internal::Only(&["ringcat", "ringcat-control", "ringcat-link"]),
+        external: External::Only(&["clap"]),
+    },
+    CrateRule {
+        directory: "ffi",
+        // Its tests run programs beside a daemon.
+        internal: Internal::Only(&["ringcat", "ringcatd"]),
+        external: External::Only(&["libc"]),
+    },
     CrateRule {
         directory: "cli",
         internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link"]),

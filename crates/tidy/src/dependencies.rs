@@ -11,8 +11,8 @@ use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each one alone.
-pub const FEATURE_SETS: [&str; 10] =
-    ["", "packet", "sim", "eni", "network", "esi", "gateway", "eoe", "tracing", "serde"];
+pub const FEATURE_SETS: [&str; 11] =
+    ["", "packet", "sim", "eni", "network", "esi", "gateway", "eoe", "daemon", "tracing", "serde"];
 
 /// Sets for an application on network interfaces, with few dependencies.
 const SMALL: [&str; 2] = ["", "packet"];

@@ -3,6 +3,7 @@
 //! The libraries are installed by `crates/ffi/install`. Without a C compiler the tests print a line and pass.
 
 mod conformance;
+mod daemon;
 mod fake;
 mod hosts;
 mod library;

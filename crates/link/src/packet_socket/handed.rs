@@ -1,14 +1,17 @@
 //! A socket with its ring that another process opened: this process goes on with it.
 
 use std::cell::Cell;
-use std::os::fd::{AsRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsRawFd, BorrowedFd, OwnedFd, RawFd};
 
-use super::{LinkCounters, PacketSocket, ethernet};
+use super::{LinkCounters, PacketSocket, bind, ethernet};
 use crate::error::LinkError;
 use crate::kernel;
 use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
 use crate::rx_ring::{self, RxRing};
+
+/// The interface that leads nowhere.
+const LOOPBACK: &str = "lo";
 
 /// What a process must know to go on with a socket, beside its descriptor.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,6 +87,17 @@ impl PacketSocket {
         }
         !self.is_searching
     }
+}
+
+/// Takes the interface away from a socket of which another process may have a duplicate: what it still sends goes to
+/// the loopback interface, and it receives nothing.
+///
+/// # Errors
+/// The descriptor is no packet socket.
+pub fn revoke(socket: BorrowedFd<'_>) -> Result<(), LinkError> {
+    let failed = |errno| LinkError::from_errno(LOOPBACK, "taking the interface away from a socket", errno);
+    let index = kernel::index_of(LOOPBACK).ok_or_else(|| failed(libc::ENODEV))?;
+    bind(socket.as_raw_fd(), index as libc::c_int, 0).map_err(failed)
 }
 
 /// Whether it is a packet socket with a ring of our version, bound to this interface.

@@ -98,6 +98,28 @@ fn descriptors_that_are_no_ring_of_this_interface_are_refused() {
     assert!(matches!(adopt(duplicate(), &none), Err(LinkError::NoInterface { .. })));
 }
 
+// covers: links
+#[test]
+fn a_duplicate_of_a_socket_that_was_taken_back_neither_sends_nor_receives() {
+    let Some(bench) = Bench::make() else { return };
+    let mut far = bench.far_socket();
+    let mut near = bench.near_socket(PacketOptions::default());
+    let mut other = adopt(&bench, &near, true);
+    let fd = near.as_fd();
+    bench.near.run(move || ringcat_link::revoke(fd)).expect("it is a packet socket");
+    let mut fresh = bench.near_socket(PacketOptions::default());
+    other.send(&ethercat(0, 1));
+    near.send(&ethercat(0, 2));
+    assert!(fresh.send(&ethercat(0, 3)));
+    assert_eq!(take(&mut far, 1), [ethercat(0, 3)], "nothing was sent before");
+    send(&mut far, 4..6);
+    assert_eq!(take(&mut fresh, 2).len(), 2);
+    assert!(drain(&mut other).is_empty());
+    let stream = UnixStream::pair().expect("a pair").0;
+    let fd = stream.as_fd();
+    assert!(bench.near.run(move || ringcat_link::revoke(fd)).is_err());
+}
+
 /// What the other process does: it receives the socket, and reads frames until it is killed. For each it writes a byte.
 fn other_process(path: &str) {
     let stream = UnixStream::connect(path).expect("the first process listens");

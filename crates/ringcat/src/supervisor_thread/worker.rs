@@ -55,6 +55,8 @@ pub(super) struct Published {
     pub settled: AtomicBool,
     /// Events that wait to be fetched.
     pub waiting: AtomicUsize,
+    /// The thread ends after this turn: it sends nothing more.
+    pub is_handed_over: AtomicBool,
     pub rest: Mutex<Rest>,
 }
 
@@ -142,6 +144,9 @@ impl<L: Links> Worker<L> {
             }
             if has_work || self.is_due(now) {
                 self.turn();
+            }
+            if self.published.is_handed_over.load(Ordering::Acquire) {
+                return;
             }
             let now = self.links.now();
             self.links.wait_from(now, self.next_turn(now).max(now));

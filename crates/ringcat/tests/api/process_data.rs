@@ -143,7 +143,7 @@ fn writing_inputs_values_that_do_not_fit_and_places_beyond_the_image_is_an_error
     application.cycle(|data| {
         let before = data.image(domain).to_vec();
         let input = data.write(&button, 1);
-        assert!(matches!(input, Err(WriteError::NotAnOutput { start, .. }) if start == button.bit_offset.into()));
+        assert!(matches!(input, Err(WriteError::NotAnOutput { start, .. }) if start == u64::from(button.bit_offset)));
         assert!(input.unwrap_err().to_string().starts_with("SubDevice 2: 0x6000:01: domain 0, bit "));
         assert_eq!(data.status(domain).map(|status| status.state), Ok(DomainState::Complete));
         let undeclared = data.status(DomainId(1)).expect_err("one is declared");

@@ -45,6 +45,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "gateway" => payloads().into_iter().map(|(protocol, payload)| in_gateway(protocol, &payload)).collect(),
         "eni" => vec![super::eni::GROUP.as_bytes().to_vec()],
         "esi" => vec![super::esi::SMALL.as_bytes().to_vec()],
+        "control" => super::control::seeds(),
         "knowledge" => vec![super::knowledge::SMALL.to_vec()],
         "network" => vec![super::network::WHOLE.as_bytes().to_vec()],
         other => panic!("no target \"{other}\""),

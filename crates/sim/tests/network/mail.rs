@@ -68,7 +68,7 @@ fn answers(mail: Option<Vec<u8>>) -> bool {
     mail.is_some_and(|mail| matches!(SdoResponse::decode(&mail), Ok(SdoResponse::UploadExpedited { data: [4], .. })))
 }
 
-// covers: 6.1, sim-mail-faults
+// covers: 6.1, sim-mailbox
 #[test]
 fn mail_faults_occur_at_their_time_in_a_segment() {
     let mut network = ready();

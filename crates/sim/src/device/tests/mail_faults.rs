@@ -25,7 +25,7 @@ fn counter(client: &mut Client) -> Option<u8> {
     client.bench.fetch_mail().map(|(header, _)| header.counter)
 }
 
-// covers: sim-mail-faults
+// covers: sim-mailbox
 #[test]
 fn a_request_with_a_lost_response_is_executed_and_a_lost_request_is_not() {
     for (fault, value) in [(MailFault::LoseAnswers { count: 1 }, 7), (MailFault::LoseRequests { count: 1 }, 1)] {
@@ -55,7 +55,7 @@ fn a_device_may_stop_answering_until_the_fault_is_cleared() {
     assert_eq!(counter(&mut client), Some(1));
 }
 
-// covers: sim-mail-faults
+// covers: sim-mailbox
 #[test]
 fn a_repeated_response_has_the_same_counter() {
     let mut client = disturbed(MailFault::RepeatAnswers { count: 1 });
@@ -66,7 +66,7 @@ fn a_repeated_response_has_the_same_counter() {
     assert_eq!(counter(&mut client), Some(2));
 }
 
-// covers: sim-mail-faults
+// covers: sim-mailbox
 #[test]
 fn a_delayed_response_is_overtaken_by_the_next() {
     let mut client = disturbed(MailFault::DelayAnswers { count: 1, by: Duration::from_millis(50) });
@@ -80,14 +80,14 @@ fn a_delayed_response_is_overtaken_by_the_next() {
     assert!(matches!(SdoResponse::decode(&payload), Ok(SdoResponse::UploadExpedited { sub_index: 1, .. })));
 }
 
-// covers: sim-mail-faults
+// covers: sim-mailbox
 #[test]
 fn a_wrong_counter_affects_one_response_only() {
     let mut client = disturbed(MailFault::WrongCounter { count: 1, counter: 5 });
     assert_eq!([counter(&mut client), counter(&mut client)], [Some(5), Some(1)]);
 }
 
-// covers: sim-mail-faults
+// covers: sim-mailbox
 #[test]
 fn requests_are_refused_or_aborted() {
     let mut client = disturbed(MailFault::Refuse { count: 1, detail: ErrorReply::SERVICE_IN_WORK });
@@ -102,7 +102,7 @@ fn requests_are_refused_or_aborted() {
     assert_eq!(client.upload(0x1018, 0), Ok(vec![4]));
 }
 
-// covers: 6.1, sim-mail-faults
+// covers: 6.1, sim-mailbox
 #[test]
 fn a_full_mailbox_accepts_nothing_for_some_time() {
     let mut client = disturbed(MailFault::Full { during: Duration::from_millis(30) });
@@ -115,7 +115,7 @@ fn a_full_mailbox_accepts_nothing_for_some_time() {
     assert!(client.bench.fetch_mail().is_some());
 }
 
-// covers: 6.3, sim-mail-faults
+// covers: 6.3, sim-mailbox
 #[test]
 fn an_emergency_directly_precedes_a_response() {
     let mut client = disturbed(MailFault::EmergencyBefore { count: 1, code: 0x8130 });

@@ -1,0 +1,136 @@
+//! Questions to a daemon.
+
+use std::fmt;
+use std::io;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::connection::{Connection, ReceiveError};
+use crate::message::{Answer, Ask, Content, Message, Numbered, Right};
+use crate::refusal::Refusal;
+use crate::wire::{Limits, WireError};
+
+/// The daemon answers to a greeting within this time.
+const GREETING: Duration = Duration::from_secs(5);
+/// Longest wait for an answer: that of a slow SubDevice.
+const ANSWER: Duration = Duration::from_secs(60);
+
+/// Why a daemon gave no answer.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ClientError {
+    /// No daemon answers at this socket.
+    NoDaemon {
+        /// The socket.
+        socket: PathBuf,
+        /// The error of the system.
+        cause: io::Error,
+    },
+    /// The connection failed.
+    Connection(ReceiveError),
+    /// The daemon refuses.
+    Refused(Refusal),
+}
+
+impl fmt::Display for ClientError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ClientError::NoDaemon { socket, cause } => {
+                write!(f, "no daemon answers at {}: {cause}; does ringcatd run?", socket.display())
+            }
+            ClientError::Connection(error) => write!(f, "connection to ringcatd: {error}"),
+            ClientError::Refused(refusal) => write!(f, "ringcatd: {refusal}"),
+        }
+    }
+}
+
+impl std::error::Error for ClientError {}
+
+impl From<ReceiveError> for ClientError {
+    fn from(error: ReceiveError) -> ClientError {
+        match error {
+            ReceiveError::Wire(WireError::Version { there }) => {
+                ClientError::Refused(Refusal::Version { here: crate::VERSION, there })
+            }
+            error => ClientError::Connection(error),
+        }
+    }
+}
+
+impl From<io::Error> for ClientError {
+    fn from(error: io::Error) -> ClientError {
+        ClientError::Connection(error.into())
+    }
+}
+
+/// A connection to a daemon.
+#[derive(Debug)]
+pub struct Client {
+    connection: Connection,
+    right: Right,
+    daemon_pid: u32,
+    next: u32,
+}
+
+impl Client {
+    /// Connects to the daemon at this socket; `program` is the name that it logs.
+    ///
+    /// # Errors
+    /// No daemon is there, it has another version, or it refuses.
+    pub fn connect(socket: &Path, program: &str) -> Result<Client, ClientError> {
+        let no_daemon = |cause| ClientError::NoDaemon { socket: socket.to_owned(), cause };
+        let connection = Connection::new(UnixStream::connect(socket).map_err(no_daemon)?)?;
+        let hello: Message = Content::Hello { program: program.to_owned() }.into();
+        // A daemon that refuses closes the connection, and has said why before.
+        let sent = connection.send(&hello);
+        match connection.receive(Limits::OWNER, Some(GREETING))?.0.content {
+            Content::Welcome { right, pid } => {
+                sent?;
+                Ok(Client { connection, right, daemon_pid: pid, next: 0 })
+            }
+            Content::Refused(refusal) => Err(ClientError::Refused(refusal)),
+            _ => Err(unexpected("a greeting")),
+        }
+    }
+
+    /// What this client may do.
+    pub fn right(&self) -> Right {
+        self.right
+    }
+
+    /// Process id of the daemon.
+    pub fn daemon_pid(&self) -> u32 {
+        self.daemon_pid
+    }
+
+    /// Asks about a master; `bytes` is data to write. Returns the answer, and data that was read.
+    ///
+    /// # Errors
+    /// The daemon refuses, or does not answer within a minute.
+    pub fn ask(&mut self, master: u32, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
+        self.next = self.next.wrapping_add(1);
+        let content = Content::Ask(Numbered { id: self.next, master, what });
+        self.connection.send(&Message { content, bytes })?;
+        loop {
+            let (message, _) = self.connection.receive(Limits::OWNER, Some(ANSWER))?;
+            match message.content {
+                Content::Answer(answer) if answer.id == self.next => {
+                    return answer.what.map(|answer| (answer, message.bytes)).map_err(ClientError::Refused);
+                }
+                Content::Answer(_) | Content::Underway { .. } => {}
+                Content::Refused(refusal) => return Err(ClientError::Refused(refusal)),
+                _ => return Err(unexpected("an answer")),
+            }
+        }
+    }
+
+    /// The connection, to take a master on it.
+    pub fn into_connection(self) -> Connection {
+        self.connection
+    }
+}
+
+fn unexpected(expected: &str) -> ClientError {
+    ClientError::Refused(Refusal::Unexpected { expected: expected.to_owned() })
+}

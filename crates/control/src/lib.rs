@@ -1,0 +1,30 @@
+//! Messages between the daemon `ringcatd`, the application that drives a segment (its owner), and clients.
+//!
+//! * [`message`]: what they say;
+//! * [`refusal`]: why something is not done, in one sentence;
+//! * [`wire`]: messages as bytes, and any bytes as a message or an error;
+//! * [`connection`]: messages and descriptors over a Unix socket;
+//! * [`client`]: questions to a daemon.
+//!
+//! A client says [`Content::Hello`], then asks. An application that drives a master says [`Content::Take`] and gets the
+//! descriptors of its links with what is known of the segment; from then on the daemon asks on this connection. The
+//! order is in decision 0074.
+#![forbid(unsafe_code)]
+
+pub mod client;
+pub mod connection;
+pub mod message;
+mod owner;
+pub mod refusal;
+pub mod wire;
+
+pub use client::Client;
+pub use connection::{Connection, ReceiveError};
+pub use message::{
+    Answer, Ask, Content, EventLine, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Right,
+};
+pub use refusal::Refusal;
+pub use wire::{Limits, VERSION, WireError};
+
+/// Where a daemon listens unless an option says otherwise.
+pub const DEFAULT_SOCKET: &str = "/run/ringcat/control";

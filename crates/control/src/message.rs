@@ -1,0 +1,262 @@
+//! What a daemon, its clients and the owner of a master say to each other.
+//!
+//! A message is typed content, and bytes where data is in it. A change of any type here changes [`crate::VERSION`].
+
+pub use ringcat_engine::main_device::snapshot::Snapshot;
+use serde::{Deserialize, Serialize};
+
+pub use crate::owner::Owner;
+use crate::refusal::Refusal;
+
+/// A message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// What it says.
+    pub content: Content,
+    /// Data: of an object, of registers, of an SII, or knowledge of a segment. Empty where none belongs to it.
+    pub bytes: Vec<u8>,
+}
+
+impl From<Content> for Message {
+    fn from(content: Content) -> Message {
+        Message { content, bytes: Vec::new() }
+    }
+}
+
+/// What a message says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Content {
+    /// First message of a client.
+    Hello {
+        /// Its name, for logs.
+        program: String,
+    },
+    /// Answer of the daemon to [`Content::Hello`].
+    Welcome {
+        /// What the client may do.
+        right: Right,
+        /// Process id of the daemon.
+        pid: u32,
+    },
+    /// A question: of a client to the daemon, of the daemon to an owner.
+    Ask(Numbered<Ask>),
+    /// An owner has taken a question, and answers when it is done.
+    Underway {
+        /// Number of the question.
+        id: u32,
+    },
+    /// The answer.
+    Answer(Numbered<Result<Answer, Refusal>>),
+    /// A client wants to drive a master.
+    Take {
+        /// Number of the master.
+        master: u32,
+    },
+    /// The client drives it. Descriptors come with the message; its bytes are what is known of the segment, empty if
+    /// nothing is known.
+    Taken(HandedLinks),
+    /// An owner tells what it knows after a scan, in the bytes.
+    Knowledge,
+    /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
+    /// nothing.
+    Release,
+    /// The daemon drives the master again.
+    Released,
+    /// The connection ends, and why.
+    Refused(Refusal),
+}
+
+/// A question or an answer to the question with the same number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Numbered<T> {
+    /// Number, chosen by the side that asks.
+    pub id: u32,
+    /// Number of the master; that of a question about all masters is not used.
+    pub master: u32,
+    /// Question or answer.
+    pub what: T,
+}
+
+/// What a client may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Right {
+    /// Ask for what changes nothing.
+    Read,
+    /// Also change states, objects and registers, and drive a master.
+    Change,
+}
+
+/// A question. SubDevices have their positions in the ring, whether an application is active or not.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Ask {
+    /// All masters and their owners.
+    Masters,
+    /// The whole state of a master, its SubDevices with it.
+    State,
+    /// Events from a number on, at most 256 of them.
+    Events {
+        /// Number of the first.
+        from: u64,
+    },
+    /// AL status and AL status code of a SubDevice.
+    AlStatus {
+        /// Its position.
+        position: u16,
+    },
+    /// Reads an object.
+    SdoUpload {
+        /// Position of the SubDevice.
+        position: u16,
+        /// Index.
+        index: u16,
+        /// Sub-index; `None` for complete access.
+        sub_index: Option<u8>,
+    },
+    /// Writes an object with the bytes of the message.
+    SdoDownload {
+        /// Position of the SubDevice.
+        position: u16,
+        /// Index.
+        index: u16,
+        /// Sub-index; `None` for complete access.
+        sub_index: Option<u8>,
+    },
+    /// Reads registers.
+    RegisterRead {
+        /// Position of the SubDevice.
+        position: u16,
+        /// First register.
+        address: u16,
+        /// Number of bytes, 1 to 1,024.
+        length: u16,
+    },
+    /// Writes registers with the bytes of the message, 1 to 1,024.
+    RegisterWrite {
+        /// Position of the SubDevice.
+        position: u16,
+        /// First register.
+        address: u16,
+    },
+    /// Reads the whole SII.
+    SiiRead {
+        /// Position of the SubDevice.
+        position: u16,
+    },
+    /// Requests a state: 1 INIT, 2 PREOP, 3 BOOT, 4 SAFEOP, 8 OP.
+    RequestState {
+        /// Position of the SubDevice.
+        position: u16,
+        /// The state, as in register AL_CONTROL.
+        state: u8,
+    },
+    /// Scans the segment again.
+    Rescan,
+}
+
+impl Ask {
+    /// The right that it needs.
+    pub fn right(&self) -> Right {
+        match self {
+            Ask::Masters
+            | Ask::State
+            | Ask::Events { .. }
+            | Ask::AlStatus { .. }
+            | Ask::SdoUpload { .. }
+            | Ask::RegisterRead { .. }
+            | Ask::SiiRead { .. } => Right::Read,
+            Ask::SdoDownload { .. } | Ask::RegisterWrite { .. } | Ask::RequestState { .. } | Ask::Rescan => {
+                Right::Change
+            }
+        }
+    }
+}
+
+/// An answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Answer {
+    /// To [`Ask::Masters`].
+    Masters(Vec<MasterState>),
+    /// To [`Ask::State`].
+    State(Box<Snapshot>),
+    /// To [`Ask::Events`].
+    Events {
+        /// Identifies the numbering: another epoch means that it began anew.
+        epoch: u64,
+        /// Events that are no longer kept.
+        missed: u64,
+        /// The number to go on with.
+        next: u64,
+        /// Oldest first.
+        events: Vec<EventLine>,
+    },
+    /// To [`Ask::AlStatus`].
+    AlStatus {
+        /// Register AL_STATUS: state, error bit 0x10.
+        status: u16,
+        /// Register AL_STATUS_CODE.
+        code: u16,
+    },
+    /// What was read is in the bytes of the message.
+    Data,
+    /// It is done.
+    Done,
+}
+
+/// A master.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MasterState {
+    /// Its number.
+    pub master: u32,
+    /// Its links, as in the option of the daemon.
+    pub links: String,
+    /// The application that drives it; `None` while the daemon does.
+    pub owner: Option<Owner>,
+    /// Why nothing drives it; `None` while it is driven.
+    pub fault: Option<String>,
+}
+
+/// An event.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EventLine {
+    /// Its number.
+    pub number: u64,
+    /// Time in nanoseconds of the monotonic clock.
+    pub at_ns: u64,
+    /// One line for the operator.
+    pub text: String,
+}
+
+/// The links of a master that is handed over. Descriptors follow in this order: cyclic half main, redundant; acyclic
+/// half main, redundant.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HandedLinks {
+    /// The main link.
+    pub main: HandedLink,
+    /// The redundant link.
+    pub redundant: Option<HandedLink>,
+}
+
+/// A link, with a socket for each half.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum HandedLink {
+    /// Pipes to a simulated segment.
+    Pipe,
+    /// Packet sockets on an interface. Places in their rings are found.
+    Interface {
+        /// Its name.
+        name: String,
+        /// Slots of each ring.
+        slots: u32,
+    },
+}
+
+impl HandedLinks {
+    /// Number of descriptors that come with it.
+    pub fn descriptors(&self) -> usize {
+        if self.redundant.is_some() { 4 } else { 2 }
+    }
+}

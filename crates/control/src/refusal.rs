@@ -1,0 +1,109 @@
+//! Why something is not done: what was expected, what is so, and what helps, in one sentence.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::owner::Owner;
+
+/// Why a question has no answer, or a connection ends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The versions differ.
+    Version {
+        /// That of the side that refuses.
+        here: u16,
+        /// That of the message.
+        there: u16,
+    },
+    /// The client may only read.
+    ReadOnly,
+    /// There is no such master.
+    NoMaster {
+        /// The number asked for.
+        master: u32,
+        /// Those that are there.
+        present: Vec<u32>,
+    },
+    /// Another application drives the master.
+    Owned {
+        /// Number of the master.
+        master: u32,
+        /// The application.
+        by: Owner,
+    },
+    /// The owner of the master does not answer.
+    Silent {
+        /// Number of the master.
+        master: u32,
+        /// The owner.
+        owner: Owner,
+        /// For so long.
+        limit_ms: u32,
+    },
+    /// The master passes from one process to another at this moment.
+    Changing {
+        /// Number of the master.
+        master: u32,
+    },
+    /// Nothing drives the master.
+    Fault {
+        /// Number of the master.
+        master: u32,
+        /// Why.
+        cause: String,
+    },
+    /// It was tried and failed.
+    Failed(String),
+    /// The message is none that is expected here.
+    Unexpected {
+        /// What is.
+        expected: String,
+    },
+    /// There are as many clients as there may be.
+    TooManyClients {
+        /// So many.
+        limit: usize,
+    },
+    /// The owner of the master has as many questions as it may have.
+    TooManyQuestions {
+        /// Number of the master.
+        master: u32,
+        /// The owner.
+        owner: Owner,
+    },
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Refusal::Version { here, there } => {
+                write!(f, "expected control version {here}, got {there}: install ringcatd and library of one release")
+            }
+            Refusal::ReadOnly => {
+                f.write_str("this user may read only; ringcatd lets root, its own user and --group change the bus")
+            }
+            Refusal::NoMaster { master, present } => {
+                let present: Vec<String> = present.iter().map(u32::to_string).collect();
+                write!(f, "there is no master {master}; there are: {}", present.join(", "))
+            }
+            Refusal::Owned { master, by } => write!(f, "master {master} is driven by {by}"),
+            Refusal::Silent { master, owner, limit_ms } => {
+                write!(f, "master {master}: {owner} drives it and has not answered for {limit_ms} ms")
+            }
+            Refusal::Changing { master } => {
+                write!(f, "master {master} passes from one process to another now: ask again")
+            }
+            Refusal::Fault { master, cause } => write!(f, "master {master} is not driven: {cause}"),
+            Refusal::Failed(cause) => f.write_str(cause),
+            Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
+            Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
+            Refusal::TooManyQuestions { master, owner } => {
+                write!(f, "master {master}: {owner} drives it and has not taken earlier questions yet")
+            }
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}

@@ -1,0 +1,151 @@
+//! Programs that get their bus from a daemon.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use ringcat::AlState;
+use ringcat::esi::load_segment;
+use ringcat::piped::segment::PipedSegment;
+use ringcat::sim::network::Network;
+use ringcatd::daemon::{Daemon, STOP_LIMIT};
+use ringcatd::master::Master;
+use ringcatd::rights::Rights;
+use ringcatd::segment_process::serve;
+use ringcatd::wires::Wires;
+
+use crate::library::{here, program, root};
+
+/// A busy machine delays a change at most for so long.
+const LONG: Duration = Duration::from_secs(30);
+
+/// What the segment shows to the test.
+#[derive(Debug, Default)]
+struct Seen {
+    /// All SubDevices are in PREOP.
+    in_preop: AtomicBool,
+    /// When the links were connected last.
+    connected_ns: AtomicU64,
+    ends: AtomicBool,
+}
+
+/// A daemon on the segment of a file.
+struct Bench {
+    seen: Arc<Seen>,
+    daemon: Option<Daemon>,
+    segment: Option<JoinHandle<()>>,
+    socket: PathBuf,
+}
+
+impl Bench {
+    fn start(file: &Path, name: &str) -> Bench {
+        let (near, far) = UnixStream::pair().expect("a pair");
+        let (seen, file) = (Arc::new(Seen::default()), file.to_owned());
+        let shown = seen.clone();
+        let segment = std::thread::spawn(move || {
+            let described = load_segment(&file).expect("it is right");
+            let mut segment = PipedSegment::new(Network::from_description(described).expect("it is right"));
+            let show = |segment: &mut PipedSegment| {
+                shown.connected_ns.store(segment.connected_ns(), Ordering::Release);
+                let mut states = segment.network_mut().devices().map(|device| device.al_status().al_state());
+                shown.in_preop.store(states.all(|state| state == Some(AlState::PreOp)), Ordering::Release);
+                !shown.ends.load(Ordering::Acquire)
+            };
+            serve(&mut segment, &far, show).expect("the daemon is there");
+        });
+        let socket = std::env::temp_dir().join(format!("ringcat-ffi-{name}-{}", std::process::id()));
+        let master = Master::new(0, name.to_owned(), Wires::to_segment(near).expect("it is right"));
+        let daemon = Daemon::start(vec![master], &socket, Rights::default(), STOP_LIMIT).expect("it listens");
+        let bench = Bench { seen, daemon: Some(daemon), segment: Some(segment), socket };
+        bench.wait_for_preop();
+        bench
+    }
+
+    fn wait_for_preop(&self) {
+        let begin = Instant::now();
+        while !self.seen.in_preop.load(Ordering::Acquire) {
+            assert!(begin.elapsed() < LONG, "not all are in PREOP");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn connected_ns(&self) -> u64 {
+        self.seen.connected_ns.load(Ordering::Acquire)
+    }
+
+    fn command(&self, program: &Path) -> Command {
+        let mut command = Command::new(program);
+        command.env("RINGCAT_SOCKET", &self.socket).stdout(Stdio::piped());
+        command
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.seen.ends.store(true, Ordering::Release);
+        if let Some(segment) = self.segment.take() {
+            assert!(segment.join().is_ok() || std::thread::panicking());
+        }
+        self.daemon = None;
+    }
+}
+
+/// Reads lines of a program until one begins so.
+fn wait_for_line(child: &mut Child, begin: &str) -> BufReader<std::process::ChildStdout> {
+    let mut lines = BufReader::new(child.stdout.take().expect("it is piped"));
+    let mut line = String::new();
+    while !line.starts_with(begin) {
+        line.clear();
+        assert!(lines.read_line(&mut line).expect("it is text") > 0, "it has ended before {begin:?}");
+    }
+    lines
+}
+
+// covers: c-interface, daemon
+#[test]
+fn the_first_application_runs_on_the_bus_of_a_daemon_and_gives_it_back() {
+    let examples = root().join("examples/c");
+    let Some(first) = program(&examples.join("first_application.c"), &[]) else { return };
+    let bench = Bench::start(&examples.join("first_application.toml"), "first");
+    for _ in 0..2 {
+        let before = bench.connected_ns();
+        let output = bench.command(&first).arg("3000").output().expect("it runs");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+        for wanted in ["Domain1: WC 5.", "5 slave(s).", "AnaIn: operational.", "AL states: 0x0A."] {
+            assert!(text.lines().any(|line| line == wanted), "{wanted}\n{text}");
+        }
+        bench.wait_for_preop();
+        assert!(bench.connected_ns() > before, "the daemon has it again");
+    }
+}
+
+// covers: c-interface, daemon
+#[test]
+fn a_killed_program_whose_child_lives_on_leaves_the_bus_to_the_daemon() {
+    let Some(forking) = program(&here().join("tests/c/forking.c"), &[]) else { return };
+    let bench = Bench::start(&root().join("examples/c/first_application.toml"), "forking");
+    let mut parent = bench.command(&forking).spawn().expect("it runs");
+    let mut lines = wait_for_line(&mut parent, "forked");
+    let before = bench.connected_ns();
+    parent.kill().expect("it runs");
+    let begin = Instant::now();
+    while bench.connected_ns() == before {
+        assert!(begin.elapsed() < Duration::from_secs(2), "the child holds the connection open for three");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    println!("the daemon has the bus after {:?}", begin.elapsed());
+    bench.wait_for_preop();
+    let connected = bench.connected_ns();
+    let mut line = String::new();
+    lines.read_line(&mut line).expect("it is text");
+    assert_eq!(line, "child released\n");
+    parent.wait().expect("it has ended");
+    assert_eq!(bench.connected_ns(), connected, "the child has no bus to give back");
+    bench.wait_for_preop();
+}

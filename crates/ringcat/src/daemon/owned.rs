@@ -1,0 +1,211 @@
+//! A bus that a daemon has handed over to this process.
+//!
+//! A thread receives what the daemon says: questions of its clients, and the end of the connection. It tells the daemon
+//! what is known of the segment after each scan, so that a crash of this process costs no scan.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ringcat_control::client::Client;
+use ringcat_control::connection::{Connection, ReceiveError};
+use ringcat_control::message::{Content, Message};
+use ringcat_control::refusal::Refusal;
+use ringcat_control::wire::Limits;
+use ringcat_engine::event::{ClientId, Subject, Subjects};
+use ringcat_engine::knowledge::{Handover, Knowledge};
+
+use super::error::DaemonError;
+use super::links::DaemonLinks;
+use super::questions::Questions;
+use crate::main_device::Options;
+use crate::services::Services;
+use crate::supervisor_thread::SupervisorThread;
+
+/// The daemon hands a bus over within this time: it waits for the end of a scan.
+const TAKE: Duration = Duration::from_secs(30);
+/// Interval of looks for new events of scans.
+const LOOK: Duration = Duration::from_millis(200);
+/// Events of scans that are kept between two looks: one is enough to tell that there were any.
+const KEPT: usize = 1;
+
+/// A bus that a daemon has handed over. It is given back by [`OwnedBus::release`], or when this is dropped.
+#[derive(Debug)]
+pub struct OwnedBus {
+    supervisor: SupervisorThread,
+    links: Option<DaemonLinks>,
+    connection: Arc<Connection>,
+    shared: Arc<Shared>,
+    receiver: Option<JoinHandle<()>>,
+    /// A child of `fork` has no threads of this: it gives nothing back.
+    process: u32,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    /// The bus is given back.
+    is_over: AtomicBool,
+    /// The daemon has ended the connection before.
+    is_lost: AtomicBool,
+}
+
+impl OwnedBus {
+    /// Takes the bus of a master from the daemon at this socket. `program` is the name with which the daemon names this
+    /// process to others; `prepare` runs first in the thread of the acyclic half. Returns when the SubDevices were
+    /// found as the daemon knows them; no SII is read.
+    ///
+    /// # Errors
+    /// [`DaemonError::is_no_daemon`]: none answers. The daemon refuses: there is no such master, another process drives
+    /// it, or this user may not. No SubDevice answers is no error: the MainDevice waits for some.
+    pub fn take(
+        socket: &Path,
+        master: u32,
+        program: &str,
+        options: &Options,
+        prepare: impl FnOnce() + Send + 'static,
+    ) -> Result<OwnedBus, DaemonError> {
+        let connection = Arc::new(Client::connect(socket, program)?.into_connection());
+        connection.send(&Content::Take { master }.into())?;
+        let (message, descriptors) = connection.receive(Limits::OWNER, Some(TAKE))?;
+        let handed = match message.content {
+            Content::Taken(handed) => handed,
+            Content::Refused(refusal) => return Err(refusal.into()),
+            _ => return Err(Refusal::Unexpected { expected: "links of a master".to_owned() }.into()),
+        };
+        let (cyclic, acyclic) = DaemonLinks::adopt(&handed, descriptors)?;
+        let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
+        let options = options.clone().with_idle_operation(true);
+        let supervisor = match knowledge {
+            Some(knowledge) => {
+                let known = (knowledge, Handover::Orderly);
+                SupervisorThread::start_resumed(acyclic, &options, known, prepare)?
+            }
+            None => SupervisorThread::start(acyclic, &options, prepare)?,
+        };
+        let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
+        let events = supervisor.register_client(scans, KEPT)?;
+        if !message.bytes.is_empty() {
+            // A segment that does not answer any more is watched as any other.
+            let _ = supervisor.finish_scan(|| ());
+        }
+        let shared = Arc::new(Shared::default());
+        let questions = Questions::start(&supervisor, &connection).map_err(crate::error::Error::Thread)?;
+        let receiver = Receiver {
+            supervisor: supervisor.clone(),
+            connection: connection.clone(),
+            shared: shared.clone(),
+            questions,
+            events,
+        };
+        let thread = std::thread::Builder::new().name("daemon".into());
+        let receiver = thread.spawn(move || receiver.run()).map_err(crate::error::Error::Thread)?;
+        let (links, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
+        Ok(OwnedBus { supervisor, links, connection, shared, receiver, process })
+    }
+
+    /// The acyclic half. It knows the SubDevices that the daemon knew.
+    pub fn supervisor(&self) -> &SupervisorThread {
+        &self.supervisor
+    }
+
+    /// Takes the links of the cyclic half, for an activation.
+    pub fn take_links(&mut self) -> Option<DaemonLinks> {
+        self.links.take()
+    }
+
+    /// Gives the links of the cyclic half back after the end of an application.
+    pub fn give_links_back(&mut self, links: DaemonLinks) {
+        self.links = Some(links);
+    }
+
+    /// Whether the daemon drives the bus again, because this process was stopped; or the daemon has ended, then the bus
+    /// can still be driven.
+    pub fn is_lost(&self) -> bool {
+        self.shared.is_lost.load(Ordering::Acquire)
+    }
+
+    /// Gives the bus back, and waits until the daemon has it. An active application is to be ended before; otherwise
+    /// its outputs last until the daemon has its SubDevices in PREOP.
+    ///
+    /// # Errors
+    /// The daemon has ended, or has the bus already.
+    pub fn release(mut self) -> Result<(), DaemonError> {
+        self.give_back()
+    }
+
+    fn give_back(&mut self) -> Result<(), DaemonError> {
+        let Some(receiver) = self.receiver.take() else { return Ok(()) };
+        if std::process::id() != self.process {
+            // A child of `fork`: its parent has the bus, and the threads are not in this process.
+            std::mem::forget(receiver);
+            return Ok(());
+        }
+        // The thread of the acyclic half may have ended already.
+        let bytes = match self.supervisor.hand_over() {
+            Ok(Some(knowledge)) => knowledge.to_bytes(),
+            Ok(None) | Err(_) => Vec::new(),
+        };
+        self.links = None;
+        let was_lost = self.shared.is_lost.load(Ordering::Acquire);
+        self.shared.is_over.store(true, Ordering::Release);
+        let sent = self.connection.send(&Message { content: Content::Release, bytes });
+        // It ends at the daemon's answer, or at the end of the connection. Its panic was reported by itself.
+        let _ = receiver.join();
+        // A daemon that does not listen any more has ended, or has taken the bus back.
+        if was_lost || sent.is_err() { Err(DaemonError::Lost) } else { Ok(()) }
+    }
+}
+
+impl Drop for OwnedBus {
+    fn drop(&mut self) {
+        // The daemon takes the bus back at the end of the connection, too.
+        let _ = self.give_back();
+    }
+}
+
+/// The thread that receives what the daemon says.
+struct Receiver {
+    supervisor: SupervisorThread,
+    connection: Arc<Connection>,
+    shared: Arc<Shared>,
+    questions: Questions,
+    events: Option<ClientId>,
+}
+
+impl Receiver {
+    fn run(self) {
+        loop {
+            match self.connection.receive(Limits::OWNER, Some(LOOK)) {
+                Ok((message, _)) => match message.content {
+                    Content::Ask(question) => self.questions.take(question, message.bytes),
+                    Content::Released => return self.end(),
+                    // A daemon of this version says nothing else.
+                    _ => {}
+                },
+                Err(ReceiveError::TimedOut) => self.tell_knowledge(),
+                Err(_) => return self.end(),
+            }
+        }
+    }
+
+    /// The daemon drives the bus from now on, or is gone. Without a release the bus is lost.
+    fn end(&self) {
+        let is_over = self.shared.is_over.load(Ordering::Acquire);
+        self.shared.is_lost.store(!is_over, Ordering::Release);
+    }
+
+    /// Tells the daemon what is known, if a scan has ended since the last time.
+    fn tell_knowledge(&self) {
+        let Some(events) = self.events else { return };
+        match self.supervisor.client_events(events) {
+            Ok(Some(events)) if !events.events.is_empty() => {}
+            _ => return,
+        }
+        if let Ok(Some(knowledge)) = self.supervisor.knowledge() {
+            // If the daemon is gone the next look finds that.
+            let _ = self.connection.send(&Message { content: Content::Knowledge, bytes: knowledge.to_bytes() });
+        }
+    }
+}

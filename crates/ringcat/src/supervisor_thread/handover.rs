@@ -1,0 +1,66 @@
+//! Hand-over of a segment between processes: the thread begins with what another process has known, and ends with what
+//! it knows.
+
+use std::sync::atomic::Ordering;
+
+use ringcat_engine::Scan;
+use ringcat_engine::knowledge::{Handover, Knowledge};
+use ringcat_engine::main_device::MainDevice as Engine;
+
+use super::SupervisorThread;
+use crate::error::Error;
+use crate::links::Links;
+use crate::main_device::Options;
+
+impl SupervisorThread {
+    /// Starts the thread as [`SupervisorThread::start`], and goes on with a segment that another process has known,
+    /// before anything else is done on it. Does not wait for the result: until then a scan runs.
+    ///
+    /// # Errors
+    /// The system cannot start a thread.
+    pub fn start_resumed<L>(
+        links: L,
+        options: &Options,
+        (knowledge, handover): (Knowledge, Handover),
+        prepare: impl FnOnce() + Send + 'static,
+    ) -> Result<Self, Error>
+    where
+        L: Links + Send + 'static,
+    {
+        let resume = move |engine: &mut Engine| {
+            // A new engine is neither active nor scans, so it does not refuse.
+            let _ = engine.resume(knowledge, handover);
+        };
+        Self::start_with(links, options, prepare, resume)
+    }
+
+    /// Goes on with a segment that another process has known, as [`crate::MainDevice::resume`].
+    ///
+    /// # Errors
+    /// As [`crate::MainDevice::resume`].
+    pub fn resume(&self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
+        self.with(move |engine| engine.resume(knowledge, handover))??;
+        Ok(self.ask(|engine| engine.scan_result()).wait()??)
+    }
+
+    /// What is known of the segment, for another process that goes on with it; `None` without a successful scan.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn knowledge(&self) -> Result<Option<Knowledge>, Error> {
+        self.with(|engine| engine.knowledge())
+    }
+
+    /// Ends the thread without a further frame, and returns what is known of the segment, for another process that goes
+    /// on with it. All handles get [`Error::Gone`] from then on.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn hand_over(&self) -> Result<Option<Knowledge>, Error> {
+        let published = self.0.published.clone();
+        self.with(move |engine| {
+            published.is_handed_over.store(true, Ordering::Release);
+            engine.knowledge()
+        })
+    }
+}

@@ -1,0 +1,26 @@
+//! The daemon of RingCAT: it drives segments while no application does, and hands them over.
+//!
+//! * [`source`]: the links of a master as an option names them; [`wires`]: opened, revoked, opened anew;
+//! * [`segment_process`]: a simulated segment in a process of its own;
+//! * [`master`]: a master with the process that drives it;
+//! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
+//!   [`process_state`]: what the kernel tells of its process;
+//! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
+//! * [`daemon`]: all of it; [`log`]: lines for the operator.
+//!
+//! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to
+//! 0076.
+#![forbid(unsafe_code)]
+
+pub mod daemon;
+pub mod listening;
+pub mod log;
+pub mod master;
+pub mod owner;
+pub mod process_state;
+pub mod rights;
+pub mod segment_process;
+pub mod session;
+pub mod source;
+pub mod tenure;
+pub mod wires;

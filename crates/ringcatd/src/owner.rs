@@ -1,0 +1,249 @@
+//! An application that drives a master, as the daemon sees it: questions to it, and their answers.
+//!
+//! What an owner has not answered yet is bounded in number and in bytes, so a message to it always finds room in the
+//! socket, and an owner that is stopped costs each client one second at most. Further questions wait for a place.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::os::unix::net::UnixStream;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, Owner};
+use ringcat_control::{Connection, Refusal};
+
+/// An owner takes a question within this time.
+pub const SILENCE: Duration = Duration::from_secs(1);
+/// It answers a question that it has taken within this time.
+const ANSWER: Duration = Duration::from_secs(30);
+/// Questions that it may have at a time.
+const MOST_QUESTIONS: usize = 16;
+/// Bytes of questions that it may have at a time: half of what a socket holds by default.
+const MOST_BYTES: usize = 96 << 10;
+
+/// An answer with its data.
+pub type Answered = Result<(Answer, Vec<u8>), Refusal>;
+
+/// An application that drives a master.
+#[derive(Debug)]
+pub struct OwnerLink {
+    master: u32,
+    owner: Owner,
+    connection: Arc<Connection>,
+    questions: Mutex<Questions>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Questions {
+    last: u32,
+    open: BTreeMap<u32, Question>,
+    /// The owner does not drive the master any more.
+    is_over: bool,
+}
+
+/// A question that has no answer yet.
+#[derive(Debug)]
+struct Question {
+    bytes: usize,
+    state: Standing,
+}
+
+#[derive(Debug)]
+enum Standing {
+    Sent,
+    UnderWay,
+    Answered(Answered),
+    /// The client has given up.
+    Forgotten,
+}
+
+impl OwnerLink {
+    /// The process at the other end of this connection.
+    pub fn new(master: u32, owner: Owner, connection: Arc<Connection>) -> OwnerLink {
+        OwnerLink { master, owner, connection, questions: Mutex::default(), changed: Condvar::new() }
+    }
+
+    /// The application.
+    pub fn owner(&self) -> &Owner {
+        &self.owner
+    }
+
+    /// The connection to it.
+    pub fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    fn questions(&self) -> MutexGuard<'_, Questions> {
+        self.questions.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Asks, and waits for the answer: a second for a sign, longer for the result of what it has begun.
+    ///
+    /// # Errors
+    /// The owner refuses, is silent, or has ended.
+    pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+        let (master, size) = (self.master, bytes.len());
+        let mut questions = self.place(size)?;
+        questions.last = questions.last.wrapping_add(1);
+        let id = questions.last;
+        questions.open.insert(id, Question { bytes: size, state: Standing::Sent });
+        drop(questions);
+        let message = Message { content: Content::Ask(Numbered { id, master, what }), bytes };
+        if self.connection.send(&message).is_err() {
+            self.questions().open.remove(&id);
+            return Err(Refusal::Changing { master });
+        }
+        self.wait(id)
+    }
+
+    /// Waits until the owner may have another question of this size.
+    fn place(&self, size: usize) -> Result<MutexGuard<'_, Questions>, Refusal> {
+        let begin = Instant::now();
+        let mut questions = self.questions();
+        loop {
+            if questions.is_over {
+                return Err(Refusal::Changing { master: self.master });
+            }
+            let waiting: usize = questions.open.values().map(|question| question.bytes).sum();
+            if questions.open.len() < MOST_QUESTIONS && waiting + size <= MOST_BYTES {
+                return Ok(questions);
+            }
+            let left = SILENCE.saturating_sub(begin.elapsed());
+            if left.is_zero() || size > MOST_BYTES {
+                return Err(Refusal::TooManyQuestions { master: self.master, owner: self.owner.clone() });
+            }
+            questions = self.changed.wait_timeout(questions, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn wait(&self, id: u32) -> Answered {
+        let begin = Instant::now();
+        let mut questions = self.questions();
+        loop {
+            let Some(question) = questions.open.get_mut(&id) else {
+                return Err(Refusal::Changing { master: self.master });
+            };
+            let limit = match question.state {
+                Standing::Answered(_) => {
+                    let answered = questions.open.remove(&id).map(|question| question.state);
+                    let Some(Standing::Answered(answered)) = answered else { continue };
+                    // There is room for another question.
+                    self.changed.notify_all();
+                    return answered;
+                }
+                Standing::UnderWay => ANSWER,
+                Standing::Sent | Standing::Forgotten => SILENCE,
+            };
+            let left = limit.saturating_sub(begin.elapsed());
+            if left.is_zero() {
+                question.state = Standing::Forgotten;
+                let limit_ms = limit.as_millis() as u32;
+                return Err(Refusal::Silent { master: self.master, owner: self.owner.clone(), limit_ms });
+            }
+            questions = self.changed.wait_timeout(questions, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// The owner has taken a question.
+    pub fn taken(&self, id: u32) {
+        if let Some(question) = self.questions().open.get_mut(&id)
+            && matches!(question.state, Standing::Sent)
+        {
+            question.state = Standing::UnderWay;
+            self.changed.notify_all();
+        }
+    }
+
+    /// The owner has answered. Answers that nothing waits for are dropped.
+    pub fn answered(&self, id: u32, answer: Answered) {
+        let mut questions = self.questions();
+        match questions.open.get_mut(&id) {
+            Some(Question { state: Standing::Forgotten, .. }) => {
+                questions.open.remove(&id);
+                self.changed.notify_all();
+            }
+            Some(question) if !matches!(question.state, Standing::Answered(_)) => {
+                question.state = Standing::Answered(answer);
+                self.changed.notify_all();
+            }
+            Some(_) | None => {}
+        }
+    }
+
+    /// The owner does not drive the master any more: all that wait for it get an answer.
+    pub fn end(&self) {
+        let mut questions = self.questions();
+        questions.is_over = true;
+        questions.open.clear();
+        self.changed.notify_all();
+    }
+}
+
+/// A connection whose other end a test plays.
+///
+/// # Errors
+/// The system reports one.
+#[doc(hidden)]
+pub fn for_tests() -> io::Result<(OwnerLink, Connection)> {
+    let (near, far) = UnixStream::pair()?;
+    let owner = Owner { pid: 42, program: "test".to_owned() };
+    Ok((OwnerLink::new(0, owner, Arc::new(Connection::new(near)?)), Connection::new(far)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use ringcat_control::Limits;
+
+    use super::*;
+
+    const QUESTION: Ask = Ask::AlStatus { position: 1 };
+
+    // covers: daemon
+    #[test]
+    fn a_silent_owner_is_named_after_a_second_and_holds_a_bounded_number_of_questions() {
+        let (owner, _far) = for_tests().expect("a pair");
+        let owner = Arc::new(owner);
+        let begin = Instant::now();
+        let all: Vec<_> = (0..MOST_QUESTIONS)
+            .map(|_| {
+                let owner = owner.clone();
+                thread::spawn(move || owner.ask(QUESTION, Vec::new()))
+            })
+            .collect();
+        for one in all {
+            let refused = one.join().expect("no panic").expect_err("nothing answers").to_string();
+            assert_eq!(refused, "master 0: \"test\" (process 42) drives it and has not answered for 1000 ms");
+        }
+        assert!((SILENCE..2 * SILENCE).contains(&begin.elapsed()));
+        let begin = Instant::now();
+        assert!(matches!(owner.ask(QUESTION, Vec::new()), Err(Refusal::TooManyQuestions { .. })));
+        assert!(begin.elapsed() < 2 * SILENCE);
+    }
+
+    // covers: daemon
+    #[test]
+    fn answers_reach_their_questions_in_any_order_and_late_ones_nothing() {
+        let (owner, far) = for_tests().expect("a pair");
+        let owner = Arc::new(owner);
+        let asking = owner.clone();
+        let first = thread::spawn(move || asking.ask(QUESTION, vec![1]));
+        let (question, _) = far.receive(Limits::OWNER, None).expect("it is asked");
+        let Content::Ask(Numbered { id, .. }) = question.content else { panic!("{question:?}") };
+        owner.taken(id);
+        owner.answered(id + 1, Ok((Answer::Done, Vec::new())));
+        thread::sleep(SILENCE + Duration::from_millis(100));
+        owner.answered(id, Ok((Answer::Data, vec![7])));
+        owner.answered(id, Ok((Answer::Done, Vec::new())));
+        assert_eq!(first.join().expect("no panic"), Ok((Answer::Data, vec![7])));
+        assert!(owner.ask(QUESTION, vec![0; MOST_BYTES + 1]).is_err());
+        let asking = owner.clone();
+        let last = thread::spawn(move || asking.ask(QUESTION, Vec::new()));
+        far.receive(Limits::OWNER, None).expect("it is asked");
+        owner.end();
+        assert_eq!(last.join().expect("no panic"), Err(Refusal::Changing { master: 0 }));
+        assert_eq!(owner.ask(QUESTION, Vec::new()), Err(Refusal::Changing { master: 0 }));
+    }
+}

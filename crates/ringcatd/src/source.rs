@@ -1,0 +1,119 @@
+//! The links of a master as the option `--master` names them.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Where the frames of a master go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A segment file, simulated in a process of its own.
+    Simulated(PathBuf),
+    /// Network interfaces: main, redundant.
+    Interfaces(String, Option<String>),
+}
+
+/// A master with its links: `0=eth1`, `0=eth1,eth2`, `0=sim:FILE`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MasterOption {
+    /// Its number.
+    pub master: u32,
+    /// Its links.
+    pub source: Source,
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Source::Simulated(file) => write!(f, "sim:{}", file.display()),
+            Source::Interfaces(main, None) => f.write_str(main),
+            Source::Interfaces(main, Some(redundant)) => write!(f, "{main},{redundant}"),
+        }
+    }
+}
+
+impl FromStr for MasterOption {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<MasterOption, String> {
+        let expected = || format!("expected NUMBER=INTERFACE[,INTERFACE] or NUMBER=sim:FILE, got {text:?}");
+        let (number, links) = text.split_once('=').ok_or_else(expected)?;
+        let master = number.parse().map_err(|_| expected())?;
+        if let Some(file) = links.strip_prefix("sim:") {
+            return match file {
+                "" => Err(expected()),
+                file => Ok(MasterOption { master, source: Source::Simulated(file.into()) }),
+            };
+        }
+        let mut names = links.split(',').map(str::to_owned);
+        let (main, redundant) = (names.next().unwrap_or_default(), names.next());
+        let is_named = |name: &String| !name.is_empty();
+        if names.next().is_some() || !is_named(&main) || !redundant.iter().all(is_named) {
+            return Err(expected());
+        }
+        if redundant.as_ref() == Some(&main) {
+            return Err(format!("{text:?} names one interface for both ends of a ring"));
+        }
+        Ok(MasterOption { master, source: Source::Interfaces(main, redundant) })
+    }
+}
+
+/// Checks that each master and each interface occurs once.
+///
+/// # Errors
+/// What occurs twice, or that there is no master.
+pub fn check(masters: &[MasterOption]) -> Result<(), String> {
+    if masters.is_empty() {
+        return Err("expected at least one --master".to_owned());
+    }
+    let mut numbers: Vec<u32> = masters.iter().map(|it| it.master).collect();
+    let mut names: Vec<&String> = masters.iter().flat_map(|it| interfaces(&it.source)).collect();
+    numbers.sort_unstable();
+    names.sort_unstable();
+    if let Some(pair) = numbers.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(format!("master {} is given twice", pair[0]));
+    }
+    match names.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(format!("interface {} belongs to two masters", pair[0])),
+        None => Ok(()),
+    }
+}
+
+fn interfaces(source: &Source) -> impl Iterator<Item = &String> {
+    let (main, redundant) = match source {
+        Source::Simulated(_) => (None, None),
+        Source::Interfaces(main, redundant) => (Some(main), redundant.as_ref()),
+    };
+    main.into_iter().chain(redundant)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<MasterOption, String> {
+        text.parse()
+    }
+
+    // covers: daemon
+    #[test]
+    fn a_master_has_a_number_and_one_link_two_links_or_a_segment_file() {
+        for text in ["0=eth1", "3=eth1,eth2", "0=sim:a=b,c.toml"] {
+            let option = parse(text).expect("it is right");
+            assert_eq!(format!("{}={}", option.master, option.source), text);
+        }
+        for text in ["", "eth1", "x=eth1", "0=", "0=sim:", "0=a,", "0=,a", "0=a,b,c", "-1=a", "0=a,a"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+
+    // covers: daemon
+    #[test]
+    fn a_master_or_an_interface_that_is_given_twice_is_named() {
+        let all = |texts: &[&str]| texts.iter().map(|text| parse(text).expect("it is right")).collect::<Vec<_>>();
+        assert_eq!(check(&all(&["0=a", "1=b,c", "2=sim:f", "3=sim:f"])), Ok(()));
+        assert_eq!(check(&all(&["1=a", "1=b"])), Err("master 1 is given twice".to_owned()));
+        assert_eq!(check(&all(&["0=a", "1=b,a"])), Err("interface a belongs to two masters".to_owned()));
+        assert!(check(&[]).is_err());
+    }
+}

@@ -1,0 +1,165 @@
+//! A daemon on a simulated segment whose SubDevices the test sees.
+
+use std::fmt::Write;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use ringcat::daemon::{Client, OwnedBus};
+use ringcat::piped::segment::PipedSegment;
+use ringcat::sim::network::Network;
+use ringcat::sim::segment::Segment;
+use ringcat::{Activity, AlState, AlStatus, Options};
+use ringcat_control::{Answer, Ask};
+use ringcatd::daemon::Daemon;
+use ringcatd::master::Master;
+use ringcatd::rights::Rights;
+use ringcatd::segment_process;
+use ringcatd::wires::Wires;
+
+/// SubDevices reach PREOP within this time on a busy machine.
+pub const LONG: Duration = Duration::from_secs(20);
+
+/// One daemon at a time: the tests measure times, and count descriptors.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Waits for the turn of a test.
+pub fn turn() -> MutexGuard<'static, ()> {
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+type Look = Box<dyn FnOnce(&mut PipedSegment) + Send>;
+
+/// A daemon with master 0.
+pub struct Bench {
+    pub socket: PathBuf,
+    pub daemon: Option<Daemon>,
+    looks: Option<Sender<Look>>,
+    segment: Option<JoinHandle<()>>,
+    directory: PathBuf,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// A ring of SubDevices of different kinds.
+pub fn ring(count: usize) -> String {
+    let mut text = "[segment]\nring = true\n".to_owned();
+    for at in 0..count {
+        let kind = ["digital-output-8", "digital-input-8", "analog-input-4", "servo"][at % 4];
+        write!(text, "[[device]]\ntype = \"{kind}\"\n").expect("a string");
+    }
+    text
+}
+
+/// A directory of its own below that for temporary files.
+pub fn directory() -> PathBuf {
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let path = std::env::temp_dir().join(format!("ringcatd-{}-{number}", std::process::id()));
+    std::fs::create_dir_all(&path).expect("it can be made");
+    path
+}
+
+impl Bench {
+    /// A daemon on a ring of so many SubDevices, all in PREOP.
+    pub fn start(count: usize) -> Bench {
+        Bench::with_limit(count, ringcatd::daemon::STOP_LIMIT)
+    }
+
+    /// The same where an owner may be stopped for this time.
+    pub fn with_limit(count: usize, stop_limit: Duration) -> Bench {
+        let turn = turn();
+        let (near, far) = UnixStream::pair().expect("a pair");
+        let (looks, asked) = channel::<Look>();
+        let segment = std::thread::spawn(move || simulate(count, &far, &asked));
+        let wires = Wires::to_segment(near).expect("the segment is right");
+        let directory = directory();
+        let socket = directory.join("socket");
+        let master = Master::new(0, "test".to_owned(), wires);
+        let rights = Rights { group: None, mode: 0o666 };
+        let daemon = Daemon::start(vec![master], &socket, rights, stop_limit).expect("it listens");
+        let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));
+        let bench = Bench { socket, daemon, looks, segment, directory, _turn: turn };
+        bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+        bench.wait_until("scanned", |bench| {
+            let Answer::State(state) = ask(&mut bench.client(), Ask::State) else { return false };
+            state.activity == Activity::Scanned && state.subdevices.len() == count
+        });
+        bench
+    }
+
+    /// Looks into the segment.
+    pub fn inside<T: Send + 'static>(&self, look: impl FnOnce(&mut PipedSegment) -> T + Send + 'static) -> T {
+        let (answer, answered) = channel();
+        let look = move |segment: &mut PipedSegment| {
+            answer.send(look(segment)).expect("the test waits");
+        };
+        self.looks.as_ref().expect("it runs").send(Box::new(look)).expect("the segment runs");
+        answered.recv().expect("the segment runs")
+    }
+
+    /// AL status of all SubDevices.
+    pub fn states(&self) -> Vec<AlStatus> {
+        self.inside(|segment| segment.network_mut().devices().map(|device| device.al_status()).collect())
+    }
+
+    /// All SubDevices are in a state without an error.
+    pub fn are_in(&self, state: AlState) -> bool {
+        self.states().iter().all(|status| *status == AlStatus::new(state))
+    }
+
+    /// Waits for something that a busy machine may delay.
+    pub fn wait_until(&self, what: &str, holds: impl Fn(&Bench) -> bool) -> Duration {
+        let begin = Instant::now();
+        while !holds(self) {
+            assert!(begin.elapsed() < LONG, "{what}: {:?}", self.states());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        begin.elapsed()
+    }
+
+    /// Takes the bus in this process.
+    pub fn take(&self) -> OwnedBus {
+        OwnedBus::take(&self.socket, 0, "test", &Options::default(), || ()).expect("the daemon drives it")
+    }
+
+    /// A client of the daemon.
+    pub fn client(&self) -> Client {
+        Client::connect(&self.socket, "client").expect("the daemon listens")
+    }
+}
+
+fn simulate(count: usize, control: &UnixStream, asked: &Receiver<Look>) {
+    let described = Segment::from_toml(&ring(count), Path::new(".")).expect("it is right");
+    let mut segment = PipedSegment::new(Network::from_description(described).expect("it is right"));
+    let turn = |segment: &mut PipedSegment| {
+        loop {
+            match asked.try_recv() {
+                Ok(look) => look(segment),
+                Err(std::sync::mpsc::TryRecvError::Empty) => return true,
+                Err(std::sync::mpsc::TryRecvError::Disconnected) => return false,
+            }
+        }
+    };
+    segment_process::serve(&mut segment, control, turn).expect("the daemon is there");
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.looks = None;
+        if let Some(segment) = self.segment.take() {
+            assert!(segment.join().is_ok() || std::thread::panicking());
+        }
+        self.daemon = None;
+        // Another process may have a file open; the directory is for temporary files anyway.
+        let _ = std::fs::remove_dir_all(&self.directory);
+    }
+}
+
+/// An answer that is not data.
+pub fn ask(client: &mut Client, ask: Ask) -> Answer {
+    client.ask(0, ask, Vec::new()).expect("it is answered").0
+}

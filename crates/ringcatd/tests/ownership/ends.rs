@@ -1,0 +1,123 @@
+//! Ends of an owner without a release.
+
+use std::time::{Duration, Instant};
+
+use ringcat::AlState;
+
+use crate::bench::{Bench, LONG};
+use crate::owner_process::{OwnerProcess, Work};
+
+/// From SIGKILL to the first frame of the daemon: median and longest of 50 (issue 18).
+const FIRST_FRAME: [Duration; 2] = [Duration::from_millis(5), Duration::from_millis(20)];
+/// From then on all SubDevices are in PREOP within this time, beside what they take themselves.
+const PREOP: Duration = Duration::from_millis(100);
+
+/// When the first frame came over the present links, by the clock of this machine.
+fn first_frame(bench: &Bench, after_ns: u64) -> Option<u64> {
+    bench.inside(move |segment| segment.first_frame_ns().filter(|at| segment.connected_ns() > after_ns && *at > 0))
+}
+
+fn now_ns() -> u64 {
+    ringcat_link::monotonic::now_ns()
+}
+
+/// Waits for the daemon's first frame, and returns the time since then until now.
+fn wait_for_first_frame(bench: &Bench, after_ns: u64) -> Duration {
+    let begin = Instant::now();
+    loop {
+        if let Some(at) = first_frame(bench, after_ns) {
+            return Duration::from_nanos(at.saturating_sub(after_ns));
+        }
+        assert!(begin.elapsed() < LONG, "no frame of the daemon");
+        std::thread::sleep(Duration::from_micros(500));
+    }
+}
+
+// covers: daemon
+#[test]
+fn fifty_killed_applications_leave_the_bus_to_the_daemon_within_20_ms() {
+    let bench = Bench::start(8);
+    let (mut first, mut preop) = (Vec::new(), Vec::new());
+    for round in 0..50_u64 {
+        let work = if round % 5 == 0 { Work::Hold } else { Work::Cycle };
+        let mut owner = OwnerProcess::start(&bench.socket, work);
+        // Between 0 and 20 ms, the same in each run.
+        std::thread::sleep(Duration::from_micros(round.wrapping_mul(7_919) % 20_000));
+        let killed = now_ns();
+        owner.child.kill().expect("it runs");
+        first.push(wait_for_first_frame(&bench, killed));
+        let back = bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+        preop.push(back);
+        owner.child.wait().expect("it has ended");
+    }
+    first.sort_unstable();
+    preop.sort_unstable();
+    let (median, longest) = (first[25], first[49]);
+    println!("SIGKILL to the first frame of the daemon: median {median:?}, longest {longest:?}");
+    println!("from there to PREOP of all 8 SubDevices: median {:?}, longest {:?}", preop[25], preop[49]);
+    assert!(median <= FIRST_FRAME[0] && longest <= FIRST_FRAME[1], "{first:?}");
+    assert!(preop[49] <= PREOP, "{preop:?}");
+}
+
+// covers: daemon
+#[test]
+fn an_application_that_ends_without_a_release_leaves_the_bus_to_the_daemon() {
+    let bench = Bench::start(4);
+    let mut client = bench.client();
+    for signal in ["-TERM", "-ABRT", "-QUIT"] {
+        let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+        assert!(bench.are_in(AlState::Op));
+        let at = now_ns();
+        owner.signal(signal);
+        wait_for_first_frame(&bench, at);
+        bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+        crate::bench::ask(&mut client, ringcat::daemon::Ask::State);
+    }
+}
+
+// covers: daemon
+#[test]
+fn a_core_dump_does_not_delay_the_daemon() {
+    let bench = Bench::start(4);
+    let directory = crate::bench::directory();
+    let mut times = Vec::new();
+    for _ in 0..5 {
+        let owner = OwnerProcess::start_with_core(&bench.socket, &directory);
+        let at = now_ns();
+        owner.signal("-QUIT");
+        times.push(wait_for_first_frame(&bench, at));
+        bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+    }
+    times.sort_unstable();
+    println!("SIGQUIT with a core of 64 MB to the first frame of the daemon: median {:?}, all {times:?}", times[2]);
+    std::fs::remove_dir_all(directory).expect("it is there");
+    // The time includes that of starting the program `kill`.
+    assert!(times[2] <= FIRST_FRAME[1], "{times:?}");
+}
+
+// covers: daemon
+#[test]
+fn a_stopped_application_loses_the_bus_after_the_limit_and_sends_nothing_later() {
+    let bench = Bench::with_limit(4, Duration::from_millis(100));
+    let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    owner.signal("-STOP");
+    std::thread::sleep(Duration::from_millis(20));
+    owner.signal("-CONT");
+    std::thread::sleep(Duration::from_millis(200));
+    let connected = bench.inside(|segment| segment.connected_ns());
+    let at = now_ns();
+    assert!(connected < at, "a short stop is none");
+    owner.signal("-STOP");
+    let first = wait_for_first_frame(&bench, at);
+    assert!(first >= Duration::from_millis(80), "{first:?}");
+    bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+    let frames = bench.inside(|segment| segment.cyclic_frames());
+    owner.signal("-CONT");
+    // It goes on with its cycles for a while.
+    std::thread::sleep(Duration::from_millis(200));
+    let said = owner.end();
+    assert!(said.ends_with("lost true"), "{said}");
+    assert_eq!(bench.inside(|segment| segment.cyclic_frames()), frames, "none of its frames reaches the segment");
+    assert!(bench.are_in(AlState::PreOp));
+    bench.take().release().expect("the daemon drives it");
+}

@@ -1,0 +1,44 @@
+//! Messages of the daemon and any bytes: an error, or a message that survives a round trip.
+
+use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, Numbered, Right};
+use ringcat_control::wire::{decode, encode};
+use ringcat_control::{Content, Limits, Message, Refusal};
+
+/// Takes a message from bytes as they are, and from the same as content behind a header that fits.
+pub fn target(bytes: &[u8]) {
+    check(bytes);
+    let length = (bytes.len() as u32).to_le_bytes();
+    check(&[b"RCTL\x01\0\0\0", &length[..], &[0; 4], bytes].concat());
+}
+
+fn check(bytes: &[u8]) {
+    if let Ok(message) = decode(bytes, Limits::CLIENT) {
+        let again = encode(&message).expect("it is short");
+        assert_eq!(decode(&again, Limits::OWNER), Ok(message));
+    }
+}
+
+/// One message of each kind.
+pub fn seeds() -> Vec<Vec<u8>> {
+    let numbered = |what| Content::Ask(Numbered { id: 1, master: 0, what });
+    let answered = |what| Content::Answer(Numbered { id: 1, master: 0, what });
+    let links = HandedLinks {
+        main: HandedLink::Interface { name: "eth1".to_owned(), slots: 128 },
+        redundant: Some(HandedLink::Pipe),
+    };
+    let contents = [
+        Content::Hello { program: "program".to_owned() },
+        Content::Welcome { right: Right::Change, pid: 1 },
+        numbered(Ask::SdoUpload { position: 1, index: 0x1018, sub_index: None }),
+        numbered(Ask::Events { from: 7 }),
+        Content::Underway { id: 1 },
+        answered(Ok(Answer::State(Box::default()))),
+        answered(Err(Refusal::NoMaster { master: 1, present: vec![0, 2] })),
+        Content::Take { master: 0 },
+        Content::Taken(links),
+        Content::Release,
+        Content::Refused(Refusal::TooManyClients { limit: 64 }),
+    ];
+    let message = |content| encode(&Message { content, bytes: vec![1, 2] }).expect("it is short");
+    contents.into_iter().map(message).collect()
+}
