@@ -116,8 +116,8 @@ impl Drop for Wires {
 
 /// A packet socket for one class of frames. Its ring is unmapped here, and mapped by the process that drives it.
 fn socket(interface: &str, filter: ClassFilter) -> Result<OwnedFd, String> {
-    let options =
-        PacketOptions { filter, receive: ReceiveMode::Blocking, ring_frames: SLOTS, ..PacketOptions::default() };
+    let options = PacketOptions::default().with_filter(filter).with_receive(ReceiveMode::Blocking);
+    let options = options.with_ring_frames(SLOTS);
     let socket = PacketSocket::open(interface, &options).map_err(|error| error.to_string())?;
     socket.as_fd().try_clone_to_owned().map_err(|error| format!("{interface}: {error}"))
 }

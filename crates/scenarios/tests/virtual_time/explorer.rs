@@ -116,8 +116,10 @@ fn segment(dice: &mut Dice, seed: u64) -> (Network, bool) {
     let options = NetworkOptions::default().with_seed(seed).with_detection_delay(detection);
     let closed = !dice.one_in(4);
     let mut described = descriptions(&kinds);
-    for (_, description) in described.iter_mut().enumerate().filter(|(number, _)| seeds::one_buffer(seed, *number)) {
-        *description = one_buffer(description.clone());
+    for (number, description) in described.iter_mut().enumerate() {
+        if seeds::one_buffer(seed, number) {
+            *description = one_buffer(description.clone());
+        }
     }
     let mut network = if closed { ring(described, options) } else { line(described, options) };
     if dice.one_in(3) {
