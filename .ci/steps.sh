@@ -141,7 +141,7 @@ figures() {
 
 # The README's first command, and the size of the program that a release has.
 demo() {
-    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=8000000
+    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=7100000
     cargo run --release
     bytes=$(stat --format %s "$program")
     echo "$program has $bytes bytes, at most $most may be; without symbols $(without_symbols "$program")"

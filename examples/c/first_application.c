@@ -1,8 +1,8 @@
 /*
  * A first application: a running light on digital outputs, an analogue input that is printed once a second.
  *
- * It uses the SubDevices at positions 0, 2, 3 and 4: EK1100, EL2032, EL3102, EL4102. What is at position 1 stays in PREOP.
- * An argument limits the number of cycles of 1 ms.
+ * It uses the SubDevices at positions 0, 2, 3 and 4: EK1100, EL2032, EL3102, EL4102. What is at position 1 stays in
+ * PREOP. An argument limits the number of cycles of 1 ms.
  */
 #include <errno.h>
 #include <signal.h>
@@ -155,9 +155,11 @@ static int configure(void)
         return -1;
     if (ecrt_slave_config_pdos(analogue_in, EC_END, analogue_in_syncs))
         return -1;
-    if (!(sc = ecrt_master_slave_config(master, ANALOGUE_OUT)) || ecrt_slave_config_pdos(sc, EC_END, analogue_out_syncs))
+    sc = ecrt_master_slave_config(master, ANALOGUE_OUT);
+    if (!sc || ecrt_slave_config_pdos(sc, EC_END, analogue_out_syncs))
         return -1;
-    if (!(sc = ecrt_master_slave_config(master, DIGITAL_OUT)) || ecrt_slave_config_pdos(sc, EC_END, digital_out_syncs))
+    sc = ecrt_master_slave_config(master, DIGITAL_OUT);
+    if (!sc || ecrt_slave_config_pdos(sc, EC_END, digital_out_syncs))
         return -1;
     if (!ecrt_master_slave_config(master, COUPLER))
         return -1;

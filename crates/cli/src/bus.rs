@@ -57,7 +57,7 @@ impl BusArguments {
         if let Some(path) = &self.sim {
             let segment = load_segment(path)?;
             let links = SimulatedSegment::new(Network::from_description(segment)?);
-            let ring = links.addresses().1.is_some();
+            let ring = links.addresses().redundant.is_some();
             return scan(links, &Options::default(), ring, reads_firmware, print);
         }
         let interfaces = InterfaceArguments {

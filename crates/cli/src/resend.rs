@@ -34,6 +34,6 @@ pub struct ResendArgument {
 impl ResendArgument {
     /// The declaration with this choice for all domains.
     pub fn adapt(self, declaration: Declaration) -> Declaration {
-        declaration.with_lost_frames_sent_again(self.resend == Resend::Always)
+        declaration.with_sends_again(self.resend == Resend::Always)
     }
 }

@@ -1,7 +1,7 @@
 //! `ringcat run`: all SubDevices to OP as their SII or a file says, process data in a fixed cycle, and an orderly stop.
 //!
 //! Cycles have a thread of their own, and so has the acyclic half; the main thread only prints. Outputs stay zero or,
-//! with a file, have the values of `--set`. The summary tells apart why cycles are late: late wake-ups and left out
+//! with a file, have the values of `--set`. The summary distinguishes why cycles are late: late wake-ups and left out
 //! cycles are due to this machine, lost frames to the wire.
 
 mod beside;

@@ -30,7 +30,7 @@ pub struct Surroundings {
     links: LinkNames,
     /// The interface that our frames arrive on and should not.
     elsewhere: Arc<OnceLock<String>>,
-    /// Bytes that tell senders apart, and the senders.
+    /// Bytes that distinguish senders, and the senders.
     mask: [u8; 6],
     senders: Vec<(Link, [u8; 6])>,
     /// Ends the thread that listens when it is dropped.
@@ -98,7 +98,7 @@ impl Surroundings {
     }
 }
 
-/// Bytes of the source address that carry no marks (protocol 9.7.1): they tell senders apart.
+/// Bytes of the source address that carry no marks (protocol 9.7.1): they distinguish senders.
 fn unmarked(codec: MacCodec) -> [u8; 6] {
     match codec {
         MacCodec::FlagsFirst => [0, 0, 0, 0xFF, 0xFF, 0xFF],
@@ -108,7 +108,7 @@ fn unmarked(codec: MacCodec) -> [u8; 6] {
 
 /// Starts the thread that listens.
 fn listen(interfaces: &InterfaceArguments, links: &PacketLinks, found: Arc<OnceLock<String>>) -> Option<UnixStream> {
-    let (main, redundant) = links.addresses();
+    let ringcat::PerLink { main, redundant, .. } = links.addresses();
     let codec = interfaces.codec();
     let identity = Identity::new(codec, main, redundant);
     let (end, ours) = UnixStream::pair().ok()?;

@@ -21,7 +21,7 @@ pub fn lines(scan: &Scan) -> Vec<String> {
     let heading = "pos  station  alias  vendor      product     out   in  connected to  name".to_owned();
     let line = |info: &SubDeviceInfo| {
         let position = usize::from(info.position.0);
-        let parent = match scan.topology.connection_to(position) {
+        let parent = match scan.topology.connection_to(info.position) {
             Some(connection) => format!("{} port {}", connection.near.position(), connection.near.port()),
             None if position == 0 && scan.topology.main_count > 0 => "MAIN".to_owned(),
             None => "REDUNDANT".to_owned(),
@@ -55,7 +55,7 @@ pub fn json(scan: &Scan) -> scan::Scan {
 pub fn json_subdevices(scan: &Scan) -> Vec<scan::SubDevice> {
     let subdevice = |info: &SubDeviceInfo| {
         let bytes = bytes(info);
-        let connection = scan.topology.connection_to(usize::from(info.position.0));
+        let connection = scan.topology.connection_to(info.position);
         scan::SubDevice {
             position: info.position.0,
             station: info.station.0,

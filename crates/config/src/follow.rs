@@ -51,7 +51,7 @@ pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
         plugged_into: *plugged_into,
         net_id: subdevice.mailbox.as_ref().and_then(|mailbox| mailbox.net_id),
     });
-    let mut declaration = Declaration::default().with_optional_clocks(clocks);
+    let mut declaration = Declaration::default().with_clocks(clocks);
     declaration.subdevices = configs;
     declaration.domains = cyclic.domains;
     declaration.explicit_lrw = cyclic.explicit_lrw;

@@ -4,6 +4,7 @@
 //! * [`wiring`]: the path of a frame through the segment;
 //! * [`delay`]: propagation delays along this path, with known times of [`cables`] and of `sums` of cables;
 //! * [`measurement`]: the mean of several measurements, corrected for the drift of each clock;
+//! * `measured`: the result of a measurement, and whether it is that of a segment;
 //! * [`start`]: start times of SYNC signals;
 //! * [`follow`]: adjusts the cycle of the host to the reference clock.
 //!
@@ -17,6 +18,8 @@ pub mod delay;
 mod delay_range;
 pub mod delays;
 pub mod follow;
+mod known_cable;
+mod measured;
 pub mod measurement;
 mod places;
 pub mod start;
@@ -29,6 +32,8 @@ pub use delay::{Passage, PortTimes, Segment};
 pub use delay_range::DelayRange;
 pub use delays::{Delays, Unknown};
 pub use follow::{Follower, phase_error};
+pub use known_cable::KnownCable;
+pub use measured::{KnownClocks, Measured, port_times};
 pub use measurement::{Disagreement, Latched, Measurements};
 pub use start::first_pulse;
 pub(crate) use window::SyncWindow;

@@ -30,7 +30,7 @@ use crate::info::{Direction, SubDeviceInfo};
 pub use crate::info::IdentityField;
 
 pub use address::ConfigAddress;
-pub use declared::{DeclaredSyncManager, SyncManagerRole};
+pub use declared::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;

@@ -16,6 +16,7 @@ use ringcat_wire::address::{LogicalAddress, Position, StationAddress, Wkc};
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
+use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::Identity;
 
@@ -83,6 +84,14 @@ pub enum Event {
         in_state: usize,
         /// The segment was not as known: what differs was scanned.
         differs: bool,
+    },
+    /// The former owner has handed the segment over in the middle of a conversation with a mailbox. An SDO transfer and
+    /// a file are aborted at the SubDevice; the mailbox can be used.
+    ConversationCut {
+        /// Position.
+        position: Position,
+        /// Protocol of the conversation.
+        protocol: Protocol,
     },
     /// A SubDevice without a declaration did not reach its requested state.
     UndeclaredFailed {

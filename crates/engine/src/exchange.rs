@@ -42,7 +42,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 pub use clocks::{ClockDatagrams, ClockSetup, ReferenceTime};
-pub use copy::{CopyError, CopyRule, WhenStale};
+pub use copy::{CopyError, CopyId, CopyRule, WhenStale};
 pub use counters::CyclicCounters;
 pub use domain::Domain;
 pub use entry::Entry;

@@ -5,6 +5,7 @@
 //! header with version and checksum (decision 0061). Any bytes are allowed: they are checked as a whole, and memory is
 //! bounded by their length. Whether the segment is still as known is left to `resume`.
 
+mod clocks;
 mod code;
 mod error;
 mod subdevice;
@@ -16,7 +17,9 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::sii::{CategoryKind, SiiHeader};
 
+use crate::clocks::KnownClocks;
 use crate::info::{SiiExtent, SubDeviceInfo};
+use crate::order::InOrder;
 use crate::ring::RingState;
 use crate::topology::Topology;
 use code::{Code, Input, choice, fields};
@@ -25,7 +28,7 @@ pub use error::KnowledgeError;
 /// First bytes.
 const MAGIC: [u8; 8] = *b"RingCAT\0";
 /// Version of the form of the bytes. Bytes of other versions are refused: the reader scans.
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 /// Bytes of magic, version, length and checksum.
 const HEADER: usize = 8 + 2 + 4 + 8;
 /// Bytes of a SubDevice, as a first estimate.
@@ -68,6 +71,8 @@ pub struct Knowledge {
     pub(crate) activations: u32,
     /// SII contents read before.
     pub(crate) siis: Vec<KnownSii>,
+    /// Delays, drifts and cable times, if the clocks were set up.
+    pub(crate) clocks: Option<KnownClocks>,
 }
 
 /// What is known of one SubDevice.
@@ -110,6 +115,8 @@ pub struct KnownMailbox {
     pub(crate) recent: Vec<(u8, u64)>,
     /// Requests that may still be answered.
     pub(crate) late: Vec<LateAnswer>,
+    /// Lanes with a conversation under way.
+    pub(crate) under_way: Vec<u8>,
 }
 
 /// A request of the former owner that may still be answered.
@@ -170,7 +177,13 @@ pub(crate) enum KnownEnd {
     Unreadable,
 }
 
-fields!(KnownMailbox { counter: u8, repeat: bool, recent: Vec<(u8, u64)>, late: Vec<LateAnswer> });
+fields!(KnownMailbox {
+    counter: u8,
+    repeat: bool,
+    recent: Vec<(u8, u64)>,
+    late: Vec<LateAnswer>,
+    under_way: Vec<u8>,
+});
 fields!(LateAnswer { lane: u8, mark: u16, limit_ms: u32 });
 fields!(KnownSubDevice {
     info: SubDeviceInfo,
@@ -216,6 +229,7 @@ impl Knowledge {
         self.topology.put(&mut out);
         self.others.put(&mut out);
         self.siis.put(&mut out);
+        self.clocks.put(&mut out);
         write_header(&mut out);
         out
     }
@@ -240,18 +254,19 @@ impl Knowledge {
         let stations = input.expected("a station address of its own for each SubDevice");
         let others = take_subdevices(input)?;
         let siis = Vec::take(input)?;
+        let clocks = clocks::take_checked(input)?;
         if input.left() > 0 {
             return Err(input.expected("the end"));
         }
         let knowledge =
-            Knowledge { subdevices, others, topology, main_count, ring, sequence, offered, activations, siis };
+            Knowledge { subdevices, others, topology, main_count, ring, sequence, offered, activations, siis, clocks };
         if knowledge.are_stations_unique() { Ok(knowledge) } else { Err(stations) }
     }
 
     fn are_stations_unique(&self) -> bool {
         let all = self.subdevices.iter().chain(&self.others);
         let mut stations: Vec<u16> = all.map(|known| known.info.station.0).collect();
-        stations.sort_unstable();
+        stations.put_in_order();
         stations.first() != Some(&0) && stations.windows(2).all(|pair| pair[0] != pair[1])
     }
 }
@@ -299,7 +314,7 @@ fn open(bytes: &[u8]) -> Result<Input<'_>, KnowledgeError> {
         return wrong(0, "knowledge of a segment");
     }
     if u16::take(&mut input)? != VERSION {
-        return wrong(8, "version 1");
+        return wrong(8, "version 2");
     }
     if usize::take(&mut input)? != bytes.len().saturating_sub(HEADER) {
         return wrong(10, "the number of bytes behind the header");

@@ -25,6 +25,7 @@ use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
 
 use crate::domain::DomainId;
 use crate::link::LinkSet;
+use crate::order::InOrder;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 use fixed::Starts;
 use spec::Cut;
@@ -284,7 +285,7 @@ fn contributions(command: Command, reads: &[PlacedArea], writes: &[PlacedArea]) 
     let mut contributions: Vec<(usize, Wkc)> = Vec::new();
     let subdevices = |areas: &[PlacedArea]| {
         let mut subdevices: Vec<usize> = areas.iter().map(|a| a.area.subdevice).collect();
-        subdevices.sort_unstable();
+        subdevices.put_in_order();
         subdevices.dedup();
         subdevices
     };

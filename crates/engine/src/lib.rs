@@ -34,6 +34,7 @@ pub mod layout;
 pub mod link;
 pub mod mail;
 pub mod main_device;
+mod order;
 pub(crate) mod plan;
 pub(crate) mod procedures;
 pub(crate) mod queue;
@@ -54,7 +55,9 @@ pub use plan::{
 };
 pub use procedures::al_state::StateError;
 pub use procedures::clocks::NotLocked;
-pub use procedures::configure::{ConfigureError, SetupError};
+pub use procedures::configure::{
+    ConfigureError, RegisterCommandError, RegisterFailure, SetupError, StartupError, WrongValue,
+};
 pub use procedures::dictionary::ReadPdos;
 pub use procedures::inspect_ring::{RingInspection, inspect_ring};
 pub use procedures::request_states::{NotFollowed, NotFollowedReason, StateScope, StatesError};
@@ -66,6 +69,7 @@ pub use procedures::services::port_report::{Neighbour, PortRegisters, PortReport
 pub use procedures::services::ports::BlockedPort;
 pub use procedures::services::registers::Urgency;
 pub use procedures::services::statistics::{PortErrors, Statistics};
+pub use procedures::sii::SiiReadError;
 pub use procedures::sii::program::{SiiProgramError, SiiWritten};
 pub use procedures::stop::StopError;
 pub use procedures::unassigned::rescan::{Found, Identified, Rescan};

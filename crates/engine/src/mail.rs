@@ -26,6 +26,7 @@ mod error;
 pub mod foe;
 mod handover;
 mod lane;
+mod lanes;
 mod mailbox;
 mod protocol_error;
 pub mod raw;
@@ -42,7 +43,7 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
-pub use conversation::{Conversation, Limits};
+pub use conversation::{Conversation, Limits, MailboxSizes};
 pub use counters::MailCounters;
 pub use emergencies::EmergencyRing;
 pub(crate) use emergencies::EmergencyRings;

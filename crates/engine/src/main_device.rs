@@ -8,6 +8,7 @@ mod activate;
 mod activate_error;
 mod active;
 mod areas;
+mod bus_control;
 mod clients;
 mod clocks;
 mod commands;
@@ -58,16 +59,16 @@ use ringcat_wire::al::AlState;
 
 pub use activate_error::ActivateError;
 pub use active::Active;
-pub use areas::{AreaEntries, Directory};
+pub use areas::{AreaEntries, Directory, PlacedEntry};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
-pub use declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
+pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;
-pub use registered_area::RegisteredArea;
+pub use registered_area::{EntryPlace, RegisteredArea};
 pub use sent_once::SentOnce;
 pub use states::{GroupState, SubDeviceState};
 
@@ -77,10 +78,11 @@ pub use crate::segment::Retries;
 pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
+use crate::knowledge::KnownMailbox;
 use crate::link::{Link, LinkSet};
-use crate::mail::EmergencyRings;
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
+use crate::mail::{EmergencyRings, InUse};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::{Companions, reconcile_without_application};
@@ -143,6 +145,8 @@ pub struct MainDevice {
     own_objects: OwnObjects,
     /// A link that was taken down by command.
     disconnected: Option<Link>,
+    /// Mailboxes that were in use when the role became INACTIVE.
+    left_mailboxes: Vec<(InUse, KnownMailbox)>,
 }
 
 impl MainDevice {
@@ -178,6 +182,7 @@ impl MainDevice {
             gateway_queue: None,
             own_objects: OwnObjects::default(),
             disconnected: None,
+            left_mailboxes: Vec::new(),
             options,
         };
         main_device.start_reconciler();

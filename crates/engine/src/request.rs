@@ -16,7 +16,7 @@ pub use register::RegisterRequest;
 pub use sdo::SdoRequest;
 pub use slot::{Request, RequestFailure, RequestRefused, RequestState};
 pub use soe::SoeRequest;
-pub use voe::VoeHandler;
+pub use voe::{VoeHandler, VoeHeader};
 
 pub(crate) use slot::{Access, AcyclicSide, Order, Subject};
 

@@ -26,8 +26,7 @@ pub enum MainDeviceRole {
     /// It controls the segment.
     #[default]
     Active,
-    /// Another MainDevice controls the segment: functions that need the bus are refused. Procedures that run when the
-    /// role is set, supervision among them, go on: a standby MainDevice ends them first.
+    /// Another MainDevice controls the segment: functions that need the bus are refused, and nothing runs.
     Inactive,
 }
 

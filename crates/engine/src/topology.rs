@@ -30,13 +30,13 @@ use rings::Rings;
 
 impl Topology {
     /// Builds the tree. The first `main_count` SubDevices are those on the main link.
-    pub fn build(nodes: &[NodeStatus], main_count: usize) -> Topology {
+    pub(crate) fn build(nodes: &[NodeStatus], main_count: usize) -> Topology {
         Topology::with_local_rings(nodes, main_count, &[])
     }
 
     /// As [`Topology::build`], with rings behind junctions. Each ring, closed or broken, is a branch on the port where
     /// it begins; a closing cable that does not fit is left out.
-    pub fn with_local_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
+    pub(crate) fn with_local_rings(nodes: &[NodeStatus], main_count: usize, closings: &[Closing]) -> Topology {
         place::build(nodes, main_count.min(nodes.len()), &Rings::new(nodes, closings))
     }
 }

@@ -1,9 +1,10 @@
 /*
  * ecrt.h: the realtime interface of EtherCAT masters on Linux, version 1.6, as RingCAT provides it.
  *
- * A program requests a master, declares the SubDevices that it uses and places their process data in domains, activates,
- * and then cycles: receive, process, its own work, queue, send. docs/ecrt.md of RingCAT has each function with its return
- * codes. Functions return 0 or a value, and a negative error number if they fail, unless stated otherwise.
+ * A program requests a master, declares the SubDevices that it uses and places their process data in domains,
+ * activates, and then cycles: receive, process, its own work, queue, send. docs/ecrt.md of RingCAT has each function
+ * with its return codes. Functions return 0 or a value, and a negative error number if they fail, unless
+ * stated otherwise.
  */
 #ifndef __ECRT_H__
 #define __ECRT_H__

@@ -57,7 +57,7 @@ impl Links for AnyLinks {
         either!(self, links => links.now())
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         either!(self, links => links.addresses())
     }
 

@@ -87,7 +87,7 @@ impl Bus {
         })?;
         let _held = HeldSignals::hold();
         let (cyclic, acyclic) = AnyLinks::open(&source)?;
-        let is_ring = cyclic.addresses().1.is_some();
+        let is_ring = cyclic.addresses().redundant.is_some();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
         let supervisor = started.map_err(|error| error.to_string())?;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat::{
-    ClockConfig, Declaration, DomainId, Entry, ReferenceClock, RegisterError, Required, SubDeviceConfig, SubDeviceId,
-    SubDeviceInfo,
+    ClockConfig, Declaration, DomainId, Entry, EntryPlace, ReferenceClock, RegisterError, Required, SubDeviceConfig,
+    SubDeviceId, SubDeviceInfo,
 };
 
 use crate::code::{Code, Outcome, report};
@@ -90,11 +90,11 @@ impl Draft {
         placed.map_err(refusal)
     }
 
-    /// Places the entry at a place (SyncManager, PDO in it, entry in that) in a domain.
+    /// Places the entry at a place in a domain.
     ///
     /// # Errors
     /// There is none, or the SubDevice has too few FMMUs.
-    pub fn register_at(&mut self, index: usize, domain: DomainId, place: (u8, usize, usize)) -> Outcome<Entry> {
+    pub fn register_at(&mut self, index: usize, domain: DomainId, place: EntryPlace) -> Outcome<Entry> {
         let found = self.prepare(index)?;
         let placed = self.declaration.register_entry_at(domain, SubDeviceId(index), place, found.as_ref());
         self.registered(domain);
@@ -147,7 +147,8 @@ impl Draft {
                 declaration.subdevices[index] = config;
             }
         }
-        if self.has_clock() {
+        // Those with SYNC signals may come later.
+        if self.has_clock() || declaration.subdevices.iter().any(|config| config.sync.is_some()) {
             let reference = match self.reference {
                 None => ReferenceClock::FirstWithClock,
                 Some(index) => ReferenceClock::Declared(SubDeviceId(index)),
@@ -165,6 +166,7 @@ fn refusal(error: RegisterError) -> Code {
         RegisterError::Plan { .. }
         | RegisterError::Unknown { .. }
         | RegisterError::NotMapped { .. }
+        | RegisterError::NoProcessData { .. }
         | RegisterError::NoSuchPlace { .. } => Code::NOT_FOUND,
         _ => Code::INVALID,
     };

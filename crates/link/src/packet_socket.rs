@@ -26,6 +26,7 @@ const OFFSET_FRAMES: u64 = 1024;
 
 /// How a socket is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PacketOptions {
     /// Frames that the socket receives.
     pub filter: ClassFilter,
@@ -40,6 +41,43 @@ pub struct PacketOptions {
     /// sockets of one EtherType. If true, the socket sees all frames before that step, and each EtherCAT frame counts
     /// as dropped in the statistics of the interface.
     pub keep_vlan_tags: bool,
+}
+
+impl PacketOptions {
+    /// Sets [`PacketOptions::filter`].
+    #[must_use]
+    pub const fn with_filter(mut self, filter: ClassFilter) -> PacketOptions {
+        self.filter = filter;
+        self
+    }
+
+    /// Sets [`PacketOptions::receive`].
+    #[must_use]
+    pub const fn with_receive(mut self, receive: ReceiveMode) -> PacketOptions {
+        self.receive = receive;
+        self
+    }
+
+    /// Sets [`PacketOptions::ring_frames`].
+    #[must_use]
+    pub const fn with_ring_frames(mut self, ring_frames: u32) -> PacketOptions {
+        self.ring_frames = ring_frames;
+        self
+    }
+
+    /// Sets [`PacketOptions::promiscuous`].
+    #[must_use]
+    pub const fn with_promiscuous(mut self, promiscuous: bool) -> PacketOptions {
+        self.promiscuous = promiscuous;
+        self
+    }
+
+    /// Sets [`PacketOptions::keep_vlan_tags`].
+    #[must_use]
+    pub const fn with_keep_vlan_tags(mut self, keep_vlan_tags: bool) -> PacketOptions {
+        self.keep_vlan_tags = keep_vlan_tags;
+        self
+    }
 }
 
 impl Default for PacketOptions {

@@ -67,7 +67,11 @@ fn describe(path: &Path, error: &io::Error) -> String {
     format!("the capture {} cannot be written: {error}; {advice}", path.display())
 }
 
-impl Error for RecorderError {}
+impl Error for RecorderError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        Some(&self.error)
+    }
+}
 
 #[derive(Debug)]
 struct Shared {

@@ -36,7 +36,7 @@ impl Sniffer {
     /// # Errors
     /// As [`PacketSocket::open`].
     pub fn open(interface: &str, all: bool) -> Result<Sniffer, LinkError> {
-        let options = PacketOptions { ring_frames: RING_FRAMES, keep_vlan_tags: true, ..PacketOptions::default() };
+        let options = PacketOptions::default().with_ring_frames(RING_FRAMES).with_keep_vlan_tags(true);
         let socket = PacketSocket::open_with(interface, &options, Passing { outgoing: true, all })?;
         Ok(Sniffer { socket })
     }

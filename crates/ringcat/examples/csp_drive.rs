@@ -79,7 +79,7 @@ impl Drive {
 fn run<L: Links + 'static>(links: L) -> Result<(), Box<dyn Error>> {
     let mut main_device = MainDevice::request(links, &Options::default());
     main_device.scan()?;
-    let mut declaration = Declaration::with_period(PERIOD).with_clocks(ClockConfig::default());
+    let mut declaration = Declaration::new(PERIOD).with_clocks(ClockConfig::default());
     let config = SubDeviceConfig::at_position(0).sync(SyncSignals::sync0(PERIOD_NS, 0));
     let id = declaration.add(config);
     let mut application = main_device.activate(declaration)?;

@@ -28,7 +28,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 fn main() -> Result<(), Box<dyn Error>> {
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
     main_device.scan()?;
-    let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    let mut declaration = Declaration::new(Duration::from_millis(1));
     let [_, device, _] = [0, 1, 2].map(|position| declaration.add(SubDeviceConfig::at_position(position)));
     let mut application = main_device.activate(declaration)?;
     application.wait_until_op(LIMIT)?;

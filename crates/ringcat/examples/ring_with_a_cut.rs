@@ -30,7 +30,7 @@ const DOMAIN: DomainId = DomainId(0);
 fn main() -> Result<(), Box<dyn Error>> {
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
     main_device.scan()?;
-    let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    let mut declaration = Declaration::new(Duration::from_millis(1));
     let [_, lamps, _] = [0, 1, 2].map(|position| declaration.add(SubDeviceConfig::at_position(position)));
     let mut application = main_device.activate(declaration)?;
     let lamp = application.output::<bool>(lamps, 0x7000, 1)?;

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     // What is expected: vendor and product where it matters, anything at position 0.
-    let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    let mut declaration = Declaration::new(Duration::from_millis(1));
     declaration.add(SubDeviceConfig::at_position(0));
     let lamps = declaration.add(SubDeviceConfig::at_position(1).expect_product(VENDOR, 0x07D8_0008));
     let buttons = declaration.add(SubDeviceConfig::at_position(2).expect_product(VENDOR, 0x03F0_0008));

@@ -40,7 +40,7 @@ fn run<L: Links + Send + 'static>(cyclic: L, acyclic: L) -> Result<(), Box<dyn E
     let serial = supervisor.subdevice(Position(0)).sdo_read::<u32>(0x1018, 4)?;
     println!("serial number {serial}");
 
-    let mut declaration = Declaration::with_period(Duration::from_millis(2));
+    let mut declaration = Declaration::new(Duration::from_millis(2));
     let id = declaration.add(SubDeviceConfig::at_position(0));
     let application = supervisor.activate(declaration, cyclic)?;
     let cycles = application.start_cycles(ringcat::realtime::precise_timers, |_| ControlFlow::Continue(()))?;

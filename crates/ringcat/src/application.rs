@@ -93,22 +93,27 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Waits until the cycle begins. Returns the time, and the time at which the last check for frames began.
     #[inline(always)]
     fn wait_for_cycle(&mut self, probe: &mut impl CycleProbe) -> (Instant, Instant) {
-        let left_at = self.wait_for_only_frame(probe);
+        let waited = self.wait_for_only_frame(probe);
         let now = self.links.now();
-        if let Some(left_at) = left_at {
-            self.note_round_trip(left_at, now);
-        }
-        let is_idle = !self.links.has_frame() && (!H::SHARES_LINKS || self.acyclic.due_at(&self.links) > now);
-        if is_idle && self.cyclic.begins(now) {
+        let due_at = match waited {
+            Some((left_at, due_at)) => {
+                self.note_round_trip(left_at, now);
+                due_at
+            }
+            None if H::SHARES_LINKS => self.acyclic.due_at(&self.links),
+            None => Instant::NEVER,
+        };
+        if due_at > now && !self.links.has_frame() && self.cyclic.begins(now) {
             return (now, now);
         }
         self.wait_for_frames(probe)
     }
 
-    /// The fast path of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. Returns
-    /// the departure of the frame if it came back. Ends early if the acyclic half shares the links and has work.
+    /// The fast path of a wait: if the only frame is on the wire, waits for it, and then for the next cycle. If the
+    /// frame came back: its departure, and when the acyclic half has work if it shares the links. What other threads
+    /// request during the second wait is done after this cycle has left. Ends early if the acyclic half has work.
     #[inline(always)]
-    fn wait_for_only_frame<P: CycleProbe>(&mut self, probe: &mut P) -> Option<Instant> {
+    fn wait_for_only_frame<P: CycleProbe>(&mut self, probe: &mut P) -> Option<(Instant, Instant)> {
         let Application { links, cyclic, acyclic, .. } = self;
         if !cyclic.exchange.awaits_only_frame() || !links.knows_arrivals() {
             return None;
@@ -141,18 +146,19 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         if P::AWAITS_FRAMES && !cyclic.exchange.awaits_frames() {
             probe.frames_are_in(links.now());
         }
+        let due_at = if H::SHARES_LINKS { acyclic.due_at(links) } else { Instant::NEVER };
         if cyclic.may_begin_early() {
-            return Some(left_at);
+            return Some((left_at, due_at));
         }
         if H::SHARES_LINKS {
-            let wake = until.min(acyclic.due_at(links));
+            let wake = until.min(due_at);
             if now < wake {
                 links.wait_from(now, wake);
             }
         } else {
             links.sleep(until);
         }
-        Some(left_at)
+        Some((left_at, due_at))
     }
 
     /// Receives frames, and runs the acyclic half if it shares the links, until the cycle begins. Returns the time, and

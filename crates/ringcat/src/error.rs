@@ -89,9 +89,10 @@ impl fmt::Display for Error {
             Error::Write(error) => error.fmt(f),
             Error::NoDomain(error) => error.fmt(f),
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
-            Error::Stop(StopError::Bus(BusError::Lost { .. })) => f.write_str(
+            Error::Stop(error @ StopError::Bus(BusError::Lost { .. })) => write!(
+                f,
                 "stop: no frame comes back on any interface, so no SubDevice was brought to INIT: they keep their \
-                 states until their watchdogs expire. Are the cables of the host unplugged?",
+                 states until their watchdogs expire. Are the cables of the host unplugged? ({error})"
             ),
             Error::Stop(error) => write!(f, "stop: {error}"),
             #[cfg(feature = "sim")]
@@ -105,7 +106,31 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Scan(error) => Some(error),
+            Error::Activate(error) => Some(error),
+            Error::Configure(error) => Some(error),
+            Error::Sdo(error) => Some(error),
+            Error::Service(error) => Some(error),
+            Error::SubDevice(error) => Some(&**error),
+            Error::States(error) => Some(error),
+            Error::NotReady(error) => Some(error),
+            Error::Map(error) => Some(error),
+            Error::DoesNotFit(error) => Some(error),
+            Error::Write(error) => Some(error),
+            Error::NoDomain(error) => Some(error),
+            Error::Stop(error) => Some(error),
+            #[cfg(feature = "sim")]
+            Error::Segment(error) => Some(error),
+            Error::Thread(error) => Some(error),
+            #[cfg(feature = "gateway")]
+            Error::Gateway { cause, .. } => Some(cause),
+            _ => None,
+        }
+    }
+}
 
 macro_rules! errors {
     ($($variant:ident($error:ty),)*) => {$(

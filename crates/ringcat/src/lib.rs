@@ -12,7 +12,7 @@
 //! let segment = SimulatedSegment::from_toml("[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\n")?;
 //! let mut main_device = MainDevice::request(segment, &Options::default());
 //! main_device.scan()?;
-//! let mut declaration = Declaration::with_period(Duration::from_millis(1));
+//! let mut declaration = Declaration::new(Duration::from_millis(1));
 //! let terminal = declaration.add(SubDeviceConfig::at_position(0));
 //! let mut application = main_device.activate(declaration)?;
 //! let lamp = application.output::<bool>(terminal, 0x7000, 1)?;
@@ -49,6 +49,7 @@
 //! | `esi` | device descriptions from files; with `sim`, simulated devices from them |
 //! | `gateway` | the mailbox gateway over UDP and TCP |
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
+//! | `serde` | the types of `Snapshot` in any format of serde |
 //! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
@@ -119,7 +120,7 @@ pub use error::Error;
 pub use job::Job;
 pub use limits::TransferLimits;
 pub use link_figures::{LinkFigures, LinkRate};
-pub use links::Links;
+pub use links::{Links, PerLink};
 pub use live::LiveSubDevice;
 pub use main_device::{MainDevice, Options, Refused, automatic};
 pub use mapped::{DoesNotFit, Input, MapError, Mapped, MappedObject, ObjectOf, Output, OutputBits, Wanted, WriteError};
@@ -138,7 +139,6 @@ pub use value::{Number, ObjectValue};
 
 pub use ringcat_engine::Acknowledge;
 pub use ringcat_engine::BlockedPort;
-pub use ringcat_engine::ConfigureError;
 pub use ringcat_engine::PortOf;
 pub use ringcat_engine::ReadPdos;
 pub use ringcat_engine::RingInspection;
@@ -147,10 +147,10 @@ pub use ringcat_engine::SiiWritten;
 pub use ringcat_engine::StopError;
 pub use ringcat_engine::Urgency;
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, DeclaredSyncManager, Expected, Group, IdentityField, IdnWrite, IpSettings, ModeError,
-    Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock, RegisterAccess, RegisterCommand,
-    SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals,
-    Timeouts, Transition, Watchdog, WhenUnlocked,
+    ClockConfig, ConfigAddress, ConfigError, DeclaredArea, DeclaredSyncManager, Expected, Group, IdentityField,
+    IdnWrite, IpSettings, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock,
+    RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout,
+    SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{
@@ -158,13 +158,13 @@ pub use ringcat_engine::event::{
     Subject, Subjects, TimedEvent,
 };
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
-pub use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, WhenStale};
+pub use ringcat_engine::exchange::{CopyError, CopyId, CopyRule, CyclicCounters, Entry, WhenStale};
 pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
 pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
 pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};
-pub use ringcat_engine::mail::coe::history::History;
+pub use ringcat_engine::mail::coe::history::{History, HistoryMessage};
 pub use ringcat_engine::mail::coe::information::{Entry as ObjectEntry, InformationError, Object};
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::foe::{FoeError, FoeFailure, FoeOptions, FoeProgress};
@@ -177,14 +177,15 @@ pub use ringcat_engine::main_device::snapshot::{
     Snapshot, SubDeviceSnapshot,
 };
 pub use ringcat_engine::main_device::{
-    ActivateError, Address, ClockStatus, Declaration, Directory, DomainConfig, DomainMember, ExplicitLrw, Function,
-    GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY,
-    MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries, SegmentStatus,
-    SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
+    ActivateError, Address, ClockStatus, Declaration, DeclaredGroup, Directory, DomainConfig, DomainMember, EntryPlace,
+    ExplicitLrw, Function, GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS,
+    MAX_UNDER_WAY, MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries,
+    SegmentStatus, SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
 pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::request::{
     RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
+    VoeHeader,
 };
 pub use ringcat_engine::ring_status::{
     Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
@@ -194,6 +195,7 @@ pub use ringcat_engine::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::{Classified, Identity};
 pub use ringcat_engine::{ClosingEvidence, JunctionConnection, JunctionError, JunctionMode};
+pub use ringcat_engine::{ConfigureError, RegisterCommandError, RegisterFailure, StartupError, WrongValue};
 pub use ringcat_engine::{DelayRange, Follower, phase_error};
 pub use ringcat_engine::{EepromAssignment, EepromOwner, EepromOwnership};
 pub use ringcat_engine::{FIRST_STATION, Scan, ScanError};
@@ -211,7 +213,6 @@ pub use ringcat_wire::source_address::MacCodec;
 
 pub use ringcat_engine::NotLocked;
 pub use ringcat_engine::SetupError;
-pub use ringcat_engine::SiiProgramError;
 pub use ringcat_engine::StateError;
 pub use ringcat_engine::Topology;
 pub use ringcat_engine::config::SyncManagerOverride;
@@ -219,11 +220,13 @@ pub use ringcat_engine::event::history::Incident;
 pub use ringcat_engine::exchange::Exchange;
 pub use ringcat_engine::info::{ControllerInfo, InfoWarning, MailboxSyncManagers, PdoInfo};
 pub use ringcat_engine::layout::LayoutError;
-pub use ringcat_engine::mail::eoe::EthernetStatus;
+pub use ringcat_engine::mail::eoe::{EoeError, EoeFailure, EthernetCounters, EthernetRate, EthernetStatus};
 pub use ringcat_engine::mail::stream::Overflow;
-pub use ringcat_engine::mail::{Conversation, Lane, MailCounters};
-pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice};
+pub use ringcat_engine::mail::{Conversation, Lane, MailCounters, MailboxSizes};
+pub use ringcat_engine::main_device::MainDevice as Engine;
+pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice, PlacedEntry};
 pub use ringcat_engine::{PlanFault, PlanProblem, PlanWarning, SmPlan};
+pub use ringcat_engine::{SiiProgramError, SiiReadError};
 #[cfg(feature = "packet")]
 pub use ringcat_link::pcapng::Direction as FrameDirection;
 #[cfg(feature = "packet")]

@@ -8,6 +8,23 @@ use ringcat_engine::time::Instant;
 use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
+/// What there is once for each link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PerLink<T> {
+    /// Of the main link.
+    pub main: T,
+    /// Of the redundant link, in a ring.
+    pub redundant: Option<T>,
+}
+
+impl<T> PerLink<T> {
+    /// Of the main link, and of the redundant link if there is one.
+    pub const fn new(main: T, redundant: Option<T>) -> PerLink<T> {
+        PerLink { main, redundant }
+    }
+}
+
 /// One or two network interfaces with a clock.
 ///
 /// Links belong to one thread, which calls these in turn. [`Links::send`] and [`Links::receive`] are called in the
@@ -17,7 +34,7 @@ pub trait Links {
     fn now(&self) -> Instant;
 
     /// Addresses of the main interface and, if there is one, of the redundant interface.
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>);
+    fn addresses(&self) -> PerLink<MacAddress>;
 
     /// Sends a frame, without FCS. A link that is down drops it.
     fn send(&mut self, link: Link, frame: &[u8]);

@@ -4,9 +4,6 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::AcyclicCounters;
-use ringcat_engine::ReadPdos;
-use ringcat_engine::Scan;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
@@ -18,15 +15,15 @@ use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
 };
 use ringcat_engine::time::Instant;
+use ringcat_engine::{AcyclicCounters, ReadPdos, RingInspection, Scan, inspect_ring};
 use ringcat_engine::{JunctionConnection, JunctionMode};
-use ringcat_engine::{RingInspection, inspect_ring};
 use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
 use crate::acyclic::{Inline, carry_out_link_order, log_messages};
 use crate::application::Application;
 use crate::error::Error;
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 use crate::window::{DEFAULT_BUDGET, Window};
 
 /// Options of a MainDevice. The MAC addresses come from the links.
@@ -204,7 +201,7 @@ impl Options {
 
     /// An engine for these links.
     pub(crate) fn engine(&self, links: &impl Links) -> Engine {
-        let (main, redundant) = links.addresses();
+        let PerLink { main, redundant, .. } = links.addresses();
         let mut options = Engineering::new(main, redundant);
         options.sii_cache = self.sii_cache;
         options.sii_extent = self.sii_extent;
@@ -481,7 +478,11 @@ impl<M> fmt::Display for Refused<M> {
     }
 }
 
-impl<M> std::error::Error for Refused<M> {}
+impl<M> std::error::Error for Refused<M> {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.error)
+    }
+}
 
 impl<M> From<Box<Refused<M>>> for Error {
     fn from(refused: Box<Refused<M>>) -> Error {
@@ -491,7 +492,7 @@ impl<M> From<Box<Refused<M>>> for Error {
 
 /// A declaration of all scanned SubDevices, with the process data of their SII in one domain.
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
-    let mut declaration = Declaration::with_period(period);
+    let mut declaration = Declaration::new(period);
     for subdevice in subdevices {
         declaration.add(SubDeviceConfig::from_info(subdevice));
     }

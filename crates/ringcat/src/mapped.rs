@@ -38,7 +38,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// let segment = SimulatedSegment::from_toml("[segment]\n[[device]]\ntype = \"servo\"\n")?;
     /// let mut main_device = MainDevice::request(segment, &Options::default());
     /// main_device.scan()?;
-    /// let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    /// let mut declaration = Declaration::new(Duration::from_millis(1));
     /// let drive = declaration.add(SubDeviceConfig::at_position(0));
     /// let application = main_device.activate(declaration)?;
     ///

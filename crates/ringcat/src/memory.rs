@@ -7,7 +7,7 @@ use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::{MAX_FRAME_VLAN, MacAddress};
 
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 
 /// A frame in a ring.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ pub struct MemoryLinks {
     /// Frames from the peer.
     pub arriving: FrameRing,
     now: Instant,
-    addresses: (MacAddress, Option<MacAddress>),
+    addresses: PerLink<MacAddress>,
 }
 
 impl MemoryLinks {
@@ -98,7 +98,7 @@ impl MemoryLinks {
             sent: FrameRing::new(capacity),
             arriving: FrameRing::new(capacity),
             now: Instant::default(),
-            addresses: (main, redundant),
+            addresses: PerLink::new(main, redundant),
         }
     }
 
@@ -113,7 +113,7 @@ impl Links for MemoryLinks {
         self.now
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> PerLink<MacAddress> {
         self.addresses
     }
 

@@ -75,7 +75,14 @@ impl fmt::Display for NetworkFailure {
     }
 }
 
-impl std::error::Error for NetworkFailure {}
+impl std::error::Error for NetworkFailure {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            NetworkFailure::Read { error, .. } => Some(error),
+            NetworkFailure::Content(error) => Some(&**error),
+        }
+    }
+}
 
 impl LoadedNetwork {
     /// Reads a file.

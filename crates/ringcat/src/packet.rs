@@ -15,7 +15,7 @@ use ringcat_wire::frame::MacAddress;
 
 pub use ringcat_link::{HandedSocket, LinkCounters, LinkError, ReceiveMode};
 
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 
 /// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on
 /// the wire at once ([`ringcat_engine::MAX_IN_FLIGHT`]).
@@ -94,7 +94,7 @@ impl PacketLinks {
     ) -> Result<PacketLinks, LinkError> {
         let classes = if filter == ClassFilter::All { 2 } else { 1 };
         let ring_frames = RING_FRAMES * classes;
-        let options = PacketOptions { receive: mode, filter, ring_frames, ..PacketOptions::default() };
+        let options = PacketOptions::default().with_receive(mode).with_filter(filter).with_ring_frames(ring_frames);
         let names = [Some(main.to_owned()), redundant.map(str::to_owned)];
         let redundant = redundant.map(|name| PacketSocket::open(name, &options)).transpose()?;
         let main = PacketSocket::open(main, &options)?;
@@ -141,13 +141,13 @@ impl PacketLinks {
     }
 
     /// What another process must know to go on with the sockets, beside duplicates of their descriptors.
-    pub fn handed(&self) -> (HandedSocket, Option<HandedSocket>) {
-        (self.main.handed(), self.redundant.as_ref().map(PacketSocket::handed))
+    pub fn handed(&self) -> PerLink<HandedSocket> {
+        PerLink::new(self.main.handed(), self.redundant.as_ref().map(PacketSocket::handed))
     }
 
     /// The descriptors of both sockets, to be duplicated for another process.
-    pub fn descriptors(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        (self.main.as_fd(), self.redundant.as_ref().map(PacketSocket::as_fd))
+    pub fn descriptors(&self) -> PerLink<BorrowedFd<'_>> {
+        PerLink::new(self.main.as_fd(), self.redundant.as_ref().map(PacketSocket::as_fd))
     }
 
     #[cold]
@@ -190,8 +190,8 @@ impl Links for PacketLinks {
         Instant(monotonic::now_ns())
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
-        (MacAddress(self.main.mac()), self.redundant.as_ref().map(|socket| MacAddress(socket.mac())))
+    fn addresses(&self) -> PerLink<MacAddress> {
+        PerLink::new(MacAddress(self.main.mac()), self.redundant.as_ref().map(|socket| MacAddress(socket.mac())))
     }
 
     #[inline(always)]

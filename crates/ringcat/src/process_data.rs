@@ -283,7 +283,7 @@ impl ProcessData<'_> {
 
     /// Age of a SubDevice's inputs in a domain.
     pub fn freshness(&self, domain: DomainId, subdevice: SubDeviceId) -> Freshness {
-        self.exchange.freshness(domain, subdevice.0)
+        self.exchange.freshness(domain, subdevice)
     }
 
     /// The places of all process data.

@@ -193,8 +193,9 @@ pub trait Services: Sized {
         self.immediately(|engine| engine.role())
     }
 
-    /// Sets the role: in [`MainDeviceRole::Inactive`] functions that need the bus are refused
-    /// ([`Function::needs_the_bus`]).
+    /// Sets the role. [`MainDeviceRole::Inactive`] ends all that runs, and functions that need the bus are refused from
+    /// then on ([`Function::needs_the_bus`]); with [`MainDeviceRole::Active`] the MainDevice goes on with what it knows
+    /// ([`Engine::set_role`]).
     fn set_role(self, role: MainDeviceRole) -> Self::Immediate<()> {
         self.immediately(move |engine| engine.set_role(role))
     }

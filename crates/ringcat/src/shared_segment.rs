@@ -15,7 +15,7 @@ use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::frame::MacAddress;
 
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 use crate::simulated::{MAIN, REDUNDANT, host_link};
 use crate::window::Half;
 
@@ -99,8 +99,8 @@ impl Links for SharedSegment {
         since(self.begin)
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
-        (MAIN, self.ring.then_some(REDUNDANT))
+    fn addresses(&self) -> PerLink<MacAddress> {
+        PerLink::new(MAIN, self.ring.then_some(REDUNDANT))
     }
 
     fn send(&mut self, link: Link, frame: &[u8]) {

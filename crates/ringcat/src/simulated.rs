@@ -14,7 +14,7 @@ use ringcat_sim::segment::{Segment, SegmentError};
 use ringcat_sim::time::SimTime;
 use ringcat_wire::frame::MacAddress;
 
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 
 /// Address of the main interface: not locally administered, because controllers set that bit.
 pub(crate) const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
@@ -102,8 +102,8 @@ impl Links for SimulatedSegment {
         Instant(self.network.now().0)
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
-        (MAIN, self.ring.then_some(REDUNDANT))
+    fn addresses(&self) -> PerLink<MacAddress> {
+        PerLink::new(MAIN, self.ring.then_some(REDUNDANT))
     }
 
     fn send(&mut self, link: Link, frame: &[u8]) {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat_engine::main_device::{Function, Permission};
 use ringcat_wire::al::AlState;
 
 use crate::acyclic::{AcyclicHalf, Inline};
@@ -45,7 +46,10 @@ impl<L: Links> Application<L, Inline> {
         outputs: LastOutputs,
         limit: Duration,
     ) -> Result<MainDevice<L>, Box<Refused<MainDevice<L>>>> {
-        self.last_cycles(outputs);
+        // In role INACTIVE the segment belongs to another MainDevice.
+        if self.acyclic.engine.permission(Function::Deactivate) == Permission::Allowed {
+            self.last_cycles(outputs);
+        }
         let begun = self.acyclic.engine.start_deactivate(limit, self.links.now()).map_err(Error::from);
         let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
         match begun.and_then(|()| main_device.finish_stop()) {

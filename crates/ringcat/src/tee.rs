@@ -14,7 +14,7 @@ use ringcat_link::Tap;
 use ringcat_link::pcapng::Direction;
 use ringcat_wire::frame::MacAddress;
 
-use crate::links::Links;
+use crate::links::{Links, PerLink};
 
 /// Links with or without a tap.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ impl<L: Links> Links for Tee<L> {
         self.links.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> PerLink<MacAddress> {
         self.links.addresses()
     }
 

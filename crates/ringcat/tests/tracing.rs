@@ -57,7 +57,7 @@ fn events_reach_a_subscriber_once_with_their_levels() -> Result<(), Box<dyn Erro
     let segment = "[segment]\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-8\"\n";
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(segment)?, &Options::default());
     main_device.scan()?;
-    let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    let mut declaration = Declaration::new(Duration::from_millis(1));
     declaration.add(SubDeviceConfig::at_position(0));
     declaration.add(SubDeviceConfig::at_position(1));
     let mut application = main_device.activate(declaration)?;

@@ -26,7 +26,7 @@ const BEFORE_THE_CYCLE: Duration = Duration::from_micros(100);
 const CYCLE: Duration = Duration::from_millis(1);
 
 /// Events as text, with their cycle.
-type Told = Vec<(usize, String)>;
+type Reported = Vec<(usize, String)>;
 
 /// Results of one cycle.
 struct Seen {
@@ -51,7 +51,7 @@ fn segment() -> String {
 }
 
 /// Runs the ring.
-fn watch() -> Result<(Vec<Seen>, Told), ringcat::Error> {
+fn watch() -> Result<(Vec<Seen>, Reported), ringcat::Error> {
     let links = SimulatedSegment::from_toml(&segment())?;
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan()?;

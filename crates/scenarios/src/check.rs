@@ -1,7 +1,7 @@
 //! Checks, separate from the scenarios: results of each cycle, comparison of images with the data of the simulated
 //! devices, and the number of events of a change.
 
-use ringcat::{Direction, DomainId, DomainState, DomainStatus, Event, Freshness, Instant, TimedEvent};
+use ringcat::{Direction, DomainId, DomainState, DomainStatus, Event, Freshness, Instant, SubDeviceId, TimedEvent};
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::DeviceIndex;
@@ -122,7 +122,7 @@ impl Mirror {
                 // Inputs are checked with the device's log, if it has one ([`crate::truth`]).
                 Direction::Inputs
                     if !device.controller.logs_logical()
-                        && exchange.freshness(domain, area.subdevice) == Freshness::Fresh =>
+                        && exchange.freshness(domain, SubDeviceId(area.subdevice)) == Freshness::Fresh =>
                 {
                     let inputs = &flight.inputs[area.device.0];
                     (image.get(area.in_image.clone()), inputs.get(area.in_device.clone()))
@@ -131,7 +131,8 @@ impl Mirror {
                 // this one.
                 Direction::Outputs
                     if ((delivery == Delivery::Complete && status.wkc == status.expected)
-                        || !self.was_sent_again && exchange.freshness(domain, area.subdevice) == Freshness::Fresh)
+                        || !self.was_sent_again
+                            && exchange.freshness(domain, SubDeviceId(area.subdevice)) == Freshness::Fresh)
                         && flight.operating[area.device.0]
                         && uses_outputs(device) =>
                 {
@@ -151,7 +152,7 @@ impl Mirror {
     /// SubDevices with stale inputs.
     pub fn stale(&self, domain: DomainId, exchange: &Exchange) -> Vec<usize> {
         let inputs = self.areas.iter().filter(|area| area.domain == domain && area.direction == Direction::Inputs);
-        let stale = inputs.filter(|area| exchange.freshness(domain, area.subdevice) != Freshness::Fresh);
+        let stale = inputs.filter(|area| exchange.freshness(domain, SubDeviceId(area.subdevice)) != Freshness::Fresh);
         stale.map(|area| area.subdevice).collect()
     }
 
@@ -168,7 +169,7 @@ impl Mirror {
             let absent = !device.controller.is_powered() || device.al_status().al_state() != Some(AlState::Op);
             absent
                 || area.direction == Direction::Outputs
-                || exchange.freshness(domain, area.subdevice) == Freshness::Fresh
+                || exchange.freshness(domain, SubDeviceId(area.subdevice)) == Freshness::Fresh
         });
         if all_fresh { Delivery::WithoutAbsent } else { Delivery::Incomplete }
     }

@@ -15,18 +15,23 @@ use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 const MODE: u8 = 0b11;
 const ONE_BUFFER: u8 = 0b10;
 
-/// The same device with one buffer for each area.
+/// Set in the revision of a device with one buffer: another EEPROM is another revision. A MainDevice reads the words that
+/// SubDevices of one revision share only once.
+const REVISION: u32 = 0x0B00_0000;
+
+/// The same device with one buffer for each area, as a revision of its own.
 pub fn one_buffer(mut description: DeviceDescription) -> DeviceDescription {
     let of_process_data = |kind| matches!(kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs);
     for entry in description.sync_managers.iter_mut().filter(|entry| of_process_data(entry.kind)) {
         entry.control = entry.control & !MODE | ONE_BUFFER;
     }
+    description.identity.revision |= REVISION;
     description
 }
 
 /// As [`ringcat::automatic`]; SubDevices with one buffer keep it.
 pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration {
-    let mut declaration = Declaration::with_period(period);
+    let mut declaration = Declaration::new(period);
     for info in subdevices {
         let config = SubDeviceConfig::from_info(info);
         let has_one = info.sync_managers.iter().any(|sm| role(sm).is_some_and(is_process_data) && has_one_buffer(sm));

@@ -64,7 +64,7 @@ impl Links for PartLinks {
         self.segment.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.segment.addresses()
     }
 

@@ -162,7 +162,7 @@ impl Links for Watched {
         self.segment.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.segment.addresses()
     }
 

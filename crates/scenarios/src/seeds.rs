@@ -17,6 +17,12 @@ pub const fn knows_arrivals(seed: u64) -> bool {
     Dice::new(seed ^ 0x00A2_0000).one_in(2)
 }
 
+/// Whether a device of a seed's scenario has one buffer for each area of process data: every second one in one of three
+/// scenarios.
+pub const fn one_buffer(seed: u64, device: usize) -> bool {
+    Dice::new(seed ^ 0x00A3_0000).one_in(3) && Dice::new(seed ^ 0x00A4_0000 ^ (device as u64) << 32).one_in(2)
+}
+
 /// Number of seeds in whose scenarios lost frames are sent again.
 pub fn sending_again(seeds: &Range<u64>) -> usize {
     seeds.clone().filter(|seed| sends_again(*seed)).count()

@@ -36,9 +36,8 @@ pub fn run(seed: u64) {
     let count = 2 + dice.below(5) as usize;
     let kinds: Vec<&str> = (0..count).map(|_| *dice.pick(&KINDS)).collect();
     let detection = Duration::from_micros(*dice.pick(&[10, 200, 1_500]));
-    let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
-    let declare =
-        |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed));
+    let options = NetworkOptions::default().with_seed(seed).with_detection_delay(detection);
+    let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_sends_again(seeds::sends_again(seed));
     let mut world = World::with(seed, ring(descriptions(&kinds), options), &Options::default(), declare)
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     world.settle();

@@ -51,7 +51,7 @@ impl<F: FnMut(&mut Vec<u8>) -> Verdict> Links for TamperedLinks<F> {
         self.segment.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.segment.addresses()
     }
 

@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use ringcat::{Direction, DomainId, DomainState, DomainStatus, Freshness};
+use ringcat::{Direction, DomainId, DomainState, DomainStatus, Freshness, SubDeviceId};
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::main_device::Directory;
 use ringcat_sim::cable::DeviceIndex;
@@ -104,7 +104,7 @@ impl Truth {
             spared += u64::from(self.is_spared(area, remembered.back(), network));
             match area.direction {
                 Direction::Inputs => {
-                    if exchange.freshness(domain, area.subdevice) != Freshness::Fresh {
+                    if exchange.freshness(domain, SubDeviceId(area.subdevice)) != Freshness::Fresh {
                         continue;
                     }
                     let value = &image[area.in_image.clone()];

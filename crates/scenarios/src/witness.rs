@@ -53,6 +53,11 @@ impl<L: Links> Witness<L> {
         &mut self.links
     }
 
+    /// The links below, without the witness.
+    pub fn into_links(self) -> L {
+        self.links
+    }
+
     fn note(&self, link: Link, is_sent: bool, frame: &[u8]) {
         let passed = Passed { at: self.links.now(), link, is_sent, frame: frame.to_vec() };
         self.passed.lock().unwrap_or_else(PoisonError::into_inner).push(passed);
@@ -64,7 +69,7 @@ impl<L: Links> Links for Witness<L> {
         self.links.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.links.addresses()
     }
 

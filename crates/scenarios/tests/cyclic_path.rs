@@ -127,7 +127,7 @@ fn recorded_cycles_do_not_allocate() {
     let recorder = Recorder::start(&path, &[("main", ""), ("redundant", "")]).expect("a file");
     let mut load = load(Cabling::ClosedRing);
     let CyclicLoad { exchange, links, double, now, .. } = &mut load;
-    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().0, None, 1)), recorder.tap());
+    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().main, None, 1)), recorder.tap());
     let used = counted(|| {
         for _ in 0..CYCLES {
             *now += PERIOD;
@@ -161,7 +161,7 @@ fn taps_that_another_thread_switches_on_and_off_do_not_allocate_in_cycles() {
     let taps = Taps::new(2);
     let mut load = load(Cabling::ClosedRing);
     let CyclicLoad { exchange, links, double, now, .. } = &mut load;
-    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().0, None, 1)), taps.tap());
+    let mut tee = Tee::new(std::mem::replace(links, MemoryLinks::new(links.addresses().main, None, 1)), taps.tap());
     let switching = std::thread::spawn(move || {
         let mut frames = 0_usize;
         for _ in 0..SWITCHES {
@@ -220,7 +220,7 @@ fn copying_does_not_allocate() {
         }
     });
     assert_eq!((set, used), (Ok(()), (0, 0)));
-    assert!(!load.exchange.is_copy_stale(0));
+    assert!(!load.exchange.is_copy_stale(ringcat::CopyId(0)));
     println!("{} words refused", load.exchange.counters().stale_copies);
 }
 
@@ -271,7 +271,7 @@ impl Links for Apart {
         self.links.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.links.addresses()
     }
 
@@ -381,7 +381,7 @@ fn disturb(load: &mut CyclicLoad, cycle: u64) {
             let subdevice = cycle as usize % SUBDEVICES;
             board.set_taking_part(subdevice, !board.takes_part(subdevice));
             exchange.process(DomainId(0), *now + PERIOD);
-            assert_ne!(exchange.freshness(DomainId(0), 0), Freshness::Never);
+            assert_ne!(exchange.freshness(DomainId(0), SubDeviceId(0)), Freshness::Never);
             double.answer(&mut links.sent, &mut links.arriving);
         }
     }
@@ -427,7 +427,7 @@ fn typed_process_data_does_not_allocate_in_a_cycle() {
     let links = SimulatedSegment::from_toml(segment).expect("a good segment");
     let mut main_device = ringcat::MainDevice::request(links, &ringcat::Options::default());
     main_device.scan().expect("a scan");
-    let mut declaration = ringcat::Declaration::with_period(PERIOD);
+    let mut declaration = ringcat::Declaration::new(PERIOD);
     let [drive, lamps] = [0, 1].map(|at| declaration.add(ringcat::SubDeviceConfig::at_position(at)));
     let mut application = main_device.activate(declaration).expect("it fits");
     let target = application.output::<i32>(drive, 0x607A, 0).expect("it is mapped");

@@ -36,7 +36,7 @@ const MEMORY: i64 = 64 << 20;
 /// A segment, and the product codes of its devices.
 fn segment(dice: &mut Dice, seed: u64) -> (Network, Vec<u32>) {
     let kinds: Vec<&str> = (0..1 + dice.below(5)).map(|_| *dice.pick(&KINDS)).collect();
-    let options = NetworkOptions { seed, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_seed(seed);
     let descriptions = descriptions(&kinds);
     let products = descriptions.iter().map(|description| description.identity.product_code).collect();
     (if dice.one_in(2) { ring(descriptions, options) } else { line(descriptions, options) }, products)

@@ -65,7 +65,7 @@ fn operational(compiled: bool) -> Network {
     let devices = names
         .iter()
         .flat_map(|name| (0..HALF).map(|_| Device::new(catalogue::by_name(name).expect("a device of the catalogue"))));
-    let options = NetworkOptions { compiled, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_compiled(compiled);
     let mut network = SegmentBuilder::line(devices.collect()).options(options).build().expect("a line");
     network.advance_by(Duration::from_millis(50));
     for position in 0..2 * HALF {
@@ -134,7 +134,7 @@ fn main() {
     let frames = arguments.next().and_then(Result::ok).unwrap_or(2_000);
     let terminal = catalogue::by_name("digital-output-8").expect("a terminal of the catalogue");
     let line = (0..devices).map(|_| Device::new(terminal.clone())).collect();
-    let options = NetworkOptions { compiled, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_compiled(compiled);
     let mut network = SegmentBuilder::line(line).options(options).build().expect("a line");
     println!("{devices} devices in a line, {frames} frames of each kind");
     for (name, bytes) in [

@@ -25,6 +25,7 @@ const MAX_STRING: usize = 255;
 
 /// The reason for which an SII image is no device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DescriptionError {
     /// The image is invalid.
     Sii(SiiError),
@@ -48,7 +49,14 @@ impl fmt::Display for DescriptionError {
     }
 }
 
-impl std::error::Error for DescriptionError {}
+impl std::error::Error for DescriptionError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            DescriptionError::Sii(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 /// The EEPROM content of a device: the real image if there is one, with the alias and the serial number of the
 /// description. An image derived from the description grows beyond the declared size if the content needs it; strings

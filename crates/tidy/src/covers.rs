@@ -1,7 +1,7 @@
 //! The tests of the tree and their coverage: names of at most 80 characters, ids on a `// covers:` line above.
 //!
 //! Input: a tree. Output: [`Test`]s and findings. Ids are statements (CR-12) and sections (7.1) of `docs/protocol`, and
-//! rows of `docs/FEATURES.md` (`ring-cut`), separated by commas; several lines may follow each other.
+//! rows of `docs/capabilities.md` (`ring-cut`), separated by commas; several lines may follow each other.
 
 use std::collections::BTreeSet;
 
@@ -105,7 +105,7 @@ pub fn unresolved_covers(tree: &Tree, features: &BTreeSet<String>) -> Vec<Findin
         let tests = in_file(file);
         for test in &tests {
             for id in test.covers.iter().filter(|id| !pages.know(id) && !features.contains(*id)) {
-                let text = format!("`{id}` is neither in docs/protocol nor a row of docs/FEATURES.md");
+                let text = format!("`{id}` is neither in docs/protocol nor a row of docs/capabilities.md");
                 findings.push(Finding::new(&file.path, test.line, text));
             }
         }

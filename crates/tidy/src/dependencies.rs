@@ -11,7 +11,8 @@ use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each one alone.
-pub const FEATURE_SETS: [&str; 7] = ["", "packet", "sim", "eni", "gateway", "eoe", "tracing"];
+pub const FEATURE_SETS: [&str; 10] =
+    ["", "packet", "sim", "eni", "network", "esi", "gateway", "eoe", "tracing", "serde"];
 
 /// Sets for an application on network interfaces, with few dependencies.
 const SMALL: [&str; 2] = ["", "packet"];

@@ -1,7 +1,8 @@
-//! Checks that `docs/FEATURES.md` is short and honest: tests cover every row with state "works" or "partly".
+//! Checks that `docs/capabilities.md` is honest, tests cover every row with state "works" or "partly", and that
+//! `docs/FEATURES.md`, its short form, is read in two minutes.
 //!
-//! Input: a tree. Output: findings. A row is `| [capability](feature-tests.md#id) | state | limits |`; a test covers it
-//! by its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row.
+//! Input: a tree. Output: findings. A row of the former is `| [capability](feature-tests.md#id) | state | limits |`; a
+//! test covers it by its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row.
 
 use std::collections::BTreeSet;
 
@@ -10,11 +11,15 @@ use crate::covers;
 use crate::tree::Tree;
 
 /// The page with the table.
-pub(crate) const PAGE: &str = "docs/FEATURES.md";
+pub(crate) const PAGE: &str = "docs/capabilities.md";
+/// Its short form.
+const SHORT: &str = "docs/FEATURES.md";
 /// Values of the second column; the last one needs no test.
 const STATES: [&str; 3] = ["works", "partly", "not yet"];
-/// Maximum number of rows, readable in two minutes.
+/// Maximum number of rows.
 const MAX_ROWS: usize = 120;
+/// Maximum number of words of the short form outside of links: two minutes at 240 words a minute.
+const MAX_SHORT_WORDS: usize = 480;
 /// Maximum length of a capability with its limits, without the link.
 const MAX_WORDS: usize = 170;
 
@@ -61,6 +66,50 @@ fn row(cells: &[&str], line: usize) -> Result<Row, Finding> {
     let (capability, id) = linked.map_or((*first, ""), |(capability, id)| (capability, id.trim_end_matches(')')));
     let [capability, id, state, limits] = [capability, id, state, limits].map(str::to_owned);
     Ok(Row { id, capability, state, limits, line })
+}
+
+/// Findings about the short form: it is too long, a row has an unknown state or leads to no section, a section of the
+/// page is missing in it.
+pub fn short_form(tree: &Tree) -> Vec<Finding> {
+    let (Some(short), Some(page)) = (tree.file(SHORT), tree.file(PAGE)) else {
+        return vec![Finding::new(SHORT, 0, "is missing, or the page behind it")];
+    };
+    let sections: BTreeSet<String> =
+        page.text.lines().filter_map(|line| line.strip_prefix("## ")).map(anchor).collect();
+    let (mut findings, mut named, mut words) = (Vec::new(), BTreeSet::new(), 0);
+    for (number, line) in short.text.lines().enumerate() {
+        let (link, rest) = match line.split_once("](capabilities.md#") {
+            Some((before, after)) => (after.split_once(')'), before),
+            None => (None, line),
+        };
+        let row = link.map(|(section, cells)| (section, cells.split('|').map(str::trim).collect::<Vec<_>>()));
+        words += words_of(rest) + link.map_or(0, |(_, cells)| words_of(cells));
+        let Some((section, cells)) = row else { continue };
+        if !sections.contains(section) {
+            findings.push(Finding::new(SHORT, number + 1, format!("{PAGE} has no section #{section}")));
+        }
+        if !cells.get(1).is_some_and(|state| STATES.contains(state)) {
+            findings.push(Finding::new(SHORT, number + 1, format!("state is one of {STATES:?}")));
+        }
+        named.insert(section.to_owned());
+    }
+    let missing = sections.difference(&named);
+    findings.extend(missing.map(|section| Finding::new(SHORT, 0, format!("no row leads to #{section}"))));
+    if words > MAX_SHORT_WORDS {
+        findings.push(Finding::new(SHORT, 0, format!("{words} words, more than {MAX_SHORT_WORDS}")));
+    }
+    findings
+}
+
+/// Words of a text, without signs that stand alone.
+fn words_of(text: &str) -> usize {
+    text.split_whitespace().filter(|word| word.contains(char::is_alphanumeric)).count()
+}
+
+/// The anchor of a heading.
+fn anchor(heading: &str) -> String {
+    let kept = heading.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-'));
+    kept.map(|c| if c == ' ' { '-' } else { c.to_ascii_lowercase() }).collect()
 }
 
 /// Ids of all rows.
@@ -154,5 +203,22 @@ mod tests {
     #[test]
     fn a_missing_page_is_found() {
         assert_eq!(faults(&Tree::default()).len(), 1);
+    }
+
+    #[test]
+    fn the_short_form_leads_to_each_section_with_few_words() {
+        let page = "# Capabilities\n\n## Clocks (all)\n\n## Not yet\n";
+        let short = |text: &str| {
+            short_form(&Tree { files: vec![File::new(PAGE, page), File::new(SHORT, text)] })
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+        };
+        let good =
+            "| [Clocks](capabilities.md#clocks-all) | works | |\n| [It](capabilities.md#not-yet) | not yet | |\n";
+        assert_eq!(short(good), [""; 0]);
+        let wrong = good.replace("#not-yet", "#other").replace("works", "worked");
+        assert_eq!(short(&wrong).len(), 3, "{:?}", short(&wrong));
+        assert_eq!(short(&format!("{good}{}", "word ".repeat(480))).len(), 1);
     }
 }

@@ -40,10 +40,13 @@ fn longer_than(tree: &Tree, limit: usize) -> Vec<Finding> {
 /// Files, directories and inline modules with a name that does not describe the content.
 pub fn empty_names(tree: &Tree) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for file in tree.rust() {
-        let parts = file.path.trim_end_matches(".rs").split('/');
+    for file in &tree.files {
+        let parts = file.path.split('/').map(|part| part.split('.').next().unwrap_or(part));
         for name in parts.filter(|part| EMPTY_NAMES.contains(part)) {
             findings.push(Finding::new(&file.path, 0, format!("`{name}` does not say what is inside: rename it")));
+        }
+        if !file.is_rust() {
+            continue;
         }
         for pair in tokens(&file.text).windows(2) {
             if let (true, Some(name)) = (pair[0].is_ident("mod"), pair[1].ident())
@@ -105,6 +108,7 @@ mod tests {
     fn empty_names_of_files_directories_and_modules_are_found() {
         assert_eq!(empty_names(&tree("crates/x/src/utils.rs", "")).len(), 1);
         assert_eq!(empty_names(&tree("crates/x/src/common/a.rs", "")).len(), 1);
+        assert_eq!(empty_names(&tree("examples/c/helpers.c", "mod util {}")).len(), 1);
         assert_eq!(empty_names(&tree("crates/x/src/a.rs", "mod helpers {}")).len(), 1);
         assert!(empty_names(&tree("crates/x/src/common_mode.rs", "mod a; // mod misc")).is_empty());
     }

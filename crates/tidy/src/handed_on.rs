@@ -1,23 +1,23 @@
 //! Items of lower crates that the library `ringcat` re-exports by name, with their members.
 //!
 //! Input: the lines of [`crate::interface`] for a lower crate. Output: those of the types that the sources of `ringcat`
-//! name in a `pub use`: fields, variants, functions, implemented traits, and what macros make of them. A crate that is
-//! re-exported as a whole (`wire`, `sim`, `config`) is one line here: it has a public interface of its own.
+//! name in a `pub use`: fields, variants, functions, implemented traits, and what macros make of them. Of a crate or a
+//! module that is re-exported as a whole (`wire`, `sim`, `config`, `realtime`), all items.
 
 use std::collections::BTreeSet;
 
-use crate::interface::{SOURCES, items_of, own_items};
+use crate::interface::{Item, SOURCES, items_of, own_items};
 use crate::tree::Tree;
 
 /// Lower crates by the name under which the sources of `ringcat` use them.
-const CRATES: [&str; 5] = ["engine", "wire", "link", "config", "gateway"];
+const CRATES: [&str; 6] = ["engine", "wire", "link", "config", "gateway", "sim"];
 
 /// The whole list: the items of the library, then those of lower crates.
 pub fn items(tree: &Tree) -> Vec<String> {
     own_items(tree).into_iter().chain(members(tree)).collect()
 }
 
-/// Lines for the types that are re-exported by name, sorted by crate and name.
+/// Lines for what is re-exported, sorted by crate and name.
 fn members(tree: &Tree) -> Vec<String> {
     CRATES.iter().flat_map(|name| of_crate(tree, name)).collect()
 }
@@ -25,13 +25,33 @@ fn members(tree: &Tree) -> Vec<String> {
 fn of_crate(tree: &Tree, name: &str) -> Vec<String> {
     let names = re_exported(tree, name);
     let items = items_of(tree, &format!("crates/{name}/src/"));
-    let mut found = Vec::new();
-    for wanted in &names {
+    let line = |item: &Item| format!("ringcat_{name}::{}: {}", item.module, item.text);
+    if is_re_exported_whole(tree, name) {
+        return items.iter().map(line).collect();
+    }
+    let root = tree.file(&format!("crates/{name}/src/lib.rs")).map_or("", |root| &root.text);
+    let is_module = |wanted: &&String| root.lines().any(|line| line == format!("pub mod {wanted};"));
+    let (modules, names): (Vec<&String>, Vec<&String>) = names.iter().partition(is_module);
+    let is_of_module = |item: &&Item| modules.iter().any(|module| is_below(&item.module, module));
+    let mut found: Vec<String> = items.iter().filter(is_of_module).map(line).collect();
+    for wanted in names {
         for item in items.iter().filter(|item| item.owners.contains(wanted)) {
             found.push(format!("ringcat_{name}::{wanted}: {}", item.text));
         }
     }
     found
+}
+
+/// Whether the sources of the library have `pub use ringcat_<name> as ...`.
+fn is_re_exported_whole(tree: &Tree, name: &str) -> bool {
+    let start = format!("pub use ringcat_{name} as ");
+    let mut sources = tree.rust().filter(|file| file.path.starts_with(SOURCES));
+    sources.any(|file| file.text.lines().any(|line| line.starts_with(&start)))
+}
+
+/// Whether a module is this one or in it.
+fn is_below(path: &str, module: &str) -> bool {
+    path.strip_prefix(module).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
 }
 
 /// The names in `pub use ringcat_<name>::...` of the library; a renamed one by its name in the lower crate.
@@ -60,8 +80,8 @@ mod tests {
 
     #[test]
     fn members_of_types_are_listed_where_the_library_names_the_type() {
-        let library =
-            "//! It.\n\npub use ringcat_engine::one::{\n    A, B as C,\n};\npub use ringcat_engine::two::D;\n";
+        let library = "//! It.\n\npub use ringcat_engine::one::{\n    A, B as C,\n};\npub use ringcat_engine::two::D;\n\
+             pub use ringcat_link::near;\npub use ringcat_wire as wire;\n";
         let lower = "//! It.\n\n/// A.\npub struct A {\n    pub field: u8,\n}\n\n\
                      impl A {\n    pub fn f(&self) {}\n}\n\n\
                      impl Clone for A {\n    fn clone(&self) -> A {\n        A\n    }\n}\n\npub struct Other;\n\n\
@@ -74,6 +94,10 @@ mod tests {
                 File::new("crates/ringcat/src/lib.rs", library),
                 File::new("crates/engine/src/one.rs", lower),
                 File::new("crates/engine/src/two.rs", made),
+                File::new("crates/link/src/lib.rs", "//! It.\n\npub mod near;\n"),
+                File::new("crates/link/src/near.rs", "//! It.\n\npub fn near() {}\n"),
+                File::new("crates/link/src/nearer.rs", "//! It.\n\npub fn nearer() {}\n"),
+                File::new("crates/wire/src/al/code.rs", "//! It.\n\npub fn code() {}\n"),
             ],
         };
         let expected = [
@@ -86,6 +110,8 @@ mod tests {
             "ringcat_engine::D: ids!: D",
             "ringcat_engine::D: ids!: pub struct $name(pub u8)",
             "ringcat_engine::D: ids!: impl Copy for $name",
+            "ringcat_link::near: pub fn near()",
+            "ringcat_wire::al::code: pub fn code()",
         ];
         let mut found = members(&tree);
         found.sort_by_key(|line| expected.iter().position(|other| other == line));

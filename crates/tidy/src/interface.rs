@@ -3,7 +3,7 @@
 //!
 //! Input: the tree, formatted by rustfmt. Output: a line for each item: what the crate root re-exports, public types
 //! with their fields and variants, traits with their items, public functions, and the traits that types implement. For
-//! a type of a lower crate that is re-exported by name, the module `handed_on` adds the same lines. Macros are not
+//! what is re-exported of a lower crate, the module `handed_on` adds the same lines. Macros are not
 //! expanded: the list has the items in the macro's body and each line of its calls, so that a change of either shows.
 //! Items of private modules are listed where they are public, also if the crate root does not name them.
 
@@ -41,7 +41,7 @@ enum Inside {
 /// A public item.
 pub(crate) struct Item {
     /// Module path of its file below `src`.
-    module: String,
+    pub module: String,
     /// The types that it is about: its own name, that of its owner, those that a macro makes.
     pub owners: Vec<String>,
     /// Signature, with that of its owner before it.
@@ -86,12 +86,16 @@ fn of_file(file: &File, sources: &str) -> Vec<Item> {
             continue;
         }
         let mut item = text.to_owned();
+        let is_variant = inside == Inside::Enum && depth == 1;
+        if is_variant && item.ends_with('{') {
+            add_fields(&mut item, &mut lines);
+        }
         while inside != Inside::Call && !is_whole(&item) {
             let Some(more) = lines.next() else { break };
             item.push(' ');
             item.push_str(more.trim());
         }
-        let signature = signature(&item);
+        let signature = if is_variant { variant(&item) } else { signature(&item) };
         if depth == 0 {
             inside = kind(&item);
             owner = macro_name(&item).map_or_else(|| signature.clone(), |name| format!("{name}!"));
@@ -189,6 +193,25 @@ fn is_whole(item: &str) -> bool {
     opened == closed && (item.ends_with(';') || (!is_use && (item.ends_with([',', '}']) || item.ends_with('{'))))
 }
 
+/// The fields of a variant, without their comments, up to its closing brace.
+fn add_fields<'a>(item: &mut String, lines: &mut impl Iterator<Item = &'a str>) {
+    for line in lines {
+        let text = line.trim();
+        if !text.starts_with("//") && !text.starts_with('#') {
+            item.push(' ');
+            item.push_str(text);
+        }
+        if line.len() - line.trim_start().len() <= INDENT {
+            break;
+        }
+    }
+}
+
+/// A variant in one line.
+fn variant(item: &str) -> String {
+    item.trim_end_matches(',').replace(", }", " }").replace("( ", "(").replace(", )", ")").replace(",)", ")")
+}
+
 /// An item without its body. A list of names keeps its braces.
 fn signature(item: &str) -> String {
     let end = match item.starts_with("pub use") {
@@ -239,7 +262,8 @@ mod tests {
                     pub fn long(\n        &self,\n        more: (u8, u8),\n    ) -> bool {\n        \
                     pub_like()\n    }\n\n    fn own(&self) {}\n}\n\nimpl<T> Clone for It<T> {\n    \
                     fn clone(&self) -> It<T> {\n        it()\n    }\n}\n\n\
-                    pub(crate) fn inner() {}\n\npub enum Either {\n    One,\n    Other { it: u8 },\n}\n\n\
+                    pub(crate) fn inner() {}\n\npub enum Either {\n    One,\n    Other { it: u8 },\n    \
+                    Long {\n        /// A field.\n        first: u8,\n        second: u8,\n    },\n}\n\n\
                     pub const fn f() -> u8 {\n    1\n}\n\n#[cfg(test)]\nmod tests {\n    pub fn not_this() {}\n}\n";
         let expected = [
             "links::name: pub use crate::one::{A, B}",
@@ -249,7 +273,8 @@ mod tests {
             "links::name: impl<T> Clone for It<T>",
             "links::name: pub enum Either",
             "links::name: pub enum Either: One",
-            "links::name: pub enum Either: Other",
+            "links::name: pub enum Either: Other { it: u8 }",
+            "links::name: pub enum Either: Long { first: u8, second: u8 }",
             "links::name: pub const fn f() -> u8",
         ];
         assert_eq!(items_of(text), expected);

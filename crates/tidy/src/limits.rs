@@ -5,9 +5,9 @@
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
-use crate::Finding;
 use crate::known::{self, Counts};
 use crate::tree::{File, Tree};
+use crate::{Finding, interface};
 
 /// Lines of a function, from `fn` to its closing brace: it fits a screen.
 pub const FUNCTION_LINES: usize = 60;
@@ -78,16 +78,27 @@ pub fn longest_file(tree: &Tree) -> Option<(String, usize)> {
     files(tree).max_by_key(|(_, lines)| *lines)
 }
 
-/// Sources with their lines, except tests.
+/// Sources and scripts with their lines, except tests.
 fn files(tree: &Tree) -> impl Iterator<Item = (String, usize)> {
     let lines = |file: &File| (file.path.clone(), file.text.lines().count());
-    tree.rust().filter(|file| !is_test(&file.path)).map(lines)
+    tree.files.iter().filter(|file| is_program(&file.path) && !is_test(&file.path)).map(lines)
+}
+
+/// Whether a file has source code, or is a script without an extension.
+fn is_program(path: &str) -> bool {
+    let name = path.rsplit('/').next().unwrap_or(path);
+    name.rsplit_once('.').is_none_or(|(_, extension)| ["c", "py", "rs", "sh"].contains(&extension))
 }
 
 /// Whether a file has nothing but tests.
 pub fn is_test(path: &str) -> bool {
     path.contains("/tests/") || path.ends_with("/tests.rs")
 }
+
+/// Files with one line for each entry, which programs write.
+const LISTS: [&str; 2] = [known::PATH, interface::LIST];
+/// Directory in which proptest keeps cases, one line each.
+const CASES: &str = "/proptest-regressions/";
 
 /// Number of lines of each file wider than [`COLUMNS`]. Tables and links in Markdown cannot be wrapped.
 pub fn wide_lines(tree: &Tree) -> Counts {
@@ -97,7 +108,7 @@ pub fn wide_lines(tree: &Tree) -> Counts {
         let wide = |line: &&str| line.chars().count() > COLUMNS && !cannot_wrap(line);
         (file.path.clone(), file.text.lines().filter(wide).count())
     };
-    let written = tree.files.iter().filter(|file| file.path != known::PATH);
+    let written = tree.files.iter().filter(|file| !LISTS.contains(&file.path.as_str()) && !file.path.contains(CASES));
     written.map(width).filter(|(_, lines)| *lines > 0).collect()
 }
 
@@ -134,6 +145,9 @@ mod tests {
     fn files_of_tests_may_be_longer() {
         assert_eq!(long_files(&tree("a/src/b.rs", &"\n".repeat(501))).len(), 1);
         assert!(long_files(&tree("a/src/b.rs", &"\n".repeat(500))).is_empty());
+        for script in ["ci/check", "a/b.py", "examples/c/d.c"] {
+            assert_eq!(long_files(&tree(script, &"\n".repeat(501))).len(), 1, "{script}");
+        }
         assert_eq!(longest_file(&tree("a/src/b.rs", "\n\n")), Some(("a/src/b.rs".to_owned(), 2)));
         assert_eq!(longest_file(&tree("a/tests/b.rs", "\n\n")), None);
         for path in ["a/src/tests.rs", "a/tests/b.rs", "a/b.md"] {

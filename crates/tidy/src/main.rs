@@ -1,7 +1,8 @@
 //! `cargo run -p tidy`: findings of the rules in this repository, with the longest chain of files of each crate.
 //!
 //! `cargo run -p tidy -- coverage` lists the parts of `docs/protocol` without a test, `-- tests` writes the lists of
-//! tests of each feature and each part of the protocol, `-- figures` prints the bars of issue 15 with measured figures.
+//! tests of each feature and each part of the protocol, `-- figures` prints the bars of issue 15 with measured figures;
+//! `-- figures DIRECTORY` counts the files of another commit there.
 //! `cargo run -p tidy -- shrink` lowers `known.toml` to the current counts; it refuses if a count has grown.
 
 use std::path::Path;
@@ -18,10 +19,13 @@ fn main() -> ExitCode {
         None => run(false),
         Some("shrink") => run(true),
         Some("coverage") => tree().map(|tree| print!("{}", coverage::report(&tree))),
-        Some("figures") => tree().and_then(|tree| figures(&tree)),
+        Some("figures") => match std::env::args().nth(2) {
+            None => tree().and_then(|tree| figures(&tree)),
+            Some(directory) => counted(Path::new(&directory)),
+        },
         Some("tests") => tree().and_then(|tree| write_evidence(&tree)),
         Some(_) => {
-            eprintln!("usage: cargo run -p tidy [-- coverage | figures | tests | shrink]");
+            eprintln!("usage: cargo run -p tidy [-- coverage | figures [DIRECTORY] | tests | shrink]");
             return ExitCode::from(2);
         }
     };
@@ -52,6 +56,7 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
     let packet = dependencies::cargo_tree("packet").map_err(|error| Finding::new("Cargo.toml", 0, error))?;
     let (text, holds) = bars::text(&bars::rows(tree, &packet)?);
     print!("{text}");
+    println!("        before: commit {}", bars::COMMIT_BEFORE);
     for allowed in words::ALLOWED {
         println!("        allowed words in {}: {}", allowed.file, allowed.reason);
     }
@@ -59,6 +64,14 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
         println!("        {what}: {command} (bar: {bar})");
     }
     println!("{}", if holds { "all bars of the tree hold" } else { "bars are missed" });
+    Ok(())
+}
+
+/// What can be counted in the files of any commit.
+fn counted(directory: &Path) -> Result<(), Finding> {
+    let name = directory.display().to_string();
+    let tree = Tree::read(directory).map_err(|error| Finding::new(&name, 0, error.to_string()))?;
+    print!("{}", bars::Counted::of(&tree));
     Ok(())
 }
 

@@ -21,6 +21,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("time", &[]),
     ("link", &[]),
     ("queue", &[]),
+    ("order", &[]),
     ("direction", &[]),
     ("domain", &[]),
     ("declared", &[]),
@@ -30,32 +31,32 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("role", &[]),
     // frames
     ("ring", &["time", "link"]),
-    ("board", &["time", "link", "ring"]),
+    ("board", &["order", "time", "link", "ring"]),
     // knowledge of the bus
     ("info", &["direction"]),
-    ("topology", &["info", "link"]),
-    ("knowledge", &["direction", "info", "ring", "topology"]),
+    ("topology", &["order", "info", "link"]),
     ("ring_status", &["declared", "time", "link", "ring", "topology"]),
-    ("config", &["declared", "info"]),
-    ("clocks", &["topology"]),
-    ("plan", &["info", "topology", "config"]),
-    ("layout", &["declared", "link", "ring", "direction", "domain"]),
+    ("config", &["order", "declared", "info"]),
+    ("clocks", &["order", "topology"]),
+    ("knowledge", &["order", "direction", "info", "ring", "topology", "clocks"]),
+    ("plan", &["order", "info", "topology", "config"]),
+    ("layout", &["order", "declared", "link", "ring", "direction", "domain"]),
     // what happened
     ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status", "clocks"]),
     // what is known of the segment, and what follows from what is seen
-    ("segment", &["declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config", "clocks",
-        "plan", "layout", "event", "junction"]),
+    ("segment", &["order", "declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config",
+        "clocks", "plan", "layout", "event", "junction"]),
     // cyclic half
-    ("exchange", &["time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
+    ("exchange", &["order", "declared", "time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
-    ("procedures", &["declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info", "topology",
-        "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail",
+    ("procedures", &["order", "declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info",
+        "topology", "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail",
         "request", "junction", "role"]),
     // both together
-    ("main_device", &["declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board", "info",
-        "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
+    ("main_device", &["order", "declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board",
+        "info", "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
         "supervisor", "mail", "request", "junction", "role", "procedures"]),
 ];
 

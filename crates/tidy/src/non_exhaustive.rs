@@ -5,8 +5,8 @@
 //! type by name; in all of these crates also for each public type with such a name as `Error`. A newtype is its value.
 //! `EXEMPT` lists the types that are closed, with the reason.
 //!
-//! `wire` is left out: its types change with the protocol. Of `config`, which is re-exported as a whole, the types that
-//! represent a file change with the format.
+//! Of `wire`, `sim` and `config`, which are re-exported as a whole, only types with such names: the others change with
+//! the protocol, with what is simulated, and with the format of the file.
 
 use crate::Finding;
 use crate::handed_on::re_exported;
@@ -16,6 +16,8 @@ use crate::tree::{File, Tree};
 const OWN: [&str; 2] = ["ringcat", "gateway"];
 /// Crates with types that the library re-exports by name.
 const LOWER: [&str; 3] = ["engine", "config", "link"];
+/// Crates of which only types with such [`NAMES`] are meant.
+const BY_NAME: [&str; 2] = ["sim", "wire"];
 
 /// Endings of names that are meant in any crate.
 const NAMES: [&str; 8] = ["Error", "Failure", "Problem", "Warning", "Event", "Counters", "Options", "Limits"];
@@ -29,21 +31,23 @@ const EXEMPT: &[(&str, &str)] = &[
     ("Direction", "outputs or inputs"),
     ("DomainState", "the three results of a working counter"),
     ("Entry", "domain, first bit and number of bits"),
+    ("ErrorCounters", "the registers of a controller"),
     ("Freshness", "an application has to handle each"),
     ("Half", "acyclic or cyclic"),
     ("HandedSocket", "made by the process that has received the descriptor"),
     ("Handover", "in order or after a crash: a new owner has to know which"),
     ("Link", "a ring has two links"),
-    ("PacketOptions", "of the kernel's sockets; applications name interfaces"),
+    ("MessageError", "a server answers each with a code of its own"),
+    ("PayloadError", "a server answers each with a code of its own"),
     ("RegisterAccess", "a register is written or checked"),
     ("RequestState", "a request of the cyclic thread is polled: an application has to handle each"),
     ("RingState", "closed, open, or not yet proved"),
-    ("ScanOptions", "made by the engine from its own options"),
     ("SdoAddress", "index and subindex"),
     ("SoeAddress", "drive and IDN"),
     ("SyncManagerRole", "mailboxes and process data, each in two directions"),
     ("Transition", "those of the EtherCAT state machine"),
     ("Voe", "a VoE message: vendor, type and data"),
+    ("WatchdogCounters", "the registers of a controller"),
 ];
 
 /// Types without the attribute.
@@ -53,7 +57,8 @@ pub fn missing(tree: &Tree) -> Vec<Finding> {
         of_crate(tree, name, &|it| names.contains(it))
     });
     let own = OWN.iter().flat_map(|name| of_crate(tree, name, &|_| true));
-    own.chain(of_lower).collect()
+    let by_name = BY_NAME.iter().flat_map(|name| of_crate(tree, name, &|_| false));
+    own.chain(of_lower).chain(by_name).collect()
 }
 
 fn of_crate(tree: &Tree, name: &str, is_for_applications: &dyn Fn(&str) -> bool) -> Vec<Finding> {

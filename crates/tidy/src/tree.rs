@@ -1,4 +1,5 @@
-//! The checked files: all files below `crates/`, `ci/`, `docs/` and `fuzz/`, and some in the root, read once.
+//! The checked files: all files of text below `.ci/`, `ci/`, `crates/`, `docs/`, `examples/` and `fuzz/`, and some in
+//! the root, read once.
 //!
 //! Input: the root of the repository. Output: paths and texts, sorted. Build output is left out.
 
@@ -35,26 +36,17 @@ pub struct Tree {
 }
 
 /// Directories of the repository that are read.
-const ROOTS: [&str; 4] = ["crates", "ci", "docs", "fuzz"];
+const ROOTS: [&str; 6] = [".ci", "ci", "crates", "docs", "examples", "fuzz"];
 
 /// Files at the root that are read.
-const AT_THE_ROOT: [&str; 9] = [
-    ".ci/run",
-    ".ci/steps.sh",
-    "CHANGELOG.md",
-    "CONTRIBUTING.md",
-    "Cargo.toml",
-    "README.md",
-    "SECURITY.md",
-    "deny.toml",
-    "rustfmt.toml",
-];
+const AT_THE_ROOT: [&str; 7] =
+    ["CHANGELOG.md", "CONTRIBUTING.md", "Cargo.toml", "README.md", "SECURITY.md", "deny.toml", "rustfmt.toml"];
 
 /// Kinds of files that are read.
-const EXTENSIONS: [&str; 5] = ["rs", "toml", "md", "sh", "py"];
+const EXTENSIONS: [&str; 9] = ["c", "h", "map", "md", "py", "rs", "sh", "toml", "txt"];
 
-/// Directories whose files without an extension are scripts and are read too.
-const SCRIPTS: [&str; 1] = ["ci"];
+/// Directories whose files without an extension are scripts or Makefiles and are read too.
+const SCRIPTS: [&str; 3] = [".ci", "ci", "examples"];
 
 impl Tree {
     /// Reads the repository that contains this crate.

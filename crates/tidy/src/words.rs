@@ -8,7 +8,8 @@ use crate::known::{self, Counts};
 use crate::tree::{File, Tree};
 
 /// Words that no data sheet has.
-pub const WORDS: [&str; 6] = ["who", "whoever", "whom", "somebody", "nobody", "everybody"];
+pub const WORDS: [&str; 9] =
+    ["who", "whoever", "whom", "somebody", "nobody", "everybody", "someone", "anyone", "everyone"];
 
 /// A place that may have such words.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
     Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, modules, non_exhaustive, paths, protocol, publishing, reports, safety, toolchain, words,
+    interface, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -101,6 +101,12 @@ fn pure_crates_forbid_unsafe_code() {
 
 // covers: tree
 #[test]
+fn the_short_form_of_the_capabilities_is_read_in_two_minutes() {
+    none(features::short_form(&tree()));
+}
+
+// covers: tree
+#[test]
 fn every_feature_has_a_test() {
     none(features::faults(&tree()));
 }
@@ -175,6 +181,12 @@ fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
 #[test]
 fn public_error_types_implement_error() {
     none(errors::without_trait(&tree()));
+}
+
+// covers: api
+#[test]
+fn an_error_in_an_error_is_its_source() {
+    none(sources::missing(&tree()).unwrap_or_else(|finding| vec![finding]));
 }
 
 #[test]

@@ -105,6 +105,7 @@ impl EthercatType {
 
 /// Why bytes are not an EtherCAT frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameError {
     /// Too short for `part`.
     Short {

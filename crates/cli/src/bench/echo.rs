@@ -40,7 +40,7 @@ pub struct EchoArguments {
 /// Answers until a signal ends it.
 pub fn run(arguments: &EchoArguments) -> Result<Report, Failure> {
     let end = EndRequest::watch(arguments.thread.priority)?;
-    let options = PacketOptions { receive: arguments.thread.mode(), ..PacketOptions::default() };
+    let options = PacketOptions::default().with_receive(arguments.thread.mode());
     let socket = PacketSocket::open(&arguments.main, &options)?;
     check_sockets(std::iter::once(arguments.main.as_str()), arguments.force)?;
     let _awake = arguments.thread.apply();

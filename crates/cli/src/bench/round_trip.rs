@@ -208,7 +208,7 @@ struct Bare {
 
 impl Bare {
     fn open(interface: &str, mode: ReceiveMode, frame: Vec<u8>) -> Result<Bare, Failure> {
-        let options = PacketOptions { receive: mode, ..PacketOptions::default() };
+        let options = PacketOptions::default().with_receive(mode);
         Ok(Bare { socket: PacketSocket::open(interface, &options)?, mode, frame })
     }
 }
@@ -255,7 +255,7 @@ impl Cyclic {
         let board = Arc::new(Board::new(1));
         board.set_taking_part(0, true);
         let (producer, events) = queue(EVENTS);
-        let identity = Identity::new(MacCodec::FlagsFirst, links.addresses().0, None);
+        let identity = Identity::new(MacCodec::FlagsFirst, links.addresses().main, None);
         let mut exchange = Exchange::new(identity, LinkSet::Single, &layout, board, producer);
         exchange.set_timeout(DOMAIN, LOST_AFTER);
         Ok(Cyclic { links, exchange, _events: events })

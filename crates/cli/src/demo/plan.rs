@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::sim::cable::{CableId, Endpoint, HostLink};
 use ringcat::sim::network::Network;
-use ringcat::{Direction, Scan};
+use ringcat::{Direction, Position, Scan};
 
 use super::incident::Incident;
 use super::watch::Watch;
@@ -86,7 +86,10 @@ fn trunk(scan: &Scan, has_ring: bool) -> Vec<usize> {
     let mut node = last.or(scan.subdevices.len().checked_sub(1));
     while let Some(at) = node {
         path.push(at);
-        node = scan.topology.connection_to(at).map(|connection| usize::from(connection.near.position().0));
+        node = scan
+            .topology
+            .connection_to(Position(at as u16))
+            .map(|connection| usize::from(connection.near.position().0));
     }
     path.reverse();
     path

@@ -135,7 +135,8 @@ impl ConfiguredNetwork {
 
     /// How rings behind junctions are handled, where the file says it.
     pub fn junctions(&self) -> Option<(JunctionMode, Vec<JunctionConnection>)> {
-        self.network_file().map(NetworkFile::junctions).filter(|(mode, _)| *mode != JunctionMode::Disabled)
+        let file = self.network_file().filter(|file| file.junction_mode() != JunctionMode::Disabled)?;
+        Some((file.junction_mode(), file.junction_connections()))
     }
 
     /// Names of the SubDevices.

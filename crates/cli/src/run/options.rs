@@ -29,7 +29,7 @@ Distributed clocks are in use with --clocks, or with any of --phase,
 their lock. SubDevices with SYNC signals wait for it before OP. `ringcat clocks`
 shows more about clocks.
 
-The summary tells three things apart:
+The summary distinguishes three things:
   this machine  wake-ups that came late, and cycles that were left out for that.
                 The cable is not the cause: try --priority 80, a --cpu of its
                 own, a real-time kernel

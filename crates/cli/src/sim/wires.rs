@@ -94,7 +94,7 @@ impl Wires {
     /// # Errors
     /// An interface that is not there or carries no Ethernet, or a missing permission.
     pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode, pace: Pace) -> Result<Wires, LinkError> {
-        let options = PacketOptions { receive: mode, ring_frames: 1024, ..PacketOptions::default() };
+        let options = PacketOptions::default().with_receive(mode).with_ring_frames(1024);
         let names = [(HostLink::Main, Some(main)), (HostLink::Redundant, redundant)];
         let named = names.into_iter().filter_map(|(link, name)| Some((link, name?)));
         let open = |(link, name)| Ok((link, PacketSocket::open(name, &options)?));

@@ -55,9 +55,10 @@ pub(super) fn compare(
     };
     let into =
         |at: PortOf| format!("port {} of {}", LETTERS[usize::from(at.port() & 3)], name(usize::from(at.position().0)));
+    let at = |node: usize| Position(node as u16);
     let mut differences = Vec::new();
     for (config, facts) in facts.iter().enumerate() {
-        let Some(node) = place[config].filter(|node| !topology.is_in_local_ring(*node)) else { continue };
+        let Some(node) = place[config].filter(|node| !topology.is_in_local_ring(at(*node))) else { continue };
         let said = match facts.plugged_into {
             Some((previous, port)) => match place[previous] {
                 Some(node) => Some(PortOf::new(Position(node as u16), number(port))),
@@ -68,9 +69,9 @@ pub(super) fn compare(
             None if configs[config].group.is_some() => continue,
             None => None,
         };
-        let got = topology.connection_to(node).map(|cable| cable.near);
+        let got = topology.connection_to(at(node)).map(|cable| cable.near);
         // The cabling where a ring is open is unknown.
-        if said == got || (got.is_none() && topology.redundant_head == Some(node)) {
+        if said == got || (got.is_none() && topology.redundant_head() == Some(at(node))) {
             continue;
         }
         let words = |at: Option<PortOf>| at.map_or_else(|| "the MainDevice".to_owned(), into);

@@ -1,7 +1,7 @@
 //! Maps bits of SyncManagers to logical bits: the FMMUs after all commands, split at the borders of SyncManagers
 //! (protocol 3.10).
 
-use ringcat_engine::config::DeclaredSyncManager;
+use ringcat_engine::config::{DeclaredArea, DeclaredSyncManager};
 use ringcat_engine::info::Direction;
 use ringcat_wire::register::Fmmu;
 
@@ -85,8 +85,8 @@ fn map(
     let end = begin + u64::from(fmmu.bit_length());
     let mut in_part = None;
     for one in declared {
-        let Some((sync_manager, _, length)) =
-            one.area().filter(|(_, found, length)| *found == direction && *length > 0)
+        let Some(DeclaredArea { sync_manager, length, .. }) =
+            one.area().filter(|area| area.direction == direction && area.length > 0)
         else {
             continue;
         };

@@ -50,7 +50,7 @@ pub(super) fn declared(
     mailboxes(eni, index, &mut found)?;
     let mut list = Vec::with_capacity(found.len());
     for (mut one, place) in found {
-        if one.area().is_some_and(|(_, _, length)| length > 0) {
+        if one.area().is_some_and(|area| area.length > 0) {
             one.pdos = pdos(index, &one, process_data, place, notices);
         }
         list.push(one);

@@ -42,7 +42,7 @@ impl NetworkFile {
         for (config, subdevice) in configs.iter_mut().zip(&self.subdevice) {
             fill(config, subdevice);
         }
-        let mut declaration = Declaration::default().with_optional_clocks(self.clocks(&index));
+        let mut declaration = Declaration::default().with_clocks(self.clocks(&index));
         declaration.subdevices = configs;
         declaration.domains = self.domains();
         declaration.lrw = match self.lrw {
@@ -74,18 +74,22 @@ impl NetworkFile {
         }
     }
 
-    /// How rings behind junctions are handled, and the connections of the file.
-    pub fn junctions(&self) -> (JunctionMode, Vec<JunctionConnection>) {
-        let index = |name: &str| self.subdevice.iter().position(|subdevice| subdevice.name == name).map(SubDeviceId);
-        let mode = match self.redundancy.junctions {
+    /// How rings behind junctions are handled.
+    pub fn junction_mode(&self) -> JunctionMode {
+        match self.redundancy.junctions {
             Junctions::Disabled => JunctionMode::Disabled,
             Junctions::Automatic => JunctionMode::Automatic,
             Junctions::Strict => JunctionMode::Strict,
-        };
+        }
+    }
+
+    /// The connections of rings behind junctions.
+    pub fn junction_connections(&self) -> Vec<JunctionConnection> {
+        let index = |name: &str| self.subdevice.iter().position(|subdevice| subdevice.name == name).map(SubDeviceId);
         let connections = self.redundancy.connection.iter().filter_map(|it| {
             Some(JunctionConnection::new(index(&it.head)?, it.head_port, index(&it.tail)?, it.tail_port))
         });
-        (mode, connections.collect())
+        connections.collect()
     }
 
     /// What the file states of each SubDevice besides the declaration, for

@@ -140,7 +140,7 @@ fn plugged_into(info: &SubDeviceInfo, topology: &Topology, names: &[String]) -> 
     if topology.is_assumed() {
         return None;
     }
-    let near = topology.connection_to(usize::from(info.position.0))?.near;
+    let near = topology.connection_to(info.position)?.near;
     Some(PluggedInto { subdevice: names.get(usize::from(near.position().0))?.clone(), port: near.port() })
 }
 

@@ -78,7 +78,7 @@ fn every_key_is_in_the_declaration() {
     let fast = vec![(0, None), (1, Some(vec![2])), (2, None), (4, None)];
     assert_eq!(members, [fast, vec![(1, Some(vec![3])), (3, None)]]);
     assert_eq!(configuration.cycle, Some(Duration::from_micros(250)));
-    let (mode, connections) = file.junctions();
+    let (mode, connections) = (file.junction_mode(), file.junction_connections());
     assert_eq!((mode, connections.len()), (JunctionMode::Strict, 1));
     assert!(declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift && clocks.sync_window_ns == 500));
 }

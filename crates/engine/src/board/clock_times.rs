@@ -43,7 +43,7 @@ pub(crate) struct TimeWords {
     epoch: AtomicU64,
     number: AtomicU32,
     /// Changes to which the supervisor reacts: a first time, a time far from the reference, references taken over.
-    news: AtomicU32,
+    posted: AtomicU32,
     /// Number of posts of references that the exchange has taken over.
     taken: AtomicU32,
     is_called: AtomicBool,
@@ -105,13 +105,13 @@ impl TimeWords {
 
     /// Wakes the supervisor: the application's time is far from that of the reference.
     pub fn wake_supervisor(&self) {
-        let news = self.news.load(Ordering::Relaxed);
-        self.news.store(news.wrapping_add(1), Ordering::Release);
+        let posted = self.posted.load(Ordering::Relaxed);
+        self.posted.store(posted.wrapping_add(1), Ordering::Release);
     }
 
     /// Number of changes to which the supervisor reacts.
-    pub fn news(&self) -> u32 {
-        self.news.load(Ordering::Acquire)
+    pub fn posted(&self) -> u32 {
+        self.posted.load(Ordering::Acquire)
     }
 
     /// The exchange has taken over the references with this number: later frames distribute no others.

@@ -10,6 +10,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 
 use crate::link::Link;
+use crate::order::InOrder;
 
 /// Lost supervision frames in a row after which no SubDevice counts as responding. A single frame may be lost without a
 /// break.
@@ -107,7 +108,7 @@ impl LiveWords {
 
     pub(super) fn set_stations(&mut self, stations: Vec<StationAddress>) {
         self.stations = stations.into_iter().zip(0..).collect();
-        self.stations.sort_unstable();
+        self.stations.put_in_order();
     }
 
     /// Number of SubDevices.

@@ -9,7 +9,9 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use super::cable_ends::{End, Ends, ends};
+use super::known_cable::KnownCable;
 use super::sums::{Sum, solve};
+use crate::order::InOrder;
 
 /// Sums of cables that are kept: many more than a segment has forks without a clock.
 const MOST_SUMS: usize = 256;
@@ -30,6 +32,29 @@ pub struct Cables {
 }
 
 impl Cables {
+    /// All measured times.
+    pub fn known(&self) -> Vec<KnownCable> {
+        let cable = |ends: Vec<Ends>, known: &Known| KnownCable { ends, time: known.time, is_old: known.is_old };
+        let single = self.known.iter().map(|(ends, known)| cable([*ends].into(), known));
+        single.chain(self.sums.iter().map(|(ends, known)| cable(ends.clone(), known))).collect()
+    }
+
+    /// Goes on with measured times.
+    pub fn of(all: &[KnownCable]) -> Cables {
+        let mut cables = Cables::default();
+        for KnownCable { ends: both, time, is_old } in all {
+            let known = Known { time: *time, is_old: *is_old };
+            let both: Vec<Ends> = both.iter().map(|cable| ends(*cable)).collect();
+            match both[..] {
+                [] => {}
+                [single] => drop(cables.known.insert(single, known)),
+                _ if cables.sums.len() < MOST_SUMS => drop(cables.sums.insert(sorted(&both), known)),
+                _ => {}
+            }
+        }
+        cables
+    }
+
     /// Sets the cables that are connected now; all others are marked as old.
     pub fn set_present(&mut self, present: impl Iterator<Item = (End, End)>) {
         let present: alloc::collections::BTreeSet<Ends> = present.map(ends).collect();
@@ -95,7 +120,7 @@ impl Cables {
 
 fn sorted(cables: &[Ends]) -> Vec<Ends> {
     let mut cables = cables.to_vec();
-    cables.sort_unstable();
+    cables.put_in_order();
     cables
 }
 

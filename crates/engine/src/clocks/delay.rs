@@ -18,6 +18,7 @@ use super::cables::Cables;
 use super::delays::Delays;
 use super::places::{Place, Places, Range};
 use super::wiring::{Arrival, TREES, Wiring, processed_in};
+use crate::order::InOrder;
 use crate::topology::PortOf;
 
 /// Longest possible round trip of a frame: a thousand SubDevices take 2 ms.
@@ -340,7 +341,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
     fn are_several(&self, sections: &[Section]) -> bool {
         let unknown = || sections.iter().filter(|section| section.known.is_none());
         let mut cables: Vec<Ends> = unknown().flat_map(|section| self.hops(section.from, section.to)).collect();
-        cables.sort_unstable();
+        cables.put_in_order();
         unknown().count() > 1 && cables.chunk_by(|one, other| one == other).any(|same| same.len() == 1)
     }
 

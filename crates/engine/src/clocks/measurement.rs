@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use super::delay::MOST_NS;
 use super::wiring::Wiring;
 use super::{FRACTION, PortTimes};
+use crate::order::InOrder;
 
 /// Receive times that one SubDevice latched for one frame, on its local clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -139,7 +140,7 @@ impl Measurements {
         let arrivals = self.arrivals.get(series.node)?;
         (0..4).filter(|port| arrivals[*port]).find_map(|port| {
             let mut sorted: Vec<i64> = series.after_entry(port).collect();
-            sorted.sort_unstable();
+            sorted.put_in_order();
             let expected_ns = sorted[sorted.len() / 2];
             let got_ns = series.after_entry(port).find(|time| (time - expected_ns).abs() > SAME_NS)?;
             Some(Disagreement { node: series.node, port: Some(port as u8), expected_ns, got_ns })

@@ -7,6 +7,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::cable_ends::Ends;
+use crate::order::InOrder;
 
 /// Largest number of cables in a system of equations; more are not solved.
 const MOST_CABLES: usize = 512;
@@ -48,7 +49,7 @@ impl Row {
 /// The time that these cables take together; `None` if it does not follow from the sums.
 pub(super) fn solve(sums: &[Sum], wanted: &[Ends]) -> Option<i64> {
     let mut cables = wanted.to_vec();
-    cables.sort_unstable();
+    cables.put_in_order();
     cables.dedup();
     // The sums that have cables in common with the wanted ones, directly or through other sums.
     let mut relevant: Vec<&Sum> = Vec::new();
@@ -60,7 +61,7 @@ pub(super) fn solve(sums: &[Sum], wanted: &[Ends]) -> Option<i64> {
             break;
         }
         cables.extend(near.iter().flat_map(|sum| &sum.cables));
-        cables.sort_unstable();
+        cables.put_in_order();
         cables.dedup();
         relevant.extend(near);
         others = far;

@@ -20,7 +20,7 @@ pub const TREES: usize = 2;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Wiring {
     /// By position and port: the port at the other end of the cable.
-    far: Vec<[Option<PortOf>; 4]>,
+    pub(crate) far: Vec<[Option<PortOf>; 4]>,
     /// The ports at which frames of the main and of the redundant link enter and leave the segment.
     pub entries: [Option<PortOf>; TREES],
 }

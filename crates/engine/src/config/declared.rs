@@ -50,6 +50,18 @@ pub struct DeclaredSyncManager {
     pub pdos: Vec<PdoMapping>,
 }
 
+/// Process data of a declared SyncManager.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DeclaredArea {
+    /// Number of the SyncManager.
+    pub sync_manager: u8,
+    /// Direction.
+    pub direction: Direction,
+    /// Bytes; 0 if the SyncManager is disabled.
+    pub length: u16,
+}
+
 impl DeclaredSyncManager {
     /// A SyncManager without PDOs.
     pub const fn new(index: u8, role: SyncManagerRole, register: SyncManager) -> DeclaredSyncManager {
@@ -70,9 +82,9 @@ impl DeclaredSyncManager {
         self
     }
 
-    /// Number, direction and length in bytes of its process data; `None` for mailboxes.
-    pub fn area(&self) -> Option<(u8, Direction, u16)> {
+    /// Its process data; `None` for mailboxes.
+    pub fn area(&self) -> Option<DeclaredArea> {
         let length = if self.register.activate.enable { self.register.length } else { 0 };
-        self.role.direction().map(|direction| (self.index, direction, length))
+        self.role.direction().map(|direction| DeclaredArea { sync_manager: self.index, direction, length })
     }
 }

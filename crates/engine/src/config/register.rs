@@ -59,7 +59,7 @@ impl RegisterCommand {
     }
 
     /// Length of data and mask in bytes.
-    pub fn lengths(&self) -> (usize, Option<usize>) {
+    pub(crate) fn lengths(&self) -> (usize, Option<usize>) {
         match &self.access {
             RegisterAccess::Write(data) => (data.len(), None),
             RegisterAccess::Check { data, mask, .. } => (data.len(), mask.as_ref().map(Vec::len)),

@@ -13,6 +13,7 @@ use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// Two SubDevices with the same alias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ impl fmt::Display for DuplicateAlias {
 /// All SubDevices with the alias of an earlier one.
 pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
     let mut by_alias: Vec<&SubDeviceInfo> = infos.iter().filter(|info| info.alias != 0).collect();
-    by_alias.sort_by_key(|info| info.alias);
+    by_alias.put_in_order_by_key(|info| info.alias);
     let mut duplicates = Vec::new();
     for group in by_alias.chunk_by(|a, b| a.alias == b.alias) {
         let first = group[0].position;
@@ -106,7 +107,7 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
             ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
         })
         .collect();
-    found.sort_unstable();
+    found.put_in_order();
     found
 }
 

@@ -30,22 +30,29 @@ pub enum Transition {
 }
 
 impl Transition {
-    /// State before and after it.
-    pub const fn states(self) -> (AlState, AlState) {
+    /// The state before it.
+    pub const fn from(self) -> AlState {
         match self {
-            Transition::Ip => (AlState::Init, AlState::PreOp),
-            Transition::Ps => (AlState::PreOp, AlState::SafeOp),
-            Transition::So => (AlState::SafeOp, AlState::Op),
-            Transition::Os => (AlState::Op, AlState::SafeOp),
-            Transition::Sp => (AlState::SafeOp, AlState::PreOp),
+            Transition::Ip => AlState::Init,
+            Transition::Ps => AlState::PreOp,
+            Transition::So | Transition::Sp => AlState::SafeOp,
+            Transition::Os => AlState::Op,
+        }
+    }
+
+    /// The state after it.
+    pub const fn to(self) -> AlState {
+        match self {
+            Transition::Ip | Transition::Sp => AlState::PreOp,
+            Transition::Ps | Transition::Os => AlState::SafeOp,
+            Transition::So => AlState::Op,
         }
     }
 }
 
 impl fmt::Display for Transition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (from, to) = self.states();
-        write!(f, "{from} to {to}")
+        write!(f, "{} to {}", self.from(), self.to())
     }
 }
 

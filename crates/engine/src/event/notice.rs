@@ -1,11 +1,12 @@
-//! Notices: the only events that procedures report themselves. They tell the progress of one procedure, or what it was
-//! told, and nothing of the model follows from them. All other events are effects of observations (`segment`).
+//! Notices: the only events that procedures report themselves. They have the progress of one procedure, or what it was
+//! asked, and nothing of the model follows from them. All other events are effects of observations (`segment`).
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::{LogicalAddress, Position, Wkc};
 use ringcat_wire::command::Command;
+use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
 
 use crate::declared::{Address, SubDeviceId};
@@ -45,6 +46,13 @@ pub(crate) enum Notice {
         in_state: usize,
         /// The segment was not as known.
         differs: bool,
+    },
+    /// The hand-over has cut a conversation of the former owner: said once.
+    ConversationCut {
+        /// Position.
+        position: Position,
+        /// Its protocol.
+        protocol: Protocol,
     },
     /// The link layer has refused an order.
     CannotDisconnect {
@@ -101,6 +109,7 @@ impl From<Notice> for Event {
             Notice::ScanProgress { done, total } => Event::ScanProgress { done, total },
             Notice::SiiOddity { position, what } => Event::SiiOddity { position, what },
             Notice::Resumed { subdevices, in_state, differs } => Event::Resumed { subdevices, in_state, differs },
+            Notice::ConversationCut { position, protocol } => Event::ConversationCut { position, protocol },
             Notice::CannotDisconnect { link } => Event::CannotDisconnect { link },
             Notice::StartupRead { subdevice, number, index, sub_index, comment, data } => {
                 Event::StartupRead { subdevice, number, index, sub_index, comment, data }

@@ -119,7 +119,7 @@ impl Event {
             | Event::StartupRead { .. }
             | Event::GroupJoined { .. }
             | Event::GroupLeft { .. } => Subject::States,
-            Event::Emergency { .. } => Subject::Mail,
+            Event::ConversationCut { .. } | Event::Emergency { .. } => Subject::Mail,
             Event::Domain { .. } | Event::Skipped { .. } => Subject::Domains,
             Event::CyclicCommand { .. } | Event::AcyclicCommand { .. } => Subject::Commands,
             Event::ClocksLocked { .. }

@@ -5,9 +5,10 @@ use core::time::Duration;
 use super::copy::Copies;
 use super::outcome::outcome;
 use super::{
-    ClockDatagrams, ClockSetup, CopyError, CopyRule, CyclicCounters, CyclicFrame, Domain, Entry, Exchange,
+    ClockDatagrams, ClockSetup, CopyError, CopyId, CopyRule, CyclicCounters, CyclicFrame, Domain, Entry, Exchange,
     ForeignFrame, ReferenceTime,
 };
+use crate::declared::SubDeviceId;
 use crate::domain::{DomainId, DomainStatus, Freshness};
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -60,22 +61,22 @@ impl Exchange {
     }
 
     /// Age of a SubDevice's inputs in a domain.
-    pub fn freshness(&self, id: DomainId, subdevice: usize) -> Freshness {
+    pub fn freshness(&self, id: DomainId, subdevice: SubDeviceId) -> Freshness {
         let Some(domain) = self.domains.get(id.0) else { return Freshness::Never };
-        domain.freshness(subdevice)
+        domain.freshness(subdevice.0)
     }
 
     /// The AL status (register 0x0130, lower byte) that a SubDevice showed in the last evaluated cycle of its domain;
     /// zero where it did not answer. `None` before the first cycle, and where its frames do not show it
     /// ([`crate::layout::Witness`]).
-    pub fn al_status(&self, subdevice: usize) -> Option<u8> {
+    pub fn al_status(&self, subdevice: SubDeviceId) -> Option<u8> {
         let evaluated = |frame: &&CyclicFrame| {
             let evaluated = self.domains.get(frame.domain()).map_or(0, Domain::evaluated);
             (1..=evaluated).contains(&frame.left())
         };
         let tries = self.again.iter().flatten().map(|again| &again.frame);
         let shown = self.frames.iter().chain(tries).filter(evaluated);
-        let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice)?)));
+        let newest = shown.filter_map(|frame| Some((frame.left(), frame.al_status(subdevice.0)?)));
         let newest = newest.max_by_key(|(left, status)| (*left, *status != 0));
         newest.map(|(_, status)| status)
     }
@@ -92,8 +93,8 @@ impl Exchange {
         Ok(())
     }
 
-    /// Whether a copy, by its index in the table, was refused the last time because its source was stale.
-    pub fn is_copy_stale(&self, rule: usize) -> bool {
+    /// Whether a copy was refused the last time because its source was stale.
+    pub fn is_copy_stale(&self, rule: CopyId) -> bool {
         self.copies.is_stale(rule)
     }
 

@@ -14,6 +14,7 @@ use super::domain::Domain;
 use super::entry::Entry;
 use super::flight::CyclicFrame;
 use super::image::InputNumber;
+use crate::order::InOrder;
 
 /// Value of the outputs while their source is stale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,24 +62,34 @@ impl CopyRule {
     }
 }
 
-/// Why a table of copies cannot be used; rules are counted from 0.
+/// A copy, by the place of its rule in the table, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CopyId(pub usize);
+
+impl fmt::Display for CopyId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Why a table of copies cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CopyError {
     /// The source does not lie in inputs of one SubDevice.
     Source {
         /// The rule.
-        rule: usize,
+        rule: CopyId,
     },
     /// The target does not lie in outputs.
     Target {
         /// The rule.
-        rule: usize,
+        rule: CopyId,
     },
     /// Source and target have different numbers of bits, or none.
     Length {
         /// The rule.
-        rule: usize,
+        rule: CopyId,
         /// Bits of the source.
         source: u16,
         /// Bits of the target.
@@ -87,9 +98,9 @@ pub enum CopyError {
     /// Two rules copy to the same bits.
     Overlap {
         /// The first rule.
-        rule: usize,
+        rule: CopyId,
         /// The second rule.
-        with: usize,
+        with: CopyId,
     },
 }
 
@@ -150,18 +161,18 @@ impl Copies {
             let CopyRule { source, target, .. } = *rule;
             if source.bit_length != target.bit_length || source.bit_length == 0 {
                 let (source, target) = (source.bit_length, target.bit_length);
-                return Err(CopyError::Length { rule: number, source, target });
+                return Err(CopyError::Length { rule: CopyId(number), source, target });
             }
-            let subdevice = of_inputs(&source, domains, frames).ok_or(CopyError::Source { rule: number })?;
+            let subdevice = of_inputs(&source, domains, frames).ok_or(CopyError::Source { rule: CopyId(number) })?;
             if !is_outputs(&target, domains, frames) {
-                return Err(CopyError::Target { rule: number });
+                return Err(CopyError::Target { rule: CopyId(number) });
             }
             let known = sources.iter().position(|s| (s.domain, s.subdevice) == (source.domain.0, subdevice));
             let at = match known {
                 Some(at) => at,
                 None => {
                     let found = find(source.domain.0, subdevice, domains, frames);
-                    sources.push(found.ok_or(CopyError::Source { rule: number })?);
+                    sources.push(found.ok_or(CopyError::Source { rule: CopyId(number) })?);
                     sources.len() - 1
                 }
             };
@@ -173,13 +184,13 @@ impl Copies {
                 last: 0,
             }));
         }
-        pieces.sort_by_key(|piece| (piece.to.domain, piece.to.bit_offset));
+        pieces.put_in_order_by_key(|piece| (piece.to.domain, piece.to.bit_offset));
         let overlap = pieces.windows(2).find(|pair| {
             let [first, second] = [pair[0].to, pair[1].to];
             first.domain == second.domain && first.bit_offset + u32::from(first.bit_length) > second.bit_offset
         });
         if let Some([first, second]) = overlap {
-            return Err(CopyError::Overlap { rule: second.rule, with: first.rule });
+            return Err(CopyError::Overlap { rule: CopyId(second.rule), with: CopyId(first.rule) });
         }
         let range = |domain: usize| {
             let first = pieces.partition_point(|piece| piece.to.domain.0 < domain);
@@ -199,8 +210,8 @@ impl Copies {
     }
 
     /// Whether the source of a rule was stale at its last copy, or it was never copied.
-    pub(super) fn is_stale(&self, rule: usize) -> bool {
-        self.stale.get(rule).copied().unwrap_or(true)
+    pub(super) fn is_stale(&self, rule: CopyId) -> bool {
+        self.stale.get(rule.0).copied().unwrap_or(true)
     }
 
     /// Copies all rules with their target in a domain. Returns the number of words with a stale source.
@@ -238,7 +249,7 @@ fn find(domain: usize, subdevice: usize, domains: &[Domain], frames: &[CyclicFra
     let of = domains.get(domain)?;
     let mut inputs: Vec<InputNumber> = of.frames().flat_map(|frame| frames[frame].inputs_of(subdevice)).collect();
     // Each is there once per cycle that may be on the wire.
-    inputs.sort_unstable_by_key(|input| (input.datagram, input.part));
+    inputs.put_in_order_by_key(|input| (input.datagram, input.part));
     inputs.dedup();
     Some(Source { domain, subdevice, inputs: inputs.into(), age: u64::MAX })
 }

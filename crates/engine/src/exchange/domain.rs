@@ -12,6 +12,7 @@ use super::flight::CyclicFrame;
 use super::image::{Image, InputNumber};
 use crate::domain::{DomainState, DomainStatus, Freshness};
 use crate::layout::PlannedDomain;
+use crate::order::InOrder;
 
 /// Record of one SubDevice.
 #[derive(Debug)]
@@ -78,7 +79,7 @@ impl Domain {
             planned.frames.iter().flat_map(|frame| &frame.datagrams).flat_map(|datagram| &datagram.contributions);
         let expected = contributions.map(|(_, wkc)| u32::from(wkc.0)).sum();
         let mut subdevices: Vec<usize> = planned.areas.iter().map(|placed| placed.area.subdevice).collect();
-        subdevices.sort_unstable();
+        subdevices.put_in_order();
         subdevices.dedup();
         let set = planned.frames.len();
         let one = &frames[first..first + set];

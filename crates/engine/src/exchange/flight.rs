@@ -403,17 +403,23 @@ impl CyclicFrame {
     /// Whether a copy shows the same as the last one on its link, inputs excepted: intact, with the same results.
     #[inline(always)]
     fn is_usual(&self, link: usize, bytes: &[u8]) -> bool {
-        bytes.len() >= self.tx.len()
-            && self.usual[link].is_shown_by(bytes)
-            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes))
+        bytes.len() >= self.tx.len() && self.usual[link].is_shown_by(bytes) && self.has_usual_presence(link, bytes)
+    }
+
+    /// Whether the same SubDevices as in the last copy on the link processed this one.
+    #[inline(always)]
+    fn has_usual_presence(&self, link: usize, bytes: &[u8]) -> bool {
+        match &self.presence {
+            Some(presence) => presence.is_as_seen(link, bytes),
+            None => true,
+        }
     }
 
     /// Adds the working counters of a copy, and evaluates it where they are others than those of the copy before.
     #[cold]
     fn count(&mut self, sent_on: Link, bytes: &[u8], image: &mut Image) {
         let link = sent_on.index();
-        let mut as_seen = self.views.evaluated[link]
-            && self.presence.as_ref().is_none_or(|presence| presence.is_as_seen(link, bytes));
+        let mut as_seen = self.views.evaluated[link] && self.has_usual_presence(link, bytes);
         let mut sum = 0;
         for place in &self.places {
             let wkc = u16_at(bytes, place.wkc_at);

@@ -12,6 +12,7 @@ use ringcat_wire::source_address::MacCodec;
 
 use super::*;
 use crate::board::Supervision;
+use crate::declared::SubDeviceId;
 use crate::direction::Direction;
 use crate::domain::Freshness;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder};
@@ -90,7 +91,7 @@ impl Ring {
     }
 
     fn freshness(&self) -> [Freshness; 3] {
-        [0, 1, 2].map(|subdevice| self.exchange.freshness(DOMAIN, subdevice))
+        [0, 1, 2].map(|subdevice| self.exchange.freshness(DOMAIN, SubDeviceId(subdevice)))
     }
 }
 
@@ -215,7 +216,7 @@ fn a_missing_subdevice_keeps_its_last_inputs_and_the_others_are_new_at_once() {
         (&[0x20, 0x11, 0x22][..], DomainState::Incomplete)
     );
     assert_eq!(ring.freshness(), [Freshness::Fresh, Freshness::Stale { cycles: 1 }, Freshness::Fresh]);
-    assert_eq!([0, 1, 2].map(|subdevice| ring.exchange.al_status(subdevice)), [Some(8), Some(0), Some(8)]);
+    assert_eq!([0, 1, 2].map(|subdevice| ring.exchange.al_status(SubDeviceId(subdevice))), [Some(8), Some(0), Some(8)]);
 }
 
 #[test]
@@ -290,7 +291,7 @@ fn a_subdevice_below_safeop_costs_the_others_nothing_and_is_not_fresh() {
         ring.evaluate();
         let expected = [Freshness::Fresh, Freshness::Never, Freshness::Fresh];
         assert_eq!(ring.freshness(), expected, "gives inputs: {gives}");
-        assert_eq!(ring.exchange.al_status(1), Some(2));
+        assert_eq!(ring.exchange.al_status(SubDeviceId(1)), Some(2));
     }
 }
 
@@ -472,7 +473,7 @@ fn a_frame_carries_process_data_from_its_first_subdevice_with_fmmus_on() {
     start.board.set_taking_part(2, true);
     assert_eq!(start.cycle(1), [60, 60, 1028]);
     assert_eq!(start.states(), [DomainState::Zero, DomainState::Incomplete]);
-    let freshness = [1, 2].map(|subdevice| start.exchange.freshness(DomainId(1), subdevice));
+    let freshness = [1, 2].map(|subdevice| start.exchange.freshness(DomainId(1), SubDeviceId(subdevice)));
     assert_eq!(freshness, [Freshness::Never, Freshness::Fresh]);
     start.board.set_taking_part(2, false);
     assert_eq!(start.cycle(0), [60, 60, 1028], "what has its FMMUs may come back with them");

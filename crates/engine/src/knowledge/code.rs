@@ -125,6 +125,7 @@ numbers! {
     i16, "two bytes";
     u32, "four bytes";
     u64, "eight bytes";
+    i64, "eight bytes";
 }
 
 impl Code for bool {

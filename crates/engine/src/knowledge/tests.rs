@@ -3,7 +3,8 @@
 use alloc::vec;
 
 use super::*;
-use crate::topology::Node;
+use crate::clocks::{Delays, KnownCable, Measured, Passage, Unknown, Wiring};
+use crate::topology::{Node, PortOf};
 
 fn of(nodes: Vec<Node>) -> Knowledge {
     let info = |at: usize| SubDeviceInfo {
@@ -27,7 +28,49 @@ fn of(nodes: Vec<Node>) -> Knowledge {
         offered: StationAddress(0xC001),
         activations: 9,
         siis: Vec::new(),
+        clocks: Some(clocks_of_two()),
     }
+}
+
+/// A measurement of two SubDevices that are connected with each other.
+fn clocks_of_two() -> KnownClocks {
+    let [near, far] = [PortOf { node: 0, port: 1 }, PortOf { node: 1, port: 0 }];
+    let ends = ((StationAddress(0x1001), 1), (StationAddress(0x1002), 0));
+    let measured = Measured {
+        stations: vec![StationAddress(0x1001), StationAddress(0x1002)],
+        delays: Delays { units: vec![Some(0), Some(90_000)], trees: vec![0, 0], ..Delays::default() },
+        drift_ppb: vec![Some(0), Some(-12_000)],
+        passages: vec![Passage::default(); 2],
+        wiring: Wiring {
+            far: vec![[None, Some(far), None, None], [Some(near), None, None, None]],
+            entries: [Some(PortOf { node: 0, port: 0 }), None],
+        },
+        port_times: vec![Some([0, 1_400, 9, 9]), None],
+    };
+    let cables = vec![KnownCable { ends: vec![ends], time: 50_000, is_old: false }];
+    KnownClocks { measured, cables, backwards: vec![StationAddress(0x1002)] }
+}
+
+#[test]
+fn clocks_with_impossible_places_or_times_are_refused() {
+    let refused = |change: fn(&mut KnownClocks)| {
+        let mut knowledge = of(vec![node(None, Some(1)), node(Some((0, 1)), None)]);
+        change(knowledge.clocks.as_mut().expect("they are known"));
+        let error = Knowledge::from_bytes(&knowledge.to_bytes()).expect_err("it cannot be");
+        assert!(error.expected.contains("clocks"), "{error}");
+    };
+    refused(|known| known.measured.delays.units.truncate(1));
+    refused(|known| known.measured.port_times.push(None));
+    refused(|known| known.measured.delays.trees[1] = 2);
+    refused(|known| known.measured.delays.units[1] = Some(i64::MAX));
+    refused(|known| known.measured.delays.unknown.push(Unknown { node: 1, fork: Some(2), range: None }));
+    refused(|known| known.measured.delays.unknown.push(Unknown { node: 1, fork: None, range: Some((0, i64::MAX)) }));
+    refused(|known| known.measured.drift_ppb[0] = Some(i64::MIN));
+    refused(|known| known.measured.passages[0].forwarded = i64::MIN);
+    refused(|known| known.measured.wiring.far[1][0] = Some(PortOf { node: 2, port: 1 }));
+    refused(|known| known.measured.wiring.entries[1] = Some(PortOf { node: 1, port: 4 }));
+    refused(|known| known.cables[0].time = 1 << 40);
+    refused(|known| known.cables[0].ends.clear());
 }
 
 fn node(parent: Option<(usize, u8)>, child: Option<usize>) -> Node {

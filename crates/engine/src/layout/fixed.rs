@@ -8,6 +8,7 @@ use alloc::collections::BTreeMap;
 
 use super::plan::PlannedDomain;
 use super::spec::{AreaSpec, DomainSpec, ImageOrder};
+use crate::order::InOrder;
 
 /// Given first bytes of a domain's areas, and the bytes of its image; empty where the image follows the wire.
 pub(super) struct Starts {
@@ -44,7 +45,7 @@ impl Starts {
             first.entry(area.subdevice).or_insert(number);
         }
         let mut ordered = spec.clone();
-        ordered.areas.sort_by_key(|area| first[&area.subdevice]);
+        ordered.areas.put_in_order_by_key(|area| first[&area.subdevice]);
         Cow::Owned(ordered)
     }
 

@@ -55,7 +55,15 @@ impl fmt::Display for AoeError {
     }
 }
 
-impl core::error::Error for AoeError {}
+impl core::error::Error for AoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            AoeError::Mailbox(error) => Some(error),
+            AoeError::Malformed(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for AoeError {
     fn from(error: MailboxError) -> AoeError {

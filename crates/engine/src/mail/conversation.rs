@@ -71,8 +71,18 @@ impl Drop for Turn {
 }
 
 fn leave(shared: &Rc<SharedMailbox>, lane: Lane, turn: u32) {
-    shared.state_mut().lanes[lane.index()].turns.retain(|other| *other != turn);
+    shared.state_mut().lanes.of_mut(lane).turns.retain(|other| *other != turn);
     shared.changed.notify();
+}
+
+/// Lengths of the mailboxes of a SubDevice in bytes, header included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct MailboxSizes {
+    /// The mailbox that the SubDevice receives.
+    pub receive: usize,
+    /// The mailbox that the SubDevice sends.
+    pub send: usize,
 }
 
 impl Conversation {
@@ -89,7 +99,8 @@ impl Conversation {
                 return Err(MailboxError::Closed);
             }
             state.next_id = state.next_id.wrapping_add(1);
-            state.lanes[lane.index()].turns.push_back(state.next_id);
+            let next_id = state.next_id;
+            state.lanes.of_mut(lane).turns.push_back(next_id);
             (Turn { shared: shared.clone(), lane, turn: state.next_id, kept: false }, state.epoch)
         };
         let ready = || {
@@ -97,7 +108,8 @@ impl Conversation {
             if state.epoch != epoch {
                 return Some(Err(MailboxError::Closed));
             }
-            (state.lanes[lane.index()].turns.front() == Some(&turn.turn)).then_some(Ok(()))
+            let front = state.lanes.of(lane).and_then(|lane| lane.turns.front());
+            (front == Some(&turn.turn)).then_some(Ok(()))
         };
         shared.changed.until(ready).await?;
         turn.kept = true;
@@ -106,11 +118,7 @@ impl Conversation {
 
     fn with<T>(&self, work: impl FnOnce(&mut LaneState) -> T) -> Result<T, MailboxError> {
         let state = &mut *self.shared.state_mut();
-        if state.epoch != self.epoch {
-            Err(MailboxError::Closed)
-        } else {
-            Ok(work(&mut state.lanes[self.lane.index()]))
-        }
+        if state.epoch != self.epoch { Err(MailboxError::Closed) } else { Ok(work(state.lanes.of_mut(self.lane))) }
     }
 
     /// Largest payload of a message in both directions, in bytes.
@@ -127,10 +135,12 @@ impl Conversation {
         state.session.map_or(0, |session| usize::from(session.layout.receive_size).saturating_sub(Header::LEN))
     }
 
-    /// Lengths of the receive and the send mailbox, header included.
-    pub fn mailbox_sizes(&self) -> (usize, usize) {
+    /// Lengths of the mailboxes; zero while they are not in use.
+    pub fn mailbox_sizes(&self) -> MailboxSizes {
         let state = self.shared.state();
-        state.session.map_or((0, 0), |session| (session.layout.receive_size.into(), session.layout.send_size.into()))
+        let sizes = state.session.map(|session| (session.layout.receive_size, session.layout.send_size));
+        let (receive, send) = sizes.unwrap_or_default();
+        MailboxSizes { receive: receive.into(), send: send.into() }
     }
 
     /// Whether another conversation waits for the lane.
@@ -390,7 +400,7 @@ impl Conversation {
         if state.epoch != self.epoch {
             return;
         }
-        while let Some(arrival) = state.lanes[self.lane.index()].take() {
+        while let Some(arrival) = state.lanes.of_mut(self.lane).take() {
             delivery::keep_unclaimed(state, self.lane, arrival);
         }
     }

@@ -74,7 +74,9 @@ fn sort(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<
     let payload = message.payload;
     let first = payload.first().copied().unwrap_or(0);
     // Ethernet frames have no answer, but a SubDevice that sends frames supports EoE.
-    state.lanes[Lane::Frames.index()].proven |= message.header.protocol == Protocol::Eoe;
+    if message.header.protocol == Protocol::Eoe {
+        state.lanes.of_mut(Lane::Frames).proven = true;
+    }
     match message.header.protocol {
         Protocol::Error => refused(state, message, shared.bus.now()),
         Protocol::Coe => coe(shared, state, message),
@@ -92,7 +94,9 @@ fn sort(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<
             false
         }
         Protocol::Eoe => keep(state, message, Unsolicited::Ethernet),
-        protocol @ Protocol::Other(code) if state.lanes[Lane::Other(code).index()].expected == Some(protocol) => {
+        protocol @ Protocol::Other(code)
+            if state.lanes.of(Lane::Other(code)).is_some_and(|lane| lane.expected == Some(protocol)) =>
+        {
             answer(state, Lane::Other(code), message)
         }
         Protocol::Other(_) => keep(state, message, Unsolicited::Other),
@@ -119,10 +123,14 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
         CoeService::SdoRequest | CoeService::SdoResponse | CoeService::SdoInformation => {
             answer(state, Lane::Coe, message)
         }
-        CoeService::TxPdo | CoeService::RxPdo if state.lanes[Lane::Coe.index()].pdo == Some(*header) => {
+        CoeService::TxPdo | CoeService::RxPdo
+            if state.lanes.of(Lane::Coe).is_some_and(|lane| lane.pdo == Some(*header)) =>
+        {
             answer(state, Lane::Coe, message)
         }
-        CoeService::Other(_) if state.lanes[Lane::Coe.index()].any => answer(state, Lane::Coe, message),
+        CoeService::Other(_) if state.lanes.of(Lane::Coe).is_some_and(|lane| lane.any) => {
+            answer(state, Lane::Coe, message)
+        }
         CoeService::TxPdo
         | CoeService::RxPdo
         | CoeService::TxPdoRemote
@@ -134,7 +142,7 @@ fn coe(shared: &Rc<SharedMailbox>, state: &mut MailboxState, message: &Message<'
 /// Passes a mail to the conversation in the lane; without a waiting conversation it is kept as unsolicited mail.
 fn answer(state: &mut MailboxState, lane: Lane, message: &Message<'_>) -> bool {
     let arrival = Arrival::Payload(message.payload.to_vec());
-    let own = &mut state.lanes[lane.index()];
+    let own = state.lanes.of_mut(lane);
     // A conversation takes one answer at a time; if the queue is full, the oldest one is not the expected answer.
     let oldest = if own.is_full() { own.take() } else { None };
     let wanted = own.arrive(arrival, state.available_at, is_last(lane, message.payload));
@@ -197,11 +205,13 @@ fn refused(state: &mut MailboxState, message: &Message<'_>, now: Instant) -> boo
         && state.lanes.iter().any(|lane| !lane.proven && may_be_to(lane));
     let in_question = |lane: &LaneState| !(unknown && lane.proven);
     let lanes = || state.lanes.iter().filter(|lane| in_question(lane));
-    let frames = &state.lanes[Lane::Frames.index()];
+    let frames = state.lanes.of(Lane::Frames);
     // Fragments differ in length and content only: a SubDevice that sends frames itself accepts their header.
-    let to_frames =
-        in_question(frames) && frames.is_unanswered(now) && !(frames.proven && ABOUT_HEADERS.contains(&reply.detail));
-    let others = lanes().any(|lane| is_late(lane) || (lane.is_unanswered(now) && !core::ptr::eq(lane, frames)));
+    let to_frames = frames.is_some_and(|frames| {
+        in_question(frames) && frames.is_unanswered(now) && !(frames.proven && ABOUT_HEADERS.contains(&reply.detail))
+    });
+    let is_frames = |lane: &LaneState| frames.is_some_and(|frames| core::ptr::eq(lane, frames));
+    let others = lanes().any(|lane| is_late(lane) || (lane.is_unanswered(now) && !is_frames(lane)));
     let refusal = if in_parts || others || lanes().filter(|lane| is_waiting(lane)).count() > 1 {
         Refusal::Uncertain
     } else if to_frames {

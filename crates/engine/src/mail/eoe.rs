@@ -21,6 +21,6 @@ pub use error::{EoeError, EoeFailure};
 pub use port::EthernetPort;
 pub use reassembly::MAX_FRAME;
 pub use settings::{read_filter, read_ip, set_filter, set_ip};
-pub use traffic::{EthernetCounters, EthernetFrame, EthernetStatus, QUEUE, QueueError, TimeStamp};
+pub use traffic::{EthernetCounters, EthernetFrame, EthernetRate, EthernetStatus, QUEUE, QueueError, TimeStamp};
 
 pub(super) use traffic::Traffic;

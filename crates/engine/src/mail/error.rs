@@ -60,7 +60,15 @@ impl fmt::Display for MailboxError {
     }
 }
 
-impl core::error::Error for MailboxError {}
+impl core::error::Error for MailboxError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            MailboxError::Bus(error) => Some(error),
+            MailboxError::NotPermitted(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for MailboxError {
     fn from(denied: NotPermitted) -> MailboxError {

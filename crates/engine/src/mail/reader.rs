@@ -128,7 +128,7 @@ fn step(shared: &Rc<SharedMailbox>, next_poll: Instant, hold: Instant) -> Step {
     if now < due {
         return Step::Wait(due);
     }
-    for lane in &mut state.lanes {
+    for lane in state.lanes.iter_mut() {
         if lane.due().is_some_and(|due| due <= now)
             && let Some(pending) = &mut lane.pending
         {

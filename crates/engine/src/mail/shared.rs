@@ -14,7 +14,8 @@ use super::answer_time::ShortestTrip;
 use super::counters::MailCounters;
 use super::emergencies::EmergencyRing;
 use super::eoe::Traffic;
-use super::lane::{Lane, LaneState};
+use super::lane::LaneState;
+use super::lanes::Lanes;
 use super::recent::Recent;
 use super::unsolicited::UnsolicitedQueues;
 use crate::declared::Address;
@@ -46,7 +47,7 @@ pub(super) struct MailboxState {
     pub open: bool,
     /// Counts openings and closings, so that tasks and conversations of an earlier epoch end.
     pub epoch: u32,
-    pub lanes: [LaneState; Lane::COUNT],
+    pub lanes: Lanes,
     /// Lane with the next turn to write.
     pub next_lane: usize,
     pub next_id: u32,
@@ -99,7 +100,7 @@ impl SharedMailbox {
             recent: Recent::default(),
             open: false,
             epoch: 0,
-            lanes: Default::default(),
+            lanes: Lanes::default(),
             next_lane: 0,
             next_id: 0,
             writer: None,

@@ -91,9 +91,20 @@ impl fmt::Display for SoeFailure {
     }
 }
 
-impl core::error::Error for SoeError {}
+impl core::error::Error for SoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
 
-impl core::error::Error for SoeFailure {}
+impl core::error::Error for SoeFailure {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for SoeFailure {
     fn from(error: MailboxError) -> SoeFailure {
@@ -156,7 +167,7 @@ async fn write_inner(mailbox: &Mailbox, address: SoeAddress, data: &[u8], limits
     let mut conversation = begin(mailbox, address).await?;
     let SoeAddress { drive, idn, elements } = address;
     let mut payload = vec![0; conversation.request_capacity()];
-    let piece = SoeMessage::max_data(conversation.mailbox_sizes().0).max(1);
+    let piece = SoeMessage::max_data(conversation.mailbox_sizes().receive).max(1);
     let count = data.len().div_ceil(piece).max(1);
     let Ok(mut left) = u16::try_from(count - 1) else {
         let limit = piece as u64 * (1 << 16);

@@ -41,7 +41,7 @@ pub(super) fn start(shared: &Rc<SharedMailbox>) {
 async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
     while let Some((message, session)) = next(&shared, epoch) {
         let lane = message.lane;
-        shared.state_mut().lanes[lane.index()].writing(&message, shared.bus.now());
+        shared.state_mut().lanes.of_mut(lane).writing(&message, shared.bus.now());
         let result = write(&shared, epoch, &session, &message).await;
         {
             let state = &mut *shared.state_mut();
@@ -54,7 +54,7 @@ async fn run(shared: Rc<SharedMailbox>, epoch: u32) {
             if lane == Lane::Frames {
                 state.ethernet.note_fragment(now);
             }
-            state.lanes[lane.index()].wrote(&message, result, now);
+            state.lanes.of_mut(lane).wrote(&message, result, now);
         }
         shared.bus.step(Subject::Mail, || {
             let (station, protocol, length) = (session.station, lane.protocol(), message.payload.len());
@@ -80,7 +80,7 @@ fn next(shared: &Rc<SharedMailbox>, epoch: u32) -> Option<(Outgoing, Session)> {
     for step in 0..count {
         let at = (state.next_lane + step) % count;
         let Some(session) = state.session.as_mut().filter(|_| state.open) else { break };
-        if let Some(message) = state.lanes[at].outbox.pop_front() {
+        if let Some(message) = state.lanes.used_at_mut(at).and_then(|lane| lane.outbox.pop_front()) {
             state.next_lane = (at + 1) % count;
             session.count();
             return Some((message, *session));

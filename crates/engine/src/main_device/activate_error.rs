@@ -287,7 +287,18 @@ fn fmt_sync_cycle(
     f.write_str("one must be a multiple of the other")
 }
 
-impl core::error::Error for ActivateError {}
+impl core::error::Error for ActivateError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ActivateError::NotPermitted(error) => Some(error),
+            ActivateError::Config { error, .. } => Some(error),
+            ActivateError::Setup { error, .. } => Some(error),
+            ActivateError::Junction(error) => Some(error),
+            ActivateError::Layout(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for ActivateError {
     fn from(denied: NotPermitted) -> ActivateError {

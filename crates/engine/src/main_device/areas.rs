@@ -13,6 +13,7 @@ use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Layout, PlacedArea};
+use crate::order::InOrder;
 use crate::plan::{MappedEntry, SubDevicePlan};
 use crate::segment::setup::{SetupError, declared_areas, planned_areas};
 
@@ -38,8 +39,20 @@ pub struct AreaEntries {
     pub placed: PlacedArea,
     /// Direction.
     pub direction: Direction,
-    /// Index, subindex, place; without gaps.
-    pub entries: Vec<(u16, u8, Entry)>,
+    /// Its entries; without gaps.
+    pub entries: Vec<PlacedEntry>,
+}
+
+/// A PDO entry with its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PlacedEntry {
+    /// Index of the object.
+    pub index: u16,
+    /// Subindex.
+    pub sub_index: u8,
+    /// Place in the image of the domain.
+    pub place: Entry,
 }
 
 impl Directory {
@@ -76,7 +89,7 @@ impl Directory {
             (area.domain, start..start + u64::from(area.placed.area.length) * 8)
         };
         let mut ranges: Vec<_> = areas.map(range).filter(|(_, bits)| !bits.is_empty()).collect();
-        ranges.sort_unstable_by_key(|(domain, bits)| (*domain, bits.start));
+        ranges.put_in_order_by_key(|(domain, bits)| (*domain, bits.start));
         ranges.dedup_by(|(domain, bits), (domain_before, before)| {
             let continues = domain == domain_before && bits.start <= before.end;
             if continues {
@@ -102,8 +115,8 @@ impl Directory {
         };
         self.subdevices.iter().enumerate().find_map(|(subdevice, areas)| {
             let mut entries = areas.iter().flat_map(|area| &area.entries);
-            let (index, sub_index, _) = entries.find(|(_, _, entry)| covers(entry))?;
-            Some((SubDeviceId(subdevice), *index, *sub_index))
+            let found = entries.find(|entry| covers(&entry.place))?;
+            Some((SubDeviceId(subdevice), found.index, found.sub_index))
         })
     }
 
@@ -122,7 +135,7 @@ impl Directory {
     pub fn expected_wkc_as_igh(&self, domain: DomainId) -> u32 {
         let areas = self.subdevices.iter().flatten().filter(|area| area.domain == domain);
         let mut placed: Vec<PlacedArea> = areas.map(|area| area.placed).collect();
-        placed.sort_unstable_by_key(|placed| placed.image_offset);
+        placed.put_in_order_by_key(|placed| placed.image_offset);
         let area = |placed: PlacedArea| (SubDeviceId(placed.area.subdevice), placed.area.direction, placed.area.length);
         expected_as_igh(placed.into_iter().map(area))
     }
@@ -135,7 +148,7 @@ impl Directory {
     /// The place of a PDO entry; the first one if it is mapped more than once.
     pub fn entry(&self, subdevice: SubDeviceId, index: u16, sub_index: u8) -> Option<Entry> {
         let entries = self.areas(subdevice).iter().flat_map(|area| &area.entries);
-        entries.into_iter().find(|(i, s, _)| (*i, *s) == (index, sub_index)).map(|(_, _, entry)| *entry)
+        entries.into_iter().find(|it| (it.index, it.sub_index) == (index, sub_index)).map(|it| it.place)
     }
 }
 
@@ -199,13 +212,13 @@ impl Areas {
         // In the order of the SyncManagers; the places of one in the order of the domains.
         let listed = self.list();
         let rank = |placed: &PlacedArea| listed.iter().position(|(number, ..)| *number == placed.area.sync_manager);
-        places.sort_by_key(|(_, placed)| rank(placed).unwrap_or(listed.len()));
+        places.put_in_order_by_key(|(_, placed)| rank(placed).unwrap_or(listed.len()));
         for (domain, placed) in places {
             let (sync_manager, direction) = (placed.area.sync_manager, placed.area.direction);
             let entries = self.mapped(sync_manager).into_iter().filter(|entry| entry.index != 0).map(|entry| {
                 let bit_offset = placed.image_offset * 8 + entry.bit_offset;
                 let place = Entry { domain, bit_offset, bit_length: entry.bit_length.into() };
-                (entry.index, entry.sub_index, place)
+                PlacedEntry { index: entry.index, sub_index: entry.sub_index, place }
             });
             found.push(AreaEntries { domain, placed, direction, entries: entries.collect() });
         }

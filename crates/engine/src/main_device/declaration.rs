@@ -85,6 +85,23 @@ impl DomainMember {
 }
 
 /// The declaration of the application.
+///
+/// Built like options: [`Declaration::new`], then `with_*` for values. What returns an index in the declaration
+/// (`add*`, `register*`) or takes one (`assign`, `place_image`) takes `&mut self`.
+///
+/// ```
+/// use core::time::Duration;
+/// use ringcat_engine::config::{ClockConfig, SubDeviceConfig};
+/// use ringcat_engine::main_device::{Declaration, Required};
+///
+/// let period = Duration::from_millis(1);
+/// let mut declaration = Declaration::new(period)
+///     .with_clocks(ClockConfig::default())
+///     .with_required(Required::All)
+///     .with_sends_again(true);
+/// let drive = declaration.add(SubDeviceConfig::at_position(0));
+/// assert_eq!((drive.0, declaration.domains[0].sends_again), (0, true));
+/// ```
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Declaration {
@@ -113,8 +130,19 @@ pub enum Required {
     /// Those that are not optional.
     #[default]
     Mandatory,
-    /// None.
+    /// None. A present one that cannot be set up as declared (PDOs, SDOs, SYNC signals, places of its process data)
+    /// is no obstacle either: its own configuration fails, and all others go on.
     Nothing,
+}
+
+/// A hot connect group that was added to a declaration.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DeclaredGroup {
+    /// Its number.
+    pub id: GroupId,
+    /// Its members in the declaration, head first.
+    pub members: Vec<SubDeviceId>,
 }
 
 impl Declaration {
@@ -131,18 +159,18 @@ impl Declaration {
     /// The same declaration, with lost frames of every domain sent again within their cycle, or not (see
     /// [`DomainConfig::sends_again`]).
     #[must_use]
-    pub fn with_lost_frames_sent_again(mut self, sends_again: bool) -> Declaration {
+    pub fn with_sends_again(mut self, sends_again: bool) -> Declaration {
         self.domains.iter_mut().for_each(|domain| domain.sends_again = sends_again);
         self
     }
 
-    /// Declares a hot connect group. Returns its number, and the indices of its members, head first.
-    pub fn add_group(&mut self, group: Group) -> (GroupId, Vec<SubDeviceId>) {
+    /// Declares a hot connect group.
+    pub fn add_group(&mut self, group: Group) -> DeclaredGroup {
         let numbers = self.subdevices.iter().filter_map(|config| config.group);
         let group_id = numbers.max().map_or(GroupId(0), |GroupId(last)| GroupId(last + 1));
         let first = self.subdevices.len();
         self.subdevices.extend(group.into_configs(group_id));
-        (group_id, (first..self.subdevices.len()).map(SubDeviceId).collect())
+        DeclaredGroup { id: group_id, members: (first..self.subdevices.len()).map(SubDeviceId).collect() }
     }
 }
 

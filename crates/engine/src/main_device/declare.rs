@@ -1,9 +1,10 @@
 //! Builds a declaration step by step.
 
 use alloc::vec;
+use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::declaration::{Declaration, DomainConfig, DomainMember, Required};
+use super::declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, Required};
 use crate::config::{ClockConfig, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
@@ -12,7 +13,7 @@ use crate::layout::LrwPolicy;
 impl Declaration {
     /// A declaration with one domain of this period, [`DomainId`] 0, and no SubDevices yet.
     #[must_use]
-    pub fn with_period(period: Duration) -> Declaration {
+    pub fn new(period: Duration) -> Declaration {
         Declaration { domains: vec![DomainConfig::new(period, vec![])], ..Declaration::default() }
     }
 
@@ -52,17 +53,10 @@ impl Declaration {
         }
     }
 
-    /// The same declaration, with distributed clocks.
+    /// The same declaration, with distributed clocks, or with `None` without.
     #[must_use]
-    pub fn with_clocks(mut self, clocks: ClockConfig) -> Declaration {
-        self.clocks = Some(clocks);
-        self
-    }
-
-    /// The same declaration, with or without distributed clocks.
-    #[must_use]
-    pub fn with_optional_clocks(mut self, clocks: Option<ClockConfig>) -> Declaration {
-        self.clocks = clocks;
+    pub fn with_clocks(mut self, clocks: impl Into<Option<ClockConfig>>) -> Declaration {
+        self.clocks = clocks.into();
         self
     }
 
@@ -70,6 +64,13 @@ impl Declaration {
     #[must_use]
     pub fn with_lrw(mut self, lrw: LrwPolicy) -> Declaration {
         self.lrw = lrw;
+        self
+    }
+
+    /// The same declaration, with the LRW datagrams of a configuration file ([`Declaration::explicit_lrw`]).
+    #[must_use]
+    pub fn with_explicit_lrw(mut self, explicit_lrw: Vec<ExplicitLrw>) -> Declaration {
+        self.explicit_lrw = explicit_lrw;
         self
     }
 

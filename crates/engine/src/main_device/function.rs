@@ -1,21 +1,9 @@
-//! The role of the MainDevice, and the one point at which functions are checked where they start
-//! ([`crate::role`]).
+//! The one point at which functions are checked where they start ([`crate::role`]).
 
 use super::MainDevice;
-use crate::role::{Function, MainDeviceRole, NotPermitted, Permission};
+use crate::role::{Function, NotPermitted, Permission};
 
 impl MainDevice {
-    /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.
-    pub fn role(&self) -> MainDeviceRole {
-        self.supervisor.role()
-    }
-
-    /// Sets the role. It decides which functions are refused from now on; procedures that run go on. A MainDevice with
-    /// a standby partner sets it at a takeover; alone on a segment it stays [`MainDeviceRole::Active`].
-    pub fn set_role(&mut self, role: MainDeviceRole) {
-        self.supervisor.set_role(role);
-    }
-
     /// Whether a function can be called now.
     pub fn permission(&self, function: Function) -> Permission {
         function.permission(self.role(), self.phase())

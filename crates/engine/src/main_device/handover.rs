@@ -14,6 +14,7 @@ use crate::knowledge::{Handover, Knowledge, KnownMailbox, KnownProgress, KnownSu
 use crate::procedures::resume::{Before, Known, resume};
 use crate::ring::Sequence;
 use crate::role::Function;
+use crate::segment::clocks::ClockObservation;
 use crate::segment::{Found, Observation, UpkeepProgress};
 
 /// Activations by which a session after a crash differs at least from those of the former owner: half of all sessions.
@@ -44,6 +45,7 @@ impl MainDevice {
             offered: view.last_offered(),
             activations: self.activations,
             siis: self.cache.known(),
+            clocks: view.known_clocks().map(|known| (*known).clone()),
         })
     }
 
@@ -70,7 +72,7 @@ impl MainDevice {
 
     /// Goes on with the segment that another process has known, without a scan: no SII is read. First the number of
     /// SubDevices, their station addresses, ports, AL states and mailbox SyncManagers are compared with the knowledge.
-    /// What differs is scanned as after a change of the segment; [`Event::Resumed`](crate::event::Event::Resumed) tells
+    /// What differs is scanned as after a change of the segment; [`Event::Resumed`](crate::event::Event::Resumed) has
     /// the result. [`MainDevice::scan_result`] has the SubDevices afterwards, and their mailboxes are in use again.
     /// Without idle operation SubDevices stay in their states; with it all are brought to their states. Refused while
     /// active or while a scan runs.
@@ -79,13 +81,16 @@ impl MainDevice {
         if self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
         }
-        let Knowledge { subdevices, others, topology, main_count, ring, sequence, offered, activations, siis } =
-            knowledge;
+        let Knowledge { subdevices, others, topology, main_count, ring, .. } = knowledge;
+        let Knowledge { sequence, offered, activations, siis, clocks, .. } = knowledge;
         self.supervisor.assume_ring(ring);
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         self.cache.learn(siis);
+        if let Some(known) = clocks {
+            self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
+        }
         self.begin_idle();
         self.go_on(sequence, activations, offered, handover);
         let count = subdevices.len();

@@ -17,19 +17,20 @@ use super::activate_error::ActivateError;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
 use super::registered;
-use crate::config::{ConfigError, Resolution, can_be_head, groups, resolve};
+use super::registered_area::RegisteredArea;
+use crate::config::{ConfigError, Resolution, SubDeviceConfig, can_be_head, groups, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
-use crate::plan::{PlanFault, plan};
+use crate::plan::{PlanFault, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::member::MemberView;
-use crate::segment::setup::{Setup, SetupError, declared_areas, presence};
+use crate::segment::setup::{Setup, SetupError, declared_areas, planned_areas, presence};
 use crate::segment::{Found, Observation, Owners, SubDevice, SubDevices};
 
 /// Period of the domain that only carries the supervision datagram.
@@ -75,13 +76,13 @@ pub(super) fn match_declaration(
     Ok((found, unassigned.collect()))
 }
 
-/// SYNC signals need a clock, and clocks that are synchronized.
+/// SYNC signals need a clock, and clocks that are synchronized. A SubDevice without a clock may fail alone.
 pub(super) fn check_clocks(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<(), ActivateError> {
     for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
-        let has_clock = info.as_ref().is_none_or(|info| info.controller.features.dc);
+        let has_clock = fails_alone(declaration) || info.as_ref().is_none_or(|info| info.controller.features.dc);
         if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
             return Err(ActivateError::NoClock { subdevice: SubDeviceId(subdevice), has_clock });
         }
@@ -101,26 +102,54 @@ fn report_absence(segment: &SharedSegment, subdevice: usize, optional: bool, err
     segment.observe(Observation::Compared(shown));
 }
 
+/// Whether a present SubDevice that does not fit its declaration fails alone, when its configuration begins.
+fn fails_alone(declaration: &Declaration) -> bool {
+    declaration.required == Required::Nothing
+}
+
 pub(super) fn plan_all(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<Vec<Areas>, ActivateError> {
     let pairs = declaration.subdevices.iter().zip(found).enumerate();
     pairs
-        .map(|(subdevice, (config, info))| match info {
-            Some(info) => match plan(config, info) {
-                Ok(plan) => Ok(Areas::Planned(exchanges(config.target).then_some(plan))),
-                // A bad EEPROM fails only its own SubDevice.
-                Err(error) if error.fault == PlanFault::Sii => {
-                    Ok(Areas::Declared(Declared::unfit(config, info, SetupError::Plan(error))))
-                }
-                Err(error) => {
-                    Err(ActivateError::Setup { subdevice: SubDeviceId(subdevice), error: SetupError::Plan(error) })
-                }
-            },
+        .map(|(index, (config, info))| match info {
+            Some(info) => plan_one(declaration, SubDeviceId(index), config, info),
             None => Ok(Areas::Declared(Declared::absent(config))),
         })
         .collect()
+}
+
+fn plan_one(
+    declaration: &Declaration,
+    subdevice: SubDeviceId,
+    config: &SubDeviceConfig,
+    info: &SubDeviceInfo,
+) -> Result<Areas, ActivateError> {
+    let unfit = |error| Ok(Areas::Declared(Declared::unfit(config, info, error)));
+    match plan(config, info) {
+        Ok(_) if !exchanges(config.target) => Ok(Areas::Planned(None)),
+        Ok(plan) => match misplaced(declaration, subdevice, &plan) {
+            Some(error) if fails_alone(declaration) => unfit(error),
+            _ => Ok(Areas::Planned(Some(plan))),
+        },
+        // A bad EEPROM fails only its own SubDevice.
+        Err(error) if error.fault == PlanFault::Sii || fails_alone(declaration) => unfit(SetupError::Plan(error)),
+        Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
+    }
+}
+
+/// A registered area of a SubDevice that has another size or direction than its process data now.
+fn misplaced(declaration: &Declaration, subdevice: SubDeviceId, plan: &SubDevicePlan) -> Option<SetupError> {
+    let now = planned_areas(plan);
+    let all = declaration.domains.iter().flat_map(|domain| &domain.registered);
+    all.filter(|area| area.subdevice == subdevice).find_map(|area| {
+        let RegisteredArea { sync_manager, direction, length: expected, .. } = *area;
+        let listed = now.iter().find(|(number, ..)| *number == sync_manager);
+        let got = listed.map_or(0, |(.., length)| *length);
+        let is_same = listed == Some(&(sync_manager, direction, expected));
+        (!is_same).then_some(SetupError::Area { sync_manager, expected, got })
+    })
 }
 
 /// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
@@ -186,8 +215,12 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
     Ok(())
 }
 
-/// Process data without any domain would never be exchanged.
+/// Process data without any domain would never be exchanged. Without a required SubDevice this is no obstacle: its
+/// outputs stay where its watchdog has them.
 pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
+    if fails_alone(declaration) {
+        return Ok(());
+    }
     let has_data = |areas: &Areas| areas.list().iter().any(|(.., length)| *length > 0);
     match plans.iter().position(has_data) {
         Some(subdevice) if declaration.domains.is_empty() => {
@@ -303,20 +336,22 @@ pub(super) fn members(
     layout: &Layout,
 ) -> Result<Vec<SubDevice>, ActivateError> {
     let count = found.len();
+    let is_alone = fails_alone(&declaration);
     let mut members = Vec::with_capacity(count);
     for (index, (config, info)) in declaration.subdevices.into_iter().zip(found).enumerate() {
         let unfit = plans.get(index).and_then(Areas::unfit).cloned();
         let setup = match &info {
-            Some(info) if unfit.is_none() => Some(Rc::new(
-                Setup::new(index, &config, info, layout)
-                    .map_err(|error| ActivateError::Setup { subdevice: SubDeviceId(index), error })?,
-            )),
-            Some(_) | None => None,
+            Some(info) if unfit.is_none() => match Setup::new(index, &config, info, layout) {
+                Ok(setup) => Ok(Rc::new(setup)),
+                Err(error) if is_alone => Err(Some(error)),
+                Err(error) => return Err(ActivateError::Setup { subdevice: SubDeviceId(index), error }),
+            },
+            Some(_) | None => Err(unfit),
         };
         // An absent SubDevice gets an address behind those of the scan.
         let absent = station_at(Position((0x4000 + index) as u16));
         let station = info.as_ref().map_or(absent, |info| info.station);
-        members.push(SubDevice::declared(config, info, station, setup.ok_or(unfit)));
+        members.push(SubDevice::declared(config, info, station, setup));
     }
     Ok(members)
 }

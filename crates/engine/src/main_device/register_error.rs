@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::registered_area::EntryPlace;
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::plan::PlanError;
@@ -46,14 +47,19 @@ pub enum RegisterError {
         /// Subindex.
         sub_index: u8,
     },
-    /// There is no process data at this place.
-    NoSuchPlace {
+    /// The SyncManager has no process data.
+    NoProcessData {
         /// Index in the declaration.
         subdevice: SubDeviceId,
         /// The SyncManager.
         sync_manager: u8,
-        /// Places of the PDO in the SyncManager and of the entry in the PDO, where an entry was named by them.
-        place: Option<(usize, usize)>,
+    },
+    /// There is no entry at this place.
+    NoSuchPlace {
+        /// Index in the declaration.
+        subdevice: SubDeviceId,
+        /// The place.
+        place: EntryPlace,
     },
     /// Each place needs an FMMU of the SubDevice.
     TooManyPlaces {
@@ -89,10 +95,10 @@ impl fmt::Display for RegisterError {
                 f,
                 "declaration {subdevice}: no assigned PDO contains {index:#06x}:{sub_index:02x}; assign one that does"
             ),
-            RegisterError::NoSuchPlace { subdevice, sync_manager, place: None } => {
+            RegisterError::NoProcessData { subdevice, sync_manager } => {
                 write!(f, "declaration {subdevice}: SyncManager {sync_manager} has no process data")
             }
-            RegisterError::NoSuchPlace { subdevice, sync_manager, place: Some((pdo, entry)) } => write!(
+            RegisterError::NoSuchPlace { subdevice, place: EntryPlace { sync_manager, pdo, entry } } => write!(
                 f,
                 "declaration {subdevice}: SyncManager {sync_manager} has no entry {entry} in PDO {pdo}, counted from 0"
             ),
@@ -106,4 +112,11 @@ impl fmt::Display for RegisterError {
     }
 }
 
-impl core::error::Error for RegisterError {}
+impl core::error::Error for RegisterError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            RegisterError::Plan { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}

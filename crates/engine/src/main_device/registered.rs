@@ -30,7 +30,7 @@ pub(super) fn fill(
         }
         let listed = areas.list().into_iter().find(|(number, ..)| *number == sync_manager);
         let got = listed.map(|(_, direction, length)| (direction, length));
-        let is_open = matches!(areas, Areas::Declared(_)) && got.is_none();
+        let is_open = matches!(areas, Areas::Declared(_)) && (got.is_none() || areas.unfit().is_some());
         if !is_open && got != Some((direction, length)) {
             let expected = (direction, length);
             return Err(ActivateError::Registered { domain, subdevice, sync_manager, expected, got });

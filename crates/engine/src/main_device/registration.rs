@@ -9,13 +9,14 @@ use alloc::vec::Vec;
 use super::areas::{Areas, Declared};
 use super::declaration::{Declaration, DomainConfig};
 use super::register_error::RegisterError;
-use super::registered_area::RegisteredArea;
+use super::registered_area::{EntryPlace, RegisteredArea};
 use super::working_counters::expected_as_igh;
 use crate::config::{Resolution, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 use crate::plan::{MappedEntry, plan};
 use crate::segment::setup::declared_areas;
 
@@ -68,7 +69,7 @@ impl Declaration {
     ) -> Result<Entry, RegisterError> {
         let areas = self.areas(subdevice, found)?;
         let mut listed = areas.list();
-        listed.sort_unstable_by_key(|(sync_manager, ..)| *sync_manager);
+        listed.put_in_order_by_key(|(sync_manager, ..)| *sync_manager);
         let is_wanted = |entry: &MappedEntry| (entry.index, entry.sub_index) == (index, sub_index);
         let mapped = listed.iter().find_map(|(sync_manager, ..)| {
             let entry = areas.mapped(*sync_manager).into_iter().find(is_wanted)?;
@@ -78,7 +79,7 @@ impl Declaration {
         self.place(domain, subdevice, sync_manager, &areas, found).map(|area| of_area(domain, &area, &entry))
     }
 
-    /// As [`Declaration::register_entry`], for the entry at a place: SyncManager, PDO in it, entry in the PDO, from 0.
+    /// As [`Declaration::register_entry`], for the entry at a place.
     ///
     /// # Errors
     /// As [`Declaration::register_entry`].
@@ -86,15 +87,14 @@ impl Declaration {
         &mut self,
         domain: DomainId,
         subdevice: SubDeviceId,
-        (sync_manager, pdo, entry): (u8, usize, usize),
+        place: EntryPlace,
         found: Option<&SubDeviceInfo>,
     ) -> Result<Entry, RegisterError> {
         let areas = self.areas(subdevice, found)?;
-        let pdos = areas.pdos(sync_manager);
-        let mapped = pdos.get(pdo).and_then(|entries| entries.get(entry)).copied();
-        let place = Some((pdo, entry));
-        let mapped = mapped.ok_or(RegisterError::NoSuchPlace { subdevice, sync_manager, place })?;
-        self.place(domain, subdevice, sync_manager, &areas, found).map(|area| of_area(domain, &area, &mapped))
+        let pdos = areas.pdos(place.sync_manager);
+        let mapped = pdos.get(place.pdo).and_then(|entries| entries.get(place.entry)).copied();
+        let mapped = mapped.ok_or(RegisterError::NoSuchPlace { subdevice, place })?;
+        self.place(domain, subdevice, place.sync_manager, &areas, found).map(|area| of_area(domain, &area, &mapped))
     }
 
     /// As [`Declaration::register_entry`], for a whole SyncManager.
@@ -153,7 +153,7 @@ impl Declaration {
         areas: &Areas,
         found: Option<&SubDeviceInfo>,
     ) -> Result<RegisteredArea, RegisterError> {
-        let no_area = RegisterError::NoSuchPlace { subdevice, sync_manager, place: None };
+        let no_area = RegisterError::NoProcessData { subdevice, sync_manager };
         let listed = areas.list();
         let of = |number: u8| listed.iter().find(|(listed, ..)| *listed == number);
         let (_, direction, length) = *of(sync_manager).ok_or(no_area)?;
@@ -194,7 +194,7 @@ impl Declaration {
         });
         let mut places: Vec<(usize, u8)> = registered.collect();
         places.push((domain.0, sync_manager));
-        places.sort_unstable();
+        places.put_in_order();
         places.dedup();
         let areas = listed.iter().filter(|(.., length)| *length > 0);
         areas.map(|(number, ..)| places.iter().filter(|(_, other)| other == number).count().max(1)).sum()

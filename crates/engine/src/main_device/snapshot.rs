@@ -8,16 +8,15 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::Position;
-
 use super::{MainDevice, SubDeviceState};
-use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
-use crate::mail::MailCounters;
+use crate::mail::{MailCounters, Mailbox};
 use crate::ring::RingState;
 use crate::ring_status::{Cable, Redundancy};
+use crate::segment::Addressed;
 use crate::segment::member::MemberView;
+use crate::segment::unassigned::UnassignedView;
 use crate::supervisor::AcyclicCounters;
 
 macro_rules! plain {
@@ -99,7 +98,7 @@ plain! {
     pub struct SubDeviceSnapshot {
         /// Index in the active declaration.
         pub declared: Option<usize>,
-        /// Position in the last scan; `None` if the scan did not find it.
+        /// Position; `None` for a declared SubDevice that the last scan did not find.
         pub position: Option<u16>,
         /// Station address.
         pub station: u16,
@@ -114,6 +113,12 @@ plain! {
         /// Target state while its declaration is active, as in register AL_CONTROL: 1 INIT, 2 PREOP, 3 BOOT, 4 SAFEOP,
         /// 8 OP.
         pub target_state: Option<u8>,
+        /// Mailbox protocols by its SII (word 0x1C); 0 without a mailbox.
+        pub protocols: u16,
+        /// Bytes of its mailboxes: those of messages to it, and from it; zeros without a mailbox.
+        pub mailbox_bytes: [u16; 2],
+        /// SyncManagers whose PDOs were read from its dictionary.
+        pub read_online: Vec<u8>,
         /// Its mailbox is in use.
         pub mailbox_open: bool,
         /// Messages written, mails read, and mails that no request waited for.
@@ -269,37 +274,21 @@ impl MainDevice {
         }
     }
 
-    fn subdevice_snapshots(&mut self) -> Vec<SubDeviceSnapshot> {
-        let scanned = self.subdevices();
-        let mut subdevices: Vec<SubDeviceSnapshot> = match self.active() {
-            None => Vec::new(),
-            Some(segment) => segment.view().members().enumerate().map(of_member).collect(),
+    /// The declared SubDevices by index, then those that are known to be undeclared.
+    fn subdevice_snapshots(&self) -> Vec<SubDeviceSnapshot> {
+        let view = self.segment.view();
+        let position = |station: u16| {
+            let found = view.found()?.subdevices.iter().find(|info| info.station.0 == station);
+            found.map(|info| info.position.0)
         };
-        for subdevice in &mut subdevices {
-            let found = scanned.iter().find(|info| info.station.0 == subdevice.station);
-            subdevice.position = found.map(|info| info.position.0);
-        }
-        let is_new = |info: &&SubDeviceInfo| subdevices.iter().all(|known| known.station != info.station.0);
-        let others: Vec<SubDeviceSnapshot> = scanned.iter().filter(is_new).map(of_info).collect();
-        subdevices.extend(others);
-        subdevices.into_iter().map(|subdevice| self.with_mail(subdevice)).collect()
-    }
-
-    fn with_mail(&mut self, subdevice: SubDeviceSnapshot) -> SubDeviceSnapshot {
-        let (address, mailbox) = match (self.active(), subdevice.declared, subdevice.position) {
-            (Some(segment), Some(index), _) => (Address::Declared(SubDeviceId(index)), segment.mailbox(index)),
-            (None, _, Some(position)) => (Address::Scanned(Position(position)), self.mailbox(Position(position))),
-            _ => return subdevice,
-        };
-        let MailCounters { written, read, unclaimed, .. } =
-            mailbox.as_ref().map(|mailbox| mailbox.counters()).unwrap_or_default();
-        let ring = self.emergencies(address);
-        SubDeviceSnapshot {
-            mailbox_open: mailbox.is_some_and(|mailbox| mailbox.is_open()),
-            mail: [written, read, unclaimed],
-            emergencies: [ring.len() as u64, ring.overruns()],
-            ..subdevice
-        }
+        let members = view.members().enumerate().map(|(index, member)| {
+            let snapshot = of_member((index, member));
+            (Addressed::Member(index), SubDeviceSnapshot { position: position(snapshot.station), ..snapshot })
+        });
+        let others = view.subdevices().unassigned().filter(UnassignedView::is_undeclared);
+        let others = others.map(|it| (Addressed::Undeclared(it.key), of_undeclared(&it)));
+        let with_mail = |(subdevice, snapshot)| with_mail(snapshot, self.segment.mailbox_of(subdevice).as_ref());
+        members.chain(others).map(with_mail).collect()
     }
 
     fn clock_snapshots(&self) -> Vec<ClockSnapshot> {
@@ -332,14 +321,39 @@ fn of_member((index, member): (usize, MemberView<'_>)) -> SubDeviceSnapshot {
     }
 }
 
+fn of_undeclared(subdevice: &UnassignedView<'_>) -> SubDeviceSnapshot {
+    SubDeviceSnapshot {
+        position: Some(subdevice.position.0),
+        station: subdevice.key.station.0,
+        ..subdevice.knowledge.info().map(|info| of_info(info)).unwrap_or_default()
+    }
+}
+
+/// With what its mailbox has counted, if it was in use.
+fn with_mail(subdevice: SubDeviceSnapshot, mailbox: Option<&Mailbox>) -> SubDeviceSnapshot {
+    let Some(mailbox) = mailbox else { return subdevice };
+    let MailCounters { written, read, unclaimed, .. } = mailbox.counters();
+    let ring = mailbox.emergencies();
+    SubDeviceSnapshot {
+        mailbox_open: mailbox.is_open(),
+        mail: [written, read, unclaimed],
+        emergencies: [ring.len() as u64, ring.overruns()],
+        ..subdevice
+    }
+}
+
 fn of_info(info: &SubDeviceInfo) -> SubDeviceSnapshot {
     let identity = &info.identity;
+    let layout = info.mailbox.unwrap_or_default();
     SubDeviceSnapshot {
         position: Some(info.position.0),
         station: info.station.0,
         alias: info.alias,
         identity: [identity.vendor_id, identity.product_code, identity.revision, identity.serial],
         name: info.name.clone(),
+        protocols: info.protocols.0,
+        mailbox_bytes: [layout.receive_size, layout.send_size],
+        read_online: info.read_online.clone(),
         ..SubDeviceSnapshot::default()
     }
 }

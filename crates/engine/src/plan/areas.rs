@@ -11,6 +11,7 @@ use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan};
 use crate::config::{PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
 use crate::info::{Direction, PdoInfo, SubDeviceInfo};
+use crate::order::InOrder;
 
 /// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
 pub(super) const ASSIGNMENT_BASE: u16 = 0x1C10;
@@ -193,7 +194,7 @@ fn limit(object: u16, got: usize) -> Result<(), PlanProblem> {
 fn pdo_twice(areas: &[AreaPlan]) -> Result<(), PlanProblem> {
     let mut all: Vec<(u16, u8)> =
         areas.iter().flat_map(|area| area.pdos.iter().map(|pdo| (pdo.index, area.sync_manager))).collect();
-    all.sort_unstable();
+    all.put_in_order();
     match all.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => Err(PlanProblem::PdoTwice { pdo: pair[0].0, first: pair[0].1, second: pair[1].1 }),
         None => Ok(()),

@@ -10,6 +10,7 @@ use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, SmPlan};
 use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// Checks mailbox and process data SyncManagers against the controller and against each other.
 pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]) -> Result<(), PlanProblem> {
@@ -32,7 +33,7 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
     for span in &spans {
         inside(info, span)?;
     }
-    spans.sort_by_key(|span| span.start);
+    spans.put_in_order_by_key(|span| span.start);
     match spans.windows(2).find(|pair| pair[0].end > u32::from(pair[1].start)) {
         Some([a, b]) => Err(PlanProblem::Overlap {
             first: a.index,

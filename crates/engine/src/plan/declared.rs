@@ -7,8 +7,9 @@ use ringcat_wire::register::SyncManagerDirection;
 use super::areas::place;
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedPdo, SmPlan};
-use crate::config::{DeclaredSyncManager, SyncManagerRole};
+use crate::config::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 use crate::info::{Direction, SubDeviceInfo};
+use crate::order::InOrder;
 
 /// Mailboxes (first the mailbox that the MainDevice writes), and process data by SyncManager number.
 pub(super) fn areas(
@@ -17,7 +18,7 @@ pub(super) fn areas(
 ) -> Result<(Vec<SmPlan>, Vec<AreaPlan>), PlanProblem> {
     let available = info.controller.sync_manager_count;
     let mut sorted: Vec<&DeclaredSyncManager> = declared.iter().collect();
-    sorted.sort_by_key(|sm| sm.index);
+    sorted.put_in_order_by_key(|sm| sm.index);
     if let Some(pair) = sorted.windows(2).find(|pair| pair[0].index == pair[1].index) {
         return Err(PlanProblem::DeclaredTwice { sync_manager: pair[0].index });
     }
@@ -46,7 +47,7 @@ pub(super) fn managers<'d>(
 }
 
 fn area(sm: &DeclaredSyncManager, info: &SubDeviceInfo) -> Result<Option<AreaPlan>, PlanProblem> {
-    let Some((sync_manager, direction, length)) = sm.area() else { return Ok(None) };
+    let Some(DeclaredArea { sync_manager, direction, length }) = sm.area() else { return Ok(None) };
     let mut bit = 0;
     let mut pdos = Vec::with_capacity(sm.pdos.len());
     for pdo in &sm.pdos {

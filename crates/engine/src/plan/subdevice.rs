@@ -90,7 +90,7 @@ pub struct SubDevicePlan {
 
 impl SubDevicePlan {
     /// Areas that need an FMMU, with the FMMU's number, in the order of the SyncManagers.
-    pub fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
+    pub(crate) fn mapped_areas(&self) -> impl Iterator<Item = (u8, &AreaPlan)> {
         (0..).zip(self.process_data.iter().filter(|area| area.length > 0))
     }
 

@@ -62,7 +62,14 @@ impl fmt::Display for StateError {
     }
 }
 
-impl core::error::Error for StateError {}
+impl core::error::Error for StateError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StateError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for StateError {
     fn from(error: BusError) -> StateError {

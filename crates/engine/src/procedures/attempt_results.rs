@@ -9,9 +9,12 @@ use super::configure::ConfigureError;
 
 type AttemptResult = Result<(), ConfigureError>;
 
+/// The number of an attempt that has ended, and its result.
+type Ended = Option<(u32, AttemptResult)>;
+
 /// By member, the last attempt that has ended.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct AttemptResults(Rc<RefCell<Vec<Option<(u32, AttemptResult)>>>>);
+pub(crate) struct AttemptResults(Rc<RefCell<Vec<Ended>>>);
 
 impl AttemptResults {
     /// An attempt has ended.

@@ -32,7 +32,7 @@ use crate::supervisor::{Bus, BusError};
 pub use crate::segment::setup::SetupError;
 
 pub use error::{ConfigureError, StartupError};
-pub use register_error::RegisterFailure;
+pub use register_error::{RegisterCommandError, RegisterFailure, WrongValue};
 
 /// Cycles of the exchange before the request of OP, so that valid outputs are present (protocol 5.2). The first of them
 /// may have been queued without process data; one is enough if it is known to have had it.

@@ -34,10 +34,10 @@ struct Open {
 
 /// Runs until the MainDevice stops.
 pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
-    let mut alone = 0;
+    let (mut alone, mut mapped, mut others) = (0, Vec::new(), Vec::new());
     loop {
         bus.sleep(PAUSE.max(TIME_EACH.saturating_mul(alone))).await;
-        let (mapped, mut others) = open_mailboxes(&segment);
+        open_mailboxes(&segment, &mut mapped, &mut others);
         for open in &mapped {
             if bus.has_stray_mail(open.station) {
                 open.mailbox.mail_available();
@@ -45,24 +45,26 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
         }
         // If some do not answer, it is unknown which: all are polled until the supervision has found and repaired them.
         if !poll_together(&bus, &mapped).await {
-            others.extend(mapped);
+            others.append(&mut mapped);
         }
         alone = u32::try_from(others.len()).unwrap_or(u32::MAX);
-        bus.gather_in_turns(others, poll).await;
+        if !others.is_empty() {
+            bus.gather_in_turns(core::mem::take(&mut others), poll).await;
+        }
     }
 }
 
-/// Those with a mapped status bit, and the others.
-fn open_mailboxes(segment: &SharedSegment) -> (Vec<Open>, Vec<Open>) {
+/// Lists those with a mapped status bit, and the others. The lists keep their memory from round to round.
+fn open_mailboxes(segment: &SharedSegment, mapped: &mut Vec<Open>, others: &mut Vec<Open>) {
     let view = segment.view();
-    let (mut mapped, mut others) = (Vec::with_capacity(segment.mailboxes().len()), Vec::new());
+    mapped.clear();
+    others.clear();
     for (index, (member, mailbox)) in view.members().zip(segment.mailboxes()).enumerate() {
         let Some((station, status)) = mailbox.send_status() else { continue };
         let is_mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
-        let list = if is_mapped { &mut mapped } else { &mut others };
+        let list = if is_mapped { &mut *mapped } else { &mut *others };
         list.push(Open { index, station, status, mailbox: mailbox.clone() });
     }
-    (mapped, others)
 }
 
 /// One read for all; false if not all answered.

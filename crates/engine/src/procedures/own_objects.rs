@@ -78,8 +78,8 @@ impl OwnObjects {
             CoeService::SdoRequest => match SdoRequest::decode(payload) {
                 Ok(request) => Ok(self.sdo(seen, client, &request).await.into_iter().collect()),
                 Err(SdoError::Short { .. }) => Err(ErrorReply::SIZE_TOO_SHORT),
-                Err(SdoError::Service { .. }) => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
                 Err(SdoError::Command { .. }) => Ok(vec![abort(SdoAddress::new(0, 0), AbortCode::UNKNOWN_COMMAND)]),
+                Err(_) => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
             },
             _ => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
         }

@@ -1,10 +1,11 @@
 //! Bringing SubDevices back: after an error, after power-off, or for the first time. Process data of the others
 //! continues.
 
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
-use core::pin::pin;
+use core::pin::{Pin, pin};
 use core::task::Poll;
 use core::time::Duration;
 
@@ -71,7 +72,7 @@ pub(super) async fn keep_up(
                     bus.sleep(READ_PAUSE).await;
                     continue;
                 }
-                frame_limit::explain(bus, segment).await;
+                Box::pin(frame_limit::explain(bus, segment)).await;
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
             // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back, or on
@@ -79,7 +80,8 @@ pub(super) async fn keep_up(
             Err(error @ ConfigureError::Unfit(_)) => {
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
                 segment.until_retried(index).await;
-                read_again(bus, segment, (index, attempt)).await;
+                // In a box: it needs the most memory, and is rare.
+                Box::pin(read_again(bus, segment, (index, attempt))).await;
                 continue;
             }
             Err(error) => {
@@ -235,7 +237,7 @@ pub(super) async fn bring_up_member(
     reported: Option<Shown>,
     check: Check,
 ) {
-    let procedure = async {
+    let procedure = pin!(async {
         if check == Check::None {
             return keep_up(&bus, &segment, (index, attempt), from, reported).await;
         }
@@ -243,10 +245,10 @@ pub(super) async fn bring_up_member(
             return;
         }
         if segment.view().member(index).is_some_and(|member| member.unfit.is_some()) {
-            read_again(&bus, &segment, (index, attempt)).await;
+            Box::pin(read_again(&bus, &segment, (index, attempt))).await;
         }
         keep_up(&bus, &segment, (index, attempt), from, reported).await;
-    };
+    });
     while_current(&segment, index, attempt, procedure).await;
 }
 
@@ -293,14 +295,14 @@ async fn is_the_lost_one(
     })
 }
 
-/// Runs a procedure for a SubDevice until another one begins or the SubDevice is lost.
+/// Runs a procedure for a SubDevice until another one begins or the SubDevice is lost. It is pinned by the caller: a
+/// future that an async function takes by value is in that function's memory twice.
 pub(super) async fn while_current(
     segment: &SharedSegment,
     index: usize,
     attempt: u32,
-    procedure: impl Future<Output = ()>,
+    mut procedure: Pin<&mut impl Future<Output = ()>>,
 ) {
-    let mut procedure = pin!(procedure);
     poll_fn(|context| {
         if segment.view().member(index).is_none_or(|member| member.attempt != attempt) {
             return Poll::Ready(());

@@ -6,6 +6,7 @@
 //! refusal it is brought back to its previous state.
 
 use core::future::Future;
+use core::pin::pin;
 
 use ringcat_wire::al::AlState;
 
@@ -71,7 +72,7 @@ fn begin(segment: &SharedSegment, index: usize, state: AlState) -> Option<Result
 /// Changes a member to its new target state while the attempt is the current one; after a refusal back to the state
 /// before.
 pub(super) async fn change_state(bus: Bus, segment: SharedSegment, (index, attempt): (usize, u32), before: AlState) {
-    let procedure = go(&bus, &segment, (index, attempt), before);
+    let procedure = pin!(go(&bus, &segment, (index, attempt), before));
     while_current(&segment, index, attempt, procedure).await;
 }
 

@@ -85,6 +85,9 @@ pub(crate) async fn resume(
     let reached = kept.iter().filter(|kept| kept.progress == KnownProgress::Reached);
     let (subdevices, in_state) = (found.subdevices.len(), reached.count());
     bus.notice(Notice::Resumed { subdevices, in_state, differs });
+    if before.handover == Handover::Orderly {
+        before.all.iter().for_each(|known| report_cut(bus, known, &found.subdevices));
+    }
     go_on(bus, segment, &kept, before.handover);
     if before.handover == Handover::AfterCrash {
         let left = found.subdevices.iter().filter(|info| kept.iter().any(|kept| is_in_place(kept, info)));
@@ -93,7 +96,16 @@ pub(crate) async fn resume(
     Ok(())
 }
 
-/// Tells the model which SubDevices go on as they are, and their mailboxes their counters.
+/// Reports conversations with a mailbox that the hand-over has cut.
+fn report_cut(bus: &Bus, known: &Known, found: &[Rc<SubDeviceInfo>]) {
+    let position = found.iter().find(|info| info.station == known.info.station).map(|info| info.position);
+    let protocols = known.mailbox.iter().flat_map(KnownMailbox::cut_protocols);
+    for (protocol, position) in protocols.filter_map(|protocol| Some((protocol, position?))) {
+        bus.notice(Notice::ConversationCut { position, protocol });
+    }
+}
+
+/// Reports to the model which SubDevices go on as they are; sets the counters of their mailboxes.
 fn go_on(bus: &Bus, segment: &SharedSegment, kept: &[Kept], handover: Handover) {
     let state = |kept: &Kept| KeptState {
         station: kept.station,

@@ -120,7 +120,16 @@ impl fmt::Display for ServiceError {
     }
 }
 
-impl core::error::Error for ServiceError {}
+impl core::error::Error for ServiceError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ServiceError::Bus(error) => Some(error),
+            ServiceError::Sii(error) => Some(error),
+            ServiceError::NotPermitted(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for ServiceError {
     fn from(denied: NotPermitted) -> ServiceError {

@@ -34,7 +34,7 @@ pub struct SharedSegment {
     /// Procedures to be started.
     tasks: Rc<RefCell<VecDeque<Task>>>,
     /// A new observation that was not posted by the cyclic half.
-    news: Rc<Cell<bool>>,
+    has_changed: Rc<Cell<bool>>,
     changed: Signal,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
@@ -92,7 +92,7 @@ impl SharedSegment {
             segment,
             mailboxes: Rc::default(),
             tasks: Rc::default(),
-            news: Rc::default(),
+            has_changed: Rc::default(),
             changed: bus.signal(),
             bus: bus.clone(),
             board: Arc::new(Board::new(0)),
@@ -132,7 +132,7 @@ impl SharedSegment {
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
         }
-        self.news.set(self.news.get() || !is_apart);
+        self.has_changed.set(self.has_changed.get() || !is_apart);
         self.changed.notify();
     }
 
@@ -142,7 +142,7 @@ impl SharedSegment {
     }
 
     /// Passes an observation of clocks to the model.
-    pub(super) fn observe_clocks(&self, seen: ClockObservation<'_>) {
+    pub(crate) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
     }
 
@@ -169,8 +169,8 @@ impl SharedSegment {
 
     /// Waits until the cyclic half has posted words that differ from `seen`, until another observation, or until a
     /// time.
-    pub(super) async fn until_news(&self, seen: Posted, until: Instant) {
-        self.bus.until_posted(seen, until, &self.changed, || self.news.replace(false)).await;
+    pub(super) async fn until_changed(&self, seen: Posted, until: Instant) {
+        self.bus.until_posted(seen, until, &self.changed, || self.has_changed.replace(false)).await;
     }
 
     /// Waits until the cyclic half has posted words that differ from `seen`, until a time, or until `ready`, which is

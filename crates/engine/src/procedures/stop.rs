@@ -83,7 +83,15 @@ impl fmt::Display for StopError {
     }
 }
 
-impl core::error::Error for StopError {}
+impl core::error::Error for StopError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StopError::Bus(error) => Some(error),
+            StopError::NotPermitted(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for StopError {
     fn from(denied: NotPermitted) -> StopError {

@@ -32,7 +32,7 @@ pub(super) async fn supervise(bus: Bus, segment: SharedSegment) {
         let posted = bus.posted();
         segment.observe(Observation::Words(segment.words()));
         let wake = segment.view().next_evaluation();
-        segment.until_news(posted, wake).await;
+        segment.until_changed(posted, wake).await;
     }
 }
 

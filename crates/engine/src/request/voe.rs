@@ -4,6 +4,16 @@ use super::slot::{AcyclicSide, Request, RequestRefused, RequestState, Subject, p
 use crate::bell::Bell;
 use crate::declared::Address;
 
+/// Header of a vendor message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct VoeHeader {
+    /// Vendor, as in the identity.
+    pub vendor_id: u32,
+    /// Message type, defined by the vendor.
+    pub vendor_type: u16,
+}
+
 /// Vendor messages to and from one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
 pub struct VoeHandler {
@@ -25,10 +35,10 @@ impl VoeHandler {
         self.request.set_subject(Subject::Vendor { id: vendor_id, kind: vendor_type })
     }
 
-    /// Vendor and type of the read message.
-    pub fn received_header(&self) -> Option<(u32, u16)> {
+    /// Header of the read message.
+    pub fn received_header(&self) -> Option<VoeHeader> {
         match self.request.answered() {
-            Some(Subject::Vendor { id, kind }) => Some((id, kind)),
+            Some(Subject::Vendor { id, kind }) => Some(VoeHeader { vendor_id: id, vendor_type: kind }),
             Some(Subject::Object { .. } | Subject::Register { .. } | Subject::Idn { .. }) | None => None,
         }
     }

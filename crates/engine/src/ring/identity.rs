@@ -178,6 +178,7 @@ impl Identity {
 
     /// Classifies a received frame. Any bytes are allowed; only untagged Ethernet frames can be frames of this
     /// MainDevice.
+    #[inline]
     pub fn classify(&self, bytes: &[u8]) -> Classified {
         let Some(head) = bytes.first_chunk::<{ DATAGRAMS_AT + datagram::OVERHEAD }>() else {
             return Classified::Other;

@@ -90,6 +90,7 @@ impl RingMonitor {
 
     /// Evaluates one frame; true if the state changed (protocol CR-12: once per change), or if a direction failed or
     /// recovered.
+    #[inline]
     pub fn observe(&mut self, arrivals: Arrivals) -> bool {
         let Some(verdict) = arrivals.verdict() else { return self.observe_alone(arrivals) };
         if verdict == self.state && self.alone == [0; 2] {

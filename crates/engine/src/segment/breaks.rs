@@ -26,8 +26,8 @@ pub(super) fn locate_breaks(topology: &Topology, dl_status: &[Option<DlStatus>])
     let Some(first) = topology.nodes.first() else { return Vec::new() };
     let trunk = trunk(topology);
     let first = Cable { near: None, far: Some(PortOf { node: 0, port: first.entry_port }) };
-    let inner = (0..topology.nodes.len()).filter(|node| trunk[*node] && !topology.is_in_local_ring(*node));
-    let inner = inner.filter_map(|node| topology.connection_to(node));
+    let inner = (0..topology.nodes.len()).filter(|node| trunk[*node] && !topology.has_ring_cable(*node));
+    let inner = inner.filter_map(|node| topology.cable_to(node));
     let inner = inner.map(|it| Cable { near: Some(it.near), far: Some(it.far) });
     let last = topology.open_ports.iter().map(|at| Cable { near: Some(*at), far: None });
     // One end is sufficient: the SubDevice at the other may have no power.

@@ -2,7 +2,6 @@
 //! differences. The effects of observations are in [`super::rules`].
 
 mod life;
-mod measured;
 mod node;
 mod observation;
 mod state;
@@ -11,7 +10,6 @@ mod timeline;
 
 pub use life::Due;
 pub(super) use life::{Compensation, Delays, Life, Lock, Running, Unwritten};
-pub use measured::Measured;
 pub use node::Node;
 pub use observation::{Answer, Answers, ClockObservation, Difference, LatchedTimes};
 pub use state::Clocks;

@@ -107,7 +107,7 @@ impl LocalRings {
     pub fn complete_cabling(&mut self, cabling: &mut Cabling) {
         for (near, node) in self.completed.drain(..) {
             cabling.topology.attach_behind_break(near, node);
-            let known = cabling.topology.connection_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
+            let known = cabling.topology.cable_to(node).map(|it| Cable { near: Some(it.near), far: Some(it.far) });
             if let Some(cable) = known.filter(|known| cabling.cables.iter().all(|(cable, _)| cable != known)) {
                 // Cables to SubDevices come first, in their order.
                 let closes = |it: &Cable| {

@@ -30,6 +30,7 @@ use super::undeclared::Keeping;
 use super::versions::Versions;
 use crate::board::Board;
 use crate::board::clocks::References;
+use crate::clocks::KnownClocks;
 use crate::declared::SubDeviceId;
 use crate::layout::Layout;
 use crate::ring_status::{Occupant, RingStatus};
@@ -89,6 +90,8 @@ pub struct Segment {
     pub(super) choices: Choices,
     pub(super) ring: Ring,
     pub(super) clocks: Clocks,
+    /// What is known of the clocks from a former application or another process.
+    pub(super) known_clocks: Option<Rc<KnownClocks>>,
     pub(super) breaks: Breaks,
     pub(super) local_rings: LocalRings,
     pub(super) silence: Silence,
@@ -136,6 +139,7 @@ impl Segment {
             layout,
             cabling,
             clocks,
+            known_clocks: None,
             board,
             choices,
         }
@@ -213,6 +217,11 @@ impl Segment {
     /// Distributed clocks.
     pub fn clocks(&self) -> &Clocks {
         &self.clocks
+    }
+
+    /// What is known of the clocks for their next set-up.
+    pub fn known_clocks(&self) -> Option<Rc<KnownClocks>> {
+        self.clocks.known().map(Rc::new).or_else(|| self.known_clocks.clone())
     }
 
     /// The references that the exchange distributes; `None` while they are outdated or the distribution is stopped.

@@ -52,6 +52,7 @@ pub enum ProcessDataStep {
 
 /// Why an attempt to bring up a member has failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Problem {
     /// It refused a state.
     Refused {

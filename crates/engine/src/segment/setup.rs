@@ -88,7 +88,13 @@ impl Setup {
 /// Bytes of the process data areas fixed by the declaration, for an absent SubDevice.
 pub fn declared_areas(config: &SubDeviceConfig) -> Option<Vec<(u8, Direction, u16)>> {
     if let Some(declared) = &config.declared {
-        return Some(declared.iter().filter_map(DeclaredSyncManager::area).collect());
+        return Some(
+            declared
+                .iter()
+                .filter_map(DeclaredSyncManager::area)
+                .map(|it| (it.sync_manager, it.direction, it.length))
+                .collect(),
+        );
     }
     let mut areas = Vec::new();
     for assignment in config.pdos.as_ref()? {

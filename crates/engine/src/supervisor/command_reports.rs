@@ -12,7 +12,7 @@ use crate::time::Instant;
 
 /// Shortest interval of reports about the same command and address.
 pub(crate) const INTERVAL: Duration = Duration::from_secs(1);
-/// Commands and addresses that are told apart within an interval. Further ones are reported together.
+/// Commands and addresses that are distinguished within an interval. Further ones are reported together.
 const MOST: usize = 64;
 
 /// Datagrams of one kind.

@@ -29,12 +29,12 @@ impl Bus {
         let results: Rc<RefCell<Vec<Option<T>>>> = Rc::default();
         for (index, item) in items.into_iter().enumerate() {
             results.borrow_mut().push(None);
-            let one = procedure(self.clone(), item);
+            // In a box: an async block around it would keep its memory twice.
+            let mut one = Box::pin(procedure(self.clone(), item));
             let results = results.clone();
-            group.spawn(async move {
-                let result = one.await;
-                results.borrow_mut()[index] = Some(result);
-            });
+            group.spawn(poll_fn(move |context| {
+                one.as_mut().poll(context).map(|result| results.borrow_mut()[index] = Some(result))
+            }));
         }
         group.done().await;
         results.take().into_iter().flatten().collect()

@@ -21,7 +21,7 @@ impl Shared {
             ring: board.ring(),
             carriers: self.carriers,
             holds: board.clocks.holds(),
-            times: board.clocks.times.news(),
+            times: board.clocks.times.posted(),
         }
     }
 

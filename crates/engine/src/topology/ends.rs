@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use ringcat_wire::register::DlStatus;
 
 use super::{Finding, Node, PortOf, Topology};
+use crate::order::InOrder;
 
 /// Both ends of a cable, the end nearer to MAIN first, as far as known. `None` is an interface of the host: MAIN as the
 /// first, REDUNDANT as the second end.
@@ -52,7 +53,7 @@ fn connected_ports(topology: &Topology) -> Vec<PortOf> {
         seen.extend(children.chain(entry).map(|port| PortOf { node, port }));
     }
     seen.retain(|at| !topology.local_rings.iter().any(|ring| ring.is_at(*at)));
-    seen.sort_unstable();
+    seen.put_in_order();
     seen.dedup();
     seen
 }

@@ -15,6 +15,7 @@ use super::finding::Finding;
 use super::port::PortOf;
 use super::rings::Rings;
 use super::tree::{Node, NodeStatus, Topology};
+use crate::order::InOrder;
 
 /// Order in which a frame passes the ports (protocol 2.1). The processing unit follows port 0.
 pub(super) const TRAVEL: [u8; 4] = [0, 3, 1, 2];
@@ -89,7 +90,7 @@ pub(super) fn build(status: &[NodeStatus], main_count: usize, rings: &Rings) -> 
     let towards = redundant_head.map_or(PortKind::Mii, |head| walk.kind(PortOf { node: head, port: 0 }));
     let main_end = if is_open { walk.certain_end(0..answering, towards) } else { None };
     let Walk { nodes, open_ports, mut findings, .. } = walk;
-    findings.sort_by_key(Finding::node);
+    findings.put_in_order_by_key(Finding::node);
     let local_rings = Vec::new();
     let mut topology = Topology { nodes, main_count, redundant_head, main_end, open_ports, findings, local_rings };
     rings.finish(&mut topology);

@@ -67,7 +67,7 @@ impl Topology {
     }
 
     /// Attaches a member of a broken local ring to the near end of the broken cable: its place in the closed ring.
-    pub fn attach_behind_break(&mut self, near: PortOf, node: usize) {
+    pub(crate) fn attach_behind_break(&mut self, near: PortOf, node: usize) {
         let port = usize::from(near.port & 3);
         let is_free = self.nodes.get(near.node).is_some_and(|parent| parent.children[port].is_none());
         match self.nodes.get_mut(node).filter(|orphan| is_free && orphan.parent.is_none()) {

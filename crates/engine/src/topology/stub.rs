@@ -9,6 +9,7 @@ use core::ops::Range;
 
 use super::place::{Slot, TRAVEL, Walk};
 use super::{Finding, PortOf};
+use crate::order::InOrder;
 
 impl Walk<'_> {
     /// Attaches the SubDevices of the redundant link; `head` is the one with port 0 unconnected.
@@ -91,7 +92,7 @@ impl Walk<'_> {
         self.trust_times = true;
         let spans: Option<Vec<u32>> = rest.clone().map(|node| self.span(node)).collect();
         if let Some(spans) = spans {
-            chain.sort_by_key(|link| spans[link.node - rest.start]);
+            chain.put_in_order_by_key(|link| spans[link.node - rest.start]);
         }
         if let Some(at) = chain.iter().position(|link| link.node == end) {
             let last = chain.remove(at);

@@ -3,6 +3,7 @@ use std::vec;
 use std::vec::Vec;
 
 use proptest::prelude::*;
+use ringcat_wire::address::Position;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::port::Connection;
@@ -167,8 +168,8 @@ fn more_subdevices_than_open_ports_are_inconsistent() {
 fn connections_are_found_and_displayed_by_subdevice_and_port() {
     let topology = Topology::build(&[status(PASS), status(PASS), status(END)], 3);
     let connection = Connection { near: at(1, 1), far: at(2, 0) };
-    assert_eq!(topology.connection_to(2), Some(connection));
-    assert_eq!(topology.connection_between(2, 1), Some(connection));
+    assert_eq!(topology.connection_to(Position(2)), Some(connection));
+    assert_eq!(topology.connection_between(Position(2), Position(1)), Some(connection));
     assert_eq!(topology.connection_at(at(1, 1)), Some(connection));
     assert_eq!(topology.connection_at(at(2, 0)), Some(connection));
     assert_eq!(topology.connection_at(at(2, 1)), None);

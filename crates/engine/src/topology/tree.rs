@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::address::Position;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::finding::Finding;
@@ -46,7 +47,7 @@ pub struct Topology {
     /// Number of SubDevices on the main link.
     pub main_count: usize,
     /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
-    pub redundant_head: Option<usize>,
+    pub(crate) redundant_head: Option<usize>,
     /// The open port at the end of the main link's SubDevices in an open ring; if frames of the redundant link alone
     /// reach all SubDevices, each at port 0, the end of all of them. `None` if, because of branches, the cable of the
     /// ring could be missing at several ports.
@@ -67,8 +68,18 @@ impl Topology {
         self.redundant_head.is_none() && self.main_count < self.nodes.len()
     }
 
+    /// Head of the tree on the redundant link, next to the break; `None` in a closed ring or without a second link.
+    pub fn redundant_head(&self) -> Option<Position> {
+        self.redundant_head.map(|node| PortOf { node, port: 0 }.position())
+    }
+
     /// Whether the cable between a SubDevice and its parent is part of a local ring.
-    pub fn is_in_local_ring(&self, node: usize) -> bool {
+    pub fn is_in_local_ring(&self, subdevice: Position) -> bool {
+        self.has_ring_cable(usize::from(subdevice.0))
+    }
+
+    /// As [`Topology::is_in_local_ring`].
+    pub(crate) fn has_ring_cable(&self, node: usize) -> bool {
         let Some(here) = self.nodes.get(node) else { return false };
         let far = PortOf { node, port: here.entry_port };
         self.local_rings.iter().flat_map(|ring| &ring.cables).any(|cable| cable.far == far)
@@ -88,7 +99,12 @@ impl Topology {
     }
 
     /// The cable between a SubDevice and its parent.
-    pub fn connection_to(&self, node: usize) -> Option<Connection> {
+    pub fn connection_to(&self, subdevice: Position) -> Option<Connection> {
+        self.cable_to(usize::from(subdevice.0))
+    }
+
+    /// As [`Topology::connection_to`].
+    pub(crate) fn cable_to(&self, node: usize) -> Option<Connection> {
         let here = self.nodes.get(node)?;
         let (parent, port) = here.parent?;
         let far = PortOf { node, port: here.entry_port };
@@ -99,17 +115,17 @@ impl Topology {
     pub fn connection_at(&self, at: PortOf) -> Option<Connection> {
         let here = self.nodes.get(at.node)?;
         match here.children.get(usize::from(at.port))? {
-            Some(child) => self.connection_to(*child),
-            None if here.entry_port == at.port => self.connection_to(at.node),
+            Some(child) => self.cable_to(*child),
+            None if here.entry_port == at.port => self.cable_to(at.node),
             None => None,
         }
     }
 
     /// The cable between two SubDevices, in either order.
-    pub fn connection_between(&self, a: usize, b: usize) -> Option<Connection> {
-        [(a, b), (b, a)]
-            .into_iter()
-            .filter_map(|(from, to)| self.connection_to(to).filter(|connection| connection.near.node == from))
-            .next()
+    pub fn connection_between(&self, one: Position, other: Position) -> Option<Connection> {
+        let between = |from: Position, to: Position| {
+            self.connection_to(to).filter(|connection| connection.near.position() == from)
+        };
+        between(one, other).or_else(|| between(other, one))
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use libc::in_addr;
-use ringcat::{DomainId, Entry, IpSettings, PdoEntry, SdoDownload, SubDeviceInfo};
+use ringcat::{DomainId, Entry, EntryPlace, IpSettings, PdoEntry, SdoDownload, SubDeviceInfo};
 
 use super::cyclic::put_bit;
 use super::handle::{alive, call};
@@ -189,7 +189,7 @@ unsafe extern "C" fn ecrt_slave_config_reg_pdo_entry_pos(
     domain: *mut ec_domain_t,
     bit_position: *mut c_uint,
 ) -> c_int {
-    let place = (sync_index, pdo_pos as usize, entry_pos as usize);
+    let place = EntryPlace::new(sync_index, pdo_pos as usize, entry_pos as usize);
     // SAFETY: handles of the library, memory for the bit or NULL (ecrt.h).
     unsafe { register(sc, domain, bit_position, |draft, slave, domain| draft.register_at(slave, domain, place)) }
 }

@@ -117,11 +117,11 @@ unsafe extern "C" fn ecrt_voe_handler_received_header(
     vendor_type: *mut u16,
 ) -> c_int {
     let read = |handler: &Requested<VoeHandler>| {
-        let (id, kind) = handler.look(VoeHandler::received_header)?.ok_or(Code::NOT_FOUND)?;
+        let header = handler.look(VoeHandler::received_header)?.ok_or(Code::NOT_FOUND)?;
         // SAFETY: memory for the results, or NULL (ecrt.h).
         unsafe {
-            put(vendor_id, id)?;
-            put(vendor_type, kind)
+            put(vendor_id, header.vendor_id)?;
+            put(vendor_type, header.vendor_type)
         }
     };
     // SAFETY: a handle of the library (ecrt.h).

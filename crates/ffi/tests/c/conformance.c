@@ -1,8 +1,9 @@
 /*
- * Calls each function in each phase, and prints "FUNCTION PHASE RESULT". The test compares with the table of docs/ecrt.md.
+ * Calls each function in each phase, and prints "FUNCTION PHASE RESULT". The test compares with the table of
+ * docs/ecrt.md.
  *
- * Results: 0, "positive", the name of an error, "NULL", "pointer", a request state. A function whose handle cannot exist in
- * a phase is not called there.
+ * Results: 0, "positive", the name of an error, "NULL", "pointer", a request state. A function whose handle cannot
+ * exist in a phase is not called there.
  */
 #include <arpa/inet.h>
 #include <errno.h>

@@ -58,7 +58,8 @@ static void *disturb(void *unused)
 {
     (void) unused;
     while (!atomic_load(&ends)) {
-        int results[] = {ecrt_master_receive(master), ecrt_domain_process(domain), ecrt_master_application_time(master, 5)};
+        int results[] = {
+            ecrt_master_receive(master), ecrt_domain_process(domain), ecrt_master_application_time(master, 5)};
         size_t i;
 
         for (i = 0; i < sizeof results / sizeof *results; i++) {

@@ -108,7 +108,7 @@ fn index_of(interface: &str) -> Result<u32, Failed> {
 }
 
 fn open(interface: &str, receive: ReceiveMode) -> Result<PacketSocket, Failed> {
-    Ok(PacketSocket::open(interface, &PacketOptions { receive, ..PacketOptions::default() })?)
+    Ok(PacketSocket::open(interface, &PacketOptions::default().with_receive(receive))?)
 }
 
 /// Answers frames until the process is killed.

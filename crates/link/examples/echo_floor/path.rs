@@ -25,7 +25,7 @@ pub struct Ring {
 impl Ring {
     /// Opens it on an interface.
     pub fn open(interface: &str, mode: ReceiveMode) -> Result<Ring, Failed> {
-        let options = PacketOptions { receive: mode, ..PacketOptions::default() };
+        let options = PacketOptions::default().with_receive(mode);
         Ok(Ring { socket: PacketSocket::open(interface, &options)?, mode })
     }
 }

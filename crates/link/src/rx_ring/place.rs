@@ -1,7 +1,7 @@
 //! The slot of a ring that the kernel fills next, for a process that has not read the ring from its beginning.
 //!
 //! The kernel fills the slots in turn. Slots with frames that were not read are one run, which begins behind a slot
-//! of the kernel. Without such frames the times of the frames that were there before tell the last slot that was
+//! of the kernel. Without such frames the times of the frames that were there before show the last slot that was
 //! filled; they lead astray if the host's clock was set back.
 
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -147,7 +147,7 @@ impl Bench {
 
 /// Options for one class.
 pub fn class(filter: ClassFilter) -> PacketOptions {
-    PacketOptions { filter, ..PacketOptions::default() }
+    PacketOptions::default().with_filter(filter)
 }
 
 /// A broadcast of one datagram BRD of AL_STATUS with this Idx and a number in its data.

@@ -31,7 +31,7 @@ fn each_class_of_frames_reaches_its_own_socket_and_ip_reaches_none() {
 fn frames_of_every_length_return_whole_and_in_order_while_the_ring_wraps() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
-    let mut near = bench.near_socket(PacketOptions { ring_frames: 8, ..PacketOptions::default() });
+    let mut near = bench.near_socket(PacketOptions::default().with_ring_frames(8));
     for round in 0..200u16 {
         let sent: Vec<Vec<u8>> = (0..5)
             .map(|i| {
@@ -50,7 +50,7 @@ fn frames_of_every_length_return_whole_and_in_order_while_the_ring_wraps() {
 fn frames_for_a_full_ring_are_counted_and_earlier_frames_kept() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
-    let mut near = bench.near_socket(PacketOptions { ring_frames: 4, ..PacketOptions::default() });
+    let mut near = bench.near_socket(PacketOptions::default().with_ring_frames(4));
     for number in 0..10 {
         assert!(far.send(&ethercat(0, number)));
     }
@@ -88,7 +88,7 @@ fn a_frame_beyond_the_mtu_is_refused_and_the_next_one_sent() {
 fn a_tagged_frame_reaches_the_sockets_of_its_class_and_keeps_its_tag_on_request() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
-    let open = |filter, keep_vlan_tags| bench.near_socket(PacketOptions { keep_vlan_tags, ..class(filter) });
+    let open = |filter, keep_vlan_tags| bench.near_socket(class(filter).with_keep_vlan_tags(keep_vlan_tags));
     let mut cyclic = [false, true].map(|keep| open(ClassFilter::Cyclic, keep));
     let [mut without, mut with] = [false, true].map(|keep| open(ClassFilter::Acyclic, keep));
     let plain = ethercat(0x81, 7);
@@ -109,7 +109,7 @@ fn a_tagged_frame_reaches_the_sockets_of_its_class_and_keeps_its_tag_on_request(
 fn a_socket_that_keeps_tags_receives_neither_ip_nor_what_this_host_sends() {
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
-    let mut near = bench.near_socket(PacketOptions { keep_vlan_tags: true, ..PacketOptions::default() });
+    let mut near = bench.near_socket(PacketOptions::default().with_keep_vlan_tags(true));
     let mut sender = bench.near_socket(PacketOptions::default());
     let mut ip = ethercat(0x05, 3);
     ip[12..14].copy_from_slice(&[0x08, 0x00]);
@@ -126,10 +126,10 @@ fn a_socket_accepts_the_group_address_or_all_frames() {
     let groups = || bench.near.run(|| std::fs::read_to_string("/proc/thread-self/net/dev_mcast")).expect("a table");
     let promiscuous = || bench.near.ask_ip(&["-d", "link", "show", "near"]).contains("promiscuity 1");
 
-    let member = bench.near_socket(PacketOptions { promiscuous: false, ..PacketOptions::default() });
+    let member = bench.near_socket(PacketOptions::default().with_promiscuous(false));
     assert!(groups().contains(&group) && !promiscuous());
     drop(member);
-    let all = bench.near_socket(PacketOptions { promiscuous: true, ..PacketOptions::default() });
+    let all = bench.near_socket(PacketOptions::default().with_promiscuous(true));
     assert!(!groups().contains(&group) && promiscuous());
     drop(all);
     assert!(!groups().contains(&group) && !promiscuous());
@@ -138,7 +138,7 @@ fn a_socket_accepts_the_group_address_or_all_frames() {
 #[test]
 fn a_socket_returns_name_and_address_of_its_interface() {
     let Some(bench) = Bench::make() else { return };
-    let socket = bench.near_socket(PacketOptions { receive: ReceiveMode::BusyPoll, ..PacketOptions::default() });
+    let socket = bench.near_socket(PacketOptions::default().with_receive(ReceiveMode::BusyPoll));
     let list = bench.near.run(interface::list);
     let near = list.iter().find(|interface| interface.name == "near").expect("in the list");
     assert_eq!((socket.interface(), socket.mac(), socket.mode()), ("near", near.mac, ReceiveMode::BusyPoll));

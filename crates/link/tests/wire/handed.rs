@@ -47,7 +47,7 @@ fn frames_follow_each_other_whatever_was_read_before_and_waits_at_the_handover()
     let Some(bench) = Bench::make() else { return };
     let mut far = bench.far_socket();
     for with_place in [true, false] {
-        let mut near = bench.near_socket(PacketOptions { ring_frames: 8, ..PacketOptions::default() });
+        let mut near = bench.near_socket(PacketOptions::default().with_ring_frames(8));
         let mut number = 0;
         for read in 0..11 {
             for waiting in 0..8 {
@@ -133,7 +133,7 @@ fn a_killed_owner_leaves_a_ring_that_the_next_one_reads_on() {
         let path = std::env::temp_dir().join(format!("ringcat-handed-{}-{round}", std::process::id()));
         let listener = UnixListener::bind(&path).expect("a path of our own");
         let mut far = bench.far_socket();
-        let near = bench.near_socket(PacketOptions { ring_frames: 8, ..PacketOptions::default() });
+        let near = bench.near_socket(PacketOptions::default().with_ring_frames(8));
         let mut owner = start(&bench, &path);
         let (stream, _) = listener.accept().expect("it connects");
         let slots = near.handed().slots as u8;

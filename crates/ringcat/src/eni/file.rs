@@ -67,9 +67,21 @@ impl fmt::Display for LoadFailure {
     }
 }
 
-impl std::error::Error for LoadError {}
+impl std::error::Error for LoadError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
 
-impl std::error::Error for LoadFailure {}
+impl std::error::Error for LoadFailure {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            LoadFailure::Read(error) => Some(error),
+            LoadFailure::Eni(error) => Some(&**error),
+            _ => None,
+        }
+    }
+}
 
 impl EniFile {
     /// Reads a file.

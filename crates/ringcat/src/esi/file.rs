@@ -32,7 +32,14 @@ impl fmt::Display for EsiFailure {
     }
 }
 
-impl std::error::Error for EsiFailure {}
+impl std::error::Error for EsiFailure {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            EsiFailure::Read { error, .. } => Some(error),
+            EsiFailure::Esi(error) => Some(&**error),
+        }
+    }
+}
 
 /// Reads a file with its modules and dictionaries.
 ///

@@ -42,7 +42,7 @@ impl EsiDevices {
 
 impl DescribedDevices for EsiDevices {
     fn device(&self, wanted: &DescribedDevice, name: &str) -> Result<DeviceDescription, DescriptionFault> {
-        let fault = |key, message| DescriptionFault { key, message };
+        let fault = |key, message| DescriptionFault::new(key, message);
         let esi = self.file(&wanted.path).map_err(|message| fault("esi", message))?;
         let device = chosen(&esi, wanted)?;
         // An empty text or a dash is an empty slot.
@@ -54,7 +54,7 @@ impl DescribedDevices for EsiDevices {
 
 /// The device of a type, with the wanted revision or the highest one.
 fn chosen<'a>(esi: &'a Esi, wanted: &DescribedDevice) -> Result<&'a Device, DescriptionFault> {
-    let fault = |key, message| Err(DescriptionFault { key, message });
+    let fault = |key, message| Err(DescriptionFault::new(key, message));
     let devices = || esi.devices.iter().filter(|device| !device.is_invisible);
     let mut kinds: Vec<&str> = devices().map(|device| device.kind.trim()).collect();
     kinds.sort_unstable();
@@ -80,9 +80,6 @@ fn chosen<'a>(esi: &'a Esi, wanted: &DescribedDevice) -> Result<&'a Device, Desc
     .ok_or_else(|| {
         let revisions: Vec<String> = of_kind().map(|device| format!("{:#010x}", device.revision)).collect();
         let got = wanted.revision.unwrap_or_default();
-        DescriptionFault {
-            key: "revision",
-            message: format!("expected one of {}, got {got:#010x}", revisions.join(", ")),
-        }
+        DescriptionFault::new("revision", format!("expected one of {}, got {got:#010x}", revisions.join(", ")))
     })
 }

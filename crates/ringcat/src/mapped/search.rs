@@ -31,7 +31,7 @@ impl Search {
         let areas = directory.areas(subdevice).iter();
         let mapped = areas.flat_map(|area| {
             let direction = area.direction;
-            area.entries.iter().map(move |(index, sub_index, entry)| (direction, *index, *sub_index, *entry))
+            area.entries.iter().map(move |entry| (direction, entry.index, entry.sub_index, entry.place))
         });
         let mapped = mapped.map(|(direction, index, sub_index, entry)| {
             let (pdo, name) = names(&pdos, direction, (index, sub_index));

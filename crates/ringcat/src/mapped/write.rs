@@ -56,7 +56,14 @@ impl fmt::Display for WriteError {
     }
 }
 
-impl std::error::Error for WriteError {}
+impl std::error::Error for WriteError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            WriteError::DoesNotFit(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<DoesNotFit> for WriteError {
     fn from(error: DoesNotFit) -> WriteError {

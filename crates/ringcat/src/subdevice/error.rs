@@ -118,9 +118,27 @@ impl fmt::Display for SubDeviceFailure {
     }
 }
 
-impl StdError for SubDeviceError {}
+impl StdError for SubDeviceError {
+    fn source(&self) -> Option<&(dyn StdError + 'static)> {
+        Some(&self.failure)
+    }
+}
 
-impl StdError for SubDeviceFailure {}
+impl StdError for SubDeviceFailure {
+    fn source(&self) -> Option<&(dyn StdError + 'static)> {
+        match self {
+            SubDeviceFailure::Sdo(error) => Some(error),
+            SubDeviceFailure::Information(error) => Some(error),
+            SubDeviceFailure::Foe(error) => Some(error),
+            SubDeviceFailure::Soe(error) => Some(error),
+            SubDeviceFailure::Aoe(error) => Some(error),
+            SubDeviceFailure::Mailbox(error) => Some(error),
+            SubDeviceFailure::State(error) => Some(error),
+            SubDeviceFailure::Service(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 macro_rules! failures {
     ($($variant:ident($error:ty),)*) => {$(

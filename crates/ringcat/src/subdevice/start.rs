@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ringcat_engine::ConfigureError;
 use ringcat_engine::mail::{Mailbox, MailboxError};
-use ringcat_engine::main_device::{Address, MainDevice as Engine, Pending};
+use ringcat_engine::main_device::{Address, Function, MainDevice as Engine, Pending, Permission};
 use ringcat_wire::al::AlState;
 
 use super::error::{SubDeviceError, SubDeviceFailure};
@@ -71,7 +71,9 @@ fn reach(engine: &mut Engine, address: Address) -> Result<Reached, SubDeviceFail
     if !is_open && has_none() {
         return Err(SubDeviceFailure::NoMailbox);
     }
-    let is_wanted = !is_open && !engine.is_declared(address);
+    // Where no state can be requested, the refusal of the mail names the reason.
+    let may_request = engine.permission(Function::SubDeviceState) == Permission::Allowed;
+    let is_wanted = !is_open && !engine.is_declared(address) && may_request;
     let request = is_wanted.then(|| engine.start_state_request(address, AlState::PreOp));
     let mailbox = engine.mailbox(address).ok_or(MailboxError::Closed)?;
     Ok((mailbox, request))

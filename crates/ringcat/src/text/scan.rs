@@ -17,6 +17,9 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
             let found = if *differs { "it has changed, and what differs was scanned" } else { "it is as known" };
             format!("going on with the segment of another process: {found}; {in_state} of {subdevices} SubDevices stay")
         }
+        Event::ConversationCut { position, protocol } => {
+            format!("{}: a conversation of the former owner in {protocol:?} was cut by the hand-over", at(*position))
+        }
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
         Event::SiiOddity { position, what } => format!("{}: SII: {what}", at(*position)),

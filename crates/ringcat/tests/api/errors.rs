@@ -1,4 +1,4 @@
-//! Errors as a program prints them: the whole text at once, and no cause a second time behind it.
+//! Errors as a program prints them, the whole text at once, and as a program searches them, cause by cause.
 
 use std::error::Error as StdError;
 use std::io;
@@ -8,7 +8,7 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::wire::datagram::Target;
 use ringcat::wire::register::map;
 use ringcat::{
-    ActivateError, BusError, ConfigureError, Declaration, Error, MainDevice, Options, Position, ScanError,
+    ActivateError, BusError, ConfigureError, Declaration, Error, MainDevice, Options, Position, ScanError, SdoFailure,
     ServiceError, StateError, StopError, SubDeviceConfig, SubDeviceId,
 };
 
@@ -30,13 +30,13 @@ fn happened() -> Result<Vec<Box<dyn StdError>>, Box<dyn StdError>> {
     let speaker = || Position(1);
     all.push(Box::new(device.subdevice(speaker()).foe_read("missing").expect_err("no such file")));
     all.push(Box::new(device.subdevice(speaker()).register_write(map::SII_CONTROL, vec![0; 5_000]).expect_err("long")));
-    let mut wrong = Declaration::with_period(Duration::from_millis(1));
+    let mut wrong = Declaration::new(Duration::from_millis(1));
     wrong.add(SubDeviceConfig::at_position(0).expect_product(1, 2));
     all.push(device.activate(wrong).expect_err("another product"));
 
     let mut device = main_device(segment)?;
     device.scan()?;
-    let mut declaration = Declaration::with_period(Duration::from_millis(1));
+    let mut declaration = Declaration::new(Duration::from_millis(1));
     declaration.add(SubDeviceConfig::at_position(0));
     declaration.add(SubDeviceConfig::at_position(1).sdo(0x7777, 0, [1]));
     let mut application = device.activate(declaration)?;
@@ -64,16 +64,37 @@ fn nested() -> Vec<Box<dyn StdError>> {
 
 // covers: api
 #[test]
-fn no_error_has_a_source_that_its_text_contains() -> Result<(), Box<dyn StdError>> {
+fn the_text_of_an_error_contains_the_text_of_each_cause() -> Result<(), Box<dyn StdError>> {
     let all: Vec<Box<dyn StdError>> = happened()?.into_iter().chain(nested()).collect();
+    let mut causes = 0;
     for error in &all {
         let mut level: &dyn StdError = &**error;
         assert!(!level.to_string().is_empty(), "{level:?}");
         while let Some(source) = level.source() {
-            assert!(!level.to_string().contains(&source.to_string()), "\"{level}\" repeats \"{source}\"");
-            level = source;
+            assert!(level.to_string().contains(&source.to_string()), "\"{level}\" lacks \"{source}\"");
+            (level, causes) = (source, causes + 1);
         }
     }
-    assert!(all.len() > 15, "{}", all.len());
+    assert!(all.len() > 15 && causes > all.len(), "{} errors, {causes} causes", all.len());
+    Ok(())
+}
+
+/// The causes of an error of this type, outermost first.
+fn causes<'a, E: StdError + 'static>(error: &'a (dyn StdError + 'static)) -> Vec<&'a E> {
+    let chain = std::iter::successors(Some(error), |level| (*level).source());
+    chain.filter_map(|level| level.downcast_ref()).collect()
+}
+
+// covers: api
+#[test]
+fn a_cause_is_found_by_its_type_however_deep_it_is() -> Result<(), Box<dyn StdError>> {
+    let lost = BusError::Lost { target: Target::Broadcast(map::TYPE), retries: 3 };
+    let deep = Error::Configure(ConfigureError::State(StateError::Bus(lost)));
+    assert_eq!(causes::<BusError>(&deep), [&lost]);
+    let mut device = main_device("[segment]\n[[device]]\ntype = \"all-protocols\"\n")?;
+    device.scan()?;
+    let error = device.subdevice(Position(0)).sdo_read::<u32>(0x7777, 0).expect_err("refused");
+    let aborted = causes::<SdoFailure>(&error);
+    assert!(matches!(aborted[..], [SdoFailure::Aborted(_)]), "{error:?}");
     Ok(())
 }

@@ -24,7 +24,7 @@ struct Plant {
 fn plant() -> Result<Plant, Box<dyn StdError>> {
     let mut main_device = MainDevice::request(SimulatedSegment::from_toml(SEGMENT)?, &Options::default());
     main_device.scan()?;
-    let mut declaration = Declaration::with_period(PERIOD);
+    let mut declaration = Declaration::new(PERIOD);
     let [drive, lamps, buttons] = [0, 1, 2].map(|at| declaration.add(SubDeviceConfig::at_position(at)));
     Ok(Plant { application: main_device.activate(declaration)?, drive, lamps, buttons })
 }

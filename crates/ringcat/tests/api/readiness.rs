@@ -23,7 +23,7 @@ const SHORT: Duration = Duration::from_secs(2);
 
 /// The drive is told to set an object that it does not have.
 fn declaration() -> Declaration {
-    let mut declaration = Declaration::with_period(PERIOD);
+    let mut declaration = Declaration::new(PERIOD);
     declaration.add(SubDeviceConfig::at_position(0));
     declaration.add(SubDeviceConfig::at_position(1).sdo(0x7777, 0, [1]));
     declaration.add(SubDeviceConfig::at_position(2));

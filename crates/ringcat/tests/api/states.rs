@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    DomainMember, Error, Event, Group, GroupId, GroupState, LastOutputs, Options, SubDeviceConfig, SubDeviceFailure,
-    SubDeviceId, SubDeviceState, SupervisorThread, automatic,
+    DeclaredGroup, DomainMember, Error, Event, Group, GroupId, GroupState, LastOutputs, Options, SubDeviceConfig,
+    SubDeviceFailure, SubDeviceId, SubDeviceState, SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -28,7 +28,7 @@ fn states_and_groups_are_asked_for_from_any_thread() -> Result<(), Error> {
     let scan = supervisor.scan()?;
     let mut declaration = automatic(&scan.subdevices[..2], PERIOD);
     let head = SubDeviceConfig::at_alias(5, 0).pdos_of(&scan.subdevices[2]);
-    let (group, members) = declaration.add_group(Group::new(head));
+    let DeclaredGroup { id: group, members, .. } = declaration.add_group(Group::new(head));
     assert_eq!((group, members.as_slice()), (GroupId(0), [SubDeviceId(2)].as_slice()));
     let members = members.into_iter().map(DomainMember::new);
     declaration.domains[0].members.extend(members);

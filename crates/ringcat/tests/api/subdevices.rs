@@ -26,7 +26,7 @@ const SPEAKER: Position = Position(1);
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
 fn declaration() -> (Declaration, [SubDeviceId; 3]) {
-    let mut declaration = Declaration::with_period(PERIOD);
+    let mut declaration = Declaration::new(PERIOD);
     let subdevices = [0, 1, 2].map(|at| declaration.add(SubDeviceConfig::at_position(at)));
     (declaration, subdevices)
 }

@@ -256,7 +256,7 @@ impl Links for Deaf {
         self.links.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.links.addresses()
     }
 

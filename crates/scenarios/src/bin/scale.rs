@@ -22,8 +22,9 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Maximum CPU seconds per simulated second with 1,000 SubDevices.
 const CPU_BAR: f64 = 1.0;
-/// Maximum MiB of a MainDevice with 1,000 SubDevices.
-const MEMORY_BAR: f64 = 64.0;
+/// Maximum MiB of a MainDevice with 1,000 SubDevices in OP, and on the way there: 13.2 and 16.1 are measured, 15.86 and
+/// 22.77 were before issue 15.
+const MEMORY_BARS: (f64, f64) = (14.0, 17.0);
 /// SubDevices, cycle in ms, delay of a hop in ns.
 const RINGS: [(usize, u64, u64); 3] = [(100, 1, 1_000), (1_000, 4, 1_000), (1_000, 1, 300)];
 /// Simulated time of a measurement.
@@ -55,8 +56,8 @@ fn measure() -> Result<bool, Error> {
         let (held, peak) = ((after.bytes - before.bytes) as f64 / MIB, (after.peak - before.bytes) as f64 / MIB);
         if count == 1_000 {
             figures.at_most("CPU per simulated second, best stretch", cpu, CPU_BAR, "s");
-            figures.at_most("memory in OP", held, MEMORY_BAR, "MiB");
-            figures.at_most("most memory on the way there", peak, MEMORY_BAR, "MiB");
+            figures.at_most("memory in OP", held, MEMORY_BARS.0, "MiB");
+            figures.at_most("most memory on the way there", peak, MEMORY_BARS.1, "MiB");
         } else {
             figures.show("CPU per simulated second, best stretch", format!("{cpu:.3} s"));
             figures.show("memory in OP", format!("{held:.2} MiB"));

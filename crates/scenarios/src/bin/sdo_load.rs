@@ -73,7 +73,7 @@ impl Plant {
         let mut kinds = vec!["coupler"];
         kinds.extend(["servo"; DRIVES]);
         let segment = SimulatedSegment::new(line(descriptions(&kinds), NetworkOptions::default()));
-        let (main, _) = segment.addresses();
+        let main = segment.addresses().main;
         let engine = MainDevice::new(Options::new(main, None), segment.now());
         let links = MemoryLinks::new(main, None, 64);
         let (waiting, window) = (VecDeque::new(), Window::default());

@@ -9,30 +9,21 @@
 //!
 //! CPU time and memory are measured without valgrind, for the whole process with both threads and the carrier watch.
 //!
-//! Run without arguments it prints the tables; `run ...` is the process that is measured.
+//! It prints the tables; the process that is measured is `cycle_process`, beside it.
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::hint::black_box;
 use std::path::PathBuf;
 use std::process::{ExitCode, Stdio};
-use std::time::Duration;
 
-use ringcat::packet::{PacketLinks, ReceiveMode};
-use ringcat::{
-    AcyclicHalf, AlState, Application, DomainId, LastOutputs, MainDevice, Options, ProcessData, SupervisorThread,
-    automatic, realtime,
-};
 use scenarios::callgrind::{Profile, is_installed, profile_program_within};
-use scenarios::cpu_time::process_cpu_time;
 use scenarios::figures::{Figures, verdict};
 use scenarios::namespaces::{Namespaces, Server};
 
 type Tried<T> = Result<T, String>;
 
-/// Cycles that callgrind counts, and cycles before them.
+/// Cycles that callgrind counts.
 const COUNTED: u64 = 500;
-const WARM_UP: u64 = 50;
 /// Period of the CPU time measurement, and under valgrind.
 const PERIOD_US: u64 = 1_000;
 /// Period of two threads with 50 servos under valgrind. Nothing in a cycle depends on it, but valgrind cannot keep up
@@ -42,11 +33,6 @@ const SLOW_PERIOD_US: u64 = 4_000;
 const RESIDENCE_NS: u64 = 300_000;
 /// Cycles of the CPU time measurement.
 const CPU_CYCLES: u64 = 5_000;
-/// Time limit from activation to OP, under valgrind.
-const OP_LIMIT: Duration = Duration::from_secs(60);
-const STOP_LIMIT: Duration = Duration::from_secs(10);
-/// The spinning part of a hybrid wait, as in `ringcat run`.
-const SPIN: Duration = Duration::from_micros(200);
 /// Number of functions and files in a printed profile.
 const SHOWN: usize = 14;
 /// The function within which callgrind counts.
@@ -57,8 +43,8 @@ const SOEM_FUNCTIONS: [&str; 2] = ["ecx_main_send_processdata", "ecx_receive_pro
 const SOEM_CYCLES: u64 = 200;
 
 /// Maximum instructions of a cycle by the number of servos and threads, and the goals of issue 16: SOEM in C takes 890
-/// and 1,333, and one thread took 2,058 and 2,485 when it was measured first. Measured are 814 and 1,045 with two
-/// threads, 2,234 and 3,600 to 3,900 with one, which has the acyclic half in it: with 50 servos it is late under
+/// and 1,333, and one thread took 2,058 and 2,485 when it was measured first. Measured are 830 and 1,061 with two
+/// threads, 2,370 and 3,600 to 3,900 with one, which has the acyclic half in it: with 50 servos it is late under
 /// valgrind where the machine does other work, up to 7,000.
 const BARS: [(usize, &str, f64, f64); 4] = [
     (1, "two", 850.0, 890.0),
@@ -71,8 +57,8 @@ const RUNS: usize = 3;
 /// Maximum CPU time with 50 servos at 1 kHz, in percent of a processor, and the goals of issue 16. A machine that does
 /// other work at the same time makes each wake-up longer, so the bars are above what is measured: 3 to 6 and 6 to 8.
 const CPU_BARS: [(&str, f64, f64); 2] = [("block", 25.0, 8.0), ("hybrid", 35.0, 15.0)];
-/// Maximum resident memory with 50 servos, and the goal. Measured are 5.6 to 5.7.
-const MEMORY_BAR_MB: (f64, f64) = (6.2, 5.0);
+/// Maximum resident memory with 50 servos, and the goal. Measured are 5.3 (decision 0071).
+const MEMORY_BAR_MB: (f64, f64) = (5.5, 5.0);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -80,10 +66,7 @@ fn main() -> ExitCode {
     let result = match words[..] {
         [] => measure(&["instructions", "cpu"]),
         [part @ ("instructions" | "cpu")] => measure(&[part]),
-        ["run", threads, mode, period, cycles, resend] => run(threads, mode, period, cycles, resend).map(|()| true),
-        _ => {
-            Err("usage: socket_cycle [instructions | cpu | run one|two MODE PERIOD_US CYCLES never|always]".to_owned())
-        }
+        _ => Err("usage: socket_cycle [instructions | cpu]".to_owned()),
     };
     match result {
         Ok(met) => verdict(met),
@@ -93,123 +76,6 @@ fn main() -> ExitCode {
         }
     }
 }
-
-// The process that is measured.
-
-fn receive_mode(name: &str) -> Tried<ReceiveMode> {
-    match name {
-        "block" => Ok(ReceiveMode::Blocking),
-        "hybrid" => Ok(ReceiveMode::Hybrid { spin: SPIN }),
-        "busy" => Ok(ReceiveMode::BusyPoll),
-        _ => Err(format!("no such mode: {name}")),
-    }
-}
-
-/// A MainDevice on `near0` that runs this many cycles and prints its resources. `resend`: whether lost frames are sent
-/// again, `never` or `always`.
-fn run(threads: &str, mode: &str, period_us: &str, cycles: &str, resend: &str) -> Tried<()> {
-    let (period_us, cycles): (u64, u64) = (number(period_us)?, number(cycles)?);
-    let (mode, period) = (receive_mode(mode)?, Duration::from_micros(period_us));
-    let options = Options::default();
-    realtime::precise_timers();
-    match threads {
-        "two" => {
-            let (cyclic, acyclic) = PacketLinks::open_halves("near0", None, mode).map_err(said)?;
-            let supervisor = SupervisorThread::start(acyclic, &options, realtime::precise_timers).map_err(said)?;
-            let scan = supervisor.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
-            drop(scan);
-            let mut application = supervisor.activate(declaration, cyclic).map_err(|refused| said(refused.error))?;
-            exchange(&mut application, cycles)?;
-            application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).map(drop).map_err(said)
-        }
-        "one" => {
-            let links = PacketLinks::open("near0", None, mode).map_err(said)?;
-            let mut main_device = MainDevice::request(links, &options);
-            let scan = main_device.scan().map_err(said)?;
-            let declaration = automatic(&scan.subdevices, period).with_lost_frames_sent_again(resend == "always");
-            drop(scan);
-            let mut application = main_device.activate(declaration).map_err(|refused| said(refused.error))?;
-            exchange(&mut application, cycles)?;
-            application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).map(drop).map_err(said)
-        }
-        _ => Err(format!("one thread or two, not {threads}")),
-    }
-}
-
-fn exchange<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, cycles: u64) -> Tried<()> {
-    let until = application.now() + OP_LIMIT;
-    while !application.all_settled() {
-        application.cycle(work);
-        if application.now() >= until {
-            return Err("not all SubDevices reached OP".to_owned());
-        }
-    }
-    for _ in 0..WARM_UP {
-        application.cycle(work);
-    }
-    let (before, cpu, begin) = (application.cyclic_counters(), process_cpu_time(), application.now());
-    for _ in 0..cycles {
-        measured_cycle(application);
-    }
-    let (cpu, elapsed) = (process_cpu_time() - cpu, application.now().since(begin));
-    let after = application.cyclic_counters();
-    let disturbed = (after.lost - before.lost).max(after.incomplete - before.incomplete);
-    println!("cycles: {cycles}");
-    println!("disturbed: {disturbed}");
-    println!("skipped: {}", application.pace().skipped);
-    println!("cpu percent: {:.1}", 100.0 * cpu.as_secs_f64() / elapsed.as_secs_f64());
-    for (name, kilobytes) in memory()? {
-        println!("{name}: {kilobytes} kB");
-    }
-    Ok(())
-}
-
-/// A cycle that is counted.
-#[inline(never)]
-fn measured_cycle<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) {
-    application.cycle(work);
-}
-
-/// Minimal work of an application: it reads an input and changes an output.
-fn work(data: &mut ProcessData<'_>) {
-    black_box(data.image(DomainId(0)).last());
-    if let Ok([first]) = data.outputs_mut(DomainId(0), 0..1) {
-        *first = first.wrapping_add(1);
-    }
-}
-
-/// Resident memory in kB: in total, and by mapping.
-fn memory() -> Tried<Vec<(String, u64)>> {
-    let maps = fs::read_to_string("/proc/self/smaps").map_err(said)?;
-    let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
-    let mut part = "";
-    for line in maps.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            [range, _, _, _, _, ref name @ ..] if range.contains('-') => part = kind(name),
-            ["Rss:", size, "kB"] => *parts.entry(part).or_default() += number::<u64>(size)?,
-            _ => {}
-        }
-    }
-    let all = ("resident".to_owned(), parts.values().sum());
-    Ok(std::iter::once(all).chain(parts.into_iter().map(|(name, size)| (format!("of it {name}"), size))).collect())
-}
-
-/// Kind of a mapping.
-fn kind(name: &[&str]) -> &'static str {
-    match name.first() {
-        None => "stacks and heaps of threads",
-        Some(name) if name.contains("[heap]") => "heap",
-        Some(name) if name.contains("[stack]") => "stacks and heaps of threads",
-        Some(name) if name.starts_with("socket:") => "receive rings",
-        Some(name) if name.contains(".so") => "libraries",
-        Some(name) if name.starts_with('[') => "kernel",
-        Some(_) => "program",
-    }
-}
-
-// The measurement.
 
 fn measure(parts: &[&str]) -> Tried<bool> {
     let namespaces = match Namespaces::new() {
@@ -233,6 +99,12 @@ fn measure(parts: &[&str]) -> Tried<bool> {
     Ok(met)
 }
 
+/// A program that was built with this one.
+fn beside(name: &str) -> Tried<PathBuf> {
+    let here = std::env::current_exe().map_err(said)?;
+    Ok(here.parent().map(PathBuf::from).unwrap_or_default().join(name))
+}
+
 /// A simulated segment at the far end, with its file.
 struct Simulator {
     _server: Server,
@@ -253,10 +125,8 @@ fn simulate(namespaces: &Namespaces, servos: usize, hop_ns: u64) -> Tried<Simula
          [[device]]\ntype = \"servo\"\ncount = {servos}\n"
     );
     fs::write(&file, segment).map_err(said)?;
-    let here = std::env::current_exe().map_err(said)?;
-    let ringcat = here.parent().map(PathBuf::from).unwrap_or_default().join("ringcat");
     let arguments = ["sim", "--segment", &file.display().to_string(), "--main", "far0", "--receive", "block"];
-    namespaces.serve(ringcat, &arguments).map(|_server| Simulator { _server, file })
+    namespaces.serve(beside("ringcat")?, &arguments).map(|_server| Simulator { _server, file })
 }
 
 fn instructions(namespaces: &Namespaces) -> Tried<bool> {
@@ -321,9 +191,8 @@ fn period_us(servos: usize, threads: &str) -> u64 {
 
 fn profile(namespaces: &Namespaces, servos: usize, threads: &str, resend: &str) -> Tried<Profile> {
     let period_us = period_us(servos, threads).to_string();
-    let arguments = ["run", threads, "block", &period_us, &COUNTED.to_string(), resend].map(str::to_owned);
-    let program = std::env::current_exe().map_err(said)?;
-    profile_program_within(namespaces.near("valgrind"), &[WITHIN], &program, &arguments).map_err(said)
+    let arguments = [threads, "block", &period_us, &COUNTED.to_string(), resend].map(str::to_owned);
+    profile_program_within(namespaces.near("valgrind"), &[WITHIN], &beside("cycle_process")?, &arguments).map_err(said)
 }
 
 /// Instructions of SOEM's two functions of a cycle, as pysoem calls them, Python left out; `None` without pysoem. They
@@ -368,8 +237,8 @@ fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
     let mut memory = Vec::new();
     for mode in ["block", "hybrid", "busy"] {
         let _simulator = simulate(namespaces, 50, 1_000)?;
-        let mut command = namespaces.near(std::env::current_exe().map_err(said)?);
-        command.args(["run", "two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string(), "never"]);
+        let mut command = namespaces.near(beside("cycle_process")?);
+        command.args(["two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string(), "never"]);
         let output = command.stdin(Stdio::null()).output().map_err(said)?;
         let told = String::from_utf8_lossy(&output.stdout).into_owned();
         if !output.status.success() {
@@ -397,10 +266,6 @@ fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
     let met = figures.print();
     memory.iter().for_each(|line| println!("    {line}"));
     Ok(met)
-}
-
-fn number<T: std::str::FromStr>(text: &str) -> Tried<T> {
-    text.parse().map_err(|_| format!("not a number: {text}"))
 }
 
 fn said(error: impl std::fmt::Display) -> String {

@@ -31,9 +31,10 @@ pub enum Errno {
 impl From<RegisterError> for Errno {
     fn from(error: RegisterError) -> Errno {
         match error {
-            RegisterError::Unknown { .. } | RegisterError::NotMapped { .. } | RegisterError::NoSuchPlace { .. } => {
-                Errno::NoEnt
-            }
+            RegisterError::Unknown { .. }
+            | RegisterError::NotMapped { .. }
+            | RegisterError::NoProcessData { .. }
+            | RegisterError::NoSuchPlace { .. } => Errno::NoEnt,
             RegisterError::TooManyPlaces { .. } | RegisterError::TooLarge { .. } => Errno::Overflow,
             _ => Errno::Inval,
         }

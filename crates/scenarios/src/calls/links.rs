@@ -55,7 +55,7 @@ impl Links for CallLinks {
         self.segment.now()
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.segment.addresses()
     }
 

@@ -40,6 +40,6 @@ impl Plan {
         let declaration = self.declaration.clone().with_required(Required::Nothing);
         let reference = self.reference.map(ringcat::ReferenceClock::Declared).unwrap_or_default();
         let clocks = ClockConfig::default().as_igh().with_reference(reference);
-        declaration.with_optional_clocks(self.clocks.then_some(clocks))
+        declaration.with_clocks(self.clocks.then_some(clocks))
     }
 }

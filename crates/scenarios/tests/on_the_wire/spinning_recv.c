@@ -1,6 +1,6 @@
-/* Preloaded into pysoem (LD_PRELOAD), it makes SOEM's receive spin: SOEM waits in a blocking recv() with a time limit of a
- * microsecond and repeats it until the frame is there, so a recv() that returns at once is all that it takes. Built by
- * ci/bench-wire, for a comparison of stacks that wait alike. */
+/* Preloaded into pysoem (LD_PRELOAD), it makes SOEM's receive spin: SOEM waits in a blocking recv() with a time
+ * limit of a microsecond and repeats it until the frame is there, so a recv() that returns at once is all that it
+ * takes. Built by ci/bench-wire, for a comparison of stacks that wait alike. */
 #define _GNU_SOURCE
 #include <sys/socket.h>
 

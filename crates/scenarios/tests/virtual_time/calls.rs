@@ -3,6 +3,7 @@
 mod clocks;
 mod cycles;
 mod mailbox;
+mod misfits;
 mod orders;
 mod seeds;
 

@@ -42,7 +42,7 @@ fn recorded_as(network: Network, ring: bool, again: bool, work: impl FnOnce(&mut
     let links = Tee::new(SimulatedSegment::new(network), recorder.tap());
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan().expect("a segment");
-    let declaration = automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(again);
+    let declaration = automatic(&scan.subdevices, CYCLE).with_sends_again(again);
     let mut application = main_device.activate(declaration).expect("it fits");
     settle(&mut application);
     work(&mut application);

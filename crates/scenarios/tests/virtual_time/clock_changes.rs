@@ -347,7 +347,7 @@ fn a_group_that_joins_late_or_elsewhere_has_the_clocks_of_its_place() {
     let group = group.then(expect(SubDeviceConfig::default(), &infos[0]));
     let mut world = World::with(7, two_places(), &Options::default(), |_| {
         let mut declaration = automatic(&infos, CYCLE);
-        let (_, members) = declaration.add_group(group);
+        let members = declaration.add_group(group).members;
         declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration.clocks = Some(config());
         declaration.subdevices.iter_mut().for_each(|config| config.sync = Some(SyncSignals::sync0(1_000_000, 0)));
@@ -403,7 +403,7 @@ fn the_first_clocks_of_a_segment_may_join_with_a_group() {
         };
         let group = Group::new(member(head, &infos[0])).then(member(SubDeviceConfig::default(), &infos[0]));
         let last = SubDeviceConfig::default().sync(signals);
-        let (_, members) = declaration.add_group(group.then(member(last, &infos[0])));
+        let members = declaration.add_group(group.then(member(last, &infos[0]))).members;
         declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration.clocks = Some(config());
         declaration

@@ -62,8 +62,7 @@ fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
     const COUNT: usize = 24;
     for (under_way, pauses) in [(1, true), (3, true), (1, false), (3, false)] {
         let text = format!("{under_way} under way, pauses {pauses}");
-        let passages =
-            NetworkOptions { processing_delay: PASSAGE, forwarding_delay: PASSAGE, ..NetworkOptions::default() };
+        let passages = NetworkOptions::default().with_processing_delay(PASSAGE).with_forwarding_delay(PASSAGE);
         let network = ring(clocked(COUNT, 0), passages);
         let config = config().with_pauses(pauses).with_drift_distributions(200);
         let mut world = World::with(21, network, &Options::default(), |scan| {

@@ -26,7 +26,7 @@ fn some<T: Copy>(variants: &[T], number: usize, count: usize) -> Vec<T> {
     if count < 10 { variants.to_vec() } else { vec![variants[number % variants.len()]] }
 }
 
-fn network(kind: &str, count: usize) -> Network {
+pub fn network(kind: &str, count: usize) -> Network {
     wired_as(kind, clocked(count, 50))
 }
 
@@ -39,24 +39,24 @@ fn wired_as(kind: &str, descriptions: Vec<DeviceDescription>) -> Network {
 }
 
 /// The application's time, relative to the host's.
-struct Host {
-    base: u64,
+pub struct Host {
+    pub base: u64,
 }
 
 impl Host {
-    fn time(&self, world: &World) -> u64 {
+    pub fn time(&self, world: &World) -> u64 {
         world.application().now().0.wrapping_add(self.base)
     }
 
     /// Sets the application's time and runs a cycle.
-    fn cycle(&self, world: &mut World) {
+    pub fn cycle(&self, world: &mut World) {
         let (time, now) = (self.time(world), world.application().now());
         world.application_mut().exchange_mut().set_application_time(time, now);
         world.cycle();
     }
 
     /// The reference clock's true time minus the application's.
-    fn error_ns(&self, world: &World) -> i64 {
+    pub fn error_ns(&self, world: &World) -> i64 {
         let network = world.network();
         network.device(DeviceIndex(0)).controller.system_time(network.now()).wrapping_sub(self.time(world)) as i64
     }
@@ -92,7 +92,7 @@ fn a_first_application_time_after_the_set_up_is_the_system_time_within_100_ms() 
 }
 
 /// A world with SYNC0 at all SubDevices, in OP, and with the application's time set in each cycle.
-fn with_sync0(seed: u64, network: Network, config: ClockConfig, host: &Host) -> World {
+pub fn with_sync0(seed: u64, network: Network, config: ClockConfig, host: &Host) -> World {
     let mut world = World::with(seed, network, &Options::default(), |scan| {
         let mut declaration = with_clocks(scan, config);
         for subdevice in &mut declaration.subdevices {

@@ -163,7 +163,7 @@ fn an_undeclared_reference_is_followed_and_not_configured() {
     let network = line(clocked(3, 30), NetworkOptions::default());
     let mut world = World::with(19, network, &Options::default(), |scan| {
         let clocks = Some(config());
-        automatic(&scan.subdevices[1..], CYCLE).with_optional_clocks(clocks)
+        automatic(&scan.subdevices[1..], CYCLE).with_clocks(clocks)
     })
     .expect("it can be activated");
     let before = world.network().device(DeviceIndex(0)).al_status();

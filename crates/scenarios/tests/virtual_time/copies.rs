@@ -118,12 +118,12 @@ fn outputs_hold_or_are_zero_while_their_source_is_away_and_follow_it_again() {
     world.run_cycles(10);
     assert_eq!((outputs(&world, FAST_OUT), outputs(&world, OUT_16)), (0x5A, 0));
     let exchange = world.application().exchange();
-    assert!(exchange.is_copy_stale(0) && exchange.is_copy_stale(1));
+    assert!(exchange.is_copy_stale(ringcat::CopyId(0)) && exchange.is_copy_stale(ringcat::CopyId(1)));
     world.power_on(DeviceIndex(FAST_IN));
     world.power_on(DeviceIndex(SLOW_IN));
     world.settle();
     feed(&mut world, 0xC3);
     assert_eq!((outputs(&world, FAST_OUT), outputs(&world, OUT_16)), (0xC3, 0x3CC3));
     let exchange = world.application().exchange();
-    assert!(!exchange.is_copy_stale(0) && !exchange.is_copy_stale(1));
+    assert!(!exchange.is_copy_stale(ringcat::CopyId(0)) && !exchange.is_copy_stale(ringcat::CopyId(1)));
 }

@@ -56,7 +56,7 @@ fn declare(scan: &Scan, positions: &[usize], clocks: bool) -> Declaration {
         let domain = declaration.add_domain(CYCLE);
         declaration.add_to(domain, SubDeviceConfig::from_info(&scan.subdevices[*at]));
     }
-    declaration.with_optional_clocks(clocks.then(ClockConfig::default))
+    declaration.with_clocks(clocks.then(ClockConfig::default))
 }
 
 fn statuses(main_device: &mut MainDevice<Tap>) -> Vec<AlStatus> {

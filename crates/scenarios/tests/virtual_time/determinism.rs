@@ -12,7 +12,7 @@ use scenarios::world::World;
 /// A run with cuts, power cycles and corrupt frames, all from the seed.
 fn run(seed: u64) -> (Fingerprint, usize) {
     let mut dice = Dice::new(seed);
-    let options = NetworkOptions { seed, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_seed(seed);
     let network = ring(descriptions(&SIXTEEN), options.with_detection_delay(Duration::from_micros(300)));
     let mut world = World::in_op(seed, network);
     world.judge_latched(false);

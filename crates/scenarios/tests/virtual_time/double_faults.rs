@@ -192,7 +192,7 @@ impl Run {
         let options = Options::default().with_junctions(JunctionMode::Automatic);
         let mut domains = 0;
         let declare = |scan: &Scan| {
-            let declaration = declare(scan, &mut dice).with_lost_frames_sent_again(seeds::sends_again(seed));
+            let declaration = declare(scan, &mut dice).with_sends_again(seeds::sends_again(seed));
             domains = declaration.domains.len();
             declaration
         };
@@ -237,7 +237,7 @@ impl Run {
         let image = exchange.image(domain).to_vec();
         let before = std::mem::replace(&mut self.images[domain.0], image.clone());
         for (subdevice, count) in self.counts.iter_mut().enumerate() {
-            let freshness = exchange.freshness(domain, subdevice);
+            let freshness = exchange.freshness(domain, SubDeviceId(subdevice));
             let is_input = |way: Way, length: u16| way == Way::Inputs && length > 0;
             let areas = application.directory().areas(SubDeviceId(subdevice)).iter();
             for area in areas.filter(|it| it.domain == domain && is_input(it.direction, it.placed.area.length)) {

@@ -86,7 +86,7 @@ fn wrong_descriptions_in_a_segment_file_name_line_device_and_key() {
         ("esi = \"acme.xml\"\nsii = \"a.bin\"", "expected either esi or sii, got both"),
         (
             "type = \"coupler\"\nrevision = 1",
-            "line 3: device \"coupler-1\": revision: only for a device of a description",
+            "line 3: device \"coupler-1\": revision: expected a device of a description",
         ),
         ("esi = \"outputs.xml\"\nrevision = \"x\"", "revision"),
     ] {

@@ -7,13 +7,14 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use ringcat::{Event, Options, RingState, automatic};
+use ringcat::{Event, Options, RingState};
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
 use scenarios::check::{Delivery, troubles};
 use scenarios::dice::Dice;
+use scenarios::one_buffer::{automatic, one_buffer};
 use scenarios::seeds;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::{CYCLE, World};
@@ -112,9 +113,14 @@ fn mend(world: &mut World, broken: Broken) {
 fn segment(dice: &mut Dice, seed: u64) -> (Network, bool) {
     let kinds: Vec<&str> = (0..3 + dice.below(8)).map(|_| *dice.pick(&KINDS)).collect();
     let detection = Duration::from_micros(*dice.pick(&[10, 300, 2_000, 10_000]));
-    let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
+    let options = NetworkOptions::default().with_seed(seed).with_detection_delay(detection);
     let closed = !dice.one_in(4);
-    let mut network = if closed { ring(descriptions(&kinds), options) } else { line(descriptions(&kinds), options) };
+    let mut described = descriptions(&kinds);
+    for (number, description) in described.iter_mut().enumerate().filter(|(number, _)| seeds::one_buffer(seed, *number))
+    {
+        *description = one_buffer(description.clone());
+    }
+    let mut network = if closed { ring(described, options) } else { line(described, options) };
     if dice.one_in(3) {
         for _ in 0..1 + dice.below(8) {
             let at = SimTime::from_micros(dice.below(80_000));
@@ -130,7 +136,7 @@ fn run(seed: u64) {
     let (network, closed) = segment(&mut dice, seed);
     let options = Options::default().with_sii_cache(!dice.one_in(2));
     let mut world = World::with(seed, network, &options, |scan| {
-        automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed))
+        automatic(&scan.subdevices, CYCLE).with_sends_again(seeds::sends_again(seed))
     })
     .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Late and duplicated frames change the devices.

@@ -68,7 +68,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
     let kinds: Vec<&str> = (0..3 + dice.below(8)).map(|_| *dice.pick(&KINDS)).collect();
     let crossed = (course == Course::Crossed).then(|| dice.below(kinds.len() as u64) as usize);
     let detection = Duration::from_micros(*dice.pick(&[10, 100, 1_000, 3_000]));
-    let options = NetworkOptions { seed, ..NetworkOptions::default() }.with_detection_delay(detection);
+    let options = NetworkOptions::default().with_seed(seed).with_detection_delay(detection);
     let cables = kinds.len() + 1;
     let mut network = segment(&kinds, crossed, options);
     let one_in = *dice.pick(&[2, 5, 20]);
@@ -85,8 +85,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
         }
     }
     let options = Options::default().with_enhanced_line_crossed(course == Course::Enhanced);
-    let declare =
-        |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_lost_frames_sent_again(seeds::sends_again(seed));
+    let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_sends_again(seeds::sends_again(seed));
     let mut world = World::with(seed, network, &options, declare).expect("activation");
     // Lost copies change the devices; freshness is checked in other scenarios.
     world.judge_latched(false);

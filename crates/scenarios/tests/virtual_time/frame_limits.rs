@@ -28,7 +28,7 @@ fn kinds(count: usize) -> Vec<&'static str> {
 }
 
 fn segment(count: usize, is_ring: bool, limit: Option<DatagramLimit>) -> Network {
-    let options = NetworkOptions { max_datagrams: limit, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_max_datagrams(limit);
     let build = if is_ring { ring } else { line };
     build(descriptions(&kinds(count)), options)
 }

@@ -79,7 +79,8 @@ fn an_absent_subdevice_keeps_its_last_inputs_when_a_break_moves() {
     world.cut(CableId(2));
     world.run_cycles(2);
     let exchange = world.application().exchange();
-    let freshness: Vec<Freshness> = (0..4).map(|subdevice| exchange.freshness(DOMAIN, subdevice)).collect();
+    let freshness: Vec<Freshness> =
+        (0..4).map(|subdevice| exchange.freshness(DOMAIN, SubDeviceId(subdevice))).collect();
     let of =
         |device: usize| (0..4).find(|it| world.device_of(*it) == Some(DeviceIndex(device))).expect("it was scanned");
     assert_eq!(freshness[of(0)], Freshness::Fresh);
@@ -166,7 +167,7 @@ fn a_subdevice_of_an_earlier_session_is_not_mistaken_for_another() {
         application.cycle(|_| ());
         let exchange = application.exchange();
         // Frames sent before may still arrive.
-        assert!(cycle < 2 || exchange.freshness(DOMAIN, 1) != Freshness::Fresh, "cycle {cycle}");
+        assert!(cycle < 2 || exchange.freshness(DOMAIN, SubDeviceId(1)) != Freshness::Fresh, "cycle {cycle}");
         assert_eq!(exchange.image(DOMAIN), [0xA0, 0xA0, 0xA1, 0xA1], "cycle {cycle}");
     }
 }
@@ -191,7 +192,7 @@ fn inputs_of_a_subdevice_below_safeop_are_not_fresh() {
         for _ in 0..600 {
             world.cycle();
             let state = world.network().device(last).al_status().al_state();
-            let is_fresh = world.application().exchange().freshness(DOMAIN, count - 1) == Freshness::Fresh;
+            let is_fresh = world.application().exchange().freshness(DOMAIN, SubDeviceId(count - 1)) == Freshness::Fresh;
             assert!(
                 !is_fresh || !matches!(state, Some(AlState::Init | AlState::PreOp)),
                 "{count}, {fmmus:?}: {state:?}"
@@ -380,7 +381,7 @@ fn run(seed: u64) -> Tally {
     let under_way = 1 + dice.below(3) as u8;
     let declare = |scan: &ringcat::Scan| {
         let declaration = automatic(&scan.subdevices, CYCLE).with_under_way(under_way);
-        declaration.with_lost_frames_sent_again(seeds::sends_again(seed))
+        declaration.with_sends_again(seeds::sends_again(seed))
     };
     let mut world =
         World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));

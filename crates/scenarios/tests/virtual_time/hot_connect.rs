@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
-    Declaration, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, GroupId, MainDevice, Options, Scan,
-    SubDeviceConfig, SubDeviceId, SubDeviceInfo, automatic,
+    Declaration, DeclaredGroup, DomainConfig, DomainId, DomainMember, DomainState, Event, Group, GroupId, MainDevice,
+    Options, Scan, SubDeviceConfig, SubDeviceId, SubDeviceInfo, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -55,7 +55,7 @@ pub fn group(head: SubDeviceConfig) -> Group {
 /// The base by position, then the group.
 fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
-    let (number, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+    let DeclaredGroup { id: number, members, .. } = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
     assert_eq!((number, members.as_slice()), (GroupId(0), [4, 5].map(SubDeviceId).as_slice()));
     declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
     declaration
@@ -181,7 +181,7 @@ fn a_group_joins_at_another_place_than_it_left() {
     let declare = |_: &Scan| {
         let base = ["coupler", "digital-input-8", "junction", "digital-output-8", "digital-input-16"];
         let mut declaration = automatic(&infos(&base), CYCLE);
-        let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+        let members = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0))).members;
         declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };
@@ -239,7 +239,7 @@ fn a_group_present_at_the_start_is_found_by_its_identification() {
     let all = all.into_iter().chain(head).chain(tail).collect();
     let declare = |_: &Scan| {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
-        let (_, members) = declaration.add_group(group(SubDeviceConfig::at_identification(4711)));
+        let members = declaration.add_group(group(SubDeviceConfig::at_identification(4711))).members;
         declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };
@@ -287,7 +287,7 @@ fn adjacent_groups_separated_by_a_break_continue_and_join_again() {
     let declare = |_: &Scan| {
         let mut declaration = automatic(&infos(&BASE), CYCLE);
         for alias in [TOOL, TOOL + 1] {
-            let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(alias, 0)));
+            let members = declaration.add_group(group(SubDeviceConfig::at_alias(alias, 0))).members;
             let joined = members.into_iter().map(DomainMember::new);
             declaration.domains[0].members.extend(joined);
         }
@@ -349,7 +349,7 @@ fn random_network(dice: &mut Dice) -> (Network, usize) {
 fn run(seed: u64) -> u64 {
     let mut dice = Dice::new(seed ^ 0x4C07);
     let (network, cables) = random_network(&mut dice);
-    let declare = |scan: &Scan| declare(scan).with_lost_frames_sent_again(seeds::sends_again(seed));
+    let declare = |scan: &Scan| declare(scan).with_sends_again(seeds::sends_again(seed));
     let mut world = World::with(seed, network, &Options::default(), declare).expect("scan and activation");
     world.judge_latched(false);
     world.compare_tries();

@@ -96,7 +96,11 @@ fn of_two_subdevices_at_one_address_that_of_this_session_keeps_it() {
             // Frames under way when the other SubDevice appeared, and frames that it processed instead.
             if cycle > 2 {
                 let exchange = application.exchange();
-                assert_eq!(exchange.freshness(DOMAIN, 1) == Freshness::Fresh, kind != "digital-output-8", "{what}");
+                assert_eq!(
+                    exchange.freshness(DOMAIN, SubDeviceId(1)) == Freshness::Fresh,
+                    kind != "digital-output-8",
+                    "{what}"
+                );
                 assert_eq!(
                     exchange.status(DOMAIN).expect("it is declared").state,
                     DomainState::Complete,
@@ -160,7 +164,7 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     (0..10_000).for_each(|_| application.cycle(|_| ()));
     let acyclic = sent(&application) - before - 10_000;
     assert!(acyclic < 1_000, "{acyclic} frames in 10 s beside those of process data");
-    assert_ne!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
+    assert_ne!(application.exchange().freshness(DOMAIN, SubDeviceId(1)), Freshness::Fresh);
     let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
     let told = |event: &&Event| match event {
         Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason } => {
@@ -175,7 +179,7 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     network.power_on(DeviceIndex(1));
     (0..2_000).for_each(|_| application.cycle(|_| ()));
     assert_eq!(application.exchange().status(DOMAIN).expect("it is declared").state, DomainState::Complete);
-    assert_eq!(application.exchange().freshness(DOMAIN, 1), Freshness::Fresh);
+    assert_eq!(application.exchange().freshness(DOMAIN, SubDeviceId(1)), Freshness::Fresh);
 }
 
 /// Branches of a junction with identical devices without serial numbers: the device on the later branch has its power

@@ -81,7 +81,7 @@ fn noticed(main_device: &mut MainDevice<Tap>, is_it: impl Fn(&Event) -> bool) ->
 
 fn activate(main_device: MainDevice<Tap>, declared: &[usize]) -> Application<Tap> {
     let found = main_device.subdevices();
-    let mut declaration = Declaration::with_period(CYCLE);
+    let mut declaration = Declaration::new(CYCLE);
     for at in declared {
         declaration.add(SubDeviceConfig::from_info(&found[*at]));
     }

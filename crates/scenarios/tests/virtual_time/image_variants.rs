@@ -158,7 +158,7 @@ fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
         if device.al_status() != AlStatus::new(AlState::Op) {
             return Err(format!("{} is in {:?}", device.name(), device.al_status()));
         }
-        let freshness = world.application().exchange().freshness(DomainId(0), other);
+        let freshness = world.application().exchange().freshness(DomainId(0), SubDeviceId(other));
         if !device.inputs().is_empty() && freshness != Freshness::Fresh {
             return Err(format!("{} is not fresh", device.name()));
         }

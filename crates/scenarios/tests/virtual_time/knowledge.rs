@@ -4,9 +4,11 @@
 mod bars;
 mod bytes;
 mod changes;
+mod clocks;
 mod crashes;
 mod mail;
 mod rounds;
+mod under_way;
 
 use std::time::Duration;
 
@@ -286,7 +288,7 @@ fn states_that_were_requested_or_forced_travel() {
         main_device.attend(FOLLOWED);
         assert_eq!(statuses(&mut main_device), [PREOP; MIXED.len()]);
         exchange_sdos(&mut main_device);
-        let declaration = Declaration::with_period(CYCLE);
+        let declaration = Declaration::new(CYCLE);
         assert!(main_device.activate(declaration).is_ok());
     }
 }

@@ -39,7 +39,7 @@ fn in_op(count: usize, is_ring: bool) -> World {
 fn declared(network: Network, clocks: bool) -> World {
     let declare = |scan: &ringcat::Scan| {
         let clocks = clocks.then(ClockConfig::default);
-        automatic(&scan.subdevices, CYCLE).with_optional_clocks(clocks)
+        automatic(&scan.subdevices, CYCLE).with_clocks(clocks)
     };
     let mut world = World::with(7, network, &Options::default(), declare).expect("it fits");
     // Inputs of a drive that reaches OP change while frames are under way.

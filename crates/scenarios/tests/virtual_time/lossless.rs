@@ -32,7 +32,7 @@ fn kinds(count: usize) -> Vec<&'static str> {
 }
 
 fn world(network: Network, declare: impl FnOnce(&Scan) -> Declaration) -> World {
-    let declare = |scan: &Scan| declare(scan).with_lost_frames_sent_again(true);
+    let declare = |scan: &Scan| declare(scan).with_sends_again(true);
     let mut world = World::with(0, network, &Options::default(), declare).expect("it starts");
     world.settle();
     world.run_cycles(LEARNING);

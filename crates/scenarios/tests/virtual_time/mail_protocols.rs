@@ -395,7 +395,7 @@ fn the_diagnosis_history_is_read_and_acknowledged() {
     let times: Vec<_> = full
         .messages
         .iter()
-        .map(|(_, bytes)| ringcat_wire::mailbox::coe::DiagnosisMessage::decode(bytes).unwrap().time_ns)
+        .map(|message| ringcat_wire::mailbox::coe::DiagnosisMessage::decode(&message.bytes).unwrap().time_ns)
         .collect();
     assert!(times.is_sorted(), "the oldest first: {times:?}");
     assert!(!left.new_available);

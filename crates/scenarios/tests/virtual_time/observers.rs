@@ -21,7 +21,7 @@ const FIRST: DomainId = DomainId(0);
 
 /// Every second SubDevice in a domain of twice the period.
 fn two_domains(scan: &Scan) -> Declaration {
-    let mut declaration = Declaration::with_period(CYCLE);
+    let mut declaration = Declaration::new(CYCLE);
     let slow = declaration.add_domain(2 * CYCLE);
     for (number, info) in scan.subdevices.iter().enumerate() {
         declaration.add_to(if number % 2 == 0 { FIRST } else { slow }, SubDeviceConfig::from_info(info));
@@ -277,7 +277,7 @@ impl Links for Ticking {
         Instant(self.segment.now().0 + self.ticks.get())
     }
 
-    fn addresses(&self) -> (MacAddress, Option<MacAddress>) {
+    fn addresses(&self) -> ringcat::PerLink<MacAddress> {
         self.segment.addresses()
     }
 

@@ -173,7 +173,7 @@ fn declared_lrw_is_refused_with_rings_behind_junctions_and_hot_connect_groups_to
         let mut declaration = with_lrw(scan);
         let head = SubDeviceConfig::at_alias(7, 0);
         let head = head.expect_product(info.identity.vendor_id, info.identity.product_code).pdos_of(&info);
-        let (_, members) = declaration.add_group(Group::new(head));
+        let members = declaration.add_group(Group::new(head)).members;
         declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
         declaration
     };

@@ -124,7 +124,7 @@ fn network(dice: &mut Dice, seed: u64) -> (Network, usize) {
             *source = InputSource::Function(stamp);
         }
     }
-    let options = NetworkOptions { seed, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_seed(seed);
     let options = options.with_detection_delay(Duration::from_micros(*dice.pick(&[10, 100, 1_000])));
     let is_ring = dice.one_in(2);
     (if is_ring { ring(described, options) } else { line(described, options) }, if is_ring { 2 } else { 1 })
@@ -168,7 +168,7 @@ impl Parts {
         (0..devices).map(DeviceIndex).for_each(|device| network.device_mut(device).controller.log_logical());
         let mut main_device = MainDevice::request(PartLinks::new(network), &Options::default());
         main_device.scan().expect("all are there");
-        let declaration = declare(dice, &main_device).with_lost_frames_sent_again(seeds::sends_again(seed));
+        let declaration = declare(dice, &main_device).with_sends_again(seeds::sends_again(seed));
         let timeout = |period: Duration| if period.is_zero() { micros(WITHOUT_PERIOD_US) } else { period * 3 / 4 };
         let known: Vec<Known> = declaration
             .domains

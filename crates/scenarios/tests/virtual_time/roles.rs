@@ -237,7 +237,7 @@ fn call_of_the_segment(engine: &mut Engine, function: Function) -> Option<Answer
             later(engine, service)
         }
         Function::Activate => {
-            let denied = of_activation(engine.load(Declaration::with_period(CYCLE)));
+            let denied = of_activation(engine.load(Declaration::new(CYCLE)));
             now(engine, denied)
         }
         Function::Deactivate => {

@@ -56,11 +56,11 @@ fn inputs_of_a_disabled_sync_manager_are_not_fresh() {
                     for area in &inputs {
                         assert_eq!(exchange.image(DOMAIN)[area.placed.image_offset as usize], 0xAA, "{what}");
                     }
-                    assert!(matches!(exchange.freshness(DOMAIN, 1), Freshness::Stale { .. }), "{what}");
+                    assert!(matches!(exchange.freshness(DOMAIN, SubDeviceId(1)), Freshness::Stale { .. }), "{what}");
                     // With a presence datagram the first area shares its datagram with others, whose inputs are then
                     // stale too.
                     if dead == 1 || fmmus.is_some() {
-                        assert_eq!(exchange.freshness(DOMAIN, 0), Freshness::Fresh, "{what}");
+                        assert_eq!(exchange.freshness(DOMAIN, SubDeviceId(0)), Freshness::Fresh, "{what}");
                     }
                     assert_eq!(
                         exchange.status(DOMAIN).expect("it is declared").state,
@@ -72,7 +72,7 @@ fn inputs_of_a_disabled_sync_manager_are_not_fresh() {
                 assert!(world.network_mut().device_mut(DeviceIndex(1)).controller.pdi_write(control, &[0], now));
                 world.until(Duration::from_secs(1), &what, |world| {
                     let exchange = world.application().exchange();
-                    let is_fresh = exchange.freshness(DOMAIN, 1) == Freshness::Fresh;
+                    let is_fresh = exchange.freshness(DOMAIN, SubDeviceId(1)) == Freshness::Fresh;
                     is_fresh && exchange.status(DOMAIN).expect("it is declared").state == DomainState::Complete
                 });
             }

@@ -37,7 +37,7 @@ impl Case {
     fn network(&self) -> Network {
         let max_datagrams = self.limit.map(|datagrams| DatagramLimit { datagrams, beyond: Beyond::Dropped });
         let build = if self.is_ring { ring } else { line };
-        build(self.descriptions.clone(), NetworkOptions { max_datagrams, ..NetworkOptions::default() })
+        build(self.descriptions.clone(), NetworkOptions::default().with_max_datagrams(max_datagrams))
     }
 
     fn scan(&self, network: Network, cache: bool) -> Result<Scan, ringcat::Error> {

@@ -83,8 +83,8 @@ fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
     assert_eq!(request(&mut world, DRIVE, AlState::PreOp), Ok(()));
     world.run_cycles(5);
     let exchange = world.application().exchange();
-    assert!(matches!(exchange.freshness(DomainId(0), DRIVE), Freshness::Stale { .. }));
-    assert_eq!(exchange.freshness(DomainId(0), 3), Freshness::Fresh);
+    assert!(matches!(exchange.freshness(DomainId(0), SubDeviceId(DRIVE)), Freshness::Stale { .. }));
+    assert_eq!(exchange.freshness(DomainId(0), SubDeviceId(3)), Freshness::Fresh);
     // This may be written only in PREOP.
     let mailbox = world.mailbox(DRIVE);
     let ramp = SdoAddress::new(0x2003, 2);
@@ -92,7 +92,7 @@ fn in_preop_the_mailbox_works_and_inputs_are_not_fresh() {
     assert_eq!(written, Ok(()));
     assert_eq!(request(&mut world, DRIVE, AlState::Op), Ok(()));
     world.run_cycles(2);
-    assert_eq!(world.application().exchange().freshness(DomainId(0), DRIVE), Freshness::Fresh);
+    assert_eq!(world.application().exchange().freshness(DomainId(0), SubDeviceId(DRIVE)), Freshness::Fresh);
     let dictionary = world.network().device(DeviceIndex(DRIVE)).application.dictionary();
     assert_eq!(dictionary.read(0x2003, 2), Ok(7u32.to_le_bytes().as_slice()), "it never left PREOP downwards");
 }

@@ -151,7 +151,7 @@ fn a_debug_message_leaves_on_each_link_and_disturbs_nothing() {
     for network in networks() {
         let taps = Taps::new(2);
         let (mut main_device, frames) = idle(network, &taps);
-        let links = 1 + usize::from(main_device.links_mut().addresses().1.is_some());
+        let links = 1 + usize::from(main_device.links_mut().addresses().redundant.is_some());
         let count = main_device.subdevices().len();
         let before = main_device.acyclic_counters();
         let states = states(&mut main_device);

@@ -50,7 +50,7 @@ fn idle(network: Network) -> MainDevice<Tap> {
 
 fn activate(main_device: MainDevice<Tap>, declared: &[u16]) -> Application<Tap> {
     let found = main_device.subdevices();
-    let mut declaration = Declaration::with_period(CYCLE);
+    let mut declaration = Declaration::new(CYCLE);
     for at in declared {
         declaration.add(SubDeviceConfig::from_info(&found[usize::from(*at)]));
     }

@@ -103,7 +103,7 @@ impl Stamped {
     fn look_at_all(&mut self, now: u8) {
         let exchange = self.world.application().exchange();
         for input in &mut self.inputs {
-            let is_fresh = exchange.freshness(DOMAIN, input.subdevice) == Freshness::Fresh;
+            let is_fresh = exchange.freshness(DOMAIN, SubDeviceId(input.subdevice)) == Freshness::Fresh;
             input.fresh_for = if is_fresh { input.fresh_for + 1 } else { 0 };
             if input.fresh_for > AGAIN {
                 self.oldest_fresh = self.oldest_fresh.max(now.wrapping_sub(exchange.image(DOMAIN)[input.at]));

@@ -105,6 +105,39 @@ fn a_snapshot_and_the_events_before_it_agree_at_every_cycle() {
     assert_eq!(snapshot(&mut world).subdevices[2].identity[0], 0x0C47);
 }
 
+/// Without an application, beside one that names none of them, and one that came later.
+// covers: jobs
+#[test]
+fn a_snapshot_has_identity_and_mailbox_of_subdevices_without_a_declaration() {
+    use ringcat::{Declaration, Error, MainDevice, Options};
+    let mut network = ring(descriptions(&KINDS), NetworkOptions::default());
+    network.power_off(DeviceIndex(3));
+    let options = Options::default().with_idle_operation(true).with_pdos(ringcat::ReadPdos::Always);
+    let mut main_device = MainDevice::request(scenarios::tap::Tap::new(network), &options);
+    main_device.attend(Duration::from_secs(1));
+    main_device.subdevice(ringcat::Position(2)).sdo_read::<u32>(0x1018, 1).expect("it answers");
+    let check = |state: &Snapshot, count: usize, text: &str| {
+        assert_eq!(state.subdevices.len(), count, "{text}");
+        let positions: Vec<Option<u16>> = state.subdevices.iter().map(|one| one.position).collect();
+        assert_eq!(positions, (0..count as u16).map(Some).collect::<Vec<_>>(), "{text}");
+        assert!(state.subdevices.iter().all(|one| one.identity[0] != 0 && one.declared.is_none()), "{text}");
+        let device = &state.subdevices[2];
+        assert!(device.mailbox_open && device.mail[0] > 0 && device.mail[1] > 0, "{text}: {device:?}");
+        assert!(device.mailbox_bytes[0] >= 64 && device.mailbox_bytes[1] >= 64, "{text}: {device:?}");
+        assert_eq!(device.protocols & 0x3E, 0x3E, "{text}: {device:?}");
+        let without = &state.subdevices[1];
+        assert_eq!((without.mailbox_bytes, without.protocols, without.mailbox_open), ([0; 2], 0, false), "{text}");
+    };
+    check(&main_device.engine_mut().snapshot(), 3, "idle");
+    let declaration = Declaration::with_period(scenarios::world::CYCLE);
+    let mut application = main_device.activate(declaration).map_err(Error::from).expect("it names none");
+    (0..200).for_each(|_| application.cycle(|_| ()));
+    check(&application.engine_mut().snapshot(), 3, "beside an application");
+    application.links_mut().network_mut().power_on(DeviceIndex(3));
+    (0..1_500).for_each(|_| application.cycle(|_| ()));
+    check(&application.engine_mut().snapshot(), 4, "one came");
+}
+
 // covers: jobs
 #[test]
 fn numbers_of_events_go_on_after_a_stop_and_a_new_scan() {

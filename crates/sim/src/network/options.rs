@@ -24,6 +24,7 @@ pub struct DatagramLimit {
 
 /// Options of a whole segment.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct NetworkOptions {
     /// Seed of random values (the bit that a fault inverts).
     pub seed: u64,
@@ -78,6 +79,69 @@ impl NetworkOptions {
     pub const fn with_detection_delay(mut self, delay: Duration) -> NetworkOptions {
         self.link_down_delay = delay;
         self.link_up_delay = delay;
+        self
+    }
+
+    /// Sets [`NetworkOptions::seed`].
+    #[must_use]
+    pub const fn with_seed(mut self, seed: u64) -> NetworkOptions {
+        self.seed = seed;
+        self
+    }
+
+    /// Sets [`NetworkOptions::link_down_delay`].
+    #[must_use]
+    pub const fn with_link_down_delay(mut self, link_down_delay: Duration) -> NetworkOptions {
+        self.link_down_delay = link_down_delay;
+        self
+    }
+
+    /// Sets [`NetworkOptions::link_up_delay`].
+    #[must_use]
+    pub const fn with_link_up_delay(mut self, link_up_delay: Duration) -> NetworkOptions {
+        self.link_up_delay = link_up_delay;
+        self
+    }
+
+    /// Sets [`NetworkOptions::processing_delay`].
+    #[must_use]
+    pub const fn with_processing_delay(mut self, processing_delay: Duration) -> NetworkOptions {
+        self.processing_delay = processing_delay;
+        self
+    }
+
+    /// Sets [`NetworkOptions::forwarding_delay`].
+    #[must_use]
+    pub const fn with_forwarding_delay(mut self, forwarding_delay: Duration) -> NetworkOptions {
+        self.forwarding_delay = forwarding_delay;
+        self
+    }
+
+    /// Sets [`NetworkOptions::transmit_queue`].
+    #[must_use]
+    pub const fn with_transmit_queue(mut self, transmit_queue: usize) -> NetworkOptions {
+        self.transmit_queue = transmit_queue;
+        self
+    }
+
+    /// Sets [`NetworkOptions::receive_queue`].
+    #[must_use]
+    pub const fn with_receive_queue(mut self, receive_queue: usize) -> NetworkOptions {
+        self.receive_queue = receive_queue;
+        self
+    }
+
+    /// Sets [`NetworkOptions::compiled`].
+    #[must_use]
+    pub const fn with_compiled(mut self, compiled: bool) -> NetworkOptions {
+        self.compiled = compiled;
+        self
+    }
+
+    /// Sets [`NetworkOptions::max_datagrams`].
+    #[must_use]
+    pub fn with_max_datagrams(mut self, max_datagrams: impl Into<Option<DatagramLimit>>) -> NetworkOptions {
+        self.max_datagrams = max_datagrams.into();
         self
     }
 

@@ -21,11 +21,19 @@ pub struct DescribedDevice {
 
 /// Why there is no such device, and the key of the table that is at fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DescriptionFault {
     /// `esi`, `type`, `revision` or `modules`.
     pub key: &'static str,
     /// Expected and actual value.
     pub message: String,
+}
+
+impl DescriptionFault {
+    /// A fault of this key.
+    pub fn new(key: &'static str, message: impl Into<String>) -> DescriptionFault {
+        DescriptionFault { key, message: message.into() }
+    }
 }
 
 /// Reads description files.

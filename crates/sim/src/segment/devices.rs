@@ -98,7 +98,7 @@ fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<De
         (Some(kind), None) => {
             let known = || catalogue::names().collect::<Vec<_>>().join(", ");
             catalogue::by_name(kind.get_ref()).ok_or_else(|| {
-                let message = format!("type: expected one of {}, got \"{}\"", known(), kind.get_ref());
+                let message = format!("type: expected one of {}, got \"{}\"", known(), kind.get_ref().escape_debug());
                 (message, Some(kind.span()))
             })?
         }
@@ -110,13 +110,13 @@ fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<De
             DeviceDescription::from_sii(image, name)
                 .map_err(|error| (format!("sii: {}: {error}", path.display()), place()))?
         }
-        (Some(_), Some(file)) => return Err(("expected either type or sii, got both".into(), Some(file.span()))),
-        (None, None) => return Err(("expected type or sii, got neither".into(), None)),
+        (Some(_), Some(file)) => return Err(("sii: expected either type or sii, got both".into(), Some(file.span()))),
+        (None, None) => return Err(("type: expected a key type or sii, got neither".into(), None)),
     };
     let of_esi = entry.revision.as_ref().map(|it| ("revision", it.span()));
     let of_esi = of_esi.or(entry.modules.first().map(|it| ("modules", it.span())));
     if let (None, Some((key, span))) = (&entry.esi, of_esi) {
-        return Err((format!("{key}: only for a device of a description file (key esi)"), Some(span)));
+        return Err((format!("{key}: expected a device of a description file (key esi)"), Some(span)));
     }
     settings(entry, &mut description)?;
     services(entry, &mut description, base_dir)?;
@@ -126,9 +126,9 @@ fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<De
 /// A device of a description file.
 fn described(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<DeviceDescription, (String, Place)> {
     if let Some(sii) = &entry.sii {
-        return Err(("expected either esi or sii, got both".into(), Some(sii.span())));
+        return Err(("sii: expected either esi or sii, got both".into(), Some(sii.span())));
     }
-    let Some(esi) = &entry.esi else { return Err(("expected esi".into(), None)) };
+    let Some(esi) = &entry.esi else { return Err(("esi: expected a file".into(), None)) };
     let wanted = DescribedDevice {
         path: sources.base_dir.join(esi.get_ref()),
         kind: entry.kind.as_ref().map(|kind| kind.get_ref().clone()),

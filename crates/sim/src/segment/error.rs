@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 /// An error in a segment file or in a list of devices and cables, with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SegmentError {
     /// The file, if the segment comes from a file.
     pub file: Option<PathBuf>,

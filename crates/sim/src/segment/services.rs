@@ -20,7 +20,7 @@ pub(super) fn services(
     if let Some(answer) = &entry.answer_us {
         let time = duration(answer, "answer_us", 1e-6).map_err(|error| (error.message, Some(answer.span())))?;
         let mailbox = description.mailbox.as_mut();
-        let without = || ("answer_us: the device has no mailbox".to_owned(), Some(answer.span()));
+        let without = || ("answer_us: expected a device with a mailbox".to_owned(), Some(answer.span()));
         mailbox.ok_or_else(without)?.response_time = time;
     }
     if let Some(bytes) = &entry.mailbox_bytes {
@@ -29,7 +29,7 @@ pub(super) fn services(
             return Err(error(format!("expected 24 to 1486, got {}", bytes.get_ref())));
         }
         if !description.set_mailbox_bytes(*bytes.get_ref()) {
-            return Err(error("only for a device of the catalogue with a mailbox".into()));
+            return Err(error("expected a device of the catalogue with a mailbox".into()));
         }
     }
     files(entry, &mut description.services.foe, base_dir)?;

@@ -172,10 +172,10 @@ const REFUSED: &[(&str, &str)] = &[
         "[[device]]\nname = \"x\"\ntype = \"servvo\"",
         "line 3: device \"x\": type: expected one of {known}, got \"servvo\"",
     ),
-    ("\n[[device]]\nname = \"x\"", "line 2: device \"x\": expected type or sii, got neither"),
+    ("\n[[device]]\nname = \"x\"", "line 2: device \"x\": type: expected a key type or sii, got neither"),
     (
         "[[device]]\ntype = \"servo\"\nsii = \"a.bin\"",
-        "line 3: device \"servo-1\": expected either type or sii, got both",
+        "line 3: device \"servo-1\": sii: expected either type or sii, got both",
     ),
     ("[[device]]\nsii = \"a.bin\"", "line 2: device \"a-1\": sii: nowhere/a.bin cannot be read"),
     (
@@ -196,10 +196,14 @@ const REFUSED: &[(&str, &str)] = &[
         "line 3: device \"servo-1\": drift_ppm: expected -1000000 to 1000000, got inf",
     ),
     ("[segment]\nlink_up_delay_us = nan", "line 2: link_up_delay_us: expected a time, not negative, got NaN"),
-    ("[segment]\nring = true", "line 2: ring: there is no device"),
+    ("[segment]\nring = true", "line 2: ring: expected a device to close the ring at, there is none"),
     (
         "[segment]\nring = 7\n[[device]]\ntype = \"servo\"",
         "line 2: ring: expected true, false or \"device.port\", got 7",
+    ),
+    (
+        "[segment]\nring = \"yes\"\n[[device]]\ntype = \"servo\"",
+        "line 2: ring: expected \"main\", \"redundant\" or a device, got \"yes\"",
     ),
 ];
 
@@ -219,28 +223,28 @@ fn errors_name_line_and_device() {
         ),
         (
             "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"tail\"",
-            "line 7: device \"s\": expected \"main\", \"redundant\" or a device, got \"tail\"",
+            "line 7: device \"s\": attach: expected \"main\", \"redundant\" or a device, got \"tail\"",
         ),
         (
             "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"head.7\"",
-            "line 7: device \"s\": port of \"head\": expected 0 to 3, got \"7\"",
+            "line 7: device \"s\": attach: port of \"head\": expected 0 to 3, got \"7\"",
         ),
         (
             "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"head.0\"",
-            "line 7: device \"head\": port 0 of \"head\" is joined to the main link already",
+            "line 7: device \"head\": attach: port 0 of \"head\" is joined to the main link already",
         ),
         (
             "[[device]]\ntype = \"servo\"\nname = \"s\"\nport = 3",
-            "line 4: device \"s\": port 3 of \"s\" does not exist",
+            "line 7: device \"s\": port: port 3 of \"s\" does not exist",
         ),
         ("[[device]]\ntype = \"servo\"\nname = \"s\"\nport = 4", "line 7: device \"s\": port: expected 0 to 3, got 4"),
         (
             "[[cable]]\nfrom = \"head.1\"\nto = \"head.1\"",
-            "line 5: device \"head\": port 1 of \"head\" cannot be joined to itself",
+            "line 5: device \"head\": from: port 1 of \"head\" cannot be joined to itself",
         ),
         (
             "[[device]]\ntype = \"servo\"\nname = \"s\"\nattach = \"s.1\"\nport = 1",
-            "line 7: device \"s\": port 1 of \"s\" cannot be joined to itself",
+            "line 7: device \"s\": attach: port 1 of \"s\" cannot be joined to itself",
         ),
     ] {
         let got = refused(&format!("{coupler}{text}"));
@@ -367,7 +371,7 @@ fn invalid_mailbox_keys_are_refused_with_the_valid_values() {
         assert!(message.contains(part), "{line}: {message}");
     }
     let without = refused("[[device]]\ntype = \"block\"\nmailbox_bytes = 128\n");
-    assert!(without.contains("only for a device of the catalogue with a mailbox"), "{without}");
+    assert!(without.contains("mailbox_bytes: expected a device of the catalogue with a mailbox"), "{without}");
 }
 
 // covers: sim-files

@@ -32,7 +32,7 @@ fn digest(network: &mut Network, digest: &mut u64) {
 /// A run with all kinds of faults; damaged writes to process RAM depend on the seed.
 fn run(seed: u64) -> u64 {
     let cables = format!("{} 2.2-9.0 9.1-10.0 3.3-11.0", ring(8));
-    let mut network = segment_with(&cables, NetworkOptions { seed, ..NetworkOptions::default() });
+    let mut network = segment_with(&cables, NetworkOptions::default().with_seed(seed));
     let mut hash = 0xCBF2_9CE4_8422_2325;
     let start = network.now();
     for (step, cable) in [3usize, 0, 8, 5, 9].into_iter().enumerate() {

@@ -136,8 +136,7 @@ fn actions(devices: usize) -> impl Strategy<Value = Vec<Action>> {
 fn segment(kinds: &[usize], ring: bool, compiled: bool) -> Network {
     let devices = kinds.iter().map(|kind| Device::new(catalogue::by_name(KINDS[*kind]).unwrap())).collect();
     let builder = if ring { SegmentBuilder::ring(devices) } else { SegmentBuilder::line(devices) };
-    let mut network =
-        builder.options(NetworkOptions { compiled, seed: 5, ..NetworkOptions::default() }).build().unwrap();
+    let mut network = builder.options(NetworkOptions::default().with_compiled(compiled).with_seed(5)).build().unwrap();
     network.advance_by(SETTLE);
     for position in 0..kinds.len() {
         let place = Position(position as u16);

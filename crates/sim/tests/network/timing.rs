@@ -22,7 +22,7 @@ fn ns(time: u64) -> Duration {
 }
 
 fn options() -> NetworkOptions {
-    NetworkOptions { processing_delay: ns(400), forwarding_delay: ns(200), ..NetworkOptions::default() }
+    NetworkOptions::default().with_processing_delay(ns(400)).with_forwarding_delay(ns(200))
 }
 
 /// Arrival times of the frames received on a link, relative to `since`.
@@ -74,7 +74,7 @@ fn the_two_interfaces_send_at_the_same_time() {
 
 #[test]
 fn a_full_transmit_queue_loses_frames() {
-    let mut network = segment_with(&ring(1), NetworkOptions { transmit_queue: 3, ..NetworkOptions::default() });
+    let mut network = segment_with(&ring(1), NetworkOptions::default().with_transmit_queue(3));
     for _ in 0..5 {
         network.send(Main, &shortest());
     }
@@ -85,7 +85,7 @@ fn a_full_transmit_queue_loses_frames() {
 
 #[test]
 fn frames_that_are_not_fetched_fill_a_bounded_queue() {
-    let mut network = segment_with(&ring(1), NetworkOptions { receive_queue: 2, ..NetworkOptions::default() });
+    let mut network = segment_with(&ring(1), NetworkOptions::default().with_receive_queue(2));
     for _ in 0..3 {
         network.send(Main, &shortest());
     }
@@ -97,8 +97,7 @@ fn frames_that_are_not_fetched_fill_a_bounded_queue() {
 // covers: sim-faults
 #[test]
 fn both_ends_detect_a_cut_and_a_repair_after_their_delays() {
-    let options =
-        NetworkOptions { link_down_delay: ns(20_000), link_up_delay: ns(70_000), ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_link_down_delay(ns(20_000)).with_link_up_delay(ns(70_000));
     let mut network = segment_with(&ring(2), options);
     let cable = network.host_cable(Main).unwrap();
     let port = endpoint("1.0");

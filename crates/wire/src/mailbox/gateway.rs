@@ -20,6 +20,7 @@ const TYPE_SHIFT: u16 = 12;
 
 /// The reason for which bytes are no mailbox message for a gateway.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum GatewayError {
     /// Shorter than the EtherCAT header.
     Short {
@@ -55,7 +56,14 @@ impl fmt::Display for GatewayError {
     }
 }
 
-impl core::error::Error for GatewayError {}
+impl core::error::Error for GatewayError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            GatewayError::Message(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 /// Bytes of a whole message, including the EtherCAT header, from its first two bytes; an error if the type is not 5.
 pub const fn frame_length(header: [u8; HEADER_LEN]) -> Result<usize, GatewayError> {

@@ -27,6 +27,7 @@ pub const EXPEDITED_MAX_DATA: usize = 4;
 
 /// The reason for which bytes are not the expected SDO message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SdoError {
     /// Too short.
     Short {

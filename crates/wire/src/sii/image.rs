@@ -13,6 +13,7 @@ use super::sync_manager::{SiiSyncManager, SiiSyncManagers};
 
 /// The reason for which bytes are not an SII image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SiiError {
     /// Shorter than the fixed area.
     Short {

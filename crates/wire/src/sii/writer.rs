@@ -16,6 +16,7 @@ const ERASED: u8 = 0xFF;
 
 /// The reason for which an image cannot be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SiiWriteError {
     /// The buffer is too small.
     Full {

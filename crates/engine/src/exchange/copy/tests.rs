@@ -73,11 +73,11 @@ fn copied_inputs_leave_with_the_cycle_whatever_the_application_wrote() {
     // Eleven bits at bit 3 of SubDevice 0 to bit 5 of SubDevice 1.
     exchange.set_copies(&[CopyRule::new(entry(0, INPUTS + 3, 11), entry(1, 5, 11))]).unwrap();
     let first = cycle(&mut exchange, &mut now, [Some(&[0xFF, 0xFF]), Some(&[])]);
-    assert_eq!((&first[1][..2], exchange.is_copy_stale(0)), (&[0, 0][..], true));
+    assert_eq!((&first[1][..2], exchange.is_copy_stale(CopyId(0))), (&[0, 0][..], true));
     exchange.image_mut(DomainId(1))[..3].fill(0xA5);
     let second = cycle(&mut exchange, &mut now, [Some(&[0, 0]), Some(&[])]);
     // 0xA5 with bits 5 to 15 set.
-    assert_eq!((&second[1][..3], exchange.is_copy_stale(0)), (&[0xE5, 0xFF, 0xA5][..], false));
+    assert_eq!((&second[1][..3], exchange.is_copy_stale(CopyId(0))), (&[0xE5, 0xFF, 0xA5][..], false));
     let third = cycle(&mut exchange, &mut now, [Some(&[0, 0]), Some(&[])]);
     assert_eq!(third[1][..3], [0x05, 0x00, 0xA5]);
     assert_eq!(exchange.counters().stale_copies, 1);
@@ -102,7 +102,7 @@ fn a_stale_source_is_refused_its_target_holds_the_last_value_or_is_zero() {
         let outputs = cycle(&mut exchange, &mut now, [None, Some(&[])]);
         assert_eq!(outputs[1][..3], [1, 0, 3]);
         assert_eq!(outputs[0][0], if age <= 2 { 1 } else { 0 }, "age {age}");
-        let stale = [0, 1, 2].map(|rule| exchange.is_copy_stale(rule));
+        let stale = [0, 1, 2].map(|rule| exchange.is_copy_stale(CopyId(rule)));
         assert_eq!(stale, [true, true, age > 2]);
     }
     cycle(&mut exchange, &mut now, [Some(&[7, 8, 9]), Some(&[])]);
@@ -116,17 +116,17 @@ fn a_table_that_makes_no_sense_is_refused_and_the_one_before_stays() {
     let good = CopyRule::new(entry(0, INPUTS, 8), entry(1, 0, 8));
     exchange.set_copies(&[good]).unwrap();
     let rule = |source, target| exchange_error(&[good, CopyRule::new(source, target)]);
-    assert_eq!(rule(entry(0, 0, 8), entry(1, 8, 8)), CopyError::Source { rule: 1 });
-    assert_eq!(rule(entry(0, INPUTS - 1, 8), entry(1, 8, 8)), CopyError::Source { rule: 1 });
-    assert_eq!(rule(entry(0, 2 * INPUTS - 7, 8), entry(1, 8, 8)), CopyError::Source { rule: 1 });
-    assert_eq!(rule(entry(9, INPUTS, 8), entry(1, 8, 8)), CopyError::Source { rule: 1 });
-    assert_eq!(rule(entry(0, INPUTS, 8), entry(1, INPUTS, 8)), CopyError::Target { rule: 1 });
-    assert_eq!(rule(entry(0, INPUTS, 8), entry(9, 8, 8)), CopyError::Target { rule: 1 });
-    assert_eq!(rule(entry(0, INPUTS, 8), entry(1, 7, 8)), CopyError::Overlap { rule: 1, with: 0 });
-    let length = CopyError::Length { rule: 1, source: 8, target: 7 };
+    assert_eq!(rule(entry(0, 0, 8), entry(1, 8, 8)), CopyError::Source { rule: CopyId(1) });
+    assert_eq!(rule(entry(0, INPUTS - 1, 8), entry(1, 8, 8)), CopyError::Source { rule: CopyId(1) });
+    assert_eq!(rule(entry(0, 2 * INPUTS - 7, 8), entry(1, 8, 8)), CopyError::Source { rule: CopyId(1) });
+    assert_eq!(rule(entry(9, INPUTS, 8), entry(1, 8, 8)), CopyError::Source { rule: CopyId(1) });
+    assert_eq!(rule(entry(0, INPUTS, 8), entry(1, INPUTS, 8)), CopyError::Target { rule: CopyId(1) });
+    assert_eq!(rule(entry(0, INPUTS, 8), entry(9, 8, 8)), CopyError::Target { rule: CopyId(1) });
+    assert_eq!(rule(entry(0, INPUTS, 8), entry(1, 7, 8)), CopyError::Overlap { rule: CopyId(1), with: CopyId(0) });
+    let length = CopyError::Length { rule: CopyId(1), source: 8, target: 7 };
     assert_eq!(rule(entry(0, INPUTS, 8), entry(1, 8, 7)), length);
     assert_eq!(length.to_string(), "copy 1: expected as many bits in source and target, got 8 and 7");
-    assert_eq!(rule(entry(0, INPUTS, 0), entry(1, 8, 0)), CopyError::Length { rule: 1, source: 0, target: 0 });
+    assert_eq!(rule(entry(0, INPUTS, 0), entry(1, 8, 0)), CopyError::Length { rule: CopyId(1), source: 0, target: 0 });
     assert!(exchange.set_copies(&[good, good]).is_err());
     let mut now = Instant(0);
     cycle(&mut exchange, &mut now, [Some(&[5]), Some(&[])]);

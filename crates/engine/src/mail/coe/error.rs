@@ -77,6 +77,17 @@ impl fmt::Display for SdoFailure {
     }
 }
 
-impl core::error::Error for SdoError {}
+impl core::error::Error for SdoError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
 
-impl core::error::Error for SdoFailure {}
+impl core::error::Error for SdoFailure {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SdoFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -25,9 +25,18 @@ pub struct History {
     pub new_available: bool,
     /// Settings and flags of lost messages.
     pub flags: DiagnosisFlags,
-    /// Subindex and bytes of each message, the oldest first;
-    /// [`DiagnosisMessage`](ringcat_wire::mailbox::coe::DiagnosisMessage) decodes them.
-    pub messages: Vec<(u8, Vec<u8>)>,
+    /// The messages, the oldest first.
+    pub messages: Vec<HistoryMessage>,
+}
+
+/// A message of the diagnosis history.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct HistoryMessage {
+    /// Its subindex.
+    pub sub_index: u8,
+    /// Its bytes; [`DiagnosisMessage`](ringcat_wire::mailbox::coe::DiagnosisMessage) decodes them.
+    pub bytes: Vec<u8>,
 }
 
 /// Reads the history with all its messages.
@@ -48,7 +57,7 @@ pub async fn read_history(mailbox: &Mailbox, limits: Limits) -> Result<History, 
         for place in places.take(usize::from(maximum)) {
             match read(mailbox, at(place), limits, LONGEST).await {
                 Ok(bytes) if bytes.is_empty() => {}
-                Ok(bytes) => messages.push((place, bytes)),
+                Ok(bytes) => messages.push(HistoryMessage { sub_index: place, bytes }),
                 // A slot that was never used.
                 Err(error) if is_unused(&error) => {}
                 Err(error) => return Err(error),

@@ -56,7 +56,15 @@ impl fmt::Display for InformationError {
     }
 }
 
-impl core::error::Error for InformationError {}
+impl core::error::Error for InformationError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            InformationError::Mailbox(error) => Some(error),
+            InformationError::Malformed(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for InformationError {
     fn from(error: MailboxError) -> InformationError {

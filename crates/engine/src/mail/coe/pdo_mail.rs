@@ -39,7 +39,14 @@ impl fmt::Display for PdoMailError {
     }
 }
 
-impl core::error::Error for PdoMailError {}
+impl core::error::Error for PdoMailError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            PdoMailError::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for PdoMailError {
     fn from(error: MailboxError) -> PdoMailError {

@@ -47,10 +47,23 @@ impl fmt::Display for EoeFailure {
     }
 }
 
-impl core::error::Error for EoeError {}
+impl core::error::Error for EoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
 
 impl From<MailboxError> for EoeFailure {
     fn from(error: MailboxError) -> EoeFailure {
         EoeFailure::Mailbox(error)
+    }
+}
+
+impl core::error::Error for EoeFailure {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            EoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
     }
 }

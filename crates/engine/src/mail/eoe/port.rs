@@ -176,7 +176,7 @@ fn next(shared: &Rc<SharedMailbox>, attachment: u32) -> Option<Outgoing> {
 }
 
 async fn send(conversation: &mut Conversation, frame: &Outgoing) -> Result<(), MailboxError> {
-    let size = conversation.mailbox_sizes().0;
+    let size = conversation.mailbox_sizes().receive;
     let Some(fragments) = Fragments::new(&frame.bytes, frame.number, size, frame.wants_time) else {
         return Err(MailboxError::Closed);
     };

@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use ringcat_wire::mailbox::eoe::{BLOCK, EoeFragment};
 
 /// Frame numbers.
-const NUMBERS: usize = 16;
+const NUMBERS: u8 = 16;
 
 /// Result of a fragment.
 #[derive(Debug, PartialEq, Eq)]
@@ -27,7 +27,8 @@ pub(super) enum Outcome {
 /// Incomplete frames.
 #[derive(Debug, Default)]
 pub(super) struct Reassembly {
-    frames: [Option<Partial>; NUMBERS],
+    /// By the number of the frame.
+    frames: Vec<(u8, Partial)>,
 }
 
 #[derive(Debug)]
@@ -42,20 +43,24 @@ struct Partial {
 impl Reassembly {
     /// Takes a fragment.
     pub(super) fn take(&mut self, fragment: &EoeFragment<'_>) -> Outcome {
-        let place = &mut self.frames[usize::from(fragment.frame) % NUMBERS];
-        let mut replaced = false;
-        if fragment.number == 0 {
-            let announced = usize::from(fragment.blocks) * BLOCK;
-            replaced = place.replace(Partial { bytes: Vec::new(), next: 0, announced }).is_some();
-        }
-        let Some(mut partial) = place.take() else { return Outcome::Lost };
+        let number = fragment.frame % NUMBERS;
+        let place = self.frames.iter().position(|(other, _)| *other == number);
+        let before = place.map(|place| self.frames.swap_remove(place).1);
+        let (mut partial, replaced) = match before {
+            before if fragment.number == 0 => {
+                let announced = usize::from(fragment.blocks) * BLOCK;
+                (Partial { bytes: Vec::new(), next: 0, announced }, before.is_some())
+            }
+            Some(partial) => (partial, false),
+            None => return Outcome::Lost,
+        };
         if !partial.append(fragment) {
             return Outcome::Lost;
         }
         let frame = if fragment.last {
             Some(partial.bytes)
         } else {
-            *place = Some(partial);
+            self.frames.push((number, partial));
             None
         };
         match (replaced, frame) {

@@ -95,6 +95,16 @@ pub struct EthernetCounters {
     pub malformed: u64,
 }
 
+/// Traffic per second in one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct EthernetRate {
+    /// Bytes.
+    pub bytes: u64,
+    /// Frames.
+    pub frames: u64,
+}
+
 /// Status of the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -103,10 +113,10 @@ pub struct EthernetStatus {
     pub up: bool,
     /// Counters since the port was opened.
     pub counters: EthernetCounters,
-    /// Bytes and frames per second to the SubDevice.
-    pub tx_rate: (u64, u64),
-    /// Bytes and frames per second from the SubDevice.
-    pub rx_rate: (u64, u64),
+    /// To the SubDevice.
+    pub tx_rate: EthernetRate,
+    /// From the SubDevice.
+    pub rx_rate: EthernetRate,
     /// Frames queued for sending, of [`QUEUE`].
     pub queued: usize,
 }
@@ -143,9 +153,10 @@ impl Rate {
         }
     }
 
-    fn per_second(&mut self, now: Instant) -> (u64, u64) {
+    fn per_second(&mut self, now: Instant) -> EthernetRate {
         self.turn(now);
-        self.last
+        let (bytes, frames) = self.last;
+        EthernetRate { bytes, frames }
     }
 }
 
@@ -311,9 +322,13 @@ mod tests {
         for at in 0..10 {
             rate.add(Instant(5 * SECOND + at * SECOND / 10), 100);
         }
-        assert_eq!(rate.per_second(Instant(5 * SECOND + SECOND / 2)), (0, 0), "the first second is not over");
-        assert_eq!(rate.per_second(Instant(6 * SECOND + SECOND / 2)), (1000, 10));
-        assert_eq!(rate.per_second(Instant(7 * SECOND)), (0, 0));
+        assert_eq!(
+            rate.per_second(Instant(5 * SECOND + SECOND / 2)),
+            EthernetRate { bytes: 0, frames: 0 },
+            "the first second is not over"
+        );
+        assert_eq!(rate.per_second(Instant(6 * SECOND + SECOND / 2)), EthernetRate { bytes: 1000, frames: 10 });
+        assert_eq!(rate.per_second(Instant(7 * SECOND)), EthernetRate { bytes: 0, frames: 0 });
     }
 
     // covers: eoe

@@ -74,9 +74,20 @@ impl fmt::Display for FoeFailure {
     }
 }
 
-impl core::error::Error for FoeError {}
+impl core::error::Error for FoeError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
 
-impl core::error::Error for FoeFailure {}
+impl core::error::Error for FoeFailure {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            FoeFailure::Mailbox(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<MailboxError> for FoeFailure {
     fn from(error: MailboxError) -> FoeFailure {

@@ -30,7 +30,7 @@ async fn run(
     progress: impl FnMut(FoeProgress),
 ) -> Result<u64, FoeFailure> {
     let mut transfer = Transfer::begin(mailbox, options, progress).await?;
-    let full = FoeMessage::max_data(transfer.conversation.mailbox_sizes().1);
+    let full = FoeMessage::max_data(transfer.conversation.mailbox_sizes().send);
     if full == 0 {
         return Err(FoeFailure::SmallMailbox);
     }

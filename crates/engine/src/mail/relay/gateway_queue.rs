@@ -14,7 +14,7 @@ use ringcat_wire::mailbox::{ErrorReply, Header, Message, Protocol, gateway};
 
 use super::dialogue::{AnswerFilter, Dialogue, ExpectedAnswer, lane};
 use crate::mail::coe;
-use crate::mail::conversation::{Conversation, Limits};
+use crate::mail::conversation::{Conversation, Limits, MailboxSizes};
 use crate::mail::lane::Lane;
 use crate::mail::{Mailbox, MailboxError};
 use crate::supervisor::{Bus, Signal};
@@ -340,7 +340,7 @@ async fn exchange(
     lane: Lane,
     job: &Job,
 ) -> bool {
-    let (receive, send) = conversation.mailbox_sizes();
+    let MailboxSizes { receive, send } = conversation.mailbox_sizes();
     if job.payload.len() > conversation.request_capacity() {
         shared.refuse(job, ErrorReply::INVALID_SIZE);
         return true;

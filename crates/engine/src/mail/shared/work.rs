@@ -27,7 +27,7 @@ impl SharedMailbox {
             if payload.len() > capacity {
                 return Err(MailboxError::TooLong { bytes: payload.len(), limit: capacity });
             }
-            let queue = &mut state.lanes[lane.index()];
+            let queue = state.lanes.of_mut(lane);
             if !queue.has_space() {
                 state.counters.refused += 1;
                 return Err(MailboxError::Full { limit });

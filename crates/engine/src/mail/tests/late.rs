@@ -243,7 +243,8 @@ fn an_error_reply_at_the_end_of_its_conversation_is_kept_as_unsolicited_mail() {
     let ended = bench.start(async move {
         let mut exchange = pin!(raw::exchange(&asking, Lane::of(9), &[0], LIMITS));
         poll_fn(|context| {
-            let has_arrived = mailbox.shared().state_mut().lanes[Lane::of(9).index()].has_arrivals();
+            let has_arrived =
+                mailbox.shared().state_mut().lanes.of(Lane::of(9)).is_some_and(|lane| lane.has_arrivals());
             if has_arrived { Poll::Ready(true) } else { exchange.as_mut().poll(context).map(|_| false) }
         })
         .await

@@ -12,7 +12,7 @@ use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::Direction;
-use crate::main_device::{Declaration, RegisterError};
+use crate::main_device::{Declaration, EntryPlace, RegisterError};
 
 const PERIOD: Duration = Duration::from_millis(1);
 
@@ -113,8 +113,8 @@ fn refusals_name_the_subdevice_and_register_nothing() {
     );
     assert_eq!(refused.image_bytes(domain), 0);
     let at = |refused: &mut Declaration, place| refused.register_entry_at(domain, SubDeviceId(0), place, None);
-    assert!(at(&mut refused, (3, 0, 1)).is_err() && at(&mut refused, (4, 0, 0)).is_err());
-    assert_eq!(place(at(&mut refused, (3, 0, 0)).unwrap()), (0, 0, 8));
+    assert!(at(&mut refused, EntryPlace::new(3, 0, 1)).is_err() && at(&mut refused, EntryPlace::new(4, 0, 0)).is_err());
+    assert_eq!(place(at(&mut refused, EntryPlace::new(3, 0, 0)).unwrap()), (0, 0, 8));
 }
 
 #[test]

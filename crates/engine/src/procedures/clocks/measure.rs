@@ -18,14 +18,16 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
 use crate::clocks::wiring::{TREES, Wiring};
-use crate::clocks::{Cables, Disagreement, Latched, Measurements, Passage, Segment, branches};
+use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passage, Segment, branches, port_times};
+use crate::event::Subject;
 use crate::link::{Link, LinkSet};
+use crate::order::InOrder;
 use crate::procedures::latch::{self as frames, Pauses};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
 use crate::segment::Observation;
-use crate::segment::clocks::{ClockObservation, Measured, Node};
+use crate::segment::clocks::{ClockObservation, Clocks, Node};
 use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -55,6 +57,8 @@ struct Survey {
     is_closed: bool,
     /// Latched values since which no port has changed: usable as a measurement.
     latched: Option<Vec<Option<Latched>>>,
+    /// Times of the ports after that of the processing unit, while all ports were as surveyed.
+    port_times: Vec<Option<[u32; 4]>>,
     /// The link on which copies do not return while the ring is opened.
     no_return: Option<Link>,
     /// No branch is closed.
@@ -72,9 +76,14 @@ pub(super) enum Opening {
     Branches,
 }
 
-/// Runs a measurement.
+/// Runs a measurement. For a set-up, that of a former one is enough if nothing has changed since.
 pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening) -> Result<Measured, String> {
     let mut survey = survey_segment(bus, segment).await?;
+    if opening != Opening::Nothing
+        && let Some(measured) = recall(bus, segment, &survey)
+    {
+        return Ok(measured);
+    }
     let rings = survey.whole_rings();
     if opening != Opening::Nothing && !rings.is_empty() {
         survey.latched = None;
@@ -105,6 +114,25 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
     let without_result = is_open(&measured).then_some(survey.wiring);
     segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
     exact(measured)
+}
+
+/// The measurement of a former set-up, if the survey shows the same segment.
+fn recall(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Option<Measured> {
+    let (known, reference) = {
+        let view = segment.view();
+        let (known, clocks) = (view.known_clocks()?, view.clocks());
+        let passages = passages(clocks, &survey.stations);
+        let latched = survey.latched.as_ref()?;
+        let is_same = known.measured.is_of(&survey.stations, &survey.wiring, &passages, latched);
+        (is_same.then_some(known)?, clocks.reference)
+    };
+    bus.step(Subject::Clocks, || "the segment is as it was measured before".to_string());
+    segment.observe_clocks(ClockObservation::Recalled(&known));
+    Some(known.measured.clone().referred_to(reference))
+}
+
+fn passages(clocks: &Clocks, stations: &[StationAddress]) -> Vec<Passage> {
+    stations.iter().map(|station| clocks.passage_of(*station)).collect()
 }
 
 /// An error if times contradict each other.
@@ -238,6 +266,7 @@ async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey
         Err(BusError::Wkc { .. }) => return Ok(None),
         other => other?,
     };
+    let port_times = latched.iter().map(|latched| latched.as_ref().map(port_times)).collect();
     let (segment, counts) = (segment.view(), before.counts);
     let ports = |station: StationAddress| segment.clocks().node_at(station).map(|node| node.ports);
     let node = |position: usize| NodeStatus {
@@ -265,6 +294,7 @@ async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey
         wiring,
         is_closed,
         latched: Some(latched),
+        port_times,
         no_return: None,
         is_whole: true,
     }))
@@ -307,7 +337,7 @@ fn evaluate(
     let reference = clocks.reference.filter(|station| at(*station).is_some());
     let reference = reference.or_else(|| clocks.elect(is_there));
     let on_clock = reference.and_then(at).unwrap_or(0);
-    let passages: Vec<Passage> = survey.stations.iter().map(|station| clocks.passage_of(*station)).collect();
+    let passages = passages(clocks, &survey.stations);
     if let Some(odd) = measurements.disagreement(on_clock) {
         // If most latches of a port show impossible times, no frame enters there.
         return Err(if odd.is_possible() { describe(&odd, survey.stations[odd.node]) } else { unfit() });
@@ -320,7 +350,9 @@ fn evaluate(
     }
     let delays = segment.propagation(&measurements.mean(on_clock), on_clock, &mut cables);
     let (is_plausible, stations) = (!delays.is_implausible, survey.stations.clone());
-    let measured = Measured { stations, delays, drift_ppb: measurements.drift_ppb(on_clock) };
+    let (wiring, port_times) = (survey.wiring.clone(), survey.port_times.clone());
+    let drift_ppb = measurements.drift_ppb(on_clock);
+    let measured = Measured { stations, delays, drift_ppb, passages, wiring, port_times };
     Ok((is_plausible.then_some(measured), cables))
 }
 
@@ -401,7 +433,7 @@ pub(super) async fn latch(
 /// The present loop settings of the SubDevices that have these ports.
 async fn controls(bus: &Bus, ports: &[(StationAddress, u8)]) -> Result<Vec<(StationAddress, DlControl)>, BusError> {
     let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
-    stations.sort_unstable();
+    stations.put_in_order();
     stations.dedup();
     let mut controls = Vec::new();
     for station in stations {

@@ -84,13 +84,16 @@ async fn keep(bus: Bus, segment: SharedSegment) {
 async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
     let mut seen = (segment.board.ring().changes, answering(segment));
-    let mut seen_times = segment.board.clocks.times.news();
+    let mut has_answered = seen.1 != (0, 0);
+    let mut seen_times = segment.board.clocks.times.posted();
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
     loop {
         wait(bus, segment, next_read, next_measurement, bus.now() < explained_until).await;
         let now = (segment.board.ring().changes, answering(segment));
-        let changed = now != seen;
+        let is_beginning = !has_answered && is_as_measured(segment, now.1);
+        has_answered |= now.1 != (0, 0);
+        let changed = now != seen && !is_beginning;
         if now.0 != seen.0 {
             explained_until = bus.now() + EXPLAINED;
         }
@@ -101,7 +104,7 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
             next_measurement = bus.now() + SETTLE;
         }
         let were_locked = segment.view().clocks().are_locked();
-        let times = segment.board.clocks.times.news();
+        let times = segment.board.clocks.times.posted();
         if times != seen_times {
             (seen_times, next_read) = (times, bus.now());
         }
@@ -121,6 +124,11 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
             next_measurement = bus.now() + AGAIN;
         }
     }
+}
+
+/// Whether as many SubDevices answer as were measured: so it is when cycles begin, which is not a change.
+fn is_as_measured(segment: &SharedSegment, (main, redundant): (u16, u16)) -> bool {
+    segment.view().clocks().measured_count() == Some(usize::from(main) + usize::from(redundant))
 }
 
 fn doubtful_since(segment: &SharedSegment) -> Option<Instant> {

@@ -4,7 +4,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use super::register_error::{Hex, RegisterError};
+use super::register_error::{Hex, RegisterCommandError};
 use crate::config::Transition;
 use crate::mail::coe::{SdoAddress, SdoError};
 use crate::mail::eoe::EoeError;
@@ -72,7 +72,7 @@ pub enum StartupError {
         got: Vec<u8>,
     },
     /// A register.
-    Register(RegisterError),
+    Register(RegisterCommandError),
 }
 
 impl fmt::Display for ConfigureError {
@@ -112,7 +112,20 @@ impl fmt::Display for StartupError {
     }
 }
 
-impl core::error::Error for ConfigureError {}
+impl core::error::Error for ConfigureError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ConfigureError::Bus(error) => Some(error),
+            ConfigureError::State(error) => Some(error),
+            ConfigureError::Sdo(error) => Some(error),
+            ConfigureError::Startup { error, .. } => Some(error),
+            ConfigureError::NotLocked(error) => Some(error),
+            ConfigureError::NotPermitted(error) => Some(error),
+            ConfigureError::Unfit(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for ConfigureError {
     fn from(denied: NotPermitted) -> ConfigureError {
@@ -120,7 +133,17 @@ impl From<NotPermitted> for ConfigureError {
     }
 }
 
-impl core::error::Error for StartupError {}
+impl core::error::Error for StartupError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StartupError::Sdo(error) => Some(error),
+            StartupError::Soe(error) => Some(error),
+            StartupError::Eoe(error) => Some(error),
+            StartupError::Register(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for ConfigureError {
     fn from(error: BusError) -> ConfigureError {

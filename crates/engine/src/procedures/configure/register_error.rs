@@ -12,7 +12,7 @@ use crate::supervisor::BusError;
 /// A command to a register that failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct RegisterError {
+pub struct RegisterCommandError {
     /// The first register.
     pub address: RegisterAddress,
     /// The error.
@@ -31,6 +31,7 @@ pub enum RegisterFailure {
 
 /// The value of a register and the required value.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct WrongValue {
     /// The required value.
     pub expected: Vec<u8>,
@@ -42,10 +43,15 @@ pub struct WrongValue {
     pub limit: Duration,
 }
 
-impl fmt::Display for RegisterError {
+impl fmt::Display for RegisterCommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "register {}: ", self.address)?;
-        match &self.cause {
+        write!(f, "register {}: {}", self.address, self.cause)
+    }
+}
+
+impl fmt::Display for RegisterFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             RegisterFailure::Bus(error) => error.fmt(f),
             RegisterFailure::Value(wrong) => {
                 write!(f, "expected {}", Hex(&wrong.expected))?;
@@ -54,6 +60,21 @@ impl fmt::Display for RegisterError {
                 }
                 write!(f, " within {} ms, got {}", wrong.limit.as_millis(), Hex(&wrong.got))
             }
+        }
+    }
+}
+
+impl core::error::Error for RegisterCommandError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        Some(&self.cause)
+    }
+}
+
+impl core::error::Error for RegisterFailure {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            RegisterFailure::Bus(error) => Some(error),
+            RegisterFailure::Value(_) => None,
         }
     }
 }

@@ -8,7 +8,7 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 
 use super::BringUp;
-use super::register_error::{RegisterError, RegisterFailure, WrongValue};
+use super::register_error::{RegisterCommandError, RegisterFailure, WrongValue};
 use crate::config::{RegisterAccess, RegisterCommand};
 use crate::supervisor::BusError;
 
@@ -16,12 +16,12 @@ use crate::supervisor::BusError;
 const PAUSE: Duration = Duration::from_millis(1);
 
 impl BringUp<'_> {
-    pub(super) async fn register(&self, command: &RegisterCommand) -> Result<(), RegisterError> {
+    pub(super) async fn register(&self, command: &RegisterCommand) -> Result<(), RegisterCommandError> {
         let done = match &command.access {
             RegisterAccess::Write(data) => self.write(command, data).await,
             RegisterAccess::Check { data, mask, limit } => self.check(command, data, mask.as_deref(), *limit).await,
         };
-        done.map_err(|cause| RegisterError { address: command.address, cause })
+        done.map_err(|cause| RegisterCommandError { address: command.address, cause })
     }
 
     async fn write(&self, command: &RegisterCommand, data: &[u8]) -> Result<(), RegisterFailure> {

@@ -26,6 +26,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
 use super::super::shared_segment::SharedSegment;
+use crate::order::InOrder;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::{Observation, Segment, is_down};
 use crate::supervisor::{Bus, BusError};
@@ -116,7 +117,7 @@ async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeSta
         let rings = topology.local_rings.iter().map(|ring| Ring::new(&view, ring));
         let mut rings: Vec<Ring> = rings.collect::<Option<_>>().unwrap_or_default();
         // Outer rings first.
-        rings.sort_by_key(|ring| ring.head);
+        rings.put_in_order_by_key(|ring| ring.head);
         let is_possible = (2..=MOST).contains(&rings.len());
         (if is_possible { rings } else { Vec::new() }, topology.nodes.len())
     };

@@ -19,6 +19,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::super::scan::station_at;
+use crate::order::InOrder;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
@@ -52,7 +53,7 @@ pub(in super::super) async fn learn(
         let Some(mut set) = hinted.or_else(|| with(&[])) else { break };
         let topology = Topology::with_local_rings(&untimed, main_count, &set);
         // Which SubDevices are behind a break depends on the inner rings, which are tested first.
-        set.sort_by_key(|closing| core::cmp::Reverse(closing.head.node));
+        set.put_in_order_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
             match attempt(bus, nodes, &topology, closing).await? {
                 Tried::Right => right.push(closing),
@@ -71,7 +72,7 @@ pub(in super::super) async fn learn(
                 }
             }
         }
-        set.sort_unstable();
+        set.put_in_order();
         return Ok(set);
     }
     Ok(Vec::new())

@@ -17,6 +17,7 @@ use ringcat_wire::register::{DlStatus, map};
 use super::super::scan::station_at;
 use super::learn::{first_behind_break, with_closed};
 use crate::junction::ClosingEvidence;
+use crate::order::InOrder;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -54,7 +55,7 @@ async fn attempt(
     let topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut numbers: Vec<usize> = (0..closings.len()).collect();
     // Which SubDevices are behind a break depends on the inner rings.
-    numbers.sort_by_key(|number| core::cmp::Reverse(closings[*number].head.node));
+    numbers.put_in_order_by_key(|number| core::cmp::Reverse(closings[*number].head.node));
     for number in numbers {
         let closing = closings[number];
         let has_link = |at: &PortOf| nodes[at.node].dl_status.ports[usize::from(at.port & 3)].communication;

@@ -59,7 +59,7 @@ impl<W: Fn(u8) -> bool> Requested<W> {
 
     /// Whether it contains messages that are not acknowledged.
     pub async fn has_news(&self, sub_index: u8) -> bool {
-        let news = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
-        self.value(sub_index, news).await.is_some_and(|news| news != 0)
+        let new_available = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
+        self.value(sub_index, new_available).await.is_some_and(|flag| flag != 0)
     }
 }

@@ -94,7 +94,14 @@ impl fmt::Display for StatesError {
     }
 }
 
-impl core::error::Error for StatesError {}
+impl core::error::Error for StatesError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            StatesError::NotPermitted(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<NotPermitted> for StatesError {
     fn from(denied: NotPermitted) -> StatesError {

@@ -9,6 +9,7 @@ use ringcat_wire::register::PortKind;
 use super::Scan;
 use crate::event::Event;
 use crate::link::LinkSet;
+use crate::order::InOrder;
 use crate::procedures::cabling::{Known, cabling, stays_closed};
 use crate::ring::RingState;
 use crate::segment::{LineCheck, is_swapped};
@@ -34,7 +35,7 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     }
     let others = scan.topology.findings.iter().filter(|finding| !matches!(finding, Finding::CrossedLine { .. }));
     exact.extend(others);
-    exact.sort_by_key(Finding::node);
+    exact.put_in_order_by_key(Finding::node);
     scan.topology.findings = exact;
     true
 }

@@ -45,6 +45,8 @@ pub enum ScanError {
         /// The error.
         error: SiiReadError,
     },
+    /// The role of the MainDevice became INACTIVE meanwhile.
+    RoleChanged,
 }
 
 impl fmt::Display for ScanError {
@@ -67,11 +69,20 @@ impl fmt::Display for ScanError {
             ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
             ScanError::Bus(error) => error.fmt(f),
             ScanError::Sii { position, error } => write!(f, "SubDevice at position {position}: {error}"),
+            ScanError::RoleChanged => f.write_str("the role of the MainDevice became INACTIVE during the scan"),
         }
     }
 }
 
-impl core::error::Error for ScanError {}
+impl core::error::Error for ScanError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            ScanError::Bus(error) => Some(error),
+            ScanError::Sii { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for ScanError {
     fn from(error: BusError) -> ScanError {
@@ -89,7 +100,8 @@ impl ScanError {
             | ScanError::NoAnswer
             | ScanError::Unsettled { .. }
             | ScanError::FrameLimit(_)
-            | ScanError::TooMany { .. } => false,
+            | ScanError::TooMany { .. }
+            | ScanError::RoleChanged => false,
         }
     }
 }

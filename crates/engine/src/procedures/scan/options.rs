@@ -9,6 +9,7 @@ use crate::procedures::sii::SiiCache;
 
 /// Options of a scan.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ScanOptions {
     /// The count must stay the same for this long.
     pub settle: Duration,

@@ -10,6 +10,7 @@ use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
 use crate::declared::SubDeviceId;
+use crate::order::InOrder;
 use crate::procedures::junction::ordering;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
@@ -104,7 +105,7 @@ async fn set_all(
     control: LoopControl,
 ) -> Result<(), ServiceError> {
     let mut stations: Vec<StationAddress> = ports.iter().map(|port| port.station).collect();
-    stations.sort_unstable();
+    stations.put_in_order();
     stations.dedup();
     let before = bus.gather(stations.clone(), |bus, station| async move { lasting_loops(&bus, station).await }).await;
     let mut writes = Vec::new();

@@ -67,7 +67,14 @@ impl fmt::Display for SiiReadError {
     }
 }
 
-impl core::error::Error for SiiReadError {}
+impl core::error::Error for SiiReadError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SiiReadError::Bus(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for SiiReadError {
     fn from(error: BusError) -> SiiReadError {

@@ -126,7 +126,16 @@ impl fmt::Display for SiiProgramError {
     }
 }
 
-impl core::error::Error for SiiProgramError {}
+impl core::error::Error for SiiProgramError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SiiProgramError::Bus(error) => Some(error),
+            SiiProgramError::Read(error) => Some(error),
+            SiiProgramError::Image(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 impl From<BusError> for SiiProgramError {
     fn from(error: BusError) -> SiiProgramError {

@@ -2,7 +2,7 @@
 
 use alloc::string::ToString;
 use core::future::{Future, poll_fn};
-use core::pin::pin;
+use core::pin::{Pin, pin};
 use core::task::Poll;
 
 use super::bring::bring;
@@ -18,7 +18,7 @@ pub(in crate::procedures) async fn bring_undeclared(
     segment: SharedSegment,
     (key, attempt): (SubDeviceKey, u32),
 ) {
-    let result = while_current(&segment, (key, attempt), run(&bus, &segment, key)).await;
+    let result = while_current(&segment, (key, attempt), pin!(run(&bus, &segment, key))).await;
     let Some(result) = result else { return };
     let failure =
         result.as_ref().err().map(|error| AttemptFailure { is_of_bus: is_of_bus(error), reason: error.to_string() });
@@ -38,13 +38,13 @@ async fn run(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Result<()
     bring(bus, &info, &mailbox, target).await
 }
 
-/// Runs an attempt until another one begins or the SubDevice has left.
+/// Runs an attempt until another one begins or the SubDevice has left. It is pinned by the caller: a future that an
+/// async function takes by value is in that function's memory twice.
 async fn while_current<T>(
     segment: &SharedSegment,
     (key, attempt): (SubDeviceKey, u32),
-    work: impl Future<Output = T>,
+    mut work: Pin<&mut impl Future<Output = T>>,
 ) -> Option<T> {
-    let mut work = pin!(work);
     poll_fn(|context| {
         if !segment.view().upkeep(key).is_some_and(|upkeep| upkeep.is_under_way(attempt)) {
             return Poll::Ready(None);

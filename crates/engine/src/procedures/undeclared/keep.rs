@@ -1,4 +1,4 @@
-//! Tells the model when attempts of SubDevices without a declaration are due.
+//! Reports to the model when attempts of SubDevices without a declaration are due.
 
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::{Segment, UndeclaredObservation};

@@ -1,12 +1,12 @@
 //! Observations of clocks.
 
 use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
 use alloc::string::String;
 
 use ringcat_wire::address::StationAddress;
 
-use super::measured::Measured;
-use crate::clocks::{Cables, Latched, Wiring};
+use crate::clocks::{Cables, KnownClocks, Latched, Measured, Wiring};
 use crate::config::ReferenceClock;
 use crate::link::Link;
 
@@ -27,6 +27,10 @@ pub enum ClockObservation<'a> {
     Cables(Cables),
     /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
     OpenedWithoutResult(Option<Wiring>),
+    /// What another process knows of the clocks.
+    Known(Rc<KnownClocks>),
+    /// The segment is the one that was measured before: cable times and latch modes are those of that measurement.
+    Recalled(&'a KnownClocks),
     /// The delays of all clocks, for their set-up.
     Measured(&'a Measured),
     /// Local times latched by one frame, and the system time that they are to show.

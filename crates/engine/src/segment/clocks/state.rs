@@ -5,13 +5,13 @@ use core::borrow::Borrow;
 
 use ringcat_wire::address::{Position, StationAddress};
 
-use super::life::{Compensation, Delays, Due, Life, Lock, Running};
+use super::life::{Compensation, Delays, Due, Life, Lock, Running, Unwritten};
 use super::node::Node;
 use super::status::{ClockStatus, HiddenDelay};
 use super::timeline::{Times, common_pattern};
 use crate::board::clocks::References;
 use crate::clocks::DelayRange;
-use crate::clocks::{Cables, FRACTION, Passage, Wiring, branches, round};
+use crate::clocks::{Cables, FRACTION, KnownClocks, Measured, Passage, Wiring, branches, round};
 use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
@@ -44,6 +44,8 @@ pub struct Clocks {
     pub cables: Cables,
     /// Measurements so far.
     pub(in crate::segment) measured: u32,
+    /// The last measurement.
+    pub(in crate::segment) last: Option<Measured>,
     /// Rings with these cables were opened, and the cable times are still unknown.
     pub opened_without_result: Option<Wiring>,
     /// System time of the reference clock at host time zero.
@@ -80,6 +82,7 @@ impl Clocks {
             reference,
             cables,
             measured,
+            last: None,
             opened_without_result,
             epoch,
             times: Times::default(),
@@ -129,6 +132,22 @@ impl Clocks {
     pub fn unwritten(&self) -> Vec<Link> {
         let links = self.running().map_or([false; 2], |running| running.unwritten.links);
         Link::ALL.into_iter().filter(|link| links[link.index()]).collect()
+    }
+
+    /// Number of SubDevices that were measured last.
+    pub fn measured_count(&self) -> Option<usize> {
+        self.last.as_ref().map(|measured| measured.stations.len())
+    }
+
+    /// What is known for the next set-up, if the last measurement is that of the segment.
+    pub(in crate::segment) fn known(&self) -> Option<KnownClocks> {
+        let Running { delays: Delays::Valid, unwritten, .. } = self.running()? else { return None };
+        let mut measured = self.last.clone().filter(|_| *unwritten == Unwritten::default())?;
+        for (station, drift_ppb) in measured.stations.iter().zip(&mut measured.drift_ppb) {
+            *drift_ppb = self.node_at(*station).filter(|node| node.has_clock).map(|node| node.drift_ppb);
+        }
+        let backwards = self.nodes.iter().filter(|node| node.latches_backwards).map(|node| node.station);
+        Some(KnownClocks { measured, cables: self.cables.known(), backwards: backwards.collect() })
     }
 
     /// The registers to write next.

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::board::clock_times::{Timeline, Wanted};
+use crate::order::InOrder;
 
 /// Differences up to this are made up by the control loop of the reference.
 const FAR_NS: i64 = 100_000;
@@ -82,7 +83,7 @@ impl Times {
         if self.far.len() < READINGS {
             return None;
         }
-        self.far.sort_unstable();
+        self.far.put_in_order();
         let middle = self.far[READINGS / 2];
         self.far.clear();
         self.is_first_followed |= first.is_some();

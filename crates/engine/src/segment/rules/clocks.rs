@@ -5,17 +5,18 @@ mod delays;
 mod times;
 
 use alloc::string::String;
+use alloc::vec::Vec;
 
 use ringcat_wire::address::{Position, StationAddress};
 
 use crate::board::clocks::References;
-use crate::clocks::extend;
+use crate::clocks::{Cables, KnownClocks, Measured, extend};
 use crate::config::ReferenceClock;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::link::Link;
 use crate::segment::clocks::{
-    ClockObservation, Compensation, Delays, Due, HiddenDelay, Life, Measured, Node, Running, Unwritten,
+    ClockObservation, Compensation, Delays, Due, HiddenDelay, Life, Node, Running, Unwritten,
 };
 use crate::segment::effect::{Effects, Task};
 use crate::segment::model::Segment;
@@ -32,6 +33,8 @@ impl Segment {
             ClockObservation::LatchModes(modes) => self.observe_latch_modes(modes),
             ClockObservation::Cables(cables) => self.clocks.cables = cables,
             ClockObservation::OpenedWithoutResult(wiring) => self.clocks.opened_without_result = wiring,
+            ClockObservation::Known(known) => self.known_clocks = Some(known),
+            ClockObservation::Recalled(known) => self.observe_recall(known),
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
             ClockObservation::SetUp => self.observe_set_up(effects),
@@ -119,6 +122,13 @@ impl Segment {
             Life::NotSetUp(reported) => *reported = None,
             Life::Undeclared | Life::Starting | Life::StartingWithoutBranches | Life::Running(_) => {}
         }
+    }
+
+    /// Cable times and latch modes are those of a former measurement.
+    fn observe_recall(&mut self, known: &KnownClocks) {
+        self.clocks.cables = Cables::of(&known.cables);
+        let modes: Vec<(StationAddress, bool)> = known.backwards.iter().map(|it| (*it, true)).collect();
+        self.observe_latch_modes(&modes);
     }
 
     fn observe_latch_modes(&mut self, modes: &[(StationAddress, bool)]) {

@@ -10,6 +10,7 @@ use super::group_matching;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 use crate::segment::effect::Effects;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::matching::{Fit, assign};
@@ -24,7 +25,7 @@ impl Segment {
     /// proven by cables.
     pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
         let mut unassigned: Vec<UnassignedView<'_>> = self.subdevices.unassigned().collect();
-        unassigned.sort_by_key(|it| it.position);
+        unassigned.put_in_order_by_key(|it| it.position);
         let of_groups = group_matching::members(self, &mut unassigned, now);
         let by_cable = |it: &UnassignedView<'_>| identified.iter().find(|(station, _)| *station == it.key.station);
         let by_cables = unassigned.iter().filter_map(|it| Some((*it, by_cable(it)?.1)));
@@ -101,7 +102,7 @@ impl Segment {
             .filter(|index| between.0.is_none_or(|before| rank[before] < rank[*index]))
             .filter(|index| between.1.is_none_or(|behind| rank[*index] < rank[behind]))
             .collect();
-        absent.sort_by_key(|index| rank[*index]);
+        absent.put_in_order_by_key(|index| rank[*index]);
         absent
     }
 

@@ -13,6 +13,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::fit::fit;
+use crate::order::InOrder;
 use crate::segment::knowledge::Knowledge;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
@@ -135,7 +136,7 @@ impl Present<'_> {
                 found.push((far.node, index));
             }
         }
-        found.sort_unstable();
+        found.put_in_order();
         found.dedup();
         found
     }
@@ -225,7 +226,7 @@ fn ends(topology: &Topology) -> Vec<[End; 2]> {
     if let Some(first) = topology.nodes.first().filter(|_| topology.main_count > 0) {
         ends.push([None, Some(PortOf { node: 0, port: first.entry_port })]);
     }
-    let inner = (0..topology.nodes.len()).filter_map(|node| topology.connection_to(node));
+    let inner = (0..topology.nodes.len()).filter_map(|node| topology.cable_to(node));
     ends.extend(inner.map(|cable| [Some(cable.near), Some(cable.far)]));
     ends.extend(topology.local_rings.iter().map(|ring| [Some(ring.closing.tail), Some(ring.closing.head)]));
     ends

@@ -141,6 +141,7 @@ impl Segment {
         let mut keeping = core::mem::take(&mut self.keeping);
         keeping.is_on &= matches!(stage, Stage::Active(_));
         let before = core::mem::take(&mut self.subdevices);
+        let known_clocks = self.known_clocks();
         declared.subdevices = declared.subdevices.begun(addresses.change(), first_attempt);
         if keeping.is_on {
             declared.subdevices = declared.subdevices.keeping(before);
@@ -155,6 +156,7 @@ impl Segment {
             idle,
             frames_tested_until,
             first_attempt,
+            known_clocks,
             ..Segment::of(declared, choices)
         };
     }

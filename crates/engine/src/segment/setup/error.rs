@@ -46,4 +46,11 @@ impl core::fmt::Display for SetupError {
     }
 }
 
-impl core::error::Error for SetupError {}
+impl core::error::Error for SetupError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            SetupError::Plan(error) => Some(error),
+            _ => None,
+        }
+    }
+}

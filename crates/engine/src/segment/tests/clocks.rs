@@ -2,8 +2,9 @@
 
 use crate::board::clocks::References;
 use crate::clocks::Delays;
+use crate::clocks::Measured;
 use crate::config::ClockConfig;
-use crate::segment::clocks::{Answer, ClockObservation, Difference, Due, Measured};
+use crate::segment::clocks::{Answer, ClockObservation, Difference, Due};
 
 use super::*;
 
@@ -36,7 +37,12 @@ fn declared(count: usize) -> Ring {
 fn measured(count: usize, apart_ns: i64) -> Measured {
     let units = (0..count as i64).map(|index| Some((index * apart_ns) << crate::clocks::FRACTION)).collect();
     let delays = Delays { units, trees: vec![0; count], ..Delays::default() };
-    Measured { stations: (0..count).map(station).collect(), delays, drift_ppb: vec![None; count] }
+    Measured {
+        stations: (0..count).map(station).collect(),
+        delays,
+        drift_ppb: vec![None; count],
+        ..Measured::default()
+    }
 }
 
 fn answer(link: Link, difference_ns: i32) -> Option<Answer> {

@@ -60,9 +60,10 @@ impl Upkeep {
         Upkeep { target: AlState::PreOp, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
     }
 
-    /// Another process has brought it this far.
+    /// Another process has brought it this far. A first refusal may be due to a request of that process: it is
+    /// followed by another attempt, and only the next one by PREOP.
     pub(in crate::segment) fn handed_over(target: AlState, progress: UpkeepProgress) -> Upkeep {
-        Upkeep { target, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
+        Upkeep { target, before: target, progress, attempt: 0, failures: 0 }
     }
 
     /// Whether it is in its requested state, or left as it is.

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ringcat_config::eni::{BitRange, Eni, Mailbox, MailboxBuffer, PdoEntry, SubDevice, Target};
 use ringcat_engine::config::{
-    ConfigAddress, DeclaredSyncManager, PdoAssignment, PdoEntry as ConfigEntry, PdoMapping, SubDeviceConfig,
-    SyncManagerRole,
+    ConfigAddress, DeclaredArea, DeclaredSyncManager, PdoAssignment, PdoEntry as ConfigEntry, PdoMapping,
+    SubDeviceConfig, SyncManagerRole,
 };
 use ringcat_engine::info::Direction;
 use ringcat_sim::application::{Behaviour, InputSource};
@@ -285,7 +285,7 @@ fn pdos(subdevice: &SubDevice, declared: &[DeclaredSyncManager]) -> Vec<PdoDescr
     let names = |index: u16| of_file.clone().find(|pdo| pdo.index == index);
     let mut pdos: Vec<PdoDescription> = Vec::new();
     for sm in declared {
-        let Some((sync_manager, direction, length)) = sm.area() else { continue };
+        let Some(DeclaredArea { sync_manager, direction, length, .. }) = sm.area() else { continue };
         let inputs = direction == Direction::Inputs;
         let direction = if inputs { PdoDirection::Tx } else { PdoDirection::Rx };
         let mapped: Vec<PdoDescription> = sm

@@ -63,7 +63,7 @@ fn network(dice: &mut Dice, seed: u64) -> (Network, Vec<DeviceDescription>) {
     if dice.one_in(3) {
         described[0].alias = 7;
     }
-    let options = NetworkOptions { seed, ..NetworkOptions::default() };
+    let options = NetworkOptions::default().with_seed(seed);
     let options = options.with_detection_delay(Duration::from_micros(*dice.pick(&[10, 1_000])));
     let network = if dice.one_in(2) { ring } else { line };
     (network(described.clone(), options), described)

@@ -26,7 +26,7 @@ struct Idle {
 impl Idle {
     fn new(kind: &str) -> Idle {
         let links = SimulatedSegment::new(ring(descriptions(&[kind; COUNT]), NetworkOptions::default()));
-        let (main, redundant) = links.addresses();
+        let ringcat::PerLink { main, redundant, .. } = links.addresses();
         let mut options = Options::new(main, redundant);
         options.idle_operation = true;
         let engine = MainDevice::new(options, links.now());

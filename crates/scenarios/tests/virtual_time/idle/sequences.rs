@@ -113,7 +113,7 @@ fn declare(dice: &mut Dice, main_device: &MainDevice<Tap>) -> Declaration {
         config.optional = dice.one_in(2);
         declaration.add_to(domain, config);
     }
-    declaration.with_optional_clocks(dice.one_in(3).then(ClockConfig::default))
+    declaration.with_clocks(dice.one_in(3).then(ClockConfig::default))
 }
 
 /// The next call of the application.

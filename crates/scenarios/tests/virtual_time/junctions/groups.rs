@@ -36,7 +36,7 @@ fn network(cables: &[(Endpoint, Endpoint)], two_links: bool) -> Network {
 
 fn declare(_: &Scan) -> Declaration {
     let mut declaration = automatic(&infos(&BASE), CYCLE);
-    let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+    let members = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0))).members;
     declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
     declaration
 }

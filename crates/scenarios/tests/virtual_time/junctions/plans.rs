@@ -185,14 +185,14 @@ impl Plan {
         let junctions = if strict { JunctionMode::Strict } else { JunctionMode::Automatic };
         let options = Options::default().with_junctions(junctions);
         let connections: &[JunctionConnection] = if strict { &self.connections } else { &[] };
-        let declare = |_: &Scan| self.declaration().with_lost_frames_sent_again(seeds::sends_again(seed));
+        let declare = |_: &Scan| self.declaration().with_sends_again(seeds::sends_again(seed));
         World::with_junctions(seed, network, &options, declare, connections)
     }
 
     fn declaration(&self) -> Declaration {
         let mut declaration = automatic(&infos(&self.kinds), CYCLE);
         if self.has_group {
-            let (_, members) = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0)));
+            let members = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0))).members;
             let of_domain = members.into_iter().map(DomainMember::new);
             declaration.domains[0].members.extend(of_domain);
         }

@@ -18,7 +18,17 @@ fn written() -> Vec<Vec<u8>> {
         settle(&mut application);
         application.engine().knowledge().expect("it is scanned").to_bytes()
     });
-    idle_ones.chain(active).collect()
+    let clocks = networks().into_iter().map(clocked);
+    idle_ones.chain(active).chain(clocks).collect()
+}
+
+/// Knowledge of a segment whose clocks were measured.
+fn clocked(network: Network) -> Vec<u8> {
+    let main_device = idle(network);
+    let declaration = automatic(&main_device.subdevices(), CYCLE).with_clocks(ClockConfig::default());
+    let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
+    settle(&mut application);
+    to_bytes(&application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow"))
 }
 
 // covers: states
@@ -36,7 +46,7 @@ fn bytes_return_the_knowledge_that_was_written() {
 // covers: states
 #[test]
 fn each_changed_bit_and_each_missing_byte_is_an_error_with_its_place() {
-    let bytes = to_bytes(&idle(line(descriptions(&MIXED), NetworkOptions::default())));
+    let bytes = clocked(line(descriptions(&MIXED), NetworkOptions::default()));
     for at in 0..bytes.len() {
         assert!(Knowledge::from_bytes(&bytes[..at]).is_err(), "{at} bytes");
         let mut changed = bytes.clone();
@@ -109,7 +119,7 @@ fn knowledge_that_is_wrong_but_valid_does_no_harm() {
 #[test]
 fn the_corpus_of_the_fuzz_target_is_knowledge_of_this_version() {
     if std::env::var_os("RINGCAT_WRITE_CORPUS").is_some() {
-        let bytes = to_bytes(&idle(line(descriptions(&["servo", "digital-output-8"]), NetworkOptions::default())));
+        let bytes = clocked(line(descriptions(&["servo", "digital-output-8"]), NetworkOptions::default()));
         let corpus = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz/corpus/knowledge/00");
         return std::fs::write(corpus, bytes).expect("the corpus can be written");
     }

@@ -42,8 +42,8 @@ impl Transfer {
         match SdoRequest::decode(payload) {
             Ok(request) => self.request(&request, room, objects),
             Err(SdoError::Short { .. }) => Answer::Error(ErrorReply::SIZE_TOO_SHORT),
-            Err(SdoError::Service { .. }) => Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED),
             Err(SdoError::Command { .. }) => abort(0, 0, AbortCode::UNKNOWN_COMMAND),
+            Err(_) => Answer::Error(ErrorReply::SERVICE_NOT_SUPPORTED),
         }
     }
 

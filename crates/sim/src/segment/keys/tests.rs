@@ -187,3 +187,63 @@ fn a_file_in_another_encoding_is_refused_with_its_line() {
     std::fs::remove_file(&path).unwrap();
     assert_eq!(error, format!("{}:2: expected UTF-8 text", path.display()));
 }
+
+/// Values of all types of TOML, at the ends of ranges and beyond.
+const VALUES: [&str; 17] = [
+    "0",
+    "1",
+    "-1",
+    "70000",
+    "4294967296",
+    "9223372036854775807",
+    "1.5",
+    "-1.5",
+    "nan",
+    "inf",
+    "true",
+    "\"\"",
+    "\"yes\"",
+    "[]",
+    "[\"yes\"]",
+    "[1]",
+    "{}",
+];
+
+// covers: sim-files
+#[test]
+fn a_refused_value_of_any_key_is_named_with_line_key_and_what_is_expected() {
+    let mut refused = 0;
+    for (header, keys) in [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE)] {
+        for ((key, _), value) in keys.iter().flat_map(|key| VALUES.map(|value| (key, value))) {
+            let others: &[&str] = match header {
+                "[[cable]]" => &["from = \"b.1\"", "to = \"c.0\""],
+                "[[device]]" => &["type = \"servo\"", "name = \"x\""],
+                _ => &[],
+            };
+            let others: Vec<&str> = others.iter().copied().filter(|line| !line.starts_with(*key)).collect();
+            // The cable leads to the second of them.
+            let apart = if header == "[[cable]]" { "attach = \"none\"\n" } else { "" };
+            let device = |name, more| format!("[[device]]\ntype = \"servo\"\nname = \"{name}\"\n{more}");
+            let devices = [device("b", ""), device("c", apart)];
+            let before = format!(
+                "{}{header}\n{}",
+                devices.concat(),
+                others.iter().map(|it| format!("{it}\n")).collect::<String>()
+            );
+            let at = before.lines().count() + 1;
+            let text = format!("{before}{key} = {value}\n");
+            let Err(error) = Segment::from_toml(&text, Path::new("nowhere")) else { continue };
+            let file = error.clone().in_file("plant.toml").to_string();
+            assert!(file.starts_with(&format!("plant.toml:{at}: ")), "{text}{file}");
+            assert!(error.message.starts_with(&format!("{key}: ")), "{text}{file}");
+            let is_of_file = ["cannot be read", "nowhere/"].iter().any(|words| error.message.contains(words));
+            assert!(is_of_file || error.message.contains("expected "), "{text}{file}");
+            assert!(
+                !["invalid type", "u16", "usize", "struct"].iter().any(|rust| error.message.contains(rust)),
+                "{file}"
+            );
+            refused += 1;
+        }
+    }
+    assert!(refused > 500, "{refused}");
+}

@@ -4,9 +4,9 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 
-use crate::clocks::{Unknown, round};
+use crate::clocks::{Measured, Unknown, round};
 use crate::link::Link;
-use crate::segment::clocks::{Clocks, LatchedTimes, Measured, Node};
+use crate::segment::clocks::{Clocks, LatchedTimes, Node};
 
 /// Repeated measurements of the same path differ by no more than this: such delays count as unchanged.
 const SAME_NS: i64 = 30;
@@ -25,6 +25,7 @@ impl Clocks {
     /// Takes over a measurement: the link of each SubDevice and its delay from the reference on that link.
     pub(super) fn take_over(&mut self, measured: &Measured) {
         self.measured = self.measured.wrapping_add(1);
+        self.last = Some(measured.clone());
         let are_estimated = self.config.estimated_delays;
         let positions: Vec<(StationAddress, usize)> =
             self.nodes.iter().map(|node| (node.station, usize::from(node.position))).collect();
