@@ -12,7 +12,8 @@ fn main() {
     }
     println!("cargo::rustc-link-arg-bins=-Wl,--strip-all");
     let is = |name: &str, expected: &str| env::var(name).is_ok_and(|value| value == expected);
-    let is_usual = env::var("RUSTC_LINKER").is_err() && env::var("CARGO_ENCODED_RUSTFLAGS").is_ok_and(|it| it.is_empty());
+    let has_flags = env::var("CARGO_ENCODED_RUSTFLAGS").is_ok_and(|flags| !flags.is_empty());
+    let is_usual = env::var("RUSTC_LINKER").is_err() && !has_flags;
     if is_usual && is("TARGET", "x86_64-unknown-linux-gnu") && is("HOST", "x86_64-unknown-linux-gnu") {
         println!("cargo::rustc-link-arg-bins=-Wl,--icf=all");
     }

@@ -15,7 +15,7 @@ use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 const MODE: u8 = 0b11;
 const ONE_BUFFER: u8 = 0b10;
 
-/// Set in the revision of a device with one buffer: another EEPROM is another revision. A MainDevice reads the words that
+/// Set in the revision of a device with one buffer: another EEPROM is another revision. A MainDevice reads what
 /// SubDevices of one revision share only once.
 const REVISION: u32 = 0x0B00_0000;
 

@@ -52,8 +52,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
     ("procedures", &["order", "declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info",
-        "topology", "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment", "supervisor", "mail",
-        "request", "junction", "role"]),
+        "topology", "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment",
+        "supervisor", "mail", "request", "junction", "role"]),
     // both together
     ("main_device", &["order", "declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board",
         "info", "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",

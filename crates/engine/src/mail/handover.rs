@@ -12,7 +12,7 @@ use ringcat_wire::mailbox::foe::{FoeErrorCode, FoeMessage};
 use ringcat_wire::mailbox::sdo::{AbortCode, SdoRequest};
 use ringcat_wire::sii::MailboxLayout;
 
-use super::lane::{Lane, LaneState};
+use super::lane::Lane;
 use super::mailbox::Mailbox;
 use super::reader;
 use super::recent::Recent;
@@ -48,12 +48,11 @@ impl Mailbox {
             let limit_ms = u32::try_from(state.still_expected(now)?.as_millis()).unwrap_or(u32::MAX);
             Some(LateAnswer { lane, mark: state.mark, limit_ms })
         });
-        let is_under_way = |(_, state): &(Lane, &LaneState)| !state.turns.is_empty();
-        let lanes = Lane::ALL.into_iter().filter_map(|lane| Some((lane, state.lanes.of(lane)?)));
+        let is_under_way = |lane: &Lane| state.lanes.of(*lane).is_some_and(|state| !state.turns.is_empty());
         // Ethernet frames have no beginning and no end.
-        let under_way = lanes.filter(|(lane, _)| *lane != Lane::Frames).filter(is_under_way);
+        let under_way = Lane::ALL.into_iter().filter(|lane| *lane != Lane::Frames).filter(is_under_way);
         Some(KnownMailbox {
-            under_way: under_way.map(|(lane, _)| lane.index() as u8).collect(),
+            under_way: under_way.map(|lane| lane.index() as u8).collect(),
             counter: session.counter,
             repeat: state.repeat || state.reading,
             recent: state.recent.known(),

@@ -1,5 +1,5 @@
-//! The process that `socket_cycle` measures: a MainDevice on the interface `near0`, which runs cycles and prints its CPU
-//! time and its resident memory. It has nothing of the measurement in it, so that its memory is that of an application.
+//! The process that `socket_cycle` measures: a MainDevice on the interface `near0`, which runs cycles and prints its
+//! CPU time and its resident memory. Nothing of the measurement is in it, so that its memory is that of an application.
 
 use std::collections::BTreeMap;
 use std::fs;
