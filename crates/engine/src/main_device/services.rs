@@ -174,8 +174,8 @@ impl MainDevice {
     ///
     /// Without an application it needs idle operation. SubDevices that have kept their station addresses are left in
     /// their states, their mailboxes stay open, and no word of their EEPROMs is read, except the identities of those
-    /// that are at another place; others get addresses, are read and brought to PREOP. The result has the differences from the scan before ([`Rescan::added`], `removed`,
-    /// `moved_from`).
+    /// that are at another place; others get addresses, are read and brought to PREOP. The result has the differences
+    /// from the scan before ([`Rescan::added`], `removed`, `moved_from`).
     pub fn start_rescan(&mut self, limit: Duration) -> Pending<Result<Rescan, ServiceError>> {
         let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::Rescan));
         let (is_active, is_kept) = (self.active().is_some(), self.options.idle_operation);

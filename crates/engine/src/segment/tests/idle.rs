@@ -178,7 +178,7 @@ fn a_rescan_on_request_has_the_result_of_a_scan_that_began_after_it() {
 }
 
 #[test]
-fn an_address_that_is_lost_or_doubled_is_followed_and_one_of_a_subdevice_that_has_left_is_not() {
+fn a_lost_or_doubled_address_is_followed_unless_its_subdevice_has_left() {
     for reading in [Reading::Silent, Reading::Doubled, Reading::Unknown] {
         for has_left in [false, true] {
             let mut idle = Idle::kept();

@@ -150,7 +150,7 @@ fn a_member_that_came_back_by_itself_is_reported_neither_as_held_nor_as_unfit() 
 }
 
 #[test]
-fn names_that_were_read_of_a_subdevice_are_not_stored_for_another_one_at_its_address() {
+fn names_that_were_read_of_a_subdevice_are_not_stored_for_the_next_at_its_address() {
     let whole = |serial: u32| SubDeviceInfo { name: "a name".into(), ..info(serial, station(0)) };
     let mut ring = Ring::closed(3);
     for known in &mut Rc::make_mut(&mut ring.segment.stage.scanned_mut().unwrap().found).subdevices {
