@@ -35,6 +35,7 @@ on_the_wire() {
     export RINGCAT_ON_THE_WIRE=1 RINGCAT_FOREIGN=1
     # The whole workspace each time: another selection of packages has other features, and is built again.
     tried --workspace --test wire
+    tried --workspace --test ownership
     tried --workspace --test on_the_wire
     echo "the tests on real interfaces took $((SECONDS - begin)) s, of 360 that they may take"
 }

@@ -45,7 +45,15 @@ impl fmt::Display for ClientError {
     }
 }
 
-impl std::error::Error for ClientError {}
+impl std::error::Error for ClientError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(match self {
+            ClientError::NoDaemon { cause, .. } => cause,
+            ClientError::Connection(error) => error,
+            ClientError::Refused(refusal) => refusal,
+        })
+    }
+}
 
 impl From<ReceiveError> for ClientError {
     fn from(error: ReceiveError) -> ClientError {

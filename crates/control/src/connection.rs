@@ -47,7 +47,15 @@ impl fmt::Display for ReceiveError {
     }
 }
 
-impl std::error::Error for ReceiveError {}
+impl std::error::Error for ReceiveError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            ReceiveError::Wire(error) => Some(error),
+            ReceiveError::Io(error) => Some(error),
+            ReceiveError::Ended | ReceiveError::TimedOut => None,
+        }
+    }
+}
 
 impl From<io::Error> for ReceiveError {
     fn from(error: io::Error) -> ReceiveError {

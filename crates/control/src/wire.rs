@@ -1,9 +1,9 @@
 //! Messages as bytes.
 //!
-//! A header of 16 bytes, then the content as CBOR (RFC 8949), then the bytes of the message. The header has the magic `RCTL`, the
-//! version, two zero bytes, and both lengths, little endian. It is the same in all versions, so that each side can tell
-//! the other's. Any bytes are allowed: decoding never panics, and takes no more memory than a small multiple of the
-//! limits.
+//! A header of 16 bytes, then the content as CBOR (RFC 8949), then the bytes of the message. The header has the magic
+//! `RCTL`, the version, two zero bytes, and both lengths, little endian. It is the same in all versions, so that each
+//! side recognises the other's. Any bytes are allowed: decoding never panics, and takes no more memory than a small
+//! multiple of the limits.
 
 use std::fmt;
 

@@ -9,16 +9,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::OwnedBus;
-use ringcat::wire::command::Command;
-use ringcat::wire::datagram::Target;
-use ringcat::wire::register::map;
-use ringcat::{Activity, Links, Options, RawDatagram, Retries, Services, SubDeviceInfo, SupervisorThread};
+use ringcat::{Activity, Links, Options, Retries, Services, SubDeviceInfo, SupervisorThread};
 
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome, report};
 use crate::environment::{socket, source};
 use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable, watch_forks};
 use crate::messages::Messenger;
+use crate::seen::{Seen, look};
 
 /// Longest wait of a request for the scan and for PREOP of all SubDevices.
 const READY_LIMIT: Duration = Duration::from_secs(20);
@@ -28,8 +26,6 @@ const SILENCE: Duration = Duration::from_millis(300);
 const PAUSE: Duration = Duration::from_millis(2);
 /// PREOP alone, as an OR of AL states.
 const PREOP: u8 = 2;
-/// The bits of AL states in AL status.
-const AL_STATES: u8 = 0x0F;
 
 static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
 
@@ -48,24 +44,6 @@ pub struct Bus {
     _owned: Mutex<Option<OwnedBus>>,
     is_ring: bool,
     is_reserved: AtomicBool,
-}
-
-/// What a broadcast read of the AL status shows now.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
-    /// SubDevices that processed the copy on the main link, and on the redundant link.
-    pub counts: [u16; 2],
-    /// Their AL states, ORed.
-    pub al_states: u8,
-    /// Which links are up.
-    pub is_up: [bool; 2],
-}
-
-impl Seen {
-    /// SubDevices on both links.
-    pub fn responding(&self) -> u16 {
-        self.counts[0].saturating_add(self.counts[1])
-    }
 }
 
 /// Locks a mutex. A panic of another holder leaves plain data, which stays usable.
@@ -198,18 +176,7 @@ impl Bus {
     /// # Errors
     /// [`Code::GONE`].
     pub fn look(&self) -> Outcome<Seen> {
-        let ring = self.supervisor.with(|engine| engine.ring_status()).map_err(|_| Code::GONE)?;
-        let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::AL_STATUS), [0; 2]);
-        let replies = self.supervisor.datagrams(vec![read.with_resend(true)]).unwrap_or_default();
-        let mut seen = Seen::default();
-        if let Some(Ok(reply)) = replies.first() {
-            seen.counts = [reply.main.0, reply.redundant.0];
-            seen.al_states = reply.data.first().copied().unwrap_or(0) & AL_STATES;
-        }
-        for (number, link) in ring.links.iter().enumerate() {
-            seen.is_up[number] = link.carrier.unwrap_or(seen.counts[number] > 0);
-        }
-        Ok(seen)
+        look(&self.supervisor).ok_or(Code::GONE)
     }
 
     /// Waits until the scan has ended and all SubDevices are in PREOP.

@@ -30,5 +30,6 @@ mod mailbox;
 mod master;
 mod messages;
 mod request;
+mod seen;
 mod settings;
 mod types;

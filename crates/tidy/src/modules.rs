@@ -47,7 +47,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("segment", &["order", "declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config",
         "clocks", "plan", "layout", "event", "junction"]),
     // cyclic half
-    ("exchange", &["order", "declared", "time", "link", "queue", "domain", "ring", "board", "clocks", "layout", "event"]),
+    ("exchange", &["order", "declared", "time", "link", "queue", "domain", "ring", "board", "clocks", "layout",
+        "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),

@@ -102,8 +102,8 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         "DIR/kind.toml:3: device \"coupler\": count: expected a whole number, not negative, got the text \"two\"",
     ),
     ("demo --segment DIR/image.toml", Read, 2, "DIR/image.toml:"),
-    ("demo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: there is no device"),
-    ("sim --main lo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: there is no device"),
+    ("demo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: expected a device to close"),
+    ("sim --main lo --segment DIR/empty.toml", Read, 2, "DIR/empty.toml:2: ring: expected a device to close"),
     (
         "sim --main lo --redundant eth9 --segment DIR/line.toml",
         Read,

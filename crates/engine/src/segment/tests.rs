@@ -70,6 +70,18 @@ fn ring_rules() -> Rules<'static> {
     Rules { links: LinkSet::Ring, supervision: true, lrw, witnesses: &[], session: 0, max_datagrams: None }
 }
 
+/// Choices of an application that wants nothing special.
+fn plain_choices() -> Choices {
+    Choices {
+        enhanced_line_crossed: false,
+        junctions: JunctionMode::Disabled,
+        follow_groups: false,
+        idle_operation: false,
+        supervision: true,
+        retries: Retries::Always,
+    }
+}
+
 impl Ring {
     fn closed(count: usize) -> Ring {
         Ring::with_clocks(count, Clocks::undeclared())
@@ -105,15 +117,7 @@ impl Ring {
             carriers: [Some(true); 2],
             board: Arc::new(Board::new(count)),
         };
-        let choices = Choices {
-            enhanced_line_crossed: false,
-            junctions: JunctionMode::Disabled,
-            follow_groups: false,
-            idle_operation: false,
-            supervision: true,
-            retries: Retries::Always,
-        };
-        let mut segment = Segment::new(choices);
+        let mut segment = Segment::new(plain_choices());
         segment.observe(Observation::ScanBegun, Instant(0));
         segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));
         segment.observe(Observation::Activated(Box::new(declared)), Instant(0));

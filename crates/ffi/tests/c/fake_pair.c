@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "ecrt.h"
 
@@ -138,6 +139,7 @@ int main(int argc, char **argv)
     int arrived;
 
     CHECK(argc == 4);
+    alarm(60);
     is_machine = !strcmp(argv[1], "machine");
     slaves = atoi(argv[2]);
     cycles = strtoul(argv[3], NULL, 0);

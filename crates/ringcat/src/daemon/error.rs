@@ -41,7 +41,17 @@ impl fmt::Display for DaemonError {
     }
 }
 
-impl std::error::Error for DaemonError {}
+impl std::error::Error for DaemonError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            DaemonError::Client(error) => Some(error),
+            DaemonError::Links(error) => Some(error),
+            DaemonError::Knowledge(error) => Some(error),
+            DaemonError::Bus(error) => Some(error),
+            DaemonError::Lost => None,
+        }
+    }
+}
 
 impl DaemonError {
     /// Whether no daemon answers at the socket.

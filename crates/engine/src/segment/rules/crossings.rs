@@ -46,7 +46,7 @@ impl Segment {
 
     /// Result of a scan for crossed lines; `None` if the segment changed too often. If the redundant link was down for
     /// it, an early repetition is useless.
-    pub(in crate::segment) fn observe_line_check(
+    pub(in crate::segment) fn check_line(
         &mut self,
         versions: Versions,
         found: Option<LineCheck>,

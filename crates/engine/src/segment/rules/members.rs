@@ -160,7 +160,7 @@ impl Segment {
 
     /// As soon as all SubDevices that the cyclic datagram counts have answered, process data no longer waits for the
     /// others. Whether the others are lost follows later; which inputs are fresh is known now.
-    pub(in crate::segment) fn observe_part_of_round(
+    pub(in crate::segment) fn observe_part(
         &mut self,
         versions: Versions,
         readings: &[Reading],

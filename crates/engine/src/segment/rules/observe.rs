@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::event::Event;
+use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
@@ -23,79 +24,67 @@ impl Segment {
 
     /// Processes an observation.
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
+        use Observation::*;
         match seen {
-            Observation::Words(words) if self.is_active() => self.observe_words(&words, now, effects),
-            Observation::Words(words) => self.observe_idle_words(&words, now, effects),
-            Observation::Idle(seen) => self.observe_idle(seen, now, effects),
-            Observation::PartOfRound { versions, readings, others, counted } => {
-                self.observe_part_of_round(versions, readings, others, counted);
+            Words(words) if self.is_active() => self.observe_words(&words, now, effects),
+            Words(words) => self.observe_idle_words(&words, now, effects),
+            Idle(seen) => self.observe_idle(seen, now, effects),
+            PartOfRound { versions, readings, others, counted } => {
+                self.observe_part(versions, readings, others, counted)
             }
-            Observation::Round(round_result) => self.observe_round(&round_result, now, effects),
-            Observation::RoundEnded(number) => self.attention.end(number, now),
-            Observation::RoundWanted => self.attention.want(),
-            Observation::RoundWantedIn(pause) => self.attention.again_in(pause, now),
-            Observation::FramesTested(until) => self.frames_tested_until = until,
-            Observation::FramesLimited(limit) => {
-                self.frames_tested_until = Instant::NEVER;
-                effects.report(Event::FrameLimit { limit });
-            }
-            Observation::ScanBegun => self.begin_scan(),
-            Observation::ScanShows(findings) => self.report_findings(findings, effects),
-            Observation::Compared(event) => effects.report(event),
-            Observation::ScanEnded(result) => self.end_scan(result, effects),
-            Observation::FoundAgain { versions, found } => self.find_again(versions, found),
-            Observation::Activated(declared) => self.activate(*declared, effects),
-            Observation::Attached => self.begin_procedures(effects),
-            Observation::Deactivated => self.deactivate(),
-            Observation::SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
-            Observation::Started => self.start_all(effects),
-            Observation::OfMember { index, attempt, finding } => {
-                self.observe_finding((index, attempt), finding, now, effects);
-            }
-            Observation::Proven { index, mapping } => self.observe_proof(index, mapping),
-            Observation::NotProven { index, mapping, what } => {
-                self.observe_missing_inputs((index, mapping), what, effects);
-            }
-            Observation::Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
-            Observation::Retried(subdevice) => self.observe_retry(subdevice, now),
-            Observation::Undeclared(seen) => self.observe_undeclared(seen, now, effects),
-            Observation::IncidentsForgotten => self.forget_incidents(),
-            Observation::Places { versions, view } => self.observe_places(versions, view),
-            Observation::Readdressing(old) => self.observe_readdressing(old),
-            Observation::Offered(station) => self.addresses.offered(station),
-            Observation::Given { versions, view, given } => self.observe_given(versions, view, given, now, effects),
-            Observation::Searched(result) => self.observe_search(result, effects),
-            Observation::Read { key, read } => self.observe_read(key, read, effects),
-            Observation::Unexpected(key) => self.observe_unexpected(key, effects),
-            Observation::Misfit { key, index, attempt, reason } => {
-                self.observe_misfit(key, (index, attempt), reason, effects);
-            }
-            Observation::Held { key, index, attempt } => self.hold(key, (index, attempt), now, effects),
-            Observation::Admitted { key, index, attempt, info } => {
-                self.observe_admitted(key, (index, attempt), *info, effects);
-            }
-
-            Observation::LineChecked { versions, found, in_control } => {
-                self.observe_line_check(versions, found, in_control, effects);
-            }
-            Observation::Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
-            Observation::GroupsFollowed(changes) => self.hot_connect.follow(changes),
-            Observation::Moved { versions, moved } => self.observe_moved(versions, moved, effects),
-            Observation::CableErrors { versions, fresh, rising } => {
-                self.observe_cable_errors(versions, (fresh, rising), effects);
-            }
-            Observation::Clocks(seen) => self.observe_clocks(seen, now, effects),
-            Observation::Wanted(wanted) => self.slot.want(wanted),
-            Observation::Undisturbed(number) => self.slot.end(number),
-            Observation::Isolated { versions, found, words } => {
-                self.observe_isolated(versions, found, (&words, now), effects);
-            }
-            Observation::PortsOrdered { station, control } => self.begin_order(station, control),
-            Observation::PortsWritten(station) => self.end_order(station),
-            Observation::PortsRead { station, orders, control } => self.note_control(station, orders, control),
-            Observation::Blocked(ports) => self.blocked.extend(ports),
-            Observation::Unblocking => self.blocked.clear(),
+            Round(round_result) => self.observe_round(&round_result, now, effects),
+            RoundEnded(number) => self.attention.end(number, now),
+            RoundWanted => self.attention.want(),
+            RoundWantedIn(pause) => self.attention.again_in(pause, now),
+            FramesTested(until) => self.frames_tested_until = until,
+            FramesLimited(limit) => self.limit_frames(limit, effects),
+            ScanBegun => self.begin_scan(),
+            ScanShows(findings) => self.report_findings(findings, effects),
+            Compared(event) => effects.report(event),
+            ScanEnded(result) => self.end_scan(result, effects),
+            FoundAgain { versions, found } => self.find_again(versions, found),
+            Activated(declared) => self.activate(*declared, effects),
+            Attached => self.begin_procedures(effects),
+            Deactivated => self.deactivate(),
+            SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
+            Started => self.start_all(effects),
+            OfMember { index, attempt, finding } => self.observe_finding((index, attempt), finding, now, effects),
+            Proven { index, mapping } => self.observe_proof(index, mapping),
+            NotProven { index, mapping, what } => self.observe_missing_inputs((index, mapping), what, effects),
+            Requested { subdevice, state } => self.observe_request(subdevice, state, now, effects),
+            Retried(subdevice) => self.observe_retry(subdevice, now),
+            Undeclared(seen) => self.observe_undeclared(seen, now, effects),
+            IncidentsForgotten => self.forget_incidents(),
+            Places { versions, view } => self.observe_places(versions, view),
+            Readdressing(old) => self.observe_readdressing(old),
+            Offered(station) => self.addresses.offered(station),
+            Given { versions, view, given } => self.observe_given(versions, view, given, now, effects),
+            Searched(result) => self.observe_search(result, effects),
+            Read { key, read } => self.observe_read(key, read, effects),
+            Unexpected(key) => self.observe_unexpected(key, effects),
+            Misfit { key, index, attempt, reason } => self.observe_misfit(key, (index, attempt), reason, effects),
+            Held { key, index, attempt } => self.hold(key, (index, attempt), now, effects),
+            Admitted { key, index, attempt, info } => self.observe_admitted(key, (index, attempt), *info, effects),
+            LineChecked { versions, found, in_control } => self.check_line(versions, found, in_control, effects),
+            Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
+            GroupsFollowed(changes) => self.hot_connect.follow(changes),
+            Moved { versions, moved } => self.observe_moved(versions, moved, effects),
+            CableErrors { versions, fresh, rising } => self.observe_cable_errors(versions, (fresh, rising), effects),
+            Clocks(seen) => self.observe_clocks(seen, now, effects),
+            Wanted(wanted) => self.slot.want(wanted),
+            Undisturbed(number) => self.slot.end(number),
+            Isolated { versions, found, words } => self.observe_isolated(versions, found, (&words, now), effects),
+            PortsOrdered { station, control } => self.begin_order(station, control),
+            PortsWritten(station) => self.end_order(station),
+            PortsRead { station, orders, control } => self.note_control(station, orders, control),
+            Blocked(ports) => self.blocked.extend(ports),
+            Unblocking => self.blocked.clear(),
         }
+    }
+
+    fn limit_frames(&mut self, limit: FrameLimit, effects: &mut Effects) {
+        self.frames_tested_until = Instant::NEVER;
+        effects.report(Event::FrameLimit { limit });
     }
 
     fn observe_cable_errors(
