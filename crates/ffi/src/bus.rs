@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::OwnedBus;
-use ringcat::{Activity, Links, Options, Retries, Services, SubDeviceInfo, SupervisorThread};
+use ringcat::{Activity, Links, Options, Retries, SubDeviceInfo, SupervisorThread};
 
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome, report};
