@@ -1,8 +1,8 @@
 //! Events that procedures report, and procedures that they start.
 //!
-//! Input: a tree. Output: findings. Events are effects of the model: only [`EXECUTES`] reports them, all other files of
+//! Input: a tree. Output: findings. Events are effects of the model: only `EXECUTES` reports them, all other files of
 //! the acyclic half report notices, and the list of notices is that of `docs/ARCHITECTURE.md`. What the model requests
-//! is started by the reconciler: only the files of [`STARTS`] spawn.
+//! is started by the reconciler: only the files of `STARTS` spawn.
 
 use crate::Finding;
 use crate::tokens::{Token, tokens};
@@ -51,7 +51,7 @@ pub fn past_the_model(tree: &Tree) -> Vec<Finding> {
     findings
 }
 
-/// Procedures that are started in other files than [`STARTS`].
+/// Procedures that are started in other files than `STARTS`.
 pub fn started_elsewhere(tree: &Tree) -> Vec<Finding> {
     let may_start = |path: &str| STARTS.iter().any(|(file, _)| *file == path);
     let mut findings = Vec::new();
