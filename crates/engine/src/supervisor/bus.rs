@@ -99,7 +99,7 @@ impl Bus {
         self.report(notice.into());
     }
 
-    /// Reports an event: an effect of an observation. Procedures report [`Notice`]s.
+    /// Reports an event: an effect of an observation. Procedures report notices.
     pub fn report(&self, event: Event) {
         let shared = &mut *self.shared.borrow_mut();
         shared.events.push(shared.now, event);
