@@ -95,7 +95,7 @@ lints() {
 # The library with each of its features alone: what `--workspace` builds has them all.
 features() {
     local feature
-    for feature in "" packet sim eni network esi gateway eoe daemon serde tracing; do
+    for feature in "" packet sim eni network esi gateway eoe daemon serde standby tracing; do
         echo "ringcat with \"$feature\""
         cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
     done
@@ -142,7 +142,7 @@ figures() {
 
 # The README's first command, and the size of the program that a release has.
 demo() {
-    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=7100000
+    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=6800000
     cargo run --release
     bytes=$(stat --format %s "$program")
     echo "$program has $bytes bytes, at most $most may be; without symbols $(without_symbols "$program")"

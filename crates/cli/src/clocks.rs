@@ -15,15 +15,13 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::event_log::EventLog;
-use ringcat::packet::PacketLinks;
-use ringcat::tee::Tee;
 use ringcat::text::Names;
 use ringcat::{
     AlState, Application, ClockConfig, ClockStatus, CyclicThread, Instant, LastOutputs, SupervisorThread, SyncSignals,
     automatic,
 };
 
-use crate::access::AccessArguments;
+use crate::access::{Access, AccessArguments, WireLinks};
 use crate::clock_options::{ClockOptions, farthest};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
@@ -31,7 +29,6 @@ use crate::interfaces::now;
 use crate::json::data::Data;
 use crate::output::{counted, say, warn, write_event};
 use crate::run_log::{RunLog, Shown};
-use crate::surroundings::Surroundings;
 use crate::times::{cycle, time};
 use crate::verdict::{Report, Verdict};
 use plot::{Course, plot};
@@ -82,19 +79,18 @@ pub struct ClocksArguments {
 
 /// Runs. It has held where all clocks locked and stayed together.
 pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
-    let AccessArguments { interfaces, thread, .. } = &arguments.access;
-    interfaces.links.check()?;
+    let thread = arguments.access.thread;
+    arguments.access.interfaces.links.check()?;
     // An unwritable file shows before the measurement.
     let mut picture = arguments.plot.as_ref().map(|path| Picture::create(path)).transpose()?;
-    let thread = *thread;
     let end = EndRequest::watch(thread.priority)?;
-    let halves = interfaces.open_halves(thread)?;
-    let surroundings = Surroundings::watch(interfaces, &halves.0);
-    let (recording, cyclic, acyclic) = arguments.access.record(halves)?;
-    let _awake = thread.prepare_process();
+    let access = arguments.access.begin(&arguments.access.interfaces.options())?;
+    let Access { supervisor, cyclic, surroundings, recording, tenure, awake: _awake, .. } = access;
     let begin = now();
-    let supervisor = SupervisorThread::start(acyclic, &interfaces.options(), move || thread.prepare_supervisor())?;
-    let scan = supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?;
+    let scan = match tenure.scan() {
+        Some(scan) => scan,
+        None => supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?,
+    };
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;
@@ -124,6 +120,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
         panicked.application
     });
     reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
+    reasons.extend(tenure.end());
     reasons.extend(recording.finish());
     let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
     let phase_errors = cyclic_status.phase_errors();
@@ -138,9 +135,9 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
 /// Gives the cycles a thread.
 fn start_cycles(
     arguments: &ClocksArguments,
-    mut application: Application<Tee<PacketLinks>, SupervisorThread>,
+    mut application: Application<WireLinks, SupervisorThread>,
     end: &EndRequest,
-) -> Result<CyclicThread<Tee<PacketLinks>>, Failure> {
+) -> Result<CyclicThread<WireLinks>, Failure> {
     application.set_trigger(arguments.options.trigger(arguments.options.bus_shift));
     let (thread, asked) = (arguments.access.thread, end.clone());
     Ok(application.start_cycles(
@@ -205,7 +202,7 @@ impl Watch<'_> {
     /// all SubDevices, which may wait for that, are in their state. Whether clocks are locked.
     fn until(
         &mut self,
-        cycles: &CyclicThread<Tee<PacketLinks>>,
+        cycles: &CyclicThread<WireLinks>,
         course: &mut Course,
         until: Instant,
         ends_with_lock: bool,

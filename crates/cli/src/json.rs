@@ -9,6 +9,7 @@ pub mod clocks;
 pub mod data;
 pub mod demo;
 pub mod eni;
+pub mod esi;
 #[cfg(test)]
 mod keys;
 pub mod line;
@@ -18,4 +19,5 @@ pub mod run;
 pub mod scan;
 pub mod sii;
 pub mod sim;
+pub mod standby;
 pub mod values;

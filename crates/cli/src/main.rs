@@ -10,6 +10,7 @@ mod compare;
 mod demo;
 mod ending;
 mod eni_summary;
+mod esi;
 mod failure;
 mod init;
 mod interfaces;
@@ -25,6 +26,7 @@ mod run_log;
 mod scan;
 mod sii;
 mod sim;
+mod standby;
 mod surroundings;
 mod table;
 mod thread;
@@ -49,8 +51,8 @@ First steps:
   ringcat                              a demonstration on a simulated ring:
                                        no network, no permission
   ip link                              the network interfaces of this computer
-  sudo ringcat scan --main eth1        the SubDevices on the cable in eth1
-  sudo ringcat run --main eth1 --for 10s
+  ringcat scan --main eth1             the SubDevices on the cable in eth1
+  ringcat run --main eth1 --for 10s
                                        all SubDevices to OP, ten seconds of
                                        process data, figures
   ringcat sim --help                   a simulated segment on an interface
@@ -121,6 +123,10 @@ enum Command {
     ///
     /// It never sends: a MainDevice on these interfaces does not notice.
     Capture(capture::CaptureArguments),
+    /// Forwards the frames of the ACTIVE MainDevice, as the INACTIVE one of a ring
+    ///
+    /// The second MainDevice of MainDevice redundancy; it cannot take over yet.
+    Standby(standby::StandbyArguments),
     /// Puts a simulated segment on network interfaces
     ///
     /// Any EtherCAT MainDevice at their other end can work with it.
@@ -129,6 +135,10 @@ enum Command {
     ///
     /// An ENI is a network that TwinCAT, EC-Engineer or another tool has configured. No interface is needed.
     Eni(eni_summary::EniArguments),
+    /// Device descriptions (ESI): what a folder describes
+    ///
+    /// Descriptions are files of vendors, see docs/esi.md. No interface is needed.
+    Esi(esi::EsiArguments),
     /// EEPROM images (SII): from a device description, compared, to one
     ///
     /// Descriptions are ESI files of vendors, see docs/esi.md. No interface is needed.
@@ -159,8 +169,10 @@ fn main() -> ExitCode {
         Command::Ring(arguments) => ring::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
+        Command::Standby(arguments) => standby::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
+        Command::Esi(arguments) => esi::run(&arguments),
         Command::Sii(arguments) => sii::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     })
@@ -178,8 +190,10 @@ impl Command {
             Command::Ring(_) => "ring",
             Command::Clocks(_) => "clocks",
             Command::Capture(_) => "capture",
+            Command::Standby(_) => "standby",
             Command::Sim(_) => "sim",
             Command::Eni(_) => "eni",
+            Command::Esi(arguments) => arguments.name(),
             Command::Sii(arguments) => arguments.name(),
             Command::Bench(arguments) => arguments.name(),
         }

@@ -16,6 +16,15 @@ where
     }
 }
 
+/// Decimal, or hexadecimal with `0x`.
+pub fn number_of_32_bits(text: &str) -> Result<u32, String> {
+    let parsed = match text.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    };
+    parsed.ok_or_else(|| "expected a number of 32 bits, decimal or 0x and hexadecimal digits".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,11 +4,12 @@
 use std::time::Duration;
 
 use clap::Args;
+use ringcat::Services;
 use ringcat::text::Names;
 use ringcat::wire::address::{Position, StationAddress};
 use ringcat::{Cable, CableErrors, Link, LinkCounts, MainDevice, Occupant, RingInspection, RingState};
 
-use crate::access::AccessArguments;
+use crate::access::{Access, AccessArguments};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
@@ -47,27 +48,53 @@ pub struct RingArguments {
 /// Reads and prints; it has not held where the ring is open.
 pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
-    let AccessArguments { interfaces, thread, recording } = &arguments.access;
+    if arguments.access.master.is_some() {
+        return of_master(arguments);
+    }
+    let AccessArguments { interfaces, thread, recording, .. } = &arguments.access;
     let links = interfaces.open(*thread)?;
     let recording = recording.start(interfaces)?;
     let links = recording.tee(links);
     let _awake = thread.apply();
     let mut main_device = MainDevice::request(links, &interfaces.options());
-    let mut inspection = main_device.inspect_ring()?;
-    if let Some(lasts) = arguments.lasts {
+    let inspection = inspect(arguments.lasts, || main_device.inspect_ring())?;
+    let two_links = interfaces.links.redundant.is_some();
+    drop(main_device);
+    Ok(report(&inspection, two_links, [recording.finish()]))
+}
+
+/// The ring of a master of the daemon.
+fn of_master(arguments: &RingArguments) -> Result<Report, Failure> {
+    let access = arguments.access.begin(&arguments.access.interfaces.options())?;
+    let Access { interfaces, supervisor, cyclic, recording, tenure, .. } = access;
+    let inspection = inspect(arguments.lasts, || supervisor.inspect_ring())?;
+    drop(cyclic);
+    let reasons = [tenure.end(), recording.finish()];
+    Ok(report(&inspection, interfaces.links.redundant.is_some(), reasons))
+}
+
+/// Reads once, or twice and what the counters have gained meanwhile.
+fn inspect(
+    lasts: Option<Duration>,
+    mut read: impl FnMut() -> Result<RingInspection, ringcat::Error>,
+) -> Result<RingInspection, Failure> {
+    let mut inspection = read()?;
+    if let Some(lasts) = lasts {
         std::thread::sleep(lasts);
-        let before = std::mem::replace(&mut inspection, main_device.inspect_ring()?);
+        let before = std::mem::replace(&mut inspection, read()?);
         for ((cable, errors), (same, earlier)) in inspection.cables.iter_mut().zip(&before.cables) {
             if cable == same {
                 *errors = gained(*earlier, *errors);
             }
         }
     }
-    let two_links = interfaces.links.redundant.is_some();
-    drop(main_device);
-    let verdict = verdict(&inspection, two_links).and(recording.finish());
-    lines(&inspection, two_links).iter().for_each(|line| say!("{line}"));
-    Ok(Report { verdict, data: Data::Ring(json(&inspection, two_links)) })
+    Ok(inspection)
+}
+
+fn report(inspection: &RingInspection, two_links: bool, reasons: impl IntoIterator<Item = Option<String>>) -> Report {
+    let verdict = reasons.into_iter().fold(verdict(inspection, two_links), Verdict::and);
+    lines(inspection, two_links).iter().for_each(|line| say!("{line}"));
+    Report { verdict, data: Data::Ring(json(inspection, two_links)) }
 }
 
 /// Whether there is a ring where two links are to make one.

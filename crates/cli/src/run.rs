@@ -20,15 +20,13 @@ use std::time::Duration;
 
 use ringcat::AlState;
 use ringcat::event_log::EventLog;
-use ringcat::packet::PacketLinks;
-use ringcat::tee::Tee;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
     Application, CyclicThread, Declaration, Event, Instant, JobProbe, JunctionConnection, JunctionMode, LastOutputs,
     Links, Options, ProcessData, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread, SyncSignals, automatic,
 };
 
-use crate::access::AccessArguments;
+use crate::access::{Access, WireLinks};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::{LinkNames, now};
@@ -52,26 +50,22 @@ use summary::{End, clock_account, final_account, json, summary};
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 
 /// The application of this command, with a possible recording of all frames.
-type Recorded = Application<Tee<PacketLinks>, SupervisorThread>;
+type Recorded = Application<WireLinks, SupervisorThread>;
 /// The cycles, the variables of the ENI that are printed, the SubDevices of [`sent_once`], times of jobs.
-type Started = (CyclicThread<Tee<PacketLinks>>, Watched, Vec<SentOnce>, Jobs);
+type Started = (CyclicThread<WireLinks>, Watched, Vec<SentOnce>, Jobs);
 
 /// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
 pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
-    let AccessArguments { interfaces, thread, .. } = &arguments.access;
-    interfaces.links.check()?;
-    let network = arguments.configured.load(interfaces.links.redundant.is_some())?;
-    let thread = *thread;
-    let end = EndRequest::watch(thread.priority)?;
-    let halves = interfaces.open_halves(thread)?;
-    let mut surroundings = Surroundings::watch(interfaces, &halves.0);
-    let (recording, mut cyclic, acyclic) = arguments.access.record(halves)?;
-    let _awake = thread.prepare_process();
+    arguments.access.interfaces.links.check()?;
+    let end = EndRequest::watch(arguments.access.thread.priority)?;
+    let (access, network) = begin(arguments)?;
+    let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, tenure, awake: _awake } = access;
     let begin = now();
-    let options = options(arguments, network.as_ref());
-    let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
-    let beside = arguments.beside.start(&supervisor, interfaces)?;
-    let scan = scan(&supervisor, &mut cyclic, &mut surroundings, begin)?;
+    let beside = arguments.beside.start(&supervisor, &interfaces)?;
+    let scan = match tenure.scan() {
+        Some(scan) => scan,
+        None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
+    };
     let names = match &network {
         Some(network) => network.names(),
         None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
@@ -112,10 +106,26 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
     }
     let data = finish(run, &mut at_end, &jobs, &interfaces.links, &mut reasons);
+    reasons.extend(tenure.end());
     let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
     let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
     let verdict = Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete"));
     Ok(Report { verdict, data })
+}
+
+/// Opens the segment. The network of a file depends on whether it is a ring; with a daemon the bus says that.
+fn begin(arguments: &RunArguments) -> Result<(Access, Option<ConfiguredNetwork>), Failure> {
+    let ring = match arguments.access.master {
+        Some(_) => None,
+        None => Some(arguments.access.interfaces.links.redundant.is_some()),
+    };
+    // A wrong file shows before anything is opened.
+    let network = arguments.configured.load(ring)?;
+    let access = arguments.access.begin(&options(arguments, network.as_ref()))?;
+    if let Some(network) = &network {
+        network.check_links(access.interfaces.links.redundant.is_some())?;
+    }
+    Ok((access, network))
 }
 
 fn options(arguments: &RunArguments, network: Option<&ConfiguredNetwork>) -> Options {
@@ -158,7 +168,7 @@ fn activate(
     network: Option<&ConfiguredNetwork>,
     supervisor: SupervisorThread,
     declaration: Declaration,
-    cyclic: Tee<PacketLinks>,
+    cyclic: WireLinks,
 ) -> Result<Recorded, Failure> {
     let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
     supervisor.load(declaration)?;

@@ -1,10 +1,10 @@
-//! `ringcat scan`: the SubDevices on the wire. All of them are in INIT afterwards.
+//! `ringcat scan`: the SubDevices on the wire. All of them are in INIT afterwards, unless a daemon has them.
 
 use clap::Args;
 use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice};
 
-use crate::access::AccessArguments;
+use crate::access::{Access, AccessArguments};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
@@ -32,7 +32,10 @@ pub struct ScanArguments {
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
-    let AccessArguments { interfaces, thread, recording } = &arguments.access;
+    if arguments.access.master.is_some() {
+        return known(&arguments.access);
+    }
+    let AccessArguments { interfaces, thread, recording, .. } = &arguments.access;
     let links = interfaces.open(*thread)?;
     let mut surroundings = Surroundings::watch(interfaces, &links);
     let recording = recording.start(interfaces)?;
@@ -56,5 +59,21 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     }
     drop(main_device);
     let verdict = Verdict::Held(counted(scan.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
+    Ok(Report { verdict, data: Data::Scan(table::json(&scan)) })
+}
+
+/// What a daemon knows of the bus of a master. Nothing is scanned: a daemon does that after each change.
+fn known(access: &AccessArguments) -> Result<Report, Failure> {
+    let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;
+    let scan = match tenure.scan() {
+        Some(scan) => scan,
+        None => supervisor.scan()?,
+    };
+    for line in table::lines(&scan) {
+        say!("{line}");
+    }
+    drop(cyclic);
+    let verdict = Verdict::Held(counted(scan.subdevices.len(), "SubDevice", "SubDevices"));
+    let verdict = verdict.and(tenure.end()).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(table::json(&scan)) })
 }

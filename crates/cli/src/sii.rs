@@ -13,6 +13,7 @@ use ringcat::wire::sii::Sii;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::sii::{ComparedImage, Difference, SiiBuilt, SiiCompared, SiiSkeleton};
+use crate::numbers::number_of_32_bits;
 use crate::output::{counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
@@ -56,7 +57,7 @@ struct BuildArguments {
     #[arg(long = "type", value_name = "TYPE", help_heading = "Device")]
     kind: Option<String>,
     /// Revision of the device; the highest without
-    #[arg(long, value_name = "REVISION", value_parser = number, help_heading = "Device")]
+    #[arg(long, value_name = "REVISION", value_parser = number_of_32_bits, help_heading = "Device")]
     revision: Option<u32>,
     /// Order of strings, padding and omissions of a tool
     #[arg(long, value_enum, default_value = "twincat", help_heading = "Image")]
@@ -68,7 +69,7 @@ struct BuildArguments {
     #[arg(long, value_name = "ALIAS", help_heading = "Image")]
     alias: Option<u16>,
     /// Serial number
-    #[arg(long, value_name = "SERIAL", value_parser = number, help_heading = "Image")]
+    #[arg(long, value_name = "SERIAL", value_parser = number_of_32_bits, help_heading = "Image")]
     serial: Option<u32>,
     /// Leave out PDOs, for an EEPROM that is too small
     #[arg(long, help_heading = "Image")]
@@ -95,15 +96,6 @@ struct SkeletonArguments {
     /// File to write
     #[arg(long, value_name = "FILE.xml", help_heading = "Output")]
     out: PathBuf,
-}
-
-/// Decimal, or hexadecimal with `0x`.
-fn number(text: &str) -> Result<u32, String> {
-    let parsed = match text.strip_prefix("0x") {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    };
-    parsed.ok_or_else(|| "expected a number of 32 bits, decimal or 0x and hexadecimal digits".to_owned())
 }
 
 impl SiiArguments {

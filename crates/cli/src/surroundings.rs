@@ -47,6 +47,13 @@ impl Surroundings {
         Surroundings { links: interfaces.links.clone(), elsewhere, mask, senders: Vec::new(), _end: end }
     }
 
+    /// Around links that are no interfaces: nothing listens.
+    pub fn unwatched(interfaces: &InterfaceArguments) -> Surroundings {
+        let mask = unmarked(interfaces.codec());
+        let (links, elsewhere) = (interfaces.links.clone(), Arc::default());
+        Surroundings { links, elsewhere, mask, senders: Vec::new(), _end: None }
+    }
+
     /// Takes note of an event. `Some` for a frame of another MainDevice; in it the warning, if the sender is new.
     pub fn note(&mut self, event: &Event) -> Option<Option<String>> {
         let Event::ForeignFrame { arrived_on, bytes } = event else { return None };

@@ -8,8 +8,10 @@ use std::fmt;
 use std::time::Duration;
 
 use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::Declaration;
+use ringcat_wire::address::StationAddress;
 
 use crate::eni::{Place, Port};
 
@@ -32,13 +34,13 @@ pub struct Configuration {
 
 impl Configuration {
     /// The declaration of a SubDevice with its other properties in the file.
-    pub fn subdevice(&self, index: usize) -> Option<(&SubDeviceConfig, &SubDeviceFacts)> {
-        Some((self.declaration.subdevices.get(index)?, self.subdevices.get(index)?))
+    pub fn subdevice(&self, subdevice: SubDeviceId) -> Option<(&SubDeviceConfig, &SubDeviceFacts)> {
+        Some((self.declaration.subdevices.get(subdevice.0)?, self.subdevices.get(subdevice.0)?))
     }
 
-    /// Index of the SubDevice to which the file gives this station address (`PhysAddr`).
-    pub fn at_station(&self, station: u16) -> Option<usize> {
-        self.subdevices.iter().position(|facts| facts.station == Some(station))
+    /// The SubDevice to which the file gives this station address (`PhysAddr`).
+    pub fn at_station(&self, station: StationAddress) -> Option<SubDeviceId> {
+        self.subdevices.iter().position(|facts| facts.station == Some(station.0)).map(SubDeviceId)
     }
 }
 

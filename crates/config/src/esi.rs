@@ -7,6 +7,7 @@
 
 mod element;
 mod error;
+pub mod index;
 mod limits;
 mod model;
 mod modules;

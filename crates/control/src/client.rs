@@ -2,9 +2,12 @@
 
 use std::fmt;
 use std::io;
+use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+use ringcat_link::process::wait_readable;
 
 use crate::connection::{Connection, ReceiveError};
 use crate::message::{Answer, Ask, Content, Message, Numbered, Right};
@@ -13,8 +16,8 @@ use crate::wire::{Limits, WireError};
 
 /// The daemon answers to a greeting within this time.
 const GREETING: Duration = Duration::from_secs(5);
-/// Longest wait for an answer: that of a slow SubDevice.
-const ANSWER: Duration = Duration::from_secs(60);
+/// Wait for an answer beyond the time that the question may take.
+const BEYOND: Duration = Duration::from_secs(30);
 
 /// Why a daemon gave no answer.
 #[derive(Debug)]
@@ -92,7 +95,7 @@ impl Client {
         let hello: Message = Content::Hello { program: program.to_owned() }.into();
         // A daemon that refuses closes the connection, and has said why before.
         let sent = connection.send(&hello);
-        match connection.receive(Limits::OWNER, Some(GREETING))?.0.content {
+        match connection.receive(Limits::OWNER, Some(GREETING))?.content {
             Content::Welcome { right, pid } => {
                 sent?;
                 Ok(Client { connection, right, daemon_pid: pid, next: 0 })
@@ -115,13 +118,14 @@ impl Client {
     /// Asks about a master; `bytes` is data to write. Returns the answer, and data that was read.
     ///
     /// # Errors
-    /// The daemon refuses, or does not answer within a minute.
+    /// The daemon refuses, or does not answer in time: within a minute, or 10 minutes where flash memory is written.
     pub fn ask(&mut self, master: u32, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
         self.next = self.next.wrapping_add(1);
+        let limit = what.limit() + BEYOND;
         let content = Content::Ask(Numbered { id: self.next, master, what });
         self.connection.send(&Message { content, bytes })?;
         loop {
-            let (message, _) = self.connection.receive(Limits::OWNER, Some(ANSWER))?;
+            let message = self.connection.receive(Limits::OWNER, Some(limit))?;
             match message.content {
                 Content::Answer(answer) if answer.id == self.next => {
                     return answer.what.map(|answer| (answer, message.bytes)).map_err(ClientError::Refused);
@@ -131,6 +135,12 @@ impl Client {
                 _ => return Err(unexpected("an answer")),
             }
         }
+    }
+
+    /// Whether the daemon has neither ended the connection nor said anything that was not asked for: between two
+    /// questions it says nothing but why it ends the connection.
+    pub fn is_open(&self) -> bool {
+        wait_readable(&[self.connection.as_fd()], Duration::ZERO) == 0
     }
 
     /// The connection, to take a master on it.

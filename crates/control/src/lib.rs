@@ -1,9 +1,12 @@
 //! Messages between the daemon `ringcatd`, the application that drives a segment (its owner), and clients.
 //!
 //! * [`message`]: what they say;
+//! * [`information`]: what is seen of a segment now;
+//! * [`tool`]: what is known of a master, its SubDevices and its application;
 //! * [`refusal`]: why something is not done, in one sentence;
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;
+//! * [`arriving`]: a message of which a part has arrived;
 //! * [`client`]: questions to a daemon.
 //!
 //! A client says [`Content::Hello`], then asks. An application that drives a master says [`Content::Take`] and gets the
@@ -11,19 +14,24 @@
 //! order is in decision 0074.
 #![forbid(unsafe_code)]
 
+pub mod arriving;
 pub mod client;
 pub mod connection;
+pub mod information;
 pub mod message;
 mod owner;
+mod receive_error;
 pub mod refusal;
+pub mod tool;
 pub mod wire;
 
+pub use arriving::Arriving;
 pub use client::Client;
 pub use connection::{Connection, ReceiveError};
 pub use message::{
     Answer, Ask, Content, EventLine, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Right,
 };
-pub use refusal::Refusal;
+pub use refusal::{Refusal, ServiceFault};
 pub use wire::{Limits, VERSION, WireError};
 
 /// Where a daemon listens unless an option says otherwise.

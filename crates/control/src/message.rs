@@ -2,11 +2,21 @@
 //!
 //! A message is typed content, and bytes where data is in it. A change of any type here changes [`crate::VERSION`].
 
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
 pub use ringcat_engine::main_device::snapshot::Snapshot;
 use serde::{Deserialize, Serialize};
 
+pub use crate::information::SegmentLook;
 pub use crate::owner::Owner;
 use crate::refusal::Refusal;
+pub use crate::tool::{ToolAnswer, ToolAsk};
+
+/// Longest time for most answers.
+const USUAL: Duration = Duration::from_secs(30);
+/// Longest time for answers that wait for flash memory of a SubDevice.
+const LONG: Duration = Duration::from_secs(600);
 
 /// A message.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,8 +63,8 @@ pub enum Content {
         /// Number of the master.
         master: u32,
     },
-    /// The client drives it. Descriptors come with the message; its bytes are what is known of the segment, empty if
-    /// nothing is known.
+    /// The client drives it. Descriptors come with the message, those of the links and a lock, which the client keeps
+    /// for as long as it drives the master; its bytes are what is known of the segment, empty if nothing is known.
     Taken(HandedLinks),
     /// An owner tells what it knows after a scan, in the bytes.
     Knowledge,
@@ -153,9 +163,39 @@ pub enum Ask {
     },
     /// Scans the segment again.
     Rescan,
+    /// What a broadcast shows of all SubDevices now.
+    Look,
+    /// Reads the value of an IDN.
+    IdnRead {
+        /// Position of the SubDevice.
+        position: u16,
+        /// Drive behind it, 0 to 7.
+        drive: u8,
+        /// The IDN.
+        idn: u16,
+    },
+    /// Writes the value of an IDN with the bytes of the message.
+    IdnWrite {
+        /// Position of the SubDevice.
+        position: u16,
+        /// Drive behind it, 0 to 7.
+        drive: u8,
+        /// The IDN.
+        idn: u16,
+    },
+    /// What the command line tool asks, and clients that want the same.
+    Tool(ToolAsk),
 }
 
 impl Ask {
+    /// Longest time for the answer of what drives the master.
+    pub fn limit(&self) -> Duration {
+        match self {
+            Ask::Tool(ask) if ask.is_long() => LONG,
+            _ => USUAL,
+        }
+    }
+
     /// The right that it needs.
     pub fn right(&self) -> Right {
         match self {
@@ -164,13 +204,31 @@ impl Ask {
             | Ask::Events { .. }
             | Ask::AlStatus { .. }
             | Ask::SdoUpload { .. }
-            | Ask::RegisterRead { .. }
-            | Ask::SiiRead { .. } => Right::Read,
-            Ask::SdoDownload { .. } | Ask::RegisterWrite { .. } | Ask::RequestState { .. } | Ask::Rescan => {
-                Right::Change
-            }
+            | Ask::SiiRead { .. }
+            | Ask::Look
+            | Ask::IdnRead { .. } => Right::Read,
+            Ask::RegisterRead { address, length, .. } => right_to_read(*address, *length),
+            Ask::Tool(ask) if ask.is_reading() => Right::Read,
+            Ask::Tool(_)
+            | Ask::SdoDownload { .. }
+            | Ask::RegisterWrite { .. }
+            | Ask::RequestState { .. }
+            | Ask::Rescan
+            | Ask::IdnWrite { .. } => Right::Change,
         }
     }
+}
+
+/// Registers whose reading changes something: SYNC status and latch times, which reading acknowledges, and the memory
+/// of process data and mailboxes, where reading the last byte frees a buffer.
+const CHANGED_BY_READING: [RangeInclusive<u32>; 3] = [0x098E..=0x098F, 0x09AE..=0x09CF, 0x1000..=0x1_FFFF];
+
+/// The right that reading these registers needs.
+fn right_to_read(address: u16, length: u16) -> Right {
+    let first = u32::from(address);
+    let last = first + u32::from(length).saturating_sub(1);
+    let is_changed = CHANGED_BY_READING.iter().any(|range| first <= *range.end() && last >= *range.start());
+    if is_changed { Right::Change } else { Right::Read }
 }
 
 /// An answer.
@@ -203,6 +261,10 @@ pub enum Answer {
     Data,
     /// It is done.
     Done,
+    /// To [`Ask::Look`].
+    Look(SegmentLook),
+    /// To [`Ask::Tool`].
+    Tool(ToolAnswer),
 }
 
 /// A master.
@@ -258,5 +320,23 @@ impl HandedLinks {
     /// Number of descriptors that come with it.
     pub fn descriptors(&self) -> usize {
         if self.redundant.is_some() { 4 } else { 2 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn to_read_registers_that_reading_changes_needs_the_right_to_change() {
+        let right = |address, length| Ask::RegisterRead { position: 0, address, length }.right();
+        for (address, length) in [(0, 1024), (0x0130, 2), (0x0900, 0x8E), (0x0990, 0x1E), (0x09D0, 2), (0x0FFF, 1)] {
+            assert_eq!(right(address, length), Right::Read, "{address:#x}, {length}");
+        }
+        for (address, length) in [(0x0900, 0x8F), (0x098E, 1), (0x09CF, 1), (0x0FFF, 2), (0x1000, 0), (0xFFFF, 0xFFFF)]
+        {
+            assert_eq!(right(address, length), Right::Change, "{address:#x}, {length}");
+        }
     }
 }

@@ -73,6 +73,31 @@ pub enum Refusal {
         /// The owner.
         owner: Owner,
     },
+    /// A service of a SubDevice has failed.
+    Service {
+        /// How.
+        fault: ServiceFault,
+        /// What happened, in one sentence.
+        text: String,
+    },
+}
+
+/// How a service of a SubDevice has failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum ServiceFault {
+    /// There is no SubDevice at this position.
+    NoSubDevice,
+    /// The SubDevice has no mailbox, or does not know the protocol.
+    NoProtocol,
+    /// The SubDevice has refused with this code: an abort code of an SDO, an error code of an IDN.
+    Aborted(u32),
+    /// The data is too long.
+    TooLong,
+    /// The SubDevice did not answer in time.
+    NoAnswer,
+    /// Something else.
+    Other,
 }
 
 impl fmt::Display for Refusal {
@@ -100,8 +125,9 @@ impl fmt::Display for Refusal {
             Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
             Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
             Refusal::TooManyQuestions { master, owner } => {
-                write!(f, "master {master}: {owner} drives it and has not taken earlier questions yet")
+                write!(f, "master {master}: {owner} drives it and has as many questions, or bytes, as it may have")
             }
+            Refusal::Service { text, .. } => f.write_str(text),
         }
     }
 }

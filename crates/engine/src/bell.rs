@@ -14,6 +14,7 @@ impl Bell {
     }
 
     /// The counter; it wraps around.
+    #[inline]
     pub fn rung(&self) -> u32 {
         self.0.load(Ordering::Acquire)
     }

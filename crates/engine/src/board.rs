@@ -237,6 +237,12 @@ impl Board {
         (count != 0).then(|| (count as u32, Supervision::unpack(self.supervision.load(Ordering::Relaxed))))
     }
 
+    /// The number of the latest supervision result; 0 before the first.
+    #[inline]
+    pub(crate) fn supervision_number(&self) -> u32 {
+        self.supervision_count.load(Ordering::Acquire) as u32
+    }
+
     /// That result, packed, and whether there was any.
     #[inline]
     pub(crate) fn supervision_word(&self) -> (u64, bool) {

@@ -64,8 +64,8 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// The first field that does not match: field, expected, got.
-    pub fn mismatch(&self, info: &SubDeviceInfo) -> Option<(IdentityField, u32, u32)> {
+    /// The first field that does not match.
+    pub fn mismatch(&self, info: &SubDeviceInfo) -> Option<IdentityMismatch> {
         let got = &info.identity;
         let identification = u32::from(info.identification.unwrap_or(0));
         let minimum = self.minimum_revision.filter(|minimum| got.revision < *minimum);
@@ -78,8 +78,23 @@ impl Expected {
             (IdentityField::Identification, self.identification.map(u32::from), identification),
         ]
         .into_iter()
-        .find_map(|(field, expected, got)| expected.filter(|expected| *expected != got).map(|e| (field, e, got)))
+        .find_map(|(field, expected, got)| {
+            let expected = expected.filter(|expected| *expected != got)?;
+            Some(IdentityMismatch { field, expected, got })
+        })
     }
+}
+
+/// A field of the identity with another value than expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct IdentityMismatch {
+    /// The field.
+    pub field: IdentityField,
+    /// Its expected value.
+    pub expected: u32,
+    /// The value of the SubDevice.
+    pub got: u32,
 }
 
 /// Whether writes to a SyncManager retrigger the process data watchdog.

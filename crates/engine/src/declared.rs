@@ -24,6 +24,18 @@ pub enum Address {
     Scanned(Position),
 }
 
+/// A declared SubDevice that is at another position than before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Move {
+    /// The SubDevice.
+    pub subdevice: SubDeviceId,
+    /// Position before.
+    pub from: Position,
+    /// Position now.
+    pub to: Position,
+}
+
 impl From<SubDeviceId> for Address {
     fn from(subdevice: SubDeviceId) -> Address {
         Address::Declared(subdevice)

@@ -43,12 +43,15 @@ pub(crate) mod ring;
 pub mod ring_status;
 pub mod role;
 pub(crate) mod segment;
+#[cfg(feature = "standby")]
+pub mod standby;
 pub(crate) mod supervisor;
 pub mod time;
 pub(crate) mod topology;
 
 pub use board::Board;
 pub use clocks::{DelayRange, Follower, phase_error};
+pub use declared::Move;
 pub use junction::{ClosingEvidence, HEAD_PORT, JunctionConnection, JunctionError, JunctionMode, START_PORT};
 pub use plan::{
     AreaPlan, MappedEntry, MappedPdo, PlanError, PlanFault, PlanProblem, PlanWarning, SmPlan, SubDevicePlan, plan,

@@ -21,6 +21,15 @@ impl Link {
         }
     }
 
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Link {
+        match self {
+            Link::Main => Link::Redundant,
+            Link::Redundant => Link::Main,
+        }
+    }
+
     /// A mask with the bit of this link.
     pub(crate) const fn bit(self) -> u8 {
         1 << self.index()

@@ -50,7 +50,7 @@ mod working_counters;
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::vec::Vec;
-use core::cell::{Cell, RefCell};
+use core::cell::RefCell;
 use core::future::Future;
 use core::time::Duration;
 
@@ -59,10 +59,11 @@ use ringcat_wire::al::AlState;
 
 pub use activate_error::ActivateError;
 pub use active::Active;
-pub use areas::{AreaEntries, Directory, PlacedEntry};
+pub use areas::{AreaEntries, Directory, ObjectOf, PlacedEntry};
 pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
 pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
 pub use ethernet::EthernetSubDevice;
+pub use found::DeclaredSubDevice;
 pub use image_memory::ImageMemory;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
@@ -84,6 +85,7 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
 use crate::mail::{EmergencyRings, InUse};
 use crate::procedures::error_statistics::ErrorStatistics;
+use crate::procedures::loops::restore;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::{Companions, reconcile_without_application};
 use crate::procedures::scan::ScanError;
@@ -121,8 +123,6 @@ pub struct MainDevice {
     cache: SiiCache,
     /// Why the last scan failed.
     scan_error: Rc<RefCell<Option<ScanError>>>,
-    /// A requested scan is under way, not one of idle operation.
-    scan_requested: Rc<Cell<bool>>,
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
@@ -167,7 +167,6 @@ impl MainDevice {
             identity,
             cache,
             scan_error: Rc::default(),
-            scan_requested: Rc::default(),
             stopped: StopSlot::default(),
             segment,
             cyclic_events: None,
@@ -204,14 +203,16 @@ impl MainDevice {
         }
         let to_stop = all_known(&self.segment.view());
         self.end_application(now);
-        let (bus, slot) = (self.supervisor.bus(), self.stopped.clone());
+        let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
         self.supervisor.spawn(async move {
+            restore(&bus, &segment).await;
             let result = stop(&bus, to_stop, state, limit).await;
             *slot.borrow_mut() = Some(result);
         });
     }
 
-    /// Ends all procedures; what the last scan found stays.
+    /// Ends all procedures; what the last scan found stays. A link that one of them has taken down comes back at once,
+    /// ports that were changed for a moment by the first steps of what follows ([`restore`]).
     fn end_application(&mut self, now: Instant) {
         self.counted = self.counters();
         self.number_cyclic_events(now);
@@ -231,7 +232,6 @@ impl MainDevice {
         self.begin_command_reports();
         self.requests.end();
         *self.emergencies.borrow_mut() = EmergencyRings::default();
-        self.scan_requested = Rc::default();
         self.ports.clear();
         self.gateway_queue = None;
         self.own_objects = OwnObjects::default();
@@ -352,6 +352,7 @@ impl MainDevice {
     }
 
     /// When the acyclic half has work; see [`Supervisor::due_at`].
+    #[inline(always)]
     pub fn due_at(&self) -> Instant {
         self.supervisor.due_at()
     }
@@ -395,6 +396,7 @@ impl MainDevice {
     }
 
     /// Carrier state of the links, by [`Link::index`]; `None` if a link does not report it. To be called regularly.
+    #[inline]
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
         self.supervisor.set_carriers(carriers);
     }

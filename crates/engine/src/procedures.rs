@@ -19,6 +19,7 @@ pub mod inspect;
 pub mod inspect_ring;
 pub(crate) mod junction;
 mod latch;
+pub(crate) mod loops;
 pub mod mail_watch;
 pub(crate) mod own_objects;
 mod presence;

@@ -20,6 +20,7 @@ mod received;
 mod reply;
 mod round_trip;
 mod shared;
+mod shared_cell;
 mod signal;
 mod silence;
 mod stray;
@@ -30,7 +31,6 @@ mod watching;
 
 use alloc::rc::Rc;
 use alloc::sync::Arc;
-use core::cell::RefCell;
 use core::future::Future;
 
 use ringcat_wire::frame::MacAddress;
@@ -54,17 +54,18 @@ use crate::role::MainDeviceRole;
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
+use shared_cell::SharedCell;
 
 /// The acyclic half of the MainDevice.
 pub struct Supervisor {
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<SharedCell>,
     executor: executor::Executor,
 }
 
 impl Supervisor {
     /// A supervisor without procedures.
     pub fn new(identity: Identity, links: LinkSet, now: Instant) -> Supervisor {
-        let shared = Rc::new(RefCell::new(Shared::new(identity, links, now)));
+        let shared = Rc::new(SharedCell::new(Shared::new(identity, links, now)));
         Supervisor { executor: executor::Executor::new(shared.clone()), shared }
     }
 
@@ -122,7 +123,15 @@ impl Supervisor {
     }
 
     /// Sets the carrier states that the links report.
+    #[inline]
     pub fn set_carriers(&mut self, carriers: [Option<bool>; 2]) {
+        if self.shared.borrow().carriers != carriers {
+            self.change_carriers(carriers);
+        }
+    }
+
+    #[cold]
+    fn change_carriers(&mut self, carriers: [Option<bool>; 2]) {
         let shared = &mut *self.shared.borrow_mut();
         shared.carriers = carriers;
         if let Some(board) = &shared.board {
@@ -169,15 +178,14 @@ impl Supervisor {
 
     /// Latest time at which [`Supervisor::poll`] has work to do, received frames aside.
     pub fn next_deadline(&self) -> Option<Instant> {
-        Some(self.shared.borrow().next_deadline()).filter(|at| *at != Instant::NEVER)
+        Some(self.shared.next_deadline()).filter(|at| *at != Instant::NEVER)
     }
 
     /// When there is work: for [`Supervisor::poll`], a datagram to send, or a request to the link layer. In the distant
-    /// past for work that does not wait for a time, never without work.
+    /// past for work that does not wait for a time, never without work. Cheap while nothing changes.
+    #[inline(always)]
     pub fn due_at(&self) -> Instant {
-        let shared = self.shared.borrow();
-        let is_waiting = matches!(shared.link_order, LinkOrder::Given { .. }) || shared.wants_to_send();
-        if is_waiting { Instant::default() } else { shared.next_deadline() }
+        self.shared.due_at()
     }
 
     /// Request of a procedure to the link layer: a link, and whether to disconnect it. Answer it with

@@ -2,7 +2,8 @@
 //!
 //! Waits for states of the model, for posted words and for replies need no pause (`SharedSegment::until`,
 //! `Bus::until_posted`); the model says until when such a wait lasts at most (`Segment::next_evaluation`: routine
-//! rounds each second, local rings without frames every 5 ms, since silence posts nothing). `cargo test -p
+//! rounds each second, local rings without frames every 5 ms, since silence posts nothing; the next supervision result
+//! while counts settle, the end of the pause while a report is held back). `cargo test -p
 //! ringcat-engine --test waits -- --nocapture` prints the list.
 
 use std::collections::BTreeMap;
@@ -32,7 +33,7 @@ use Reason::{Cyclic, Pace, Register, Retry, Settle, Turn};
 const TABLE: &str = "<!-- pauses for another part of the engine -->";
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 40] = [
+const WAITS: [(&str, &[Reason]); 41] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -41,6 +42,7 @@ const WAITS: [(&str, &[Reason]); 40] = [
     ("procedures/cabling.rs", &[Settle, Register, Settle, Retry]),
     ("procedures/clocks/drift.rs", &[Retry, Pace]),
     ("procedures/clocks/measure.rs", &[Register]),
+    ("procedures/clocks/slide.rs", &[Pace]),
     ("procedures/clocks/watch.rs", &[Register]),
     ("procedures/command_watch.rs", &[Cyclic]),
     ("procedures/complete_siis.rs", &[Retry]),
@@ -53,6 +55,7 @@ const WAITS: [(&str, &[Reason]); 40] = [
     ("procedures/junction/isolate.rs", &[Settle]),
     ("procedures/junction/learn.rs", &[Settle]),
     ("procedures/junction/refute.rs", &[Retry]),
+    ("procedures/loops.rs", &[Register]),
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
     ("procedures/recover.rs", &[Retry, Retry]),
@@ -60,7 +63,6 @@ const WAITS: [(&str, &[Reason]); 40] = [
     ("procedures/sample.rs", &[Cyclic]),
     ("procedures/scan.rs", &[Register]),
     ("procedures/scan/count.rs", &[Register, Register]),
-    ("procedures/services/ports.rs", &[Register]),
     ("procedures/services/statistics.rs", &[Cyclic]),
     ("procedures/sii.rs", &[Turn]),
     ("procedures/sii/eeprom.rs", &[Register, Register, Register]),

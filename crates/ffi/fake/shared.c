@@ -69,13 +69,18 @@ static int lock(int descriptor)
 static int prepare(struct shared *shared)
 {
     struct stat status;
+    int error;
 
     if (fstat(shared->descriptor, &status))
         return -errno;
     if (!S_ISREG(status.st_mode) || status.st_uid != geteuid())
         return -EPERM;
-    if (status.st_size == 0 && ftruncate(shared->descriptor, sizeof(struct memory)))
-        return -errno;
+    /* All of it now: a store into memory that does not exist would end the program. */
+    error = status.st_size == 0 || status.st_size == (off_t) sizeof(struct memory)
+                ? posix_fallocate(shared->descriptor, 0, sizeof(struct memory))
+                : 0;
+    if (error)
+        return -error;
     if (status.st_size != 0 && status.st_size != (off_t) sizeof(struct memory))
         return -EPROTO;
     shared->memory = mmap(NULL, sizeof(struct memory), PROT_READ | PROT_WRITE, MAP_SHARED, shared->descriptor, 0);
@@ -83,7 +88,8 @@ static int prepare(struct shared *shared)
         shared->memory = NULL;
         return -errno;
     }
-    if (status.st_size == 0) {
+    /* New, or the process that made it was killed before it came here. */
+    if (shared->memory->magic == 0) {
         shared->memory->version = VERSION;
         shared->memory->magic = MAGIC;
     }

@@ -1,32 +1,33 @@
 //! The buses of this process: one for each master that is open, shared by all its handles.
 //!
 //! A bus has its links and the thread of the acyclic half, which scans and keeps all SubDevices in PREOP while no
-//! application is active. One handle reserves it. It comes from a daemon where one answers, and goes back to it.
+//! application is active. One handle reserves it. Where a daemon answers, it comes from there when a handle reserves
+//! it, and goes back with that handle; others ask the daemon ([`crate::door`]).
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::OwnedBus;
-use ringcat::{Activity, Links, Options, Retries, SubDeviceInfo, SupervisorThread};
+use ringcat::daemon::{ClientError, DaemonError, OwnedBus, Refusal};
+use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread};
 
-use crate::any_links::AnyLinks;
+use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report};
-use crate::environment::{socket, source};
-use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable, watch_forks};
+use crate::door::{DaemonDoor, Door, code_of};
+use crate::environment::{program_name, source};
+use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable};
+use crate::locks::locked;
 use crate::messages::Messenger;
-use crate::seen::{Seen, look};
 
-/// Longest wait of a request for the scan and for PREOP of all SubDevices.
+/// Longest wait of a request for the scan.
 const READY_LIMIT: Duration = Duration::from_secs(20);
 /// A request waits so long for the first SubDevice to answer.
 const SILENCE: Duration = Duration::from_millis(300);
 /// Interval of looks at the progress.
-const PAUSE: Duration = Duration::from_millis(2);
-/// PREOP alone, as an OR of AL states.
-const PREOP: u8 = 2;
-
+const PAUSE: Duration = Duration::from_micros(500);
+/// A request waits so long while the master passes from one process to another.
+const CHANGE: Duration = Duration::from_secs(5);
 static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
 
 /// The bus of a master.
@@ -42,33 +43,48 @@ pub struct Bus {
     cyclic_links: Mutex<Option<AnyLinks>>,
     /// Gives the bus back to the daemon that it came from, when it is dropped.
     _owned: Mutex<Option<OwnedBus>>,
-    is_ring: bool,
+    door: Arc<Door>,
     is_reserved: AtomicBool,
 }
 
-/// Locks a mutex. A panic of another holder leaves plain data, which stays usable.
-pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// Why a daemon does not hand a bus over.
+#[derive(Debug)]
+enum TakeError {
+    /// It passes from one process to another.
+    Changing,
+    /// Something else.
+    Other(Code, String),
 }
 
-/// Takes a master from the daemon at this socket. `None` if no variable names the socket and no daemon answers there.
-fn take(socket: &Path, master: u32, options: &Options) -> Result<Option<OwnedBus>, String> {
-    let program = std::env::args_os().next().unwrap_or_default();
-    let program = Path::new(&program).file_name().unwrap_or(program.as_os_str()).to_string_lossy();
-    match OwnedBus::take(socket, master, &program, options, be_an_ordinary_thread) {
-        Ok(owned) => Ok(Some(owned)),
-        Err(error) if error.is_no_daemon() && variable("RINGCAT_SOCKET").is_none() => Ok(None),
-        Err(error) => Err(error.to_string()),
+impl From<DaemonError> for TakeError {
+    fn from(error: DaemonError) -> TakeError {
+        match &error {
+            DaemonError::Client(ClientError::Refused(Refusal::Changing { .. })) => TakeError::Changing,
+            DaemonError::Client(ClientError::Refused(refusal)) => TakeError::Other(code_of(refusal), error.to_string()),
+            DaemonError::Bus(_) => TakeError::Other(Code::GONE, format!("{error}{}", memory_hint())),
+            _ => TakeError::Other(Code::GONE, error.to_string()),
+        }
+    }
+}
+
+impl TakeError {
+    /// The code, after a line for the operator.
+    fn reported(self) -> Code {
+        let (code, text) = match self {
+            TakeError::Changing => (Code::BUSY, "it passes from one process to another".to_owned()),
+            TakeError::Other(code, text) => (code, text),
+        };
+        report(format_args!("Failed to reserve master: {text}"));
+        code
     }
 }
 
 impl Bus {
-    /// The bus of a master; opened if no handle has it open.
+    /// The bus of a master whose links this process opens; opened if no handle has it open.
     ///
     /// # Errors
     /// What is wrong, for the operator.
     pub fn open(master: u32) -> Result<Arc<Bus>, String> {
-        watch_forks();
         let mut buses = locked(&BUSES);
         buses.retain(|bus| bus.strong_count() > 0);
         if let Some(bus) = buses.iter().filter_map(Weak::upgrade).find(|bus| bus.is(master)) {
@@ -79,6 +95,31 @@ impl Bus {
         Ok(bus)
     }
 
+    /// The bus of a master from a daemon, for one handle.
+    ///
+    /// # Errors
+    /// Another handle or process drives it, or this user may not. The reason was reported.
+    pub fn take(door: &DaemonDoor) -> Outcome<Arc<Bus>> {
+        let begin = Instant::now();
+        let bus = loop {
+            let mut buses = locked(&BUSES);
+            buses.retain(|bus| bus.strong_count() > 0);
+            match Bus::of_daemon(door.socket(), door.master()) {
+                Ok(bus) => {
+                    let bus = Arc::new(bus);
+                    buses.push(Arc::downgrade(&bus));
+                    break bus;
+                }
+                Err(TakeError::Changing) if begin.elapsed() < CHANGE => {
+                    drop(buses);
+                    std::thread::sleep(PAUSE);
+                }
+                Err(error) => return Err(error.reported()),
+            }
+        };
+        Ok(bus)
+    }
+
     fn is(&self, master: u32) -> bool {
         self.master == master && self.generation == generation()
     }
@@ -86,10 +127,6 @@ impl Bus {
     fn start(master: u32) -> Result<Bus, String> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let socket = socket(master, variable);
-        if let Some(owned) = socket.as_deref().map(|path| take(path, master, &options)).transpose()?.flatten() {
-            return Bus::of_daemon(master, owned);
-        }
         let suffix = if master == 0 { String::new() } else { format!("_{master}") };
         let source = source(master, variable).ok_or_else(|| {
             format!(
@@ -97,16 +134,19 @@ impl Bus {
                  segment file), got neither"
             )
         })?;
-        let (cyclic, acyclic) = AnyLinks::open(&source)?;
+        let (cyclic, acyclic) = any_links::open(&source)?;
         let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
         Bus::with(master, supervisor, cyclic, None)
     }
 
-    /// The bus that a daemon has handed over.
-    fn of_daemon(master: u32, mut owned: OwnedBus) -> Result<Bus, String> {
-        let links = owned.take_links().ok_or("the daemon has handed over no links")?;
-        Bus::with(master, owned.supervisor().clone(), AnyLinks::Daemon(links), Some(owned))
+    fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
+        let _held = HeldSignals::hold();
+        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
+        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, be_an_ordinary_thread)?;
+        let other = |text: String| TakeError::Other(Code::GONE, text);
+        let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
+        Bus::with(master, owned.supervisor().clone(), AnyLinks::Second(links), Some(owned)).map_err(other)
     }
 
     fn with(
@@ -115,14 +155,13 @@ impl Bus {
         cyclic: AnyLinks,
         owned: Option<OwnedBus>,
     ) -> Result<Bus, String> {
-        let is_ring = cyclic.addresses().redundant.is_some();
         let messenger = Messenger::begin(master, supervisor.clone());
         let _messenger = messenger.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
-        let is_reserved = AtomicBool::new(false);
+        let (door, is_reserved) = (Arc::new(Door::Here(supervisor.clone())), AtomicBool::new(false));
         let _owned = Mutex::new(owned);
-        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, _owned, is_ring, is_reserved })
+        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, _owned, door, is_reserved })
     }
 
     /// Number of the master.
@@ -135,17 +174,16 @@ impl Bus {
         &self.supervisor
     }
 
-    /// It has two links.
-    pub fn is_ring(&self) -> bool {
-        self.is_ring
-    }
-
     /// Reserves the bus for a handle.
     ///
     /// # Errors
     /// [`Code::BUSY`]: another handle has it.
     pub fn reserve(&self) -> Outcome {
-        if self.is_reserved.swap(true, Ordering::AcqRel) { Err(Code::BUSY) } else { Ok(()) }
+        if self.is_reserved.swap(true, Ordering::AcqRel) {
+            report(format_args!("Failed to reserve master: it is in use"));
+            return Err(Code::BUSY);
+        }
+        Ok(())
     }
 
     /// Ends the reservation.
@@ -171,34 +209,27 @@ impl Bus {
         self.supervisor.with(|engine| engine.subdevices()).map_err(|_| Code::GONE)
     }
 
-    /// Asks all SubDevices for their states. A lost frame counts as no answer.
-    ///
-    /// # Errors
-    /// [`Code::GONE`].
-    pub fn look(&self) -> Outcome<Seen> {
-        look(&self.supervisor).ok_or(Code::GONE)
+    /// Where questions are answered.
+    pub fn door(&self) -> Arc<Door> {
+        self.door.clone()
     }
 
-    /// Waits until the scan has ended and all SubDevices are in PREOP.
-    pub fn wait_until_ready(&self) {
+    /// Waits until the scan has ended. SubDevices that are not in PREOP yet are on their way; what needs their
+    /// mailboxes waits for that, and an activation leads them on from where they are.
+    pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {
-            let asked = self.supervisor.with(|engine| (engine.snapshot().activity, engine.subdevices().len()));
-            let (Ok((activity, found)), Ok(seen)) = (asked, self.look()) else { return };
-            let (responding, states) = (seen.responding(), seen.al_states);
-            let is_scanned = activity == Activity::Scanned && found == usize::from(responding);
-            if is_scanned && found > 0 && states == PREOP {
+            let Ok(seen) = self.door.look() else { return };
+            let (responding, found) = (seen.responding(), seen.found);
+            if seen.is_scanned && found == u32::from(responding) && found > 0 {
                 return;
             }
             let elapsed = begin.elapsed();
-            if responding == 0 && found == 0 && activity != Activity::Scanning && elapsed >= SILENCE {
+            if responding == 0 && found == 0 && !seen.scans && elapsed >= SILENCE {
                 return;
             }
             if elapsed >= READY_LIMIT {
-                report(format_args!(
-                    "master {}: expected {responding} SubDevices in PREOP, found {found}, AL states {states:#04x}",
-                    self.master
-                ));
+                report(format_args!("master {}: expected {responding} SubDevices, found {found}", self.master));
                 return;
             }
             std::thread::sleep(PAUSE);

@@ -6,7 +6,7 @@
 //! takes `RINGCAT_SIM_1`, `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes before
 //! `RINGCAT_MAIN`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ringcat::daemon::DEFAULT_SOCKET;
 
@@ -19,6 +19,12 @@ pub fn socket(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<
         (None, Some(_)) => None,
         (None, None) => Some(DEFAULT_SOCKET.into()),
     }
+}
+
+/// The name with which a daemon names this process to others.
+pub fn program_name() -> String {
+    let program = std::env::args_os().next().unwrap_or_default();
+    Path::new(&program).file_name().unwrap_or(program.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Links of a master.

@@ -90,6 +90,28 @@ pub fn memory_hint() -> String {
     format!("; where memory is locked (mlockall), expected a limit of 16384 KiB at least, got {kib} (ulimit -l)")
 }
 
+/// Memory of the library with its threads and a simulated segment, in bytes.
+const ROOM: usize = 5 << 20;
+
+/// Checks that there is memory for the library where a program locks what it will have (`MCL_FUTURE`): otherwise the
+/// first allocation that fails would end the program.
+///
+/// # Errors
+/// There is not; the text names the limit to set.
+pub fn check_memory() -> Result<(), String> {
+    let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_NORESERVE;
+    // SAFETY: a new mapping that nothing can access, and that nothing but the next call knows. With locked memory the
+    // kernel counts it against the limit.
+    unsafe {
+        let place = libc::mmap(std::ptr::null_mut(), ROOM, libc::PROT_NONE, flags, -1, 0);
+        if place == libc::MAP_FAILED {
+            return Err(format!("there is not enough memory for the library{}", memory_hint()));
+        }
+        libc::munmap(place, ROOM);
+    }
+    Ok(())
+}
+
 /// A variable of the environment. In a process with more rights than its user (set-uid) none is given.
 pub fn variable(name: &str) -> Option<String> {
     // SAFETY: reads a word of the process; no pointer is involved.

@@ -6,7 +6,9 @@
 //! |---|---|
 //! | return codes, structures of C | `code`, `types` |
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
+//! | questions, answered here or through a daemon | `door` |
 //! | lines for the operator about a bus | `messages` |
+//! | mutexes outside of the cyclic path | `locks` |
 //! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
 //! | a handle of a master: reservation, activation, cyclic calls | `master`, `claim`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
@@ -22,14 +24,15 @@ mod c;
 mod claim;
 mod code;
 mod domain_words;
+mod door;
 mod draft;
 mod environment;
 mod host;
 mod information;
+mod locks;
 mod mailbox;
 mod master;
 mod messages;
 mod request;
-mod seen;
 mod settings;
 mod types;

@@ -7,16 +7,21 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
+use ringcat::daemon::ClientError;
 use ringcat::{
-    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, LiveStatus, ReferenceClock,
+    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, LiveStatus, ReferenceClock,
     Services, SubDeviceId, SupervisorThread,
 };
 
 use crate::any_links::AnyLinks;
-use crate::bus::{Bus, locked};
+use crate::bus::Bus;
 use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
+use crate::door::{DaemonDoor, Door};
 use crate::draft::Draft;
+use crate::environment::socket;
+use crate::host::{check_memory, variable, watch_forks};
+use crate::locks::locked;
 use crate::types::SegmentState;
 
 /// Limit of the way to PREOP at the end of an application.
@@ -70,46 +75,75 @@ impl Active {
     }
 }
 
+/// What a handle has of its master.
+#[derive(Debug)]
+enum Access {
+    /// The bus: this process has opened the links, or a daemon has handed them over to this handle.
+    Bus(Arc<Bus>),
+    /// Questions to a daemon.
+    Daemon(Arc<Door>),
+    /// Nothing: it was released.
+    Released,
+}
+
+/// A way to ask the daemon that has this master. `None` if variables name links instead, or no variable names the
+/// daemon and none answers.
+///
+/// # Errors
+/// The daemon does not answer, or has no such master.
+fn ask_daemon(index: u32) -> Result<Option<DaemonDoor>, String> {
+    let Some(socket) = socket(index, variable) else { return Ok(None) };
+    match DaemonDoor::open(&socket, index) {
+        Ok(door) => Ok(Some(door)),
+        Err(ClientError::NoDaemon { .. }) if variable("RINGCAT_SOCKET").is_none() => Ok(None),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 /// A handle of a master.
 #[derive(Debug)]
 pub struct Master {
-    /// `None` after the release.
-    bus: Mutex<Option<Arc<Bus>>>,
+    access: Mutex<Access>,
     is_reserved: AtomicBool,
     is_active: AtomicBool,
     has_clock: AtomicBool,
+    /// The links of the active application are a ring.
+    is_ring: AtomicBool,
     draft: Mutex<Draft>,
     application: Claim<Option<Active>>,
-    live: RwLock<LiveStatus>,
+    /// Of the bus, while this handle has one.
+    live: RwLock<Option<LiveStatus>>,
     /// The last time of the application; 0 before.
     application_time: AtomicU64,
     /// When it was given, before activation.
     given_at: Mutex<Option<std::time::Instant>>,
-    is_ring: bool,
     /// Memory of images that no application uses.
     memory: Mutex<Vec<&'static mut [u8]>>,
 }
 
 impl Master {
-    /// Opens a master.
+    /// Opens a master: a way to ask the daemon that has it, or the links that variables name.
     ///
     /// # Errors
     /// What is wrong, for the operator.
     pub fn open(index: u32) -> Result<Master, String> {
-        let bus = Bus::open(index)?;
-        let live = bus.supervisor().live_status().map_err(|error| error.to_string())?;
-        let is_ring = bus.is_ring();
+        watch_forks();
+        check_memory()?;
+        let access = match ask_daemon(index)? {
+            Some(door) => Access::Daemon(Arc::new(Door::Daemon(door))),
+            None => Access::Bus(Bus::open(index)?),
+        };
         Ok(Master {
-            bus: Mutex::new(Some(bus)),
+            access: Mutex::new(access),
             is_reserved: AtomicBool::new(false),
             is_active: AtomicBool::new(false),
             has_clock: AtomicBool::new(false),
+            is_ring: AtomicBool::new(false),
             draft: Mutex::default(),
             application: Claim::new(None),
-            live: RwLock::new(live),
+            live: RwLock::default(),
             application_time: AtomicU64::new(0),
             given_at: Mutex::default(),
-            is_ring,
             memory: Mutex::default(),
         })
     }
@@ -117,22 +151,53 @@ impl Master {
     /// Its bus.
     ///
     /// # Errors
-    /// It was released.
+    /// It was released, or a daemon has the bus because this handle has not reserved it.
     pub fn bus(&self) -> Outcome<Arc<Bus>> {
-        locked(&self.bus).clone().ok_or(Code::INVALID)
+        match &*locked(&self.access) {
+            Access::Bus(bus) => Ok(bus.clone()),
+            Access::Daemon(_) => Err(Code::NOT_RESERVED),
+            Access::Released => Err(Code::INVALID),
+        }
     }
 
-    /// Reserves the bus; returns when it is scanned and all SubDevices are in PREOP.
+    /// Where questions are answered.
     ///
     /// # Errors
-    /// Another handle has it, or this one has it already.
+    /// It was released.
+    pub fn door(&self) -> Outcome<Arc<Door>> {
+        match &*locked(&self.access) {
+            Access::Bus(bus) => Ok(bus.door()),
+            Access::Daemon(door) => Ok(door.clone()),
+            Access::Released => Err(Code::INVALID),
+        }
+    }
+
+    /// Reserves the bus; returns when it is scanned.
+    ///
+    /// # Errors
+    /// Another handle or process has it, or this handle has it already.
     pub fn reserve(&self) -> Outcome {
-        let bus = self.bus()?;
+        let bus = self.take()?;
         bus.reserve()?;
-        bus.wait_until_ready();
+        bus.wait_until_scanned();
         locked(&self.draft).set_found(bus.found()?);
         self.is_reserved.store(true, Ordering::Release);
         Ok(())
+    }
+
+    /// The bus, from a daemon if it does not have it.
+    fn take(&self) -> Outcome<Arc<Bus>> {
+        let mut access = locked(&self.access);
+        let taken = match &*access {
+            Access::Daemon(door) => match &**door {
+                Door::Daemon(door) => Bus::take(door)?,
+                Door::Here(_) => return Err(Code::INVALID),
+            },
+            Access::Bus(bus) => return Ok(bus.clone()),
+            Access::Released => return Err(Code::INVALID),
+        };
+        *access = Access::Bus(taken.clone());
+        Ok(taken)
     }
 
     /// Whether this handle has reserved the bus.
@@ -195,6 +260,11 @@ impl Master {
         self.refresh()?;
         let bus = self.bus()?;
         let draft = locked(&self.draft);
+        // Another thread may have activated it meanwhile; its application uses the memory of the domains.
+        if self.is_active() {
+            report(format_args!("the master is active already"));
+            return Ok(());
+        }
         let mut declaration = draft.declaration();
         for (number, words) in draft.domains().iter().enumerate() {
             let (domain, bytes) = (DomainId(number), words.bytes());
@@ -215,6 +285,7 @@ impl Master {
 
     fn begin(&self, bus: &Bus, declaration: Declaration, domains: usize) -> Outcome {
         let links = bus.take_links().ok_or(Code::BUSY)?;
+        self.is_ring.store(links.addresses().redundant.is_some(), Ordering::Relaxed);
         let supervisor = bus.supervisor().clone();
         if let Err(error) = supervisor.load(declaration) {
             bus.give_links_back(links);
@@ -260,7 +331,7 @@ impl Master {
 
     fn follow_live_status(&self, bus: &Bus) {
         if let (Ok(fresh), Ok(mut live)) = (bus.supervisor().live_status(), self.live.write()) {
-            *live = fresh;
+            *live = Some(fresh);
         }
     }
 
@@ -300,8 +371,10 @@ impl Master {
         if self.is_active() {
             let _ = self.deactivate();
         }
-        let bus = locked(&self.bus).take();
-        if let Some(bus) = bus.filter(|_| self.is_reserved.swap(false, Ordering::AcqRel)) {
+        let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
+        if self.is_reserved.swap(false, Ordering::AcqRel)
+            && let Access::Bus(bus) = access
+        {
             bus.unreserve();
         }
     }
@@ -323,9 +396,12 @@ impl Master {
     /// before, it asks the SubDevices.
     ///
     /// # Errors
-    /// The handle was released; another thread activates or deactivates it.
+    /// The handle was released; another thread activates or deactivates it; the bus has one link only.
     pub fn segment(&self, link: Option<Link>) -> Outcome<SegmentState> {
         if self.is_active() {
+            if link == Some(Link::Redundant) && !self.is_ring() {
+                return Err(Code::INVALID);
+            }
             return self.live(|live| match link {
                 None => {
                     let all = live.segment();
@@ -337,7 +413,10 @@ impl Master {
                 }
             });
         }
-        let seen = self.bus()?.look()?;
+        let seen = self.door()?.look()?;
+        if link == Some(Link::Redundant) && !seen.is_ring {
+            return Err(Code::INVALID);
+        }
         Ok(match link {
             None => SegmentState::new(seen.responding(), seen.al_states, seen.is_up.contains(&true)),
             Some(link) => {
@@ -352,7 +431,8 @@ impl Master {
     /// # Errors
     /// Another thread activates or deactivates it.
     pub fn live<R>(&self, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
-        self.live.try_read().map(|live| read(&live)).map_err(|_| Code::BUSY)
+        let live = self.live.try_read().map_err(|_| Code::BUSY)?;
+        live.as_ref().map(read).ok_or(Code::BUSY)
     }
 
     /// Whether a clock takes part in the application.
@@ -398,8 +478,9 @@ impl Master {
         chosen.map_err(|_| Code::GONE)?.map(|_| ()).ok_or(Code::NO_CLOCK)
     }
 
-    /// Whether the bus has two links.
+    /// Whether the links of the active application are a ring.
+    #[inline(always)]
     pub fn is_ring(&self) -> bool {
-        self.is_ring
+        self.is_ring.load(Ordering::Relaxed)
     }
 }

@@ -9,11 +9,11 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ringcat::daemon::serving;
 use ringcat::{Event, Instant, Link, Services, SupervisorThread, TimedEvent};
 
 use crate::code::report;
 use crate::host::be_an_ordinary_thread;
-use crate::seen;
 
 /// Interval of looks.
 const LOOK: Duration = Duration::from_millis(100);
@@ -179,7 +179,7 @@ impl Messenger {
                 let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
                 looks += 1;
                 look(&supervisor, &mut lines, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
-                if let Some(now) = is_last.then(|| seen::look(&supervisor)).flatten() {
+                if let Some(now) = is_last.then(|| serving::look(&supervisor).ok()).flatten() {
                     // After a release the live status may be older than the states.
                     let (is_up, responding) = (now.is_up.contains(&true), now.responding());
                     lines.look(Sample { is_up, responding, al_states: now.al_states });

@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
 
 use crate::error::LinkError;
-use crate::kernel;
+use crate::kernel::{self, Polled};
 use crate::monotonic::{now_ns, timespec};
 use crate::wake_up::WakeUp;
 
@@ -134,7 +134,7 @@ pub fn wait_pipes(pipes: &[&FramePipe], wake_up: Option<&WakeUp>, until_ns: u64)
         }
         polled[MAX_PIPES].fd = wake_up.map_or(-1, WakeUp::fd);
         let now = now_ns();
-        if !kernel::poll(&mut polled, timespec(until_ns.saturating_sub(now))) {
+        if kernel::poll(&mut polled, timespec(until_ns.saturating_sub(now))) != Polled::Ready {
             if now_ns() >= until_ns {
                 return false;
             }

@@ -7,6 +7,9 @@ use std::io;
 use std::mem::{size_of, zeroed};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
 
+#[cfg(target_pointer_width = "64")]
+use crate::system_call::system_call;
+
 pub const PACKET_ADD_MEMBERSHIP: libc::c_int = 1;
 pub const PACKET_RX_RING: libc::c_int = 5;
 pub const PACKET_STATISTICS: libc::c_int = 6;
@@ -16,6 +19,8 @@ pub const TPACKET_V2: libc::c_int = 1;
 pub const PACKET_MR_MULTICAST: libc::c_ushort = 0;
 pub const PACKET_MR_PROMISC: libc::c_ushort = 1;
 pub const PACKET_OUTGOING: u8 = 4;
+/// `asm-generic/socket.h`; Linux 6.5.
+pub const SO_PEERPIDFD: libc::c_int = 77;
 pub const TP_STATUS_KERNEL: u32 = 0;
 pub const TP_STATUS_USER: u32 = 1;
 pub const TP_STATUS_VLAN_VALID: u32 = 1 << 4;
@@ -183,52 +188,72 @@ pub fn index_of(name: &str) -> Option<u32> {
     (index != 0).then_some(index)
 }
 
-// In the C library, each of the three calls of a cycle is a cancellation point, which costs 30 instructions per call in
-// a program with threads. The plain system call does not have this cost. On 32-bit targets the `timespec` of the kernel
-// and of the library may differ, so these use the library.
+// The three calls of a cycle do not use the C library ([`crate::system_call`]). On 32-bit targets the `timespec` of the
+// kernel and of the library may differ, so these use the library.
 
 /// Sends a frame.
 #[inline(always)]
 pub fn send(fd: RawFd, frame: &[u8]) -> Result<(), i32> {
     let (start, length, flags) = (frame.as_ptr(), frame.len(), libc::MSG_DONTWAIT);
     #[cfg(target_pointer_width = "64")]
-    // SAFETY: pointer and length describe the live frame, which the kernel only reads; no address is passed.
-    let sent = unsafe { libc::syscall(libc::SYS_sendto, fd, start, length, flags, std::ptr::null::<u8>(), 0usize) };
+    {
+        let arguments = [fd as usize, start as usize, length, flags as usize, 0, 0];
+        // SAFETY: pointer and length describe the live frame, which the kernel only reads; no address is passed.
+        let sent = unsafe { system_call(libc::SYS_sendto, arguments) };
+        if sent < 0 { Err(-sent as i32) } else { Ok(()) }
+    }
     #[cfg(not(target_pointer_width = "64"))]
-    // SAFETY: pointer and length describe the live frame, which the kernel only reads.
-    let sent = unsafe { libc::send(fd, start.cast(), length, flags) };
-    if sent < 0 { Err(errno()) } else { Ok(()) }
+    {
+        // SAFETY: pointer and length describe the live frame, which the kernel only reads.
+        let sent = unsafe { libc::send(fd, start.cast(), length, flags) };
+        if sent < 0 { Err(errno()) } else { Ok(()) }
+    }
 }
 
-/// Waits until one of the descriptors is ready, at most for `timeout`; true if `polled` has results.
+/// Why a wait has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Polled {
+    /// `polled` has results.
+    Ready,
+    /// The time has passed.
+    TimedOut,
+    /// A signal, or an error.
+    Interrupted,
+}
+
+/// Waits until one of the descriptors is ready, at most for `timeout`.
 #[inline(always)]
-pub fn poll(polled: &mut [libc::pollfd], mut timeout: libc::timespec) -> bool {
-    let (places, count, mask) = (polled.as_mut_ptr(), polled.len(), std::ptr::null::<libc::sigset_t>());
+pub fn poll(polled: &mut [libc::pollfd], mut timeout: libc::timespec) -> Polled {
+    let (places, count) = (polled.as_mut_ptr(), polled.len());
     let timeout = std::ptr::from_mut(&mut timeout);
     #[cfg(target_pointer_width = "64")]
     // SAFETY: the pointer refers to `count` live entries; the kernel may write the remaining time to the live timeout;
     // the signal mask is not changed.
-    let ready = unsafe { libc::syscall(libc::SYS_ppoll, places, count, timeout, mask, 8usize) };
+    let ready = unsafe { system_call(libc::SYS_ppoll, [places as usize, count, timeout as usize, 0, 8, 0]) };
     #[cfg(not(target_pointer_width = "64"))]
     // SAFETY: as above.
-    let ready = unsafe { libc::ppoll(places, count as libc::nfds_t, timeout, mask) };
-    ready > 0
+    let ready = unsafe { libc::ppoll(places, count as libc::nfds_t, timeout, std::ptr::null()) };
+    match ready {
+        1.. => Polled::Ready,
+        0 => Polled::TimedOut,
+        _ => Polled::Interrupted,
+    }
 }
 
 /// Sleeps until a time of the monotonic clock.
 #[inline(always)]
 pub fn sleep_until(until: &libc::timespec) -> Result<(), i32> {
     let (clock, absolute) = (libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME);
-    let (until, rest) = (std::ptr::from_ref(until), std::ptr::null_mut::<libc::timespec>());
+    let until = std::ptr::from_ref(until);
     #[cfg(target_pointer_width = "64")]
     // SAFETY: the request is a live timespec; a null remainder is allowed and unused with an absolute time.
-    let error = match unsafe { libc::syscall(libc::SYS_clock_nanosleep, clock, absolute, until, rest) } {
-        0 => 0,
-        _ => errno(),
+    let error = unsafe {
+        let arguments = [clock as usize, absolute as usize, until as usize, 0, 0, 0];
+        -system_call(libc::SYS_clock_nanosleep, arguments) as i32
     };
     #[cfg(not(target_pointer_width = "64"))]
     // SAFETY: as above.
-    let error = unsafe { libc::clock_nanosleep(clock, absolute, until, rest) };
+    let error = unsafe { libc::clock_nanosleep(clock, absolute, until, std::ptr::null_mut()) };
     if error == 0 { Ok(()) } else { Err(error) }
 }
 

@@ -20,6 +20,7 @@
 //! allowed in this crate; each block states why it is sound.
 #![deny(unsafe_op_in_unsafe_fn)]
 
+pub mod capabilities;
 pub mod carrier;
 pub mod descriptors;
 mod error;
@@ -39,6 +40,8 @@ pub mod recorder;
 mod rx_ring;
 pub mod signals;
 pub mod sniffer;
+#[cfg(target_pointer_width = "64")]
+mod system_call;
 pub mod tap;
 pub mod waiting;
 pub mod wake_up;

@@ -5,18 +5,19 @@
 //! ([`ClassFilter`]). The socket receives only EtherType 0x88A4 and no frames sent by this host.
 
 pub mod handed;
+pub mod prepared;
 
 use std::cell::Cell;
 use std::mem::{size_of, zeroed};
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
 
 use crate::error::LinkError;
-use crate::filter::{self, ClassFilter};
+use crate::filter::ClassFilter;
 use crate::interface;
 use crate::kernel::{self, Membership, Statistics};
 use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
-use crate::rx_ring::{self, RxRing, Seen, Taken};
+use crate::rx_ring::{RxRing, Seen, Taken};
 
 /// The group address to which EtherCAT frames may be sent instead of broadcast.
 pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];
@@ -140,55 +141,6 @@ pub struct PacketSocket {
 }
 
 impl PacketSocket {
-    /// Opens a socket on an interface, which may be down and come up later.
-    pub fn open(interface: &str, options: &PacketOptions) -> Result<PacketSocket, LinkError> {
-        PacketSocket::open_with(interface, options, Passing { outgoing: false, all: false })
-    }
-
-    pub(crate) fn open_with(
-        interface: &str,
-        options: &PacketOptions,
-        passing: Passing,
-    ) -> Result<PacketSocket, LinkError> {
-        let (index, mac) = ethernet(interface)?;
-        let failed = |what| move |errno| LinkError::from_errno(interface, what, errno);
-        // Protocol 0 receives nothing until the filter and the interface are set.
-        let fd = kernel::socket(libc::AF_PACKET, libc::SOCK_RAW, 0).map_err(failed("opening a packet socket"))?;
-        let raw = fd.as_raw_fd();
-        let set = |option, value: libc::c_int| kernel::set_option(raw, libc::SOL_PACKET, option, &value);
-        set(kernel::PACKET_VERSION, kernel::TPACKET_V2).map_err(failed("choosing the ring's version"))?;
-        // Before Linux 4.20 the ring code discards outgoing frames, at a higher cost.
-        let _ = set(kernel::PACKET_IGNORE_OUTGOING, libc::c_int::from(!passing.outgoing));
-        if !passing.all {
-            attach(raw, &mut filter::program(options.filter)).map_err(failed("attaching the filter"))?;
-        }
-        let layout = rx_ring::layout(options.ring_frames);
-        kernel::set_option(raw, libc::SOL_PACKET, kernel::PACKET_RX_RING, &layout)
-            .map_err(failed("making the receive ring"))?;
-        let ring = RxRing::map(raw, &layout).map_err(failed("mapping the receive ring"))?;
-        let protocol = if options.keep_vlan_tags || passing.outgoing || passing.all {
-            libc::ETH_P_ALL as u16
-        } else {
-            filter::ETHERCAT
-        };
-        bind(raw, index, protocol).map_err(failed("binding to the interface"))?;
-        join(raw, index, options.promiscuous).map_err(failed("joining the EtherCAT group"))?;
-        // An interface that is down leaves a pending error, which the first send would return.
-        kernel::clear_error(&fd);
-        let (interface, mode) = (interface.to_owned(), options.receive);
-        Ok(PacketSocket {
-            ring,
-            fd,
-            interface,
-            mac,
-            mode,
-            counters: LinkCounters::default(),
-            overrun: Cell::new(0),
-            unix_offset_ns: monotonic::unix_offset_ns(),
-            is_searching: false,
-        })
-    }
-
     /// Address of the interface.
     pub fn mac(&self) -> [u8; 6] {
         self.mac

@@ -72,6 +72,49 @@ pub fn watch(pid: u32) -> io::Result<OwnedFd> {
     Ok(unsafe { OwnedFd::from_raw_fd(fd as i32) })
 }
 
+/// A descriptor that becomes readable when the process at the other end of a connection ends: the process that has
+/// connected, also if its number belongs to another one meanwhile. `None` where the kernel has none for it: the process
+/// is in another name space, or the kernel is older than 5.3.
+///
+/// # Errors
+/// The process has ended (`ESRCH`), or this process has no more descriptors.
+pub fn watch_peer(stream: &UnixStream, peer: &Peer) -> io::Result<Option<OwnedFd>> {
+    let mut fd: libc::c_int = -1;
+    let mut length = size_of::<libc::c_int>() as libc::socklen_t;
+    let pointer = std::ptr::from_mut(&mut fd).cast();
+    // SAFETY: pointer and length describe a live integer.
+    let told =
+        unsafe { libc::getsockopt(stream.as_raw_fd(), libc::SOL_SOCKET, kernel::SO_PEERPIDFD, pointer, &mut length) };
+    if told == 0 && fd >= 0 {
+        // SAFETY: the descriptor was just made and has no other owner.
+        return Ok(Some(unsafe { OwnedFd::from_raw_fd(fd) }));
+    }
+    let error = io::Error::last_os_error();
+    match error.raw_os_error() {
+        Some(libc::ESRCH | libc::EMFILE | libc::ENFILE) => Err(error),
+        // Before Linux 6.5.
+        _ if peer.pid == 0 => Ok(None),
+        _ => match watch(peer.pid) {
+            Err(error) if error.raw_os_error() == Some(libc::ENOSYS) => Ok(None),
+            watched => watched.map(Some),
+        },
+    }
+}
+
+/// Raises the limit of descriptors of this process as far as it may, at most to this number. Returns the limit.
+pub fn raise_descriptors(wanted: u64) -> u64 {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: the pointer is to a live value.
+    if unsafe { libc::getrlimit(libc::RLIMIT_NOFILE, &mut limit) } < 0 {
+        return 0;
+    }
+    let before = limit.rlim_cur;
+    limit.rlim_cur = before.max(wanted.min(limit.rlim_max));
+    // SAFETY: the pointer is to a live value.
+    let raised = unsafe { libc::setrlimit(libc::RLIMIT_NOFILE, &limit) } == 0;
+    if raised { limit.rlim_cur } else { before }
+}
+
 /// Waits until one of the descriptors is readable or closed at its other end, at most for this time. Which are, by bits
 /// in their order.
 ///
@@ -119,5 +162,44 @@ mod tests {
         assert_eq!(wait_readable(&both[1..], Duration::from_secs(10)), 1);
         child.wait().expect("it has ended");
         assert!(watch(child.id()).is_err());
+    }
+
+    // covers: links
+    #[test]
+    fn the_end_of_the_process_that_has_connected_is_seen() {
+        let (near, _far) = UnixStream::pair().expect("a pair");
+        let peer = Peer::of(&near).expect("it is a Unix socket");
+        let end = watch_peer(&near, &peer).expect("it lives").expect("the kernel has it");
+        assert_eq!(wait_readable(&[end.as_fd()], Duration::from_millis(1)), 0);
+        let path = std::env::temp_dir().join(format!("ringcat-link-peer-{}", std::process::id()));
+        let listener = std::os::unix::net::UnixListener::bind(&path).expect("it is free");
+        // The shell's child keeps the connection after the shell has ended.
+        let script = format!(
+            "import os, socket, time; s = socket.socket(socket.AF_UNIX); s.connect({path:?}); \
+                              os.fork() or time.sleep(2)"
+        );
+        let Ok(mut child) = Command::new("python3").args(["-c", &script]).spawn() else {
+            println!("skipped: python3 is not there");
+            return;
+        };
+        let (near, _) = listener.accept().expect("it connects");
+        let peer = Peer::of(&near).expect("it is a Unix socket");
+        assert_eq!(peer.pid, child.id());
+        child.wait().expect("it ends");
+        std::fs::remove_file(path).expect("it is there");
+        match watch_peer(&near, &peer) {
+            // Since Linux 6.16 there is a descriptor for it, too, and it is readable.
+            Ok(end) => assert_eq!(wait_readable(&[end.expect("pid").as_fd()], Duration::from_secs(1)), 1),
+            Err(error) => assert_eq!(error.raw_os_error(), Some(libc::ESRCH)),
+        }
+        assert_eq!(wait_readable(&[near.as_fd()], Duration::from_millis(1)), 0, "the connection is open");
+    }
+
+    // covers: links
+    #[test]
+    fn the_limit_of_descriptors_only_rises() {
+        let now = raise_descriptors(0);
+        assert!(now > 0);
+        assert!(raise_descriptors(now + 1) >= now);
     }
 }

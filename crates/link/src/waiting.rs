@@ -7,7 +7,7 @@
 use std::hint::spin_loop;
 use std::time::Duration;
 
-use crate::kernel;
+use crate::kernel::{self, Polled};
 use crate::monotonic::{now_ns, timespec};
 use crate::packet_socket::PacketSocket;
 use crate::receive_mode::ReceiveMode;
@@ -165,7 +165,12 @@ fn sleep_until(
         if now >= until_ns {
             return false;
         }
-        if kernel::poll(polled, timespec(until_ns - now)) {
+        let woken = kernel::poll(polled, timespec(until_ns - now));
+        if woken == Polled::TimedOut {
+            // The kernel never waits for less, so the clock need not be read again.
+            return any(sockets);
+        }
+        if woken == Polled::Ready {
             let ended = ends(polled);
             if any(sockets) {
                 return true;

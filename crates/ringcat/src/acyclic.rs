@@ -32,6 +32,9 @@ pub trait AcyclicHalf {
     /// wait for a time. Cheap, for each pass of a wait on shared links.
     fn due_at(&mut self, links: &impl Links) -> Instant;
 
+    /// As [`AcyclicHalf::due_at`], with the carriers that were read last.
+    fn known_due_at(&self) -> Instant;
+
     /// The present state of each declared SubDevice. Not for the cyclic path.
     fn states(&self) -> Vec<SubDeviceState>;
 
@@ -97,6 +100,11 @@ impl AcyclicHalf for Inline {
 
     fn due_at(&mut self, links: &impl Links) -> Instant {
         self.engine.set_carriers(Link::ALL.map(|link| links.carrier(link)));
+        self.engine.due_at()
+    }
+
+    #[inline(always)]
+    fn known_due_at(&self) -> Instant {
         self.engine.due_at()
     }
 

@@ -123,7 +123,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         let until = cyclic.begins_at();
         let sends_again = cyclic.exchange.sends_again();
         let wake = if sends_again { until.min(cyclic.exchange.decide_at()) } else { until };
-        let wake = if H::SHARES_LINKS { wake.min(acyclic.due_at(links)) } else { wake };
+        let wake = if H::SHARES_LINKS { wake.min(acyclic.known_due_at()) } else { wake };
         if now >= wake {
             return None;
         }
@@ -308,11 +308,11 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.begun_at()
     }
 
-    /// Runs the last cycles before a stop, with all outputs zero if `outputs` requests it. Afterwards only the acyclic
-    /// half uses the wire.
-    pub(crate) fn last_cycles(&mut self, outputs: LastOutputs) {
+    /// Runs the last cycles before a stop, if they are allowed, with all outputs zero if `outputs` requests it.
+    /// Afterwards only the acyclic half uses the wire.
+    pub(crate) fn end_cycles(&mut self, outputs: LastOutputs, are_allowed: bool) {
         self.cyclic.set_trigger(Trigger::Time);
-        for _ in 0..LAST_CYCLES {
+        for _ in 0..if are_allowed { LAST_CYCLES } else { 0 } {
             self.cycle(|data| {
                 if outputs == LastOutputs::Zero {
                     data.zero_outputs();

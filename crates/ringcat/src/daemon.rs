@@ -6,32 +6,36 @@
 //! crash, or SIGKILL give it back.
 //!
 //! ```no_run
-//! use std::path::Path;
 //! use std::time::Duration;
 //!
-//! use ringcat::daemon::{DEFAULT_SOCKET, OwnedBus};
+//! use ringcat::daemon::OwnedBus;
 //! use ringcat::{Options, automatic};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut bus = OwnedBus::take(Path::new(DEFAULT_SOCKET), 0, "example", &Options::default(), || ())?;
-//! let found = bus.supervisor().with(|engine| engine.subdevices())?;
-//! let links = bus.take_links().ok_or("the links are in use")?;
-//! let declaration = automatic(&found, Duration::from_millis(1));
-//! let mut application = bus.supervisor().clone().activate(declaration, links)?;
+//! let mut bus = OwnedBus::request(0, &Options::default())?;
+//! let found = bus.scan()?.subdevices;
+//! let mut application = bus.activate(automatic(&found, Duration::from_millis(1)))?;
 //! application.wait_until_op(Duration::from_secs(10))?;
 //! # Ok(())
 //! # }
 //! ```
 
+mod application;
 mod error;
 mod links;
 mod owned;
 mod questions;
+mod refusing;
 pub mod serving;
+mod tool;
 
+pub use application::socket;
 pub use error::DaemonError;
-pub use links::DaemonLinks;
+pub use links::{DaemonLinks, adopt_links};
 pub use owned::OwnedBus;
 pub use ringcat_control::DEFAULT_SOCKET;
 pub use ringcat_control::client::{Client, ClientError};
-pub use ringcat_control::message::{Answer, Ask, MasterState, Right};
+pub use ringcat_control::message::SegmentLook;
+pub use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, MasterState, Right};
+pub use ringcat_control::refusal::{Refusal, ServiceFault};
+pub use ringcat_control::tool as known;

@@ -9,6 +9,7 @@
 //!
 //! An interface that cannot be created is reported once; all other interfaces work.
 
+use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -206,6 +207,13 @@ impl Drop for Ethernet {
 }
 
 impl SupervisorThread {
+    /// The network interfaces of EoE; none if they were not started, or are removed.
+    pub fn ethernet_interfaces(&self) -> Vec<EthernetInterface> {
+        let shared = self.published_ethernet().and_then(|shared| shared.downcast::<Shared>().ok());
+        let present = shared.filter(|shared| !shared.ended.load(Ordering::Relaxed));
+        present.map(|shared| shared.published().interfaces.clone()).unwrap_or_default()
+    }
+
     /// Creates a network interface for each SubDevice that supports EoE as soon as the SubDevice is known: from
     /// activation on, or with [`Options::idle_operation`](crate::Options) from the scan on.
     ///
@@ -223,6 +231,7 @@ impl SupervisorThread {
             Ok(Box::new(tap) as Box<dyn HostInterface>)
         };
         let (ethernet, mut switch) = Switch::new(options, Box::new(make), self.waker());
+        self.publish_ethernet(&(ethernet.0.clone() as Arc<dyn Any + Send + Sync>));
         if is_called {
             self.attend(move |engine, now| switch.work(engine, now))?;
         } else {
@@ -237,6 +246,7 @@ impl SupervisorThread {
     /// The thread has ended.
     pub fn start_ethernet_on(&self, options: EthernetOptions, make: MakeInterface) -> Result<Ethernet, Error> {
         let (ethernet, mut switch) = Switch::new(options, make, self.waker());
+        self.publish_ethernet(&(ethernet.0.clone() as Arc<dyn Any + Send + Sync>));
         self.attend_often(move |engine, now| switch.work(engine, now))?;
         Ok(ethernet)
     }

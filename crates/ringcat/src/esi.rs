@@ -4,11 +4,13 @@
 #[cfg(feature = "sim")]
 mod device;
 mod file;
+mod folder;
 #[cfg(feature = "sim")]
 mod objects;
 #[cfg(feature = "sim")]
 mod segment;
 
 pub use file::{EsiFailure, load};
+pub use folder::{EsiFolder, MAX_FILES};
 #[cfg(feature = "sim")]
 pub use segment::{EsiDevices, load_segment};

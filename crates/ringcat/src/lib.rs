@@ -51,6 +51,7 @@
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
 //! | `daemon` | applications get their bus from the daemon `ringcatd` |
 //! | `serde` | the types of `Snapshot` in any format of serde |
+//! | `standby` | an INACTIVE MainDevice of a ring of two, which forwards ([`standby::StoreAndForward`]) |
 //! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
@@ -59,9 +60,11 @@ pub mod acyclic;
 pub mod application;
 mod bring_up;
 mod cyclic;
+pub mod cyclic_status;
 pub mod cyclic_thread;
 #[cfg(feature = "daemon")]
 pub mod daemon;
+mod either_links;
 #[cfg(feature = "eni")]
 pub mod eni;
 #[cfg(feature = "eoe")]
@@ -73,7 +76,6 @@ pub mod event_log;
 #[cfg(feature = "gateway")]
 pub mod gateway;
 // The pages of docs/guide, for rustdoc and its tests.
-pub mod cyclic_status;
 #[cfg(any(doc, doctest))]
 pub mod guide;
 pub mod histogram;
@@ -106,6 +108,8 @@ pub mod shared_segment;
 pub mod simulated;
 #[cfg(any(feature = "packet", feature = "sim"))]
 mod simulated_addresses;
+#[cfg(feature = "standby")]
+pub mod standby;
 mod states;
 mod stop;
 mod subdevice;
@@ -123,6 +127,7 @@ mod words;
 pub use acyclic::{AcyclicHalf, Inline};
 pub use application::{Application, LastOutputs};
 pub use cyclic_thread::{CyclicThread, Panicked};
+pub use either_links::EitherLinks;
 pub use error::Error;
 pub use job::Job;
 pub use limits::TransferLimits;
@@ -184,10 +189,10 @@ pub use ringcat_engine::main_device::snapshot::{
     Snapshot, SubDeviceSnapshot,
 };
 pub use ringcat_engine::main_device::{
-    ActivateError, Address, ClockStatus, Declaration, DeclaredGroup, Directory, DomainConfig, DomainMember, EntryPlace,
-    ExplicitLrw, Function, GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus, LostCopies, MAX_DATAGRAMS,
-    MAX_UNDER_WAY, MainDevicePhase, Pending, Permission, RawDatagram, RegisterError, RegisteredArea, Required, Retries,
-    SegmentStatus, SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
+    ActivateError, Address, ClockStatus, Declaration, DeclaredGroup, DeclaredSubDevice, Directory, DomainConfig,
+    DomainMember, EntryPlace, ExplicitLrw, Function, GroupId, GroupState, HiddenDelay, ImageMemory, LiveStatus,
+    LostCopies, MAX_DATAGRAMS, MAX_UNDER_WAY, MainDevicePhase, Pending, Permission, RawDatagram, RegisterError,
+    RegisteredArea, Required, Retries, SegmentStatus, SentOnce, SubDeviceId, SubDeviceState, SubDeviceStatus, WkcShare,
 };
 pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::request::{
@@ -206,7 +211,7 @@ pub use ringcat_engine::{ConfigureError, RegisterCommandError, RegisterFailure, 
 pub use ringcat_engine::{DelayRange, Follower, phase_error};
 pub use ringcat_engine::{EepromAssignment, EepromOwner, EepromOwnership};
 pub use ringcat_engine::{FIRST_STATION, Scan, ScanError};
-pub use ringcat_engine::{Found, Identified, Rescan};
+pub use ringcat_engine::{Found, Identified, Move, Rescan};
 pub use ringcat_engine::{FrameLimit, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use ringcat_engine::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
 pub use ringcat_engine::{NotFollowed, NotFollowedReason, StateScope, StatesError};

@@ -2,6 +2,7 @@
 //!
 //! The acyclic half takes a sample each second; the cyclic half does nothing for it. Frames of both halves count.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -16,6 +17,8 @@ use crate::words::Words;
 
 /// Times over which rates are computed, in samples.
 const SPANS: [usize; 3] = [1, 10, 60];
+/// Interval of samples.
+const INTERVAL: Duration = Duration::from_secs(1);
 /// Samples that are kept: those of the longest time, and the one at its beginning.
 const KEPT: usize = 61;
 /// Words of a sample: time; frames and bytes on each link; copies lost and their bytes, by link.
@@ -49,6 +52,8 @@ pub struct LinkRate {
     pub bytes_per_s: f64,
     /// Copies lost per second.
     pub lost_per_s: f64,
+    /// Their bytes per second.
+    pub lost_bytes_per_s: f64,
     /// Copies lost, as a share of the frames sent: 0 to 1.
     pub lost_share: f64,
 }
@@ -117,6 +122,39 @@ impl LinkSamples {
     }
 }
 
+/// Samples of the acyclic half alone, while no application is active.
+#[derive(Debug, Default)]
+pub(crate) struct AcyclicSamples(VecDeque<(Instant, AcyclicCounters)>);
+
+impl AcyclicSamples {
+    /// Takes a sample if the last one is a second old.
+    pub fn take(&mut self, now: Instant, counters: AcyclicCounters) {
+        if self.0.back().is_some_and(|(last, _)| now.since(*last) < INTERVAL) {
+            return;
+        }
+        if self.0.len() == KEPT {
+            self.0.pop_front();
+        }
+        self.0.push_back((now, counters));
+    }
+
+    /// The figures of a link now.
+    pub fn of(&self, link: Link, counters: AcyclicCounters) -> LinkFigures {
+        let sample = |(at, counters): (Instant, AcyclicCounters)| Sample {
+            at: at.0,
+            frames: counters.sent,
+            bytes: counters.bytes,
+            lost: counters.copies_lost[link.index()],
+            lost_bytes: counters.bytes_lost[link.index()],
+        };
+        let newest = self.0.len().saturating_sub(1);
+        let at = |place: usize| self.0.get(place).copied().map(sample).unwrap_or_default();
+        let rates = SPANS.map(|span| rate(at(newest.saturating_sub(span)), at(newest)));
+        let Sample { frames, bytes, lost, lost_bytes, .. } = sample((Instant(0), counters));
+        LinkFigures { frames, bytes, lost, lost_bytes, rates }
+    }
+}
+
 fn rate(from: Sample, to: Sample) -> LinkRate {
     let over = Duration::from_nanos(to.at.saturating_sub(from.at));
     if over.is_zero() {
@@ -130,6 +168,7 @@ fn rate(from: Sample, to: Sample) -> LinkRate {
         frames_per_s: frames / seconds,
         bytes_per_s: difference(|it| it.bytes) / seconds,
         lost_per_s: lost / seconds,
+        lost_bytes_per_s: difference(|it| it.lost_bytes) / seconds,
         lost_share: if frames > 0.0 { (lost / frames).min(1.0) } else { 0.0 },
     }
 }

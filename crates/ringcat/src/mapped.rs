@@ -14,10 +14,11 @@ mod write;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::SubDeviceId;
 
-pub use bits::{DoesNotFit, ObjectOf, OutputBits};
+pub use bits::{DoesNotFit, OutputBits};
 pub(crate) use bits::{signed, unsigned};
 pub use error::{MapError, MappedObject, Wanted};
 pub use place::{Input, Mapped, Output};
+pub use ringcat_engine::main_device::ObjectOf;
 pub use write::WriteError;
 
 use crate::acyclic::AcyclicHalf;

@@ -24,8 +24,8 @@ use crate::words::Words;
 
 /// Pause of a thread that waits for a snapshot.
 const PAUSE: Duration = Duration::from_micros(100);
-/// Words before those of the domains: number and time of the cycle.
-const CYCLE_WORDS: usize = 2;
+/// Words before those of the domains: number and time of the cycle, the application's time, the reference clock's.
+const CYCLE_WORDS: usize = 4;
 /// Words of a domain before its image: its state in two, pending and known working counters, working counters by link.
 const DOMAIN_WORDS: usize = 4;
 const PENDING: u64 = 1;
@@ -70,6 +70,10 @@ pub struct ProcessDataSnapshot {
     pub cycle: u64,
     /// When it began; for an application that runs the parts of a cycle, when it processed the domain.
     pub taken_at: Instant,
+    /// Time of the application, in nanoseconds.
+    pub application_time: u64,
+    /// Time of the reference clock as it was read last, in nanoseconds; `None` if it was not.
+    pub reference_time: Option<u64>,
     /// Counters up to this cycle.
     pub counters: CyclicCounters,
     /// By [`DomainId`].
@@ -131,6 +135,7 @@ impl fmt::Display for NoSnapshot {
 impl std::error::Error for NoSnapshot {}
 
 impl Observer {
+    /// Sees what a cyclic half fills.
     pub(crate) fn new(observed: Arc<Observed>) -> Observer {
         Observer(observed)
     }
@@ -213,6 +218,8 @@ impl Observed {
             };
             put(cycle);
             put(now.0);
+            put(exchange.application_time(now));
+            put(exchange.reference_time().map_or(0, |read| read.time));
             exchange.counters().to_words().into_iter().for_each(&mut put);
             for (domain, rate) in (0..).map(DomainId).zip(rates) {
                 pack_status(&rate.status).into_iter().for_each(&mut put);
@@ -236,6 +243,7 @@ impl Observed {
         let mut words = words.iter().copied();
         let mut next = || words.next().unwrap_or_default();
         let (cycle, taken_at) = (next(), Instant(next()));
+        let (application_time, reference_time) = (next(), Some(next()).filter(|time| *time != 0));
         let counters = CyclicCounters::from_words(std::array::from_fn(|_| next()));
         let domain = |bytes: &usize| {
             let mut status = unpack_status([next(), next()]);
@@ -246,7 +254,7 @@ impl Observed {
             DomainSnapshot { status, wkc_by_link, image: words.take(*bytes).collect() }
         };
         let domains = self.images.iter().map(domain).collect();
-        ProcessDataSnapshot { cycle, taken_at, counters, domains }
+        ProcessDataSnapshot { cycle, taken_at, application_time, reference_time, counters, domains }
     }
 }
 

@@ -163,12 +163,12 @@ impl ProcessData<'_> {
 
     #[cold]
     fn not_an_output(&self, domain: DomainId, start: u64) -> WriteError {
-        WriteError::NotAnOutput { domain, start, object: self.directory.object_at(domain, start).map(ObjectOf::new) }
+        WriteError::NotAnOutput { domain, start, object: self.directory.object_at(domain, start) }
     }
 
     #[cold]
     fn object_at(&self, entry: &Entry) -> Option<ObjectOf> {
-        self.directory.object_at(entry.domain, entry.bit_offset.into()).map(ObjectOf::new)
+        self.directory.object_at(entry.domain, entry.bit_offset.into())
     }
 
     /// Value of an input, or the value of an output that the next frame sends.

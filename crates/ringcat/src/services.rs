@@ -25,6 +25,7 @@ use ringcat_engine::main_device::{
 };
 use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
 use ringcat_engine::{BusError, Reply};
+use ringcat_engine::{RingInspection, ScanError, inspect_ring};
 use ringcat_engine::{StateScope, StatesError};
 use ringcat_wire::al::AlState;
 
@@ -209,6 +210,15 @@ pub trait Services: Sized {
     /// error counters. Empty before a scan.
     fn port_report(self) -> Self::Outcome<Vec<SubDevicePorts>, ServiceError> {
         self.call(|engine| engine.start_port_report())
+    }
+
+    /// State of the ring and error counters of its cables, without changing anything, as
+    /// [`MainDevice::inspect_ring`](crate::MainDevice::inspect_ring).
+    fn inspect_ring(self) -> Self::Outcome<RingInspection, ScanError> {
+        self.call(|engine| {
+            let bus = engine.bus();
+            engine.start(inspect_ring(bus))
+        })
     }
 
     /// Repeats the failed configuration of a SubDevice now, or of all, without a further pause. The result is false if

@@ -2,6 +2,8 @@
 //!
 //! In virtual time waiting takes no real time. Paced, virtual time does not run ahead of the wall clock. A stall of the
 //! machine then stops host and segment alike, and no frame counts as lost.
+//!
+//! Where the network has links of a second MainDevice, that one is INACTIVE and forwards (feature `standby`).
 
 use std::time::{Duration, Instant as WallClock};
 
@@ -16,6 +18,10 @@ use ringcat_wire::frame::MacAddress;
 
 use crate::links::{Links, PerLink};
 use crate::simulated_addresses::{MAIN, REDUNDANT};
+#[cfg(feature = "standby")]
+use crate::simulated_addresses::{SECOND_MAIN, SECOND_REDUNDANT};
+#[cfg(feature = "standby")]
+use crate::standby::{ForwardingCounters, StoreAndForward};
 
 /// No sleep while virtual time is ahead of the wall clock by less than this.
 const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
@@ -28,13 +34,48 @@ pub struct SimulatedSegment {
     arrived: Option<(Link, Received)>,
     pace: Option<(WallClock, SimTime)>,
     stalled: Duration,
+    /// A second MainDevice, INACTIVE.
+    #[cfg(feature = "standby")]
+    second: Option<StoreAndForward>,
 }
 
 impl SimulatedSegment {
     /// Links into a network; two of them if a cable is connected to its redundant host interface.
     pub fn new(network: Network) -> SimulatedSegment {
         let ring = network.host_cable(HostLink::Redundant).is_some();
-        SimulatedSegment { network, ring, arrived: None, pace: None, stalled: Duration::ZERO }
+        SimulatedSegment {
+            network,
+            ring,
+            arrived: None,
+            pace: None,
+            stalled: Duration::ZERO,
+            #[cfg(feature = "standby")]
+            second: second_main_device(),
+        }
+    }
+
+    /// Frames that the second MainDevice has forwarded, in a network where it has links.
+    #[cfg(feature = "standby")]
+    pub fn forwarded(&self) -> ForwardingCounters {
+        self.second.as_ref().map(StoreAndForward::counters).unwrap_or_default()
+    }
+
+    /// The second MainDevice forwards what it has received.
+    #[cfg(feature = "standby")]
+    fn forward(&mut self) {
+        if let Some(second) = &mut self.second {
+            second.forward(&mut SecondLinks(&mut self.network));
+        }
+    }
+
+    /// The second MainDevice is off: what it receives is lost.
+    #[cfg(not(feature = "standby"))]
+    fn forward(&mut self) {
+        for link in HostLink::SECOND {
+            while let Some(received) = self.network.receive(link) {
+                self.network.give_back(received.bytes);
+            }
+        }
     }
 
     /// A segment from the text of a segment file; SII images are read from the working directory.
@@ -121,8 +162,9 @@ impl Links for SimulatedSegment {
 
     fn wait(&mut self, until: Instant) {
         let until = SimTime(until.0);
-        if !self.fetch() && self.network.now() < until {
+        while !self.fetch() && self.network.now() < until {
             self.network.advance_until_received(until);
+            self.forward();
         }
         self.keep_pace();
     }
@@ -131,4 +173,52 @@ impl Links for SimulatedSegment {
         self.network.disconnect(host_link(link), disconnect);
         true
     }
+}
+
+/// The second MainDevice, as INACTIVE.
+#[cfg(feature = "standby")]
+fn second_main_device() -> Option<StoreAndForward> {
+    StoreAndForward::new(PerLink::new(SECOND_MAIN, Some(SECOND_REDUNDANT))).ok()
+}
+
+/// The links of the second MainDevice.
+#[cfg(feature = "standby")]
+struct SecondLinks<'a>(&'a mut Network);
+
+#[cfg(feature = "standby")]
+const fn second_link(link: Link) -> HostLink {
+    match link {
+        Link::Main => HostLink::SecondMain,
+        Link::Redundant => HostLink::SecondRedundant,
+    }
+}
+
+#[cfg(feature = "standby")]
+impl Links for SecondLinks<'_> {
+    fn now(&self) -> Instant {
+        Instant(self.0.now().0)
+    }
+
+    fn addresses(&self) -> PerLink<MacAddress> {
+        PerLink::new(SECOND_MAIN, Some(SECOND_REDUNDANT))
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        self.0.send(second_link(link), frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        let mut arrived = Link::ALL.into_iter().filter_map(|link| Some((link, self.0.receive(second_link(link))?)));
+        let Some((link, received)) = arrived.next() else { return false };
+        take(link, &received.bytes);
+        self.0.give_back(received.bytes);
+        true
+    }
+
+    fn carrier(&self, link: Link) -> Option<bool> {
+        Some(self.0.carrier(second_link(link)))
+    }
+
+    /// Time is that of the first MainDevice.
+    fn wait(&mut self, _until: Instant) {}
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat_engine::main_device::{Function, Permission};
+use ringcat_engine::main_device::{Function, MainDevice as Engine, Permission};
 use ringcat_wire::al::AlState;
 
 use crate::acyclic::{AcyclicHalf, Inline};
@@ -11,6 +11,11 @@ use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::{MainDevice, Refused};
 use crate::supervisor_thread::SupervisorThread;
+
+/// Whether last cycles may be sent: in role INACTIVE the segment belongs to another MainDevice.
+fn is_allowed(engine: &Engine, function: Function) -> bool {
+    engine.permission(function) == Permission::Allowed
+}
 
 impl<L: Links, A: AcyclicHalf> Application<L, A> {
     /// The links, when another process goes on with the segment: the application ends without a further frame, and what
@@ -27,7 +32,7 @@ impl<L: Links> Application<L, Inline> {
     /// # Errors
     /// SubDevices do not reach the state in time, or the bus fails.
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
-        self.last_cycles(outputs);
+        self.end_cycles(outputs, is_allowed(&self.acyclic.engine, Function::Stop));
         self.acyclic.engine.start_stop(state, limit, self.links.now());
         let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
         main_device.finish_stop()?;
@@ -46,10 +51,7 @@ impl<L: Links> Application<L, Inline> {
         outputs: LastOutputs,
         limit: Duration,
     ) -> Result<MainDevice<L>, Box<Refused<MainDevice<L>>>> {
-        // In role INACTIVE the segment belongs to another MainDevice.
-        if self.acyclic.engine.permission(Function::Deactivate) == Permission::Allowed {
-            self.last_cycles(outputs);
-        }
+        self.end_cycles(outputs, is_allowed(&self.acyclic.engine, Function::Deactivate));
         let begun = self.acyclic.engine.start_deactivate(limit, self.links.now()).map_err(Error::from);
         let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
         match begun.and_then(|()| main_device.finish_stop()) {
@@ -71,7 +73,8 @@ impl<L: Links> Application<L, SupervisorThread> {
         state: AlState,
         limit: Duration,
     ) -> Result<(SupervisorThread, L), Error> {
-        self.last_cycles(outputs);
+        let is_allowed = self.acyclic.with(|engine| is_allowed(engine, Function::Stop))?;
+        self.end_cycles(outputs, is_allowed);
         self.acyclic.stop(state, limit)?;
         Ok((self.acyclic, self.links))
     }
@@ -82,8 +85,11 @@ impl<L: Links> Application<L, SupervisorThread> {
     /// # Errors
     /// SubDevices do not reach PREOP in time, or the bus fails. The error contains the handle and the links.
     pub fn deactivate(mut self, outputs: LastOutputs, limit: Duration) -> Deactivated<L> {
-        self.last_cycles(outputs);
-        let ended = self.acyclic.deactivate(limit);
+        // Without its thread there is nothing to go on with.
+        let ended = self.acyclic.with(|engine| is_allowed(engine, Function::Deactivate)).and_then(|is_allowed| {
+            self.end_cycles(outputs, is_allowed);
+            self.acyclic.deactivate(limit)
+        });
         let main_device = (self.acyclic, self.links);
         match ended {
             Ok(()) => Ok(main_device),

@@ -6,6 +6,7 @@
 //! only runs its cycles.
 
 mod handover;
+mod looking;
 mod worker;
 
 use std::future::Future;
@@ -300,8 +301,10 @@ impl SupervisorThread {
         let apply = || self.with(apply)?.map_err(Error::from);
         match self.check_connections().and_then(|()| apply()) {
             Ok(active) => {
-                let window = self.0.window.clone();
-                Ok(Application::new(links, self, active, window))
+                let (window, published) = (self.0.window.clone(), self.0.published.clone());
+                let application = Application::new(links, self, active, window);
+                published.observes(&application.cyclic.observed);
+                Ok(application)
             }
             Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
         }
@@ -417,6 +420,10 @@ impl AcyclicHalf for SupervisorThread {
     }
 
     fn due_at(&mut self, _links: &impl Links) -> Instant {
+        Instant::NEVER
+    }
+
+    fn known_due_at(&self) -> Instant {
         Instant::NEVER
     }
 

@@ -15,7 +15,7 @@ use ringcat_engine::time::Instant;
 use ringcat_wire::frame::{BYTE_TIME_NS, MAX_FRAME, MIN_FRAME, WIRE_OVERHEAD, wire_time_ns};
 
 /// Time before a cycle in which no acyclic frame is sent: a frame that was sent before has then left the interface.
-const GUARD: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) / 4);
+const GUARD_NS: u64 = wire_time_ns(MAX_FRAME) / 4;
 /// A shorter gap between two cycles has no room for a frame, so there is no window.
 pub const SHORTEST: Duration = Duration::from_nanos(wire_time_ns(MAX_FRAME) + wire_time_ns(MAX_FRAME) / 2);
 /// A cyclic half that is later than posted by more than this has stopped: no cyclic frames follow.
@@ -122,7 +122,8 @@ impl Window {
             return usize::MAX;
         }
         let end = Instant(next).min(self.reserved_from(now));
-        let bytes = end.since(self.free_at(now) + GUARD).as_nanos() / u128::from(BYTE_TIME_NS);
+        let free = self.free_at(now).0.saturating_add(GUARD_NS);
+        let bytes = end.0.saturating_sub(free) / BYTE_TIME_NS;
         let room = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_sub(WIRE_OVERHEAD);
         let spent = usize::try_from(self.spent_before(next)).unwrap_or(usize::MAX);
         let left = room.min(self.budget.saturating_sub(spent));

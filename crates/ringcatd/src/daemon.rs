@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::listening::Listening;
+use crate::listening::{Listening, Prepared};
 use crate::master::Master;
 use crate::rights::Rights;
 use crate::session::Masters;
@@ -25,8 +25,16 @@ impl Daemon {
     /// # Errors
     /// What is wrong, for the operator.
     pub fn start(all: Vec<Master>, socket: &Path, rights: Rights, stop_limit: Duration) -> Result<Daemon, String> {
+        Daemon::serve(all, Prepared::new(socket, rights)?, stop_limit)
+    }
+
+    /// Serves clients at a socket that was prepared.
+    ///
+    /// # Errors
+    /// As [`Daemon::start`].
+    pub fn serve(all: Vec<Master>, socket: Prepared, stop_limit: Duration) -> Result<Daemon, String> {
         let masters = Arc::new(Masters { all, stop_limit });
-        let listening = Listening::start(socket, rights, masters.clone())?;
+        let listening = socket.serve(masters.clone())?;
         Ok(Daemon { masters, _listening: listening })
     }
 

@@ -4,7 +4,7 @@
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with the process that drives it;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
-//!   [`process_state`]: what the kernel tells of its process;
+//!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
 //! * [`daemon`]: all of it; [`log`]: lines for the operator.
 //!
@@ -17,6 +17,7 @@ pub mod listening;
 pub mod log;
 pub mod master;
 pub mod owner;
+pub mod owner_lock;
 pub mod process_state;
 pub mod rights;
 pub mod segment_process;

@@ -7,14 +7,20 @@ use std::time::Duration;
 use clap::Parser;
 use ringcat_control::DEFAULT_SOCKET;
 use ringcat_link::HeldSignals;
+use ringcat_link::capabilities::{Capabilities, keep};
+use ringcat_link::process::raise_descriptors;
 use ringcatd::daemon::Daemon;
-use ringcatd::log::say;
+use ringcatd::listening::Prepared;
+use ringcatd::log::{flush, say};
 use ringcatd::master::Master;
+use ringcatd::owner_lock::OwnerLock;
 use ringcatd::rights::{Rights, group, mode};
 use ringcatd::segment_process;
-use ringcatd::source::{MasterOption, check};
+use ringcatd::source::{MasterOption, SafeState, Source, check};
 use ringcatd::wires::Wires;
 
+/// Descriptors that are enough for all clients and many masters; limits are often lower.
+const DESCRIPTORS: u64 = 4096;
 /// Interval of attempts at what was not possible before.
 const LOOK: Duration = Duration::from_secs(1);
 
@@ -41,6 +47,11 @@ struct Arguments {
     /// An application that is stopped (SIGSTOP, a debugger) for this time loses its master
     #[arg(long, value_name = "MS", default_value_t = 100)]
     stop_limit: u64,
+    /// State of all SubDevices of a master after the end of an application: INIT, PREOP, SAFEOP
+    ///
+    /// PREOP by default. Can be given once for each master.
+    #[arg(long = "safe-state", value_name = "NUMBER=STATE")]
+    safe_states: Vec<SafeState>,
     /// The process of a simulated segment
     #[arg(long = "simulate", hide = true, value_name = "FILE")]
     simulate: Option<PathBuf>,
@@ -58,6 +69,7 @@ fn main() -> ExitCode {
         Err(_) if arguments.simulate.is_some() => ExitCode::from(2),
         Err(error) => {
             say(format_args!("{error}"));
+            flush();
             ExitCode::from(2)
         }
     }
@@ -65,18 +77,37 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), String> {
     check(&arguments.masters)?;
+    let is_known = |safe: &&SafeState| arguments.masters.iter().any(|it| it.master == safe.master);
+    if let Some(safe) = arguments.safe_states.iter().find(|safe| !is_known(safe)) {
+        return Err(format!("--safe-state names master {}, which no --master gives", safe.master));
+    }
     let held = HeldSignals::hold();
+    raise_descriptors(DESCRIPTORS);
+    std::panic::set_hook(Box::new(|panic| say(format_args!("{panic}"))));
+    let rights = Rights { group: arguments.group, mode: arguments.mode };
+    let socket = Prepared::new(&arguments.socket, rights)?;
+    // Before there are threads and segments, which inherit what is left.
+    let has_interfaces = arguments.masters.iter().any(|it| matches!(it.source, Source::Interfaces(..)));
+    let kept = if has_interfaces { Capabilities::NETWORK } else { Capabilities::NONE };
+    keep(kept).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
     let mut masters = Vec::new();
     for option in &arguments.masters {
-        let wires = Wires::of(&option.source).map_err(|error| format!("master {}: {error}", option.master))?;
-        masters.push(Master::new(option.master, option.source.to_string(), wires));
+        let failed = |error| format!("master {}: {error}", option.master);
+        let lock = OwnerLock::open(&arguments.socket, option.master).map_err(failed)?;
+        let wires = Wires::of(&option.source).map_err(failed)?;
+        let master = Master::with_lock(option.master, option.source.to_string(), wires, lock);
+        masters.push(match arguments.safe_states.iter().find(|it| it.master == option.master) {
+            Some(safe) => master.with_safe_state(safe.state),
+            None => master,
+        });
     }
-    let rights = Rights { group: arguments.group, mode: arguments.mode };
     let stop_limit = Duration::from_millis(arguments.stop_limit);
-    let daemon = Daemon::start(masters, &arguments.socket, rights, stop_limit)?;
+    let daemon = Daemon::serve(masters, socket, stop_limit)?;
     say(format_args!("listens at {}", arguments.socket.display()));
     while held.wait(LOOK).is_none() {
         daemon.look_after();
     }
+    drop(daemon);
+    flush();
     Ok(())
 }

@@ -10,14 +10,14 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, Owner};
-use ringcat_control::{Connection, Refusal};
+use ringcat_control::{Connection, Refusal, Right};
 
 /// An owner takes a question within this time.
 pub const SILENCE: Duration = Duration::from_secs(1);
-/// It answers a question that it has taken within this time.
-const ANSWER: Duration = Duration::from_secs(30);
 /// Questions that it may have at a time.
 const MOST_QUESTIONS: usize = 16;
+/// Those of them that only read: the others always find a place.
+const MOST_READING: usize = 12;
 /// Bytes of questions that it may have at a time: half of what a socket holds by default.
 const MOST_BYTES: usize = 96 << 10;
 
@@ -83,30 +83,42 @@ impl OwnerLink {
     /// # Errors
     /// The owner refuses, is silent, or has ended.
     pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
-        let (master, size) = (self.master, bytes.len());
-        let mut questions = self.place(size)?;
+        let (master, size, limit) = (self.master, bytes.len(), what.limit());
+        let mut questions = self.place(size, what.right())?;
         questions.last = questions.last.wrapping_add(1);
         let id = questions.last;
         questions.open.insert(id, Question { bytes: size, state: Standing::Sent });
         drop(questions);
         let message = Message { content: Content::Ask(Numbered { id, master, what }), bytes };
-        if self.connection.send(&message).is_err() {
-            self.questions().open.remove(&id);
-            return Err(Refusal::Changing { master });
+        match self.connection.send_within(&message, SILENCE) {
+            Ok(()) => self.wait(id, limit),
+            // A part of it may have left: the rest follows, and so may an answer.
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => {
+                if let Some(question) = self.questions().open.get_mut(&id) {
+                    question.state = Standing::Forgotten;
+                }
+                let limit_ms = SILENCE.as_millis() as u32;
+                Err(Refusal::Silent { master, owner: self.owner.clone(), limit_ms })
+            }
+            Err(_) => {
+                self.questions().open.remove(&id);
+                self.changed.notify_all();
+                Err(Refusal::Changing { master })
+            }
         }
-        self.wait(id)
     }
 
     /// Waits until the owner may have another question of this size.
-    fn place(&self, size: usize) -> Result<MutexGuard<'_, Questions>, Refusal> {
+    fn place(&self, size: usize, right: Right) -> Result<MutexGuard<'_, Questions>, Refusal> {
         let begin = Instant::now();
+        let most = if right == Right::Read { MOST_READING } else { MOST_QUESTIONS };
         let mut questions = self.questions();
         loop {
             if questions.is_over {
                 return Err(Refusal::Changing { master: self.master });
             }
             let waiting: usize = questions.open.values().map(|question| question.bytes).sum();
-            if questions.open.len() < MOST_QUESTIONS && waiting + size <= MOST_BYTES {
+            if questions.open.len() < most && waiting + size <= MOST_BYTES {
                 return Ok(questions);
             }
             let left = SILENCE.saturating_sub(begin.elapsed());
@@ -117,7 +129,8 @@ impl OwnerLink {
         }
     }
 
-    fn wait(&self, id: u32) -> Answered {
+    /// Waits for the answer to a question that may take `answer`.
+    fn wait(&self, id: u32, answer: Duration) -> Answered {
         let begin = Instant::now();
         let mut questions = self.questions();
         loop {
@@ -132,7 +145,7 @@ impl OwnerLink {
                     self.changed.notify_all();
                     return answered;
                 }
-                Standing::UnderWay => ANSWER,
+                Standing::UnderWay => answer,
                 Standing::Sent | Standing::Forgotten => SILENCE,
             };
             let left = limit.saturating_sub(begin.elapsed());
@@ -207,7 +220,7 @@ mod tests {
         let (owner, _far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let begin = Instant::now();
-        let all: Vec<_> = (0..MOST_QUESTIONS)
+        let all: Vec<_> = (0..MOST_READING)
             .map(|_| {
                 let owner = owner.clone();
                 thread::spawn(move || owner.ask(QUESTION, Vec::new()))
@@ -221,6 +234,8 @@ mod tests {
         let begin = Instant::now();
         assert!(matches!(owner.ask(QUESTION, Vec::new()), Err(Refusal::TooManyQuestions { .. })));
         assert!(begin.elapsed() < 2 * SILENCE);
+        let refused = owner.ask(Ask::Rescan, Vec::new()).expect_err("nothing answers");
+        assert!(matches!(refused, Refusal::Silent { .. }), "questions that change have places of their own: {refused}");
     }
 
     // covers: daemon
@@ -230,7 +245,7 @@ mod tests {
         let owner = Arc::new(owner);
         let asking = owner.clone();
         let first = thread::spawn(move || asking.ask(QUESTION, vec![1]));
-        let (question, _) = far.receive(Limits::OWNER, None).expect("it is asked");
+        let question = far.receive(Limits::OWNER, None).expect("it is asked");
         let Content::Ask(Numbered { id, .. }) = question.content else { panic!("{question:?}") };
         owner.taken(id);
         owner.answered(id + 1, Ok((Answer::Done, Vec::new())));

@@ -1,5 +1,7 @@
 //! A client: its greeting, its questions, and its time as the owner of a master.
 
+use std::io;
+use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,7 +13,7 @@ use ringcat_link::process::Peer;
 use crate::log::say;
 use crate::master::Master;
 use crate::owner::{Answered, OwnerLink};
-use crate::tenure;
+use crate::tenure::{self, Signs};
 
 /// A client greets within this time.
 const GREETING: Duration = Duration::from_secs(5);
@@ -48,27 +50,37 @@ impl Masters {
     }
 }
 
+/// The process of a client, as it was when it connected.
+#[derive(Debug)]
+pub struct ClientProcess {
+    /// Its number, user and groups.
+    pub peer: Peer,
+    /// What it may do.
+    pub right: Right,
+    /// Readable when it has ended.
+    pub end: io::Result<Option<OwnedFd>>,
+}
+
 /// Serves a client until it closes the connection, or has made a mistake.
-pub fn serve(stream: UnixStream, peer: &Peer, right: Right, masters: &Masters) {
+pub fn serve(stream: UnixStream, process: ClientProcess, masters: &Masters) {
     let Ok(connection) = Connection::new(stream).map(Arc::new) else { return };
-    if let Err(refusal) = converse(&connection, peer, right, masters) {
+    if let Err(refusal) = converse(&connection, process, masters) {
         // The client may have closed its end.
         let _ = connection.send(&Content::Refused(refusal).into());
     }
     connection.shut_down();
 }
 
-fn converse(connection: &Arc<Connection>, peer: &Peer, right: Right, masters: &Masters) -> Result<(), Refusal> {
+fn converse(connection: &Arc<Connection>, process: ClientProcess, masters: &Masters) -> Result<(), Refusal> {
+    let ClientProcess { peer, right, end } = process;
     let mut program = String::new();
     let mut limit = GREETING;
     loop {
-        let (message, descriptors) = match connection.receive(Limits::CLIENT, Some(limit)) {
+        let message = match connection.receive(Limits::CLIENT, Some(limit)) {
             Ok(received) => received,
             Err(ReceiveError::Wire(error)) => return Err(error.refusal()),
             Err(_) => return Ok(()),
         };
-        // Nothing that a client sends has descriptors.
-        drop(descriptors);
         match message.content {
             Content::Hello { program: name } if program.is_empty() => {
                 program = name.chars().filter(|it| !it.is_control()).take(LONGEST_NAME).collect();
@@ -87,7 +99,8 @@ fn converse(connection: &Arc<Connection>, peer: &Peer, right: Right, masters: &M
             Content::Take { .. } if right < Right::Change => return Err(Refusal::ReadOnly),
             Content::Take { master } => {
                 let owner = Owner { pid: peer.pid, program };
-                return own(connection, masters, masters.find(master)?, owner);
+                let signs = Signs::new(peer.pid, end)?;
+                return own(connection, masters, masters.find(master)?, owner, signs);
             }
             _ => return Err(expected("a question, or a request for a master")),
         }
@@ -106,13 +119,20 @@ fn expected(expected: &str) -> Refusal {
 }
 
 /// The client drives a master until its time ends.
-fn own(connection: &Arc<Connection>, masters: &Masters, master: &Master, owner: Owner) -> Result<(), Refusal> {
+fn own(
+    connection: &Arc<Connection>,
+    masters: &Masters,
+    master: &Master,
+    owner: Owner,
+    signs: Signs,
+) -> Result<(), Refusal> {
     let owner = Arc::new(OwnerLink::new(master.number(), owner, connection.clone()));
-    let opened = master.hand_over(&owner)?;
+    let tenancy = master.hand_over(&owner)?;
     say(format_args!("master {}: driven by {}", master.number(), owner.owner()));
-    let (end, why) = tenure::serve(master, &owner, masters.stop_limit);
-    master.take_back(&opened, end);
+    let (end, why) = tenure::serve(master, &owner, signs, masters.stop_limit);
+    tenancy.end(end);
     say(format_args!("master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner()));
     reply(connection, Content::Released.into());
+    master.prepare();
     Ok(())
 }

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use ringcat::AlState;
+
 /// Where the frames of a master go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -58,6 +60,31 @@ impl FromStr for MasterOption {
     }
 }
 
+/// The safe state of a master: `0=INIT`, `0=PREOP`, `0=SAFEOP`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SafeState {
+    /// Number of the master.
+    pub master: u32,
+    /// Its SubDevices are in this state after the end of an application.
+    pub state: AlState,
+}
+
+impl FromStr for SafeState {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<SafeState, String> {
+        let expected = || format!("expected NUMBER=INIT, NUMBER=PREOP or NUMBER=SAFEOP, got {text:?}");
+        let (number, state) = text.split_once('=').ok_or_else(expected)?;
+        let state = match state.to_ascii_uppercase().as_str() {
+            "INIT" => AlState::Init,
+            "PREOP" => AlState::PreOp,
+            "SAFEOP" => AlState::SafeOp,
+            _ => return Err(expected()),
+        };
+        Ok(SafeState { master: number.parse().map_err(|_| expected())?, state })
+    }
+}
+
 /// Checks that each master and each interface occurs once.
 ///
 /// # Errors
@@ -104,6 +131,17 @@ mod tests {
         }
         for text in ["", "eth1", "x=eth1", "0=", "0=sim:", "0=a,", "0=,a", "0=a,b,c", "-1=a", "0=a,a"] {
             assert!(parse(text).is_err(), "{text}");
+        }
+    }
+
+    // covers: daemon
+    #[test]
+    fn a_safe_state_is_one_without_outputs() {
+        let state = |text: &str| text.parse::<SafeState>().map(|it| (it.master, it.state));
+        assert_eq!(state("0=init"), Ok((0, AlState::Init)));
+        assert_eq!(state("3=SAFEOP"), Ok((3, AlState::SafeOp)));
+        for text in ["", "0", "0=OP", "0=BOOT", "x=INIT", "=INIT"] {
+            assert!(state(text).is_err(), "{text}");
         }
     }
 

@@ -9,11 +9,14 @@ use std::process::Child;
 
 use ringcat::piped::segment::connect;
 use ringcat_control::message::{HandedLink, HandedLinks};
-use ringcat_link::{ClassFilter, PacketOptions, PacketSocket, ReceiveMode, descriptors, revoke};
+use ringcat_link::packet_socket::prepared::Prepared;
+use ringcat_link::{ClassFilter, LinkError, PacketOptions, PacketSocket, ReceiveMode, descriptors, revoke};
 
 use crate::segment_process;
 use crate::source::Source;
 
+/// Sets of sockets that are prepared: applications that end in quick succession find one each.
+const SETS: usize = 2;
 /// Slots of a receive ring for one class of frames, 2 KiB each.
 const SLOTS: u32 = 128;
 
@@ -30,7 +33,23 @@ pub enum Wires {
         child: Option<Child>,
     },
     /// Network interfaces.
-    Interfaces(String, Option<String>),
+    Interfaces(Interfaces),
+}
+
+/// Network interfaces, with sockets for the next process.
+#[derive(Debug)]
+pub struct Interfaces {
+    main: String,
+    redundant: Option<String>,
+    /// Sets of sockets that wait without an interface, since the kernel takes long to make their rings; each in the
+    /// order of [`HandedLinks`].
+    spares: Vec<Vec<Prepared>>,
+}
+
+/// What makes sockets for the next process, without the lock of the links.
+#[derive(Clone, Copy, Debug)]
+pub struct Lacking {
+    links: usize,
 }
 
 /// Descriptors of links, to be duplicated for the process that drives them.
@@ -53,7 +72,10 @@ impl Wires {
                 let (child, control, is_ring) = segment_process::start(file)?;
                 Ok(Wires::Segment { control, is_ring, child: Some(child) })
             }
-            Source::Interfaces(main, redundant) => Ok(Wires::Interfaces(main.clone(), redundant.clone())),
+            Source::Interfaces(main, redundant) => {
+                let (main, redundant) = (main.clone(), redundant.clone());
+                Ok(Wires::Interfaces(Interfaces { main, redundant, spares: Vec::new() }))
+            }
         }
     }
 
@@ -89,19 +111,54 @@ impl Wires {
                     descriptors: all.into_iter().flatten().flatten().collect(),
                 })
             }
-            Wires::Interfaces(main, redundant) => {
-                let names = [Some(&*main), redundant.as_ref()];
-                let mut descriptors = Vec::new();
-                for filter in [ClassFilter::Cyclic, ClassFilter::Acyclic] {
-                    for name in names.into_iter().flatten() {
-                        descriptors.push(socket(name, filter)?);
-                    }
-                }
-                let link = |name: &String| HandedLink::Interface { name: name.clone(), slots: SLOTS };
-                let links = HandedLinks { main: link(main), redundant: redundant.as_ref().map(link) };
-                Ok(Opened { links, descriptors })
+            Wires::Interfaces(interfaces) => interfaces.open(),
+        }
+    }
+
+    /// Whether sockets for the next process are to be prepared.
+    pub fn lacking(&self) -> Option<Lacking> {
+        match self {
+            Wires::Interfaces(Interfaces { redundant, spares, .. }) if spares.len() < SETS => {
+                Some(Lacking { links: 1 + usize::from(redundant.is_some()) })
+            }
+            Wires::Interfaces(_) | Wires::Segment { .. } => None,
+        }
+    }
+
+    /// Keeps a set of sockets.
+    pub fn keep(&mut self, prepared: Vec<Prepared>) {
+        if let Wires::Interfaces(Interfaces { spares, .. }) = self {
+            spares.push(prepared);
+        }
+    }
+}
+
+impl Lacking {
+    /// Makes a set. The kernel takes 10 to 20 ms for each.
+    ///
+    /// # Errors
+    /// This user may not, or there is no memory for them.
+    pub fn prepare(self) -> Result<Vec<Prepared>, LinkError> {
+        let both = [ClassFilter::Cyclic, ClassFilter::Acyclic];
+        let each = both.into_iter().flat_map(|filter| std::iter::repeat_n(filter, self.links));
+        each.map(|filter| Prepared::new(&options(filter))).collect()
+    }
+}
+
+impl Interfaces {
+    /// Opens the links with the sockets that were prepared, or with new ones.
+    fn open(&mut self) -> Result<Opened, String> {
+        let Interfaces { main, redundant, spares } = self;
+        let mut prepared = spares.pop().unwrap_or_default().into_iter();
+        let mut descriptors = Vec::new();
+        for filter in [ClassFilter::Cyclic, ClassFilter::Acyclic] {
+            for name in [Some(&*main), redundant.as_ref()].into_iter().flatten() {
+                descriptors.push(socket(name, filter, prepared.next())?);
             }
         }
+        let link = |name: &String| HandedLink::Interface { name: name.clone(), slots: SLOTS };
+        let links = HandedLinks { main: link(main), redundant: redundant.as_ref().map(link) };
+        Ok(Opened { links, descriptors })
     }
 }
 
@@ -114,11 +171,17 @@ impl Drop for Wires {
     }
 }
 
+fn options(filter: ClassFilter) -> PacketOptions {
+    PacketOptions::default().with_filter(filter).with_receive(ReceiveMode::Blocking).with_ring_frames(SLOTS)
+}
+
 /// A packet socket for one class of frames. Its ring is unmapped here, and mapped by the process that drives it.
-fn socket(interface: &str, filter: ClassFilter) -> Result<OwnedFd, String> {
-    let options = PacketOptions::default().with_filter(filter).with_receive(ReceiveMode::Blocking);
-    let options = options.with_ring_frames(SLOTS);
-    let socket = PacketSocket::open(interface, &options).map_err(|error| error.to_string())?;
+fn socket(interface: &str, filter: ClassFilter, prepared: Option<Prepared>) -> Result<OwnedFd, String> {
+    let socket = match prepared {
+        Some(prepared) => prepared.bind(interface),
+        None => PacketSocket::open(interface, &options(filter)),
+    };
+    let socket = socket.map_err(|error| error.to_string())?;
     socket.as_fd().try_clone_to_owned().map_err(|error| format!("{interface}: {error}"))
 }
 

@@ -16,6 +16,8 @@ use std::process::{Command, Stdio};
 pub struct Profile {
     /// Instructions in user mode.
     pub instructions: u64,
+    /// System calls by function. Those of other threads count for the function that ran last.
+    pub system_calls: BTreeMap<String, u64>,
     /// Calls by name of the called function, also those outside of the counted function.
     pub calls: BTreeMap<String, u64>,
     /// Executions of the first instruction of each counted function.
@@ -46,11 +48,13 @@ impl Profile {
                 // The next line is the inclusive cost of the call.
                 is_of_call = true;
             } else if let Some(rest) = line.strip_prefix("0x") {
-                // Address, line of the source, cost.
+                // Address, line of the source, instructions, system calls.
                 let mut words = rest.split_whitespace();
                 let address = words.next().and_then(|address| u64::from_str_radix(address, 16).ok())?;
                 let count: u64 = words.nth(1)?.parse().ok()?;
+                let system_calls: u64 = words.next().map_or(Some(0), |count| count.parse().ok())?;
                 if !std::mem::take(&mut is_of_call) {
+                    *profile.system_calls.entry(function.to_owned()).or_default() += system_calls;
                     *profile.own.entry((file.to_owned(), function.to_owned())).or_default() += count;
                     let first = firsts.entry(function).or_insert((address, 0));
                     match address.cmp(&first.0) {
@@ -116,6 +120,7 @@ fn profile(mut valgrind: Command, options: &[String], program: &Path, arguments:
     let out = directory.0.join("callgrind.out");
     let status = valgrind
         .args(["--tool=callgrind", "--quiet", "--compress-strings=no", "--compress-pos=no", "--dump-instr=yes"])
+        .arg("--collect-systime=yes")
         .args(options)
         .arg(format!("--callgrind-out-file={}", out.display()))
         .arg(program)
@@ -154,11 +159,11 @@ mod tests {
 
     #[test]
     fn totals_and_calls_are_found_in_an_output_file() {
-        let text = "version: 1\nfn=main\n0x10 16 4\ncfn=memcpy\ncalls=12 0x80 0\n0x14 16 120\n0x18 17 2\nfi=other.rs\n\
-                    0x10 3 1\ncfn=free\ncalls=1 0x90 0\n0x20 2 3\ncfn=memcpy\ncalls=3 0x80 0\n0x24 1 1\n\n\
-                    totals: 4711\n";
+        let text = "version: 1\nfn=main\n0x10 16 4 2 300\ncfn=memcpy\ncalls=12 0x80 0\n0x14 16 120\n0x18 17 2\n\
+                    fi=other.rs\n0x10 3 1\ncfn=free\ncalls=1 0x90 0\n0x20 2 3\ncfn=memcpy\ncalls=3 0x80 0\n0x24 1 1\n\n\
+                    totals: 4711 3 1200\n";
         let profile = Profile::parse(text).unwrap();
-        assert_eq!(profile.instructions, 4711);
+        assert_eq!((profile.instructions, profile.system_calls["main"]), (4711, 2));
         assert_eq!(profile.calls_of(|name| name == "memcpy"), 15);
         let own = [("", 6), ("other.rs", 1)].map(|(file, count)| ((file.to_owned(), "main".to_owned()), count));
         assert_eq!(profile.own, BTreeMap::from(own));

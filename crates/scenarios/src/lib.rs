@@ -41,5 +41,6 @@ pub mod tampered_links;
 pub mod tap;
 pub mod terminals;
 pub mod truth;
+pub mod uploads;
 pub mod witness;
 pub mod world;

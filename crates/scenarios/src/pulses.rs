@@ -71,6 +71,11 @@ impl Pulses {
         self.devices.iter().map(|pulse| pulse.count).min().unwrap_or(0)
     }
 
+    /// Most pulses of one device.
+    pub fn most(&self) -> u64 {
+        self.devices.iter().map(|pulse| pulse.count).max().unwrap_or(0)
+    }
+
     /// From the first to the last device that pulses next, in nanoseconds; `None` if one has no next pulse.
     pub fn apart_ns(&self) -> Option<u64> {
         let phases: Option<Vec<u64>> = self.devices.iter().map(|pulse| Some(pulse.next?.0)).collect();

@@ -364,7 +364,7 @@ fn begin(world: &mut World, case: &Case) -> Option<Pending<Vec<u8>>> {
     }
 }
 
-/// Incomplete cycles that an edge may cost (issue 5, bars).
+/// Incomplete cycles that an edge may cost.
 pub fn allowed(detection: Duration, flight: Duration) -> usize {
     let time = detection + flight;
     if time < CYCLE / 2 { 1 } else { time.as_nanos().div_ceil(CYCLE.as_nanos()) as usize + 1 }

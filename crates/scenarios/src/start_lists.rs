@@ -1,4 +1,4 @@
-//! Start-up lists of many drives at once, measured in virtual time and compared with the lower bound (issue 4).
+//! Start-up lists of many drives at once, measured in virtual time and compared with the lower bound.
 //!
 //! Servo drives are connected to one link, each responds 1 ms after a mailbox request. The time is measured from
 //! activation, with the segment scanned and all SubDevices in INIT, until all are in OP and process data is complete.

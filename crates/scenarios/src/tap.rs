@@ -4,11 +4,12 @@
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Instant, Link, Links};
 use ringcat_engine::{Class, class_of};
-use ringcat_sim::network::Network;
+use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::command::Command;
 use ringcat_wire::frame::{Frame, MacAddress};
 
 use crate::loss::Loss;
+use crate::segments::{descriptions, line};
 
 /// Limit of consecutive receives and waits without progress of time; far more than an engine needs between two events.
 const IDLE_CALLS: u64 = 200_000;
@@ -123,6 +124,12 @@ impl Tap {
     /// The segment, for fault injection.
     pub fn network_mut(&mut self) -> &mut Network {
         self.segment.network_mut()
+    }
+
+    /// The segment, which outlives the program on it.
+    pub fn into_network(mut self) -> Network {
+        let other = line(descriptions(&["coupler"]), NetworkOptions::default());
+        std::mem::replace(self.network_mut(), other)
     }
 
     /// Injects a frame that the engine receives next on a link.

@@ -1,4 +1,4 @@
-//! Segments of many plain terminals for the figures of issue 2: a full SII of 512 bytes, 500 us per EEPROM command, 5
+//! Segments of many plain terminals for figures of the start: a full SII of 512 bytes, 500 us per EEPROM command, 5
 //! ms per state change, a selectable time per hop.
 
 use std::time::Duration;

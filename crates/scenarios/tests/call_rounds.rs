@@ -1,5 +1,5 @@
 //! 1,000 rounds of activation, OP and deactivation, with other configurations in turn and faults meanwhile: memory and
-//! procedures do not grow (issue 17). A program of its own, because it counts allocations.
+//! procedures do not grow. A program of its own, because it counts allocations.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! After activation the cyclic path neither allocates nor frees memory, for any received frames (issue 2).
+//! After activation the cyclic path neither allocates nor frees memory, for any received frames.
 
 use std::cell::Cell;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Cables and their effect on a frame (issue 2, part 3; protocol 11.4).
+//! Cables and their effect on a frame (protocol 11.4).
 //!
 //! A cable has two legs, one for each direction. A leg has its far end, its propagation delay, the start of its signal,
 //! and the faults for the next frames. This module determines the delivery of a frame at the time at which its last bit
@@ -18,18 +18,62 @@ pub struct DeviceIndex(pub usize);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CableId(pub usize);
 
-/// One of the two network interfaces of the MainDevice.
+/// A network interface of the MainDevice, or of a second MainDevice (MainDevice redundancy, protocol 9.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum HostLink {
     /// MAIN.
     Main = 0,
     /// RED, the other end of a ring.
     Redundant = 1,
+    /// MAIN of the second MainDevice.
+    SecondMain = 2,
+    /// RED of the second MainDevice.
+    SecondRedundant = 3,
 }
 
 impl HostLink {
-    /// Both links.
+    /// Both links of the MainDevice.
     pub const ALL: [HostLink; 2] = [HostLink::Main, HostLink::Redundant];
+    /// Both links of the second MainDevice.
+    pub const SECOND: [HostLink; 2] = [HostLink::SecondMain, HostLink::SecondRedundant];
+    /// Number of all of them.
+    pub(crate) const COUNT: usize = 4;
+}
+
+/// One of two MainDevices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Host {
+    /// That with [`HostLink::Main`].
+    First,
+    /// That with [`HostLink::SecondMain`].
+    Second,
+}
+
+impl Host {
+    /// Its main link.
+    pub const fn main(self) -> HostLink {
+        match self {
+            Host::First => HostLink::Main,
+            Host::Second => HostLink::SecondMain,
+        }
+    }
+
+    /// Its redundant link.
+    pub const fn redundant(self) -> HostLink {
+        match self {
+            Host::First => HostLink::Redundant,
+            Host::Second => HostLink::SecondRedundant,
+        }
+    }
+
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Host {
+        match self {
+            Host::First => Host::Second,
+            Host::Second => Host::First,
+        }
+    }
 }
 
 impl fmt::Display for HostLink {
@@ -37,6 +81,8 @@ impl fmt::Display for HostLink {
         f.write_str(match self {
             HostLink::Main => "main",
             HostLink::Redundant => "redundant",
+            HostLink::SecondMain => "second main",
+            HostLink::SecondRedundant => "second redundant",
         })
     }
 }
@@ -46,7 +92,7 @@ impl fmt::Display for HostLink {
 pub enum Endpoint {
     /// A port of a device.
     Device(DeviceIndex, Port),
-    /// An interface of the MainDevice.
+    /// An interface of a MainDevice.
     Host(HostLink),
 }
 

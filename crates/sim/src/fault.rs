@@ -1,4 +1,4 @@
-//! Faults that a test or a demonstration can inject, at once or at a scheduled time (issue 2, part 3).
+//! Faults that a test or a demonstration can inject, at once or at a scheduled time.
 //!
 //! Faults on a cable affect the frames that reach its far end from then on, faults on a device its power, its
 //! application, its EEPROM and its state machine.

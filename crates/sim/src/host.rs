@@ -1,4 +1,4 @@
-//! The two network interfaces of the MainDevice: they send at 100 Mbit/s, one frame after the other, and store received
+//! The network interfaces of a MainDevice: they send at 100 Mbit/s, one frame after the other, and store received
 //! frames (protocol 1.3).
 
 use core::time::Duration;
@@ -34,11 +34,12 @@ pub(crate) struct HostInterface {
 }
 
 impl HostLink {
-    /// The event lane for frames that enter the segment here.
-    pub(crate) const fn entry_lane(self) -> Lane {
+    /// The event lane for frames that enter the segment here; `None` if they do not take the fast path.
+    pub(crate) const fn entry_lane(self) -> Option<Lane> {
         match self {
-            HostLink::Main => Lane::EntryMain,
-            HostLink::Redundant => Lane::EntryRedundant,
+            HostLink::Main => Some(Lane::EntryMain),
+            HostLink::Redundant => Some(Lane::EntryRedundant),
+            HostLink::SecondMain | HostLink::SecondRedundant => None,
         }
     }
 }

@@ -1,5 +1,5 @@
-//! A segment in virtual time: devices, the cables between them and the two interfaces of the MainDevice (issue 2,
-//! part 3; protocol 2, 9.1, 11.3, 11.4).
+//! A segment in virtual time: devices, the cables between them and the interfaces of the MainDevice, or of two of them
+//! (protocol 2, 9.1, 11.3, 11.4).
 //!
 //! Input: frames of the MainDevice ([`Network::send`]), the time up to which the segment runs ([`Network::advance`]),
 //! and faults. Output: the returned frames, with the time of their last bit ([`Network::receive`]), and the devices for
@@ -81,14 +81,14 @@ pub struct Network {
     nodes: Vec<Node>,
     cables: Vec<Cable>,
     legs: Vec<Leg>,
-    hosts: [HostInterface; 2],
+    hosts: [HostInterface; HostLink::COUNT],
     frames: FramePool,
     scheduled: Vec<Option<Fault>>,
     random: Random,
     statistics: Statistics,
     /// Counter of changes of cables, links and power.
     wiring: u32,
-    /// The routes of frames of both interfaces.
+    /// The routes of frames of both interfaces of the first MainDevice.
     routes: [Route; 2],
     /// Time limit of the running call.
     limit: SimTime,
@@ -113,13 +113,11 @@ impl Network {
             let delay_ns = u64::try_from(cable.delay.as_nanos()).unwrap_or(u64::MAX);
             [Leg::new(cable.b, delay_ns), Leg::new(cable.a, delay_ns)]
         });
-        let host = |link: HostLink| {
-            HostInterface::new(out.hosts[link as usize], options.transmit_queue, options.receive_queue)
-        };
+        let host = |out: Option<LegId>| HostInterface::new(out, options.transmit_queue, options.receive_queue);
         let mut network = Network {
             now: SimTime::ZERO,
             queue: EventQueue::with_capacity(devices.len() + options.transmit_queue),
-            hosts: HostLink::ALL.map(host),
+            hosts: out.hosts.map(host),
             legs: legs.collect(),
             cables: cables.into_iter().map(|spec| Cable { spec, cut: false, epoch: 0 }).collect(),
             nodes: devices.into_iter().zip(out.devices).map(|(device, out)| Node::new(device, out)).collect(),

@@ -1,4 +1,4 @@
-//! The event queue of virtual time (issue 2, part 3).
+//! The event queue of virtual time.
 //!
 //! Input: events with their due times. Output: the events in the order of time; events of the same time in the order of
 //! insertion, so that every run is the same. Events are stored in lanes, so that a caller that processes some kinds of

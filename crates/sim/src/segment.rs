@@ -1,4 +1,4 @@
-//! Segments from files (issue 2, part 3). The format is described in `docs/segments.md`.
+//! Segments from files. The format is described in `docs/segments.md`.
 //!
 //! Input: TOML text and the directory of the SII images. Output: [`Segment`], a description of all devices, cables and
 //! options from which [`Network::from_description`](crate::network::Network::from_description) makes a segment. An

@@ -1,4 +1,4 @@
-//! Figures of the source tree against the bars of issue 15, with what they were before it.
+//! Figures of the source tree against their bars, with what they were before the model of the segment.
 //!
 //! Input: a tree. Output: [`Row`]s. [`ELSEWHERE`] names the commands that measure the other bars.
 
@@ -14,7 +14,7 @@ use crate::{Finding, circles, dependencies, handed_on, limits, words};
 pub struct Row {
     /// What is measured.
     pub what: &'static str,
-    /// Before issue 15, where it was measured.
+    /// Before the model of the segment, where it was measured.
     pub before: &'static str,
     /// Now.
     pub now: String,
@@ -35,7 +35,7 @@ pub struct Counted {
     pub examples: usize,
 }
 
-/// The commit before issue 15.
+/// The commit before the model of the segment.
 pub const COMMIT_BEFORE: &str = "4cd9b5da";
 
 /// What [`Counted::of`] has counted at [`COMMIT_BEFORE`].
@@ -72,7 +72,8 @@ impl fmt::Display for Counted {
 pub const POLLING: &str = "<!-- polling tasks of the engine -->";
 
 /// Crates that are published, by directory; their documentation counts.
-const PUBLISHED: [&str; 9] = ["cli", "config", "engine", "ffi", "gateway", "link", "ringcat", "sim", "wire"];
+const PUBLISHED: [&str; 11] =
+    ["cli", "config", "control", "engine", "ffi", "gateway", "link", "ringcat", "ringcatd", "sim", "wire"];
 /// The pages that are documentation of `ringcat`.
 const GUIDE: &str = "docs/guide/";
 const EXAMPLES: usize = 20;
@@ -82,7 +83,7 @@ pub const ELSEWHERE: [(&str, &str, &str); 7] = [
     ("instructions of a cycle", "bars in the program", "ci/bench (cycle, socket_cycle)"),
     ("start-up in virtual time", "bars in the program", "ci/bench (figures startup, figures phases)"),
     ("memory, CPU per simulated second", "14 MiB (17 on the way), 1 s with 1,000 SubDevices", "ci/bench (scale)"),
-    ("the same before and after", "+1 %", "docs/performance.md, section \"Before and after issue 15\""),
+    ("the same before and after", "+1 %", "docs/performance.md, section \"Before and after the model of the segment\""),
     ("scenarios; random explorers", "all pass", "cargo test --workspace; ci/explore --full"),
     ("packages of all published crates", "built", "ci/package"),
     ("tasks and pauses that poll, with reasons", "listed", "cargo test -p ringcat-engine --test waits -- --nocapture"),

@@ -76,8 +76,15 @@ const RULES: &[CrateRule] = &[
     },
     CrateRule {
         directory: "ringcatd",
-        internal: Internal::Only(&["ringcat", "ringcat-control", "ringcat-link"]),
+        // Its tests tell frames of both classes apart by the engine.
+        internal: Internal::Only(&["ringcat", "ringcat-control", "ringcat-engine", "ringcat-link"]),
         external: External::Only(&["clap"]),
+    },
+    CrateRule {
+        directory: "ethercat",
+        // Its tests run it beside a daemon and an application.
+        internal: Internal::Only(&["ringcat", "ringcatd", "ringcat-control", "ringcat-engine", "ringcat-wire"]),
+        external: External::Only(&[]),
     },
     CrateRule {
         directory: "ffi",
@@ -87,7 +94,8 @@ const RULES: &[CrateRule] = &[
     },
     CrateRule {
         directory: "cli",
-        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link"]),
+        // Its tests run commands on the bus of a daemon.
+        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link", "ringcatd"]),
         external: External::Any,
     },
     CrateRule { directory: "scenarios", internal: Internal::Any, external: External::Any },

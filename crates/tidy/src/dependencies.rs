@@ -11,8 +11,8 @@ use crate::tokens::tokens;
 use crate::tree::Tree;
 
 /// Features of `ringcat`, each one alone.
-pub const FEATURE_SETS: [&str; 11] =
-    ["", "packet", "sim", "eni", "network", "esi", "gateway", "eoe", "daemon", "tracing", "serde"];
+pub const FEATURE_SETS: [&str; 12] =
+    ["", "packet", "sim", "eni", "network", "esi", "gateway", "eoe", "daemon", "tracing", "serde", "standby"];
 
 /// Sets for an application on network interfaces, with few dependencies.
 const SMALL: [&str; 2] = ["", "packet"];

@@ -25,7 +25,7 @@
 //! * [`words`]: words for people in place of devices.
 //!
 //! The last three count ([`rules`]); `known.toml` lists known violations and only shrinks ([`known`]). `cargo run -p
-//! tidy` prints them, with the longest chain of files of each crate, `-- figures` the bars of issue 15 ([`bars`]).
+//! tidy` prints them, with the longest chain of files of each crate, `-- figures` figures and bars ([`bars`]).
 //! [`coverage`] lists the parts of the protocol without a test.
 //!
 //! [`tokens`] is a small Rust lexer for some of the modules, so that words in comments and strings are not read as

@@ -1,7 +1,7 @@
 //! `cargo run -p tidy`: findings of the rules in this repository, with the longest chain of files of each crate.
 //!
 //! `cargo run -p tidy -- coverage` lists the parts of `docs/protocol` without a test, `-- tests` writes the lists of
-//! tests of each feature and each part of the protocol, `-- figures` prints the bars of issue 15 with measured figures;
+//! tests of each feature and each part of the protocol, `-- figures` prints figures of the tree with their bars;
 //! `-- figures DIRECTORY` counts the files of another commit there.
 //! `cargo run -p tidy -- shrink` lowers `known.toml` to the current counts; it refuses if a count has grown.
 
@@ -51,7 +51,7 @@ fn write_evidence(tree: &Tree) -> Result<(), Finding> {
     Ok(())
 }
 
-/// What issue 15 must show; what is missed is printed and fails nothing, since the rules' tests do.
+/// Figures of the tree; what is missed is printed and fails nothing, since the rules' tests do.
 fn figures(tree: &Tree) -> Result<(), Finding> {
     let packet = dependencies::cargo_tree("packet").map_err(|error| Finding::new("Cargo.toml", 0, error))?;
     let (text, holds) = bars::text(&bars::rows(tree, &packet)?);

@@ -11,9 +11,13 @@ use crate::tree::{File, Tree};
 
 /// The directory of the pages.
 const PAGES: &str = "docs/protocol/";
-/// The word before a section, and the word used before the pages were part of the repository.
+/// The word before a section, and words used before the pages were part of the repository.
 const WORD: &str = "protocol";
-const FORMER_WORD: &str = "facts";
+const FORMER_WORDS: [&str; 2] = [concat!("fac", "ts"), concat!("she", "et")];
+/// The word before a number that the repository does not have.
+const OUTSIDE_WORD: &str = concat!("iss", "ue");
+/// Pages about what was done: a number in them is history.
+const HISTORY: &str = "CHANGELOG.md";
 
 /// Ids that can be cited.
 #[derive(Clone, Debug, Default)]
@@ -84,8 +88,7 @@ fn is_requirement(word: &str) -> bool {
 /// Citations that do not exist, or in the former form.
 pub fn unresolved(tree: &Tree) -> Vec<Finding> {
     let pages = Pages::of(tree);
-    let cites = |file: &&File| file.is_rust() || file.path.starts_with("ci/") || file.path.starts_with("docs/");
-    let elsewhere = tree.files.iter().filter(cites).filter(|file| !file.path.starts_with("docs/protocol/"));
+    let elsewhere = tree.files.iter().filter(|file| !file.path.starts_with(PAGES) && file.path != HISTORY);
     elsewhere.flat_map(|file| in_file(file, &pages)).collect()
 }
 
@@ -96,8 +99,12 @@ fn in_file(file: &File, pages: &Pages) -> Vec<Finding> {
     for (at, (word, line)) in words.iter().enumerate() {
         let bare = trimmed(word);
         let next = words.get(at + 1).map_or("", |(word, _)| trimmed(word));
-        if bare.eq_ignore_ascii_case(FORMER_WORD) && (is_section(next) || is_statement(next)) {
+        let is_former = FORMER_WORDS.iter().any(|former| bare.eq_ignore_ascii_case(former));
+        if is_former && opens_list(word) && (is_section(next) || is_statement(next)) {
             findings.push(Finding::new(&file.path, *line, format!("cite docs/protocol: `{WORD} {next}`")));
+        }
+        if bare.eq_ignore_ascii_case(OUTSIDE_WORD) && opens_list(word) && is_section(next) {
+            findings.push(Finding::new(&file.path, *line, format!("`{bare} {next}` is not in this repository")));
         }
         if bare.eq_ignore_ascii_case(WORD) && opens_list(word) {
             let missing = cited(&words[at + 1..]).into_iter().filter(|section| !pages.sections.contains(*section));
@@ -190,5 +197,8 @@ mod tests {
     #[test]
     fn the_former_form_of_citations_is_found() {
         assert_eq!(findings("ci/check-mail", concat!("# Mail (fac", "ts\n# 7.1).\n")).len(), 1);
+        assert_eq!(findings("docs/ecrt.md", concat!("| x | she", "et 5 |\n")).len(), 1);
+        assert_eq!(findings("crates/a/tests/b.py", concat!("# (iss", "ue 4)\n")).len(), 1);
+        assert_eq!(findings("CHANGELOG.md", concat!("- as iss", "ue 4 says\n")).len(), 0);
     }
 }

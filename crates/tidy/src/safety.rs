@@ -16,7 +16,7 @@ const ALLOWED: &[(&str, &str)] = &[
 ];
 
 /// Crates whose root has to say `#![forbid(unsafe_code)]`.
-const FORBIDDING: [&str; 8] = ["wire", "engine", "sim", "config", "control", "gateway", "ringcatd", "tidy"];
+const FORBIDDING: [&str; 9] = ["wire", "engine", "sim", "config", "control", "gateway", "ringcatd", "ethercat", "tidy"];
 
 /// `unsafe` in a file that is not allowed to contain it.
 pub fn misplaced(tree: &Tree) -> Vec<Finding> {

@@ -174,7 +174,7 @@ fn only_what_is_known(name: &str) {
 fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
     let tree = tree();
     let page = tree.file("docs/performance.md").expect("the page exists");
-    assert!(page.text.contains("\n## Before and after issue 15\n"));
+    assert!(page.text.contains("\n## Before and after the model of the segment\n"));
 }
 
 // covers: api

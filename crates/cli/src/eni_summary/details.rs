@@ -1,8 +1,8 @@
 //! The details of each SubDevice: SyncManagers, PDOs, start-up commands, places in the image.
 
-use ringcat::SyncSignals;
 use ringcat::config::Configuration;
 use ringcat::config::eni::Eni;
+use ringcat::{SubDeviceId, SyncSignals};
 
 use super::words::{action, one_line, role, side, time};
 
@@ -36,7 +36,7 @@ pub(super) fn lines(model: &Eni, configuration: &Configuration) -> Vec<String> {
 }
 
 fn of_subdevice(index: usize, model: &Eni, configuration: &Configuration, lines: &mut Vec<String>) {
-    let Some((config, facts)) = configuration.subdevice(index) else { return };
+    let Some((config, facts)) = configuration.subdevice(SubDeviceId(index)) else { return };
     lines.push(format!("SubDevice {index} \"{}\"", one_line(&facts.name)));
     if let Some((other, port)) = facts.plugged_into {
         lines.push(format!("  plugged into SubDevice {other} port {port:?}"));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::config::eni::{Eni, Port};
 use ringcat::config::{Configuration, ImageArea};
-use ringcat::{ConfigAddress, DeclaredSyncManager, ReferenceClock, SubDeviceConfig};
+use ringcat::{ConfigAddress, DeclaredSyncManager, ReferenceClock, SubDeviceConfig, SubDeviceId};
 
 use super::words::{action, role, side};
 use crate::json::eni;
@@ -61,7 +61,7 @@ fn ns(time: Duration) -> u64 {
 }
 
 fn subdevice(index: usize, configuration: &Configuration) -> Option<eni::SubDevice> {
-    let (config, facts) = configuration.subdevice(index)?;
+    let (config, facts) = configuration.subdevice(SubDeviceId(index))?;
     let startup = config.startup.iter().map(|command| eni::StartupCommand {
         transition: command.transition.to_string(),
         action: action(&command.action),

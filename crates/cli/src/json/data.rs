@@ -7,12 +7,14 @@ use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
 use super::eni::EniFile;
+use super::esi::EsiList;
 use super::network::{Compare, Init};
 use super::ring::Ring;
 use super::run::Run;
 use super::scan::Scan;
 use super::sii::{SiiBuilt, SiiCompared, SiiSkeleton};
 use super::sim::Sim;
+use super::standby::Standby;
 
 /// The keys of one command.
 #[derive(Clone, Debug, Serialize)]
@@ -27,7 +29,9 @@ pub enum Data {
     Clocks(Clocks),
     Capture(Capture),
     Sim(Sim),
+    Standby(Standby),
     Eni(Box<EniFile>),
+    EsiList(EsiList),
     SiiBuilt(SiiBuilt),
     SiiCompared(SiiCompared),
     SiiSkeleton(SiiSkeleton),

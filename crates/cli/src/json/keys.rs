@@ -10,7 +10,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::Value;
 
-use super::{bench, capture, clocks, demo, eni, line, network, ring, run, scan, sii, sim};
+use super::{bench, capture, clocks, demo, eni, esi, line, network, ring, run, scan, sii, sim, standby};
 
 /// Lines around the tables.
 const BEGIN: &str =
@@ -93,8 +93,10 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("`ring`", keys::<ring::Ring>()),
         ("`clocks`", keys::<clocks::Clocks>()),
         ("`capture`", keys::<capture::Capture>()),
+        ("`standby`", keys::<standby::Standby>()),
         ("`sim`", keys::<sim::Sim>()),
         ("`eni`", keys::<eni::EniFile>()),
+        ("`esi list`", keys::<esi::EsiList>()),
         ("`sii build`", keys::<sii::SiiBuilt>()),
         ("`sii compare`", keys::<sii::SiiCompared>()),
         ("`sii skeleton`", keys::<sii::SiiSkeleton>()),

@@ -13,7 +13,7 @@ use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
 use ringcat::{
     ActivateError, Declaration, Direction, Error, Instant, JunctionConnection, JunctionMode, ProcessData, Scan,
-    SubDeviceInfo,
+    StationAddress, SubDeviceId, SubDeviceInfo,
 };
 
 use crate::failure::Failure;
@@ -76,8 +76,9 @@ enum FileOfNetwork {
 }
 
 impl ConfiguredArguments {
-    /// Reads the file, if there is one, and prints what of it is not followed. Refuses a ring on one interface.
-    pub fn load(&self, has_redundant: bool) -> Result<Option<ConfiguredNetwork>, Failure> {
+    /// Reads the file, if there is one, and prints what of it is not followed. Refuses a ring on one interface, where
+    /// the interfaces are known.
+    pub fn load(&self, has_redundant: Option<bool>) -> Result<Option<ConfiguredNetwork>, Failure> {
         let failed = |error: &dyn std::fmt::Display| Failure::new(error.to_string());
         let (path, file) = match (&self.eni, &self.network) {
             (Some(path), _) => {
@@ -102,7 +103,7 @@ impl ConfiguredArguments {
         if configuration.declaration.clocks.as_ref().is_some_and(|clocks| clocks.bus_shift) {
             say!("  the reference clock follows this host (bus shift); with --phase 0us the cycles follow it instead");
         }
-        network.check_links(has_redundant)?;
+        has_redundant.map_or(Ok(()), |has_redundant| network.check_links(has_redundant))?;
         network.check_variables()?;
         Ok(Some(network))
     }
@@ -125,7 +126,7 @@ impl ConfiguredNetwork {
     }
 
     /// Refuses a ring on one interface.
-    fn check_links(&self, has_redundant: bool) -> Result<(), Failure> {
+    pub fn check_links(&self, has_redundant: bool) -> Result<(), Failure> {
         let needs_ring = self.network_file().is_some_and(|file| file.redundancy.ring);
         if needs_ring && !has_redundant {
             return Err(Failure::new("the file declares a ring (redundancy.ring): expected --redundant IF"));
@@ -149,8 +150,8 @@ impl ConfiguredNetwork {
         self.configuration().declaration.subdevices.iter().all(|config| config.declared.is_some())
     }
 
-    /// Index in the declaration of the SubDevice with this station address in the file.
-    pub fn at_station(&self, station: u16) -> Option<usize> {
+    /// The SubDevice with this station address in the file.
+    pub fn at_station(&self, station: StationAddress) -> Option<SubDeviceId> {
         self.configuration().at_station(station)
     }
 

@@ -3,14 +3,13 @@
 use std::thread::sleep;
 use std::time::Duration;
 
-use ringcat::packet::PacketLinks;
-use ringcat::tee::Tee;
 use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
 
 use super::beside::Beside;
 use super::configured::Watched;
 use super::live::{self, Live};
 use super::pace::Seen;
+use crate::access::WireLinks;
 use crate::ending::EndRequest;
 use crate::interfaces::now;
 use crate::output::{say, warn, write_event};
@@ -25,7 +24,7 @@ const CHECK_PAUSE: Duration = Duration::from_millis(1);
 
 /// Cycles that run, and what is printed about them.
 pub struct Run {
-    pub cycles: CyclicThread<Tee<PacketLinks>>,
+    pub cycles: CyclicThread<WireLinks>,
     pub log: RunLog,
     pub live: Live,
     /// Distributed clocks are in use.

@@ -1,6 +1,6 @@
 //! The option `--junction`: how rings behind junctions are handled.
 
-use ringcat::{JunctionConnection, JunctionMode, SubDeviceId};
+use ringcat::{JunctionConnection, JunctionMode, StationAddress, SubDeviceId};
 
 /// How the option is explained.
 pub const HELP: &str = "Rings behind junctions: disabled, automatic or strict=CONNECTIONS";
@@ -37,15 +37,18 @@ enum Place {
 
 impl Connection {
     /// With indices in the declaration; `at_station` finds those of station addresses.
-    pub fn resolve(&self, at_station: impl Fn(u16) -> Option<usize>) -> Result<JunctionConnection, String> {
+    pub fn resolve(
+        &self,
+        at_station: impl Fn(StationAddress) -> Option<SubDeviceId>,
+    ) -> Result<JunctionConnection, String> {
         let index = |place: Place| match place {
-            Place::Position(position) => Ok(position),
-            Place::Station(station) => at_station(station).ok_or_else(|| {
+            Place::Position(position) => Ok(SubDeviceId(position)),
+            Place::Station(station) => at_station(StationAddress(station)).ok_or_else(|| {
                 format!("--junction: no SubDevice has station address {station} in an ENI (--eni FILE)")
             }),
         };
         let ((head, head_port), (tail, tail_port)) = (self.head, self.tail);
-        Ok(JunctionConnection::new(SubDeviceId(index(head)?), head_port, SubDeviceId(index(tail)?), tail_port))
+        Ok(JunctionConnection::new(index(head)?, head_port, index(tail)?, tail_port))
     }
 }
 
@@ -108,7 +111,7 @@ mod tests {
         assert_eq!(junctions("strict=0:1-2:1,3:1-5:3"), Ok(strict(&[(0, 1, 2, 1), (3, 1, 5, 3)])));
         let by_station = junctions("strict=@1002:1-4:1").expect("as a file calls it").connections[0];
         let resolved = JunctionConnection::new(SubDeviceId(1), 1, SubDeviceId(4), 1);
-        assert_eq!(by_station.resolve(|station| (station == 1002).then_some(1)), Ok(resolved));
+        assert_eq!(by_station.resolve(|station| (station.0 == 1002).then_some(SubDeviceId(1))), Ok(resolved));
         assert!(by_station.resolve(|_| None).is_err_and(|text| text.contains("station address 1002")));
         assert!(junctions("strict=@1002:2-@1004:1").is_err(), "the head's port is 1");
         for wrong in

@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use ringcat::cyclic_status::CyclicStatus;
-use ringcat::packet::PacketLinks;
-use ringcat::tee::Tee;
 use ringcat::text::Names;
-use ringcat::{AcyclicCounters, Application, ClockStatus, Link, Links, SupervisorThread, SyncSignals};
+use ringcat::{AcyclicCounters, Application, ClockStatus, EitherLinks, Link, Links, SupervisorThread, SyncSignals};
 
 use super::reasons::Exchanged;
+use crate::access::WireLinks;
 use crate::clock_options::farthest;
 use crate::clocks;
 use crate::interfaces::{LinkNames, now};
@@ -36,7 +35,7 @@ pub struct End {
 
 /// The keys of JSON, as of the end of the exchange.
 pub fn json(
-    application: &Application<Tee<PacketLinks>, SupervisorThread>,
+    application: &Application<WireLinks, SupervisorThread>,
     end: &End,
     names: &Names,
     clocks_in_use: bool,
@@ -101,7 +100,7 @@ impl From<AcyclicCounters> for run::Acyclic {
 }
 
 /// Prints how the exchange of process data went.
-pub fn summary(application: &Application<Tee<PacketLinks>, SupervisorThread>, surroundings: &Surroundings) {
+pub fn summary(application: &Application<WireLinks, SupervisorThread>, surroundings: &Surroundings) {
     let (pace, cyclic, acyclic) = (application.pace(), application.cyclic_counters(), application.acyclic_counters());
     say!("\nsummary");
     say!("  cycles: {}, incomplete: {}, frames still out: {}", pace.cycles, cyclic.incomplete, cyclic.skipped);
@@ -160,11 +159,7 @@ pub fn clock_account(clocks: &[ClockStatus], cyclic_status: &CyclicStatus, names
 
 /// Prints what the interfaces have carried from the first frame to the last, the stop included; the same as keys of
 /// JSON.
-pub fn final_account(
-    links: &mut Tee<PacketLinks>,
-    supervisor: &SupervisorThread,
-    names: &LinkNames,
-) -> Vec<run::Interface> {
+pub fn final_account(links: &mut WireLinks, supervisor: &SupervisorThread, names: &LinkNames) -> Vec<run::Interface> {
     let mut interfaces = Vec::new();
     let until = now() + LAST_FRAMES;
     while now() < until {
@@ -172,7 +167,9 @@ pub fn final_account(
         links.wait(until);
     }
     for link in [Link::Main, Link::Redundant] {
-        let Some(counters) = links.links().counters(link) else { continue };
+        // Pipes to a simulated segment have none.
+        let EitherLinks::First(packets) = links.links() else { break };
+        let Some(counters) = packets.counters(link) else { continue };
         say!(
             "  process data on {link}: {} sent, {} received, {} overrun",
             counters.sent,

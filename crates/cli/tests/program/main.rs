@@ -1,5 +1,6 @@
 //! The program `ringcat` as a user calls it: what needs no network interface.
 
+mod daemon;
 mod demo;
 mod documented;
 mod exit_codes;

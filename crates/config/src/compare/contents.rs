@@ -1,6 +1,8 @@
 //! One SubDevice: identity, PDOs and mailboxes of the file and of the bus.
 
-use ringcat_engine::config::{DeclaredSyncManager, PdoEntry, PdoMapping, SubDeviceConfig, SyncManagerRole};
+use ringcat_engine::config::{
+    DeclaredSyncManager, IdentityMismatch, PdoEntry, PdoMapping, SubDeviceConfig, SyncManagerRole,
+};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
 use ringcat_engine::plan;
@@ -60,8 +62,9 @@ impl Both<'_> {
     fn identity(&self, differences: &mut Vec<Difference>) -> bool {
         let identity = &self.info.identity;
         let stated = self.stated.cloned().unwrap_or_default();
-        if let Some((field, expected, got)) = self.declared.expected.mismatch(self.info) {
-            let kind = DifferenceKind::of_field(field);
+        if let Some(mismatch) = self.declared.expected.mismatch(self.info) {
+            let kind = DifferenceKind::of_field(mismatch.field);
+            let IdentityMismatch { field, expected, got, .. } = mismatch;
             let text = format!("expected {field} {expected:#010x}, got {got:#010x}");
             differences.push(self.difference(kind, true, text));
             return kind == DifferenceKind::Device;

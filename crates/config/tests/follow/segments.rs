@@ -4,6 +4,7 @@ use ringcat_config::eni::Port;
 use ringcat_engine::config::{ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock};
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
+use ringcat_wire::address::StationAddress;
 
 use crate::{SMALL, changed, configured, has_notice, refused};
 
@@ -28,7 +29,7 @@ fn positions_follow_auto_inc_addr_and_not_the_order_of_the_file() {
         (Some(1004), Some((0, Port::C))),
     ];
     assert_eq!(facts, expected);
-    assert_eq!(swapped.at_station(1003), Some(2));
+    assert_eq!(swapped.at_station(StationAddress(1003)), Some(SubDeviceId(2)));
     assert_eq!(swapped.subdevices[3].net_id, Some([5, 6, 7, 8, 3, 1]));
 }
 

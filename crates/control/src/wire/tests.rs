@@ -12,7 +12,10 @@ fn a_message_is_a_header_its_content_and_its_data() {
     let data = Content::Answer(Numbered { id: 1, master: 0, what: Ok(Answer::Data) });
     let bytes = encode(&Message { content: data, bytes: vec![0xAA, 0xBB] }).expect("it is short");
     let content = b"\xA1\x66Answer\xA3\x62id\x01\x66master\x00\x64what\xA1\x62Ok\x64Data";
-    assert_eq!(&bytes[..16], [b'R', b'C', b'T', b'L', 1, 0, 0, 0, content.len() as u8, 0, 0, 0, 2, 0, 0, 0]);
+    assert_eq!(
+        &bytes[..16],
+        [b'R', b'C', b'T', b'L', VERSION as u8, 0, 0, 0, content.len() as u8, 0, 0, 0, 2, 0, 0, 0]
+    );
     assert_eq!(bytes[16..], [&content[..], &[0xAA, 0xBB]].concat());
 }
 
@@ -36,12 +39,12 @@ fn messages_are_decoded_as_they_were() {
 #[test]
 fn another_version_is_told_from_the_header_alone() {
     let mut bytes = encode(&upload()).expect("it is short");
-    bytes[4] = 2;
+    bytes[4] = 1;
     bytes[16..].fill(0xFF);
     let error = decode(&bytes, Limits::CLIENT).expect_err("it is refused");
-    assert_eq!(error, WireError::Version { there: 2 });
+    assert_eq!(error, WireError::Version { there: 1 });
     let text = error.refusal().to_string();
-    assert_eq!(text, "expected control version 1, got 2: install ringcatd and library of one release");
+    assert_eq!(text, "expected control version 3, got 1: install ringcatd and library of one release");
 }
 
 // covers: daemon
@@ -70,7 +73,7 @@ fn no_change_of_a_byte_and_no_length_makes_the_decoder_panic() {
 #[test]
 fn lengths_beyond_the_limits_are_refused_from_the_header() {
     let mut header = [0; HEADER];
-    header[..6].copy_from_slice(b"RCTL\x01\x00");
+    header[..6].copy_from_slice(b"RCTL\x03\x00");
     header[12..].fill(0xFF);
     let limit = Limits::CLIENT.bytes;
     let error = Header::decode(&header, Limits::CLIENT).expect_err("it is refused");

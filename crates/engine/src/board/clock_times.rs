@@ -3,7 +3,7 @@
 //! *Application time* is what the application gives, *system time* what the clocks show. They are the same, or differ
 //! by a shift: SYNC signals run on with the system time when the application's time jumps.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering};
 
 /// System time of the clocks, as the supervisor posts it for the exchange.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,8 +12,12 @@ pub(crate) struct Timeline {
     pub number: u32,
     /// Sum of all jumps of the system time.
     pub jumped: u64,
-    /// Application time minus system time.
+    /// Application time minus system time, once all is made up.
     pub shift: u64,
+    /// Nanoseconds by which the system time goes back until then; negative: forward.
+    pub left: i64,
+    /// Nanoseconds by which it had gone back in steps when this was posted.
+    pub slid: u64,
     /// System time of the reference clock at host time zero.
     pub epoch: u64,
 }
@@ -40,8 +44,12 @@ pub(crate) struct TimeWords {
     wanted_number: AtomicU32,
     jumped: AtomicU64,
     shift: AtomicU64,
+    left: AtomicI64,
+    slid_before: AtomicU64,
     epoch: AtomicU64,
     number: AtomicU32,
+    /// Nanoseconds by which the system time has gone back in steps.
+    slid: AtomicU64,
     /// Changes to which the supervisor reacts: a first time, a time far from the reference, references taken over.
     posted: AtomicU32,
     /// Number of posts of references that the exchange has taken over.
@@ -89,6 +97,8 @@ impl TimeWords {
     pub fn post_timeline(&self, timeline: Timeline) {
         self.jumped.store(timeline.jumped, Ordering::Relaxed);
         self.shift.store(timeline.shift, Ordering::Relaxed);
+        self.left.store(timeline.left, Ordering::Relaxed);
+        self.slid_before.store(timeline.slid, Ordering::Relaxed);
         self.epoch.store(timeline.epoch, Ordering::Relaxed);
         self.number.store(timeline.number, Ordering::Release);
     }
@@ -99,8 +109,20 @@ impl TimeWords {
             number: self.number.load(Ordering::Acquire),
             jumped: self.jumped.load(Ordering::Relaxed),
             shift: self.shift.load(Ordering::Relaxed),
+            left: self.left.load(Ordering::Relaxed),
+            slid: self.slid_before.load(Ordering::Relaxed),
             epoch: self.epoch.load(Ordering::Relaxed),
         }
+    }
+
+    /// The offsets of all clocks are being written: their system time goes back to so many nanoseconds since the begin.
+    pub fn post_slid(&self, slid: u64) {
+        self.slid.store(slid, Ordering::Release);
+    }
+
+    /// Nanoseconds by which the system time has gone back in steps.
+    pub fn slid(&self) -> u64 {
+        self.slid.load(Ordering::Acquire)
     }
 
     /// Wakes the supervisor: the application's time is far from that of the reference.

@@ -100,6 +100,7 @@ impl ClockWords {
     }
 
     /// Number of stops of the distribution so far.
+    #[inline]
     pub(crate) fn holds(&self) -> u32 {
         self.holds.load(Ordering::Acquire)
     }

@@ -1,7 +1,7 @@
 //! Whether the SubDevice at a place matches its declaration; finds an alias or identification.
 
 use super::resolution::{ConfigError, Resolution};
-use super::{ConfigAddress, SubDeviceConfig};
+use super::{ConfigAddress, IdentityMismatch, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
 /// Resolution of a declaration with the SubDevice at `place`, an index in `infos`.
@@ -17,7 +17,7 @@ pub(super) fn at_place(
     };
     match declared.expected.mismatch(info) {
         None => Resolution::Found { config, info: index },
-        Some((field, expected, got)) => {
+        Some(IdentityMismatch { field, expected, got }) => {
             let error = ConfigError::Mismatch { position: info.position, field, expected, got };
             missing(declared, config, error)
         }

@@ -179,8 +179,9 @@ pub(crate) struct Clocks {
     application: Option<ReferenceTime>,
     /// Application time that the reference is to have when the next frame passes it.
     wanted: Option<WantedTime>,
-    /// The last such time, at host time zero.
-    wanted_epoch: Option<u64>,
+    /// The last such time, at host time zero, and the last system time that was written for one.
+    wanted_epoch: u64,
+    written_epoch: Option<u64>,
     /// From application time to system time.
     slide: Slide,
     /// The wanted time is far from that of the reference.
@@ -276,10 +277,10 @@ impl Clocks {
     /// Takes over newly posted references.
     #[cold]
     fn follow(&mut self, references: References, changes: u32, board: &Board, now: Instant) {
-        let jump = self.slide.follow(board.clocks.times.timeline(), self.wanted_epoch, now);
+        let continued = self.written_epoch.map(|written| self.wanted_epoch.wrapping_sub(written));
+        let jump = self.slide.follow(board.clocks.times.timeline(), continued, now);
         if jump != 0 {
-            let times = self.times.iter_mut().chain([&mut self.last]).flatten();
-            times.for_each(|time| time.time = time.time.wrapping_add(jump));
+            self.move_times(jump);
             self.behind = None;
         }
         self.last = self.system_time().or(self.last);
@@ -297,6 +298,14 @@ impl Clocks {
         }
         (self.references, self.changes) = (references, changes);
         board.clocks.times.take(changes);
+    }
+
+    /// The system time has jumped since the references were read.
+    #[cold]
+    fn move_times(&mut self, jump: u64) {
+        let times = self.times.iter_mut().chain([&mut self.last]).flatten();
+        times.for_each(|time| time.time = time.time.wrapping_add(jump));
+        self.written_epoch = self.written_epoch.map(|written| written.wrapping_add(jump));
     }
 
     /// The references that receive another time than their own, and that time, by the link of the copy. In an open ring
@@ -351,8 +360,13 @@ impl Clocks {
     fn written_time(&mut self, application: u64, leader: Link, board: &Board, now: Instant) -> Option<u64> {
         board.clocks.lead_reference();
         let epoch = application.wrapping_sub(now.0);
+        let step = self.slide.take_steps(board.clocks.times.slid());
+        if step != 0 {
+            // The clocks were read before it.
+            self.move_times(step.wrapping_neg());
+        }
         let shift = self.slide.step(now);
-        self.wanted_epoch = Some(epoch);
+        self.wanted_epoch = epoch;
         board.clocks.times.post_wanted(epoch, shift);
         let time = application.wrapping_sub(shift);
         let own = self.times[leader.index()];
@@ -361,7 +375,11 @@ impl Clocks {
             board.clocks.times.wake_supervisor();
         }
         self.is_far = is_far;
-        (!is_far).then_some(time)
+        if is_far {
+            return None;
+        }
+        self.written_epoch = Some(epoch.wrapping_sub(shift));
+        Some(time)
     }
 
     /// Time written to a second reference, so that it follows the first one.

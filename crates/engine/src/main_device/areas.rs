@@ -3,6 +3,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::fmt;
 use core::ops::Range;
 
 use super::sent_once::SentOnce;
@@ -53,6 +54,31 @@ pub struct PlacedEntry {
     pub sub_index: u8,
     /// Place in the image of the domain.
     pub place: Entry,
+}
+
+/// An object of a declared SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct ObjectOf {
+    /// The SubDevice.
+    pub subdevice: SubDeviceId,
+    /// Index.
+    pub index: u16,
+    /// Subindex.
+    pub sub_index: u8,
+}
+
+impl ObjectOf {
+    /// The object of a SubDevice at an index and a subindex.
+    pub const fn new(subdevice: SubDeviceId, index: u16, sub_index: u8) -> ObjectOf {
+        ObjectOf { subdevice, index, sub_index }
+    }
+}
+
+impl fmt::Display for ObjectOf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SubDevice {}: {:#06x}:{:02x}", self.subdevice, self.index, self.sub_index)
+    }
 }
 
 impl Directory {
@@ -107,8 +133,8 @@ impl Directory {
         bits.is_empty() || before.is_some_and(|(other, range)| *other == domain && bits.end <= range.end)
     }
 
-    /// The object at a bit of a domain's image: SubDevice, index and subindex. For messages: it searches all entries.
-    pub fn object_at(&self, domain: DomainId, bit: u64) -> Option<(SubDeviceId, u16, u8)> {
+    /// The object at a bit of a domain's image. For messages: it searches all entries.
+    pub fn object_at(&self, domain: DomainId, bit: u64) -> Option<ObjectOf> {
         let covers = |entry: &Entry| {
             let start = u64::from(entry.bit_offset);
             entry.domain == domain && (start..start + u64::from(entry.bit_length)).contains(&bit)
@@ -116,7 +142,7 @@ impl Directory {
         self.subdevices.iter().enumerate().find_map(|(subdevice, areas)| {
             let mut entries = areas.iter().flat_map(|area| &area.entries);
             let found = entries.find(|entry| covers(&entry.place))?;
-            Some((SubDeviceId(subdevice), found.index, found.sub_index))
+            Some(ObjectOf::new(SubDeviceId(subdevice), found.index, found.sub_index))
         })
     }
 

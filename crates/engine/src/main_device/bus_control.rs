@@ -14,7 +14,7 @@ use crate::knowledge::{Handover, KnownMailbox};
 use crate::mail::InUse;
 use crate::procedures::scan::ScanError;
 use crate::role::{Denial, Function, MainDeviceRole, NotPermitted};
-use crate::segment::{KeptState, UndeclaredObservation, UpkeepProgress};
+use crate::segment::{KeptState, Observation, UndeclaredObservation, UpkeepProgress};
 
 impl MainDevice {
     /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.
@@ -57,6 +57,8 @@ impl MainDevice {
         let rings = core::mem::take(&mut *self.emergencies.borrow_mut());
         let carriers = self.supervisor.bus().carriers();
         self.end_application(self.supervisor.bus().now());
+        // Nothing may be sent in this role: ports that were changed for a moment restore themselves.
+        self.segment.observe(Observation::PortsAltered(&[]));
         self.supervisor.set_carriers(carriers);
         if !was_active {
             *self.emergencies.borrow_mut() = rings;

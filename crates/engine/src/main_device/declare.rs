@@ -1,10 +1,9 @@
 //! Builds a declaration step by step.
 
 use alloc::vec;
-use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::declaration::{Declaration, DomainConfig, DomainMember, ExplicitLrw, Required};
+use super::declaration::{Declaration, DomainConfig, DomainMember, Required};
 use crate::config::{ClockConfig, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
@@ -64,13 +63,6 @@ impl Declaration {
     #[must_use]
     pub fn with_lrw(mut self, lrw: LrwPolicy) -> Declaration {
         self.lrw = lrw;
-        self
-    }
-
-    /// The same declaration, with the LRW datagrams of a configuration file ([`Declaration::explicit_lrw`]).
-    #[must_use]
-    pub fn with_explicit_lrw(mut self, explicit_lrw: Vec<ExplicitLrw>) -> Declaration {
-        self.explicit_lrw = explicit_lrw;
         self
     }
 

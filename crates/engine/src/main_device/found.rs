@@ -1,10 +1,53 @@
 //! Access to single SubDevices of the scan and of the declaration, without a copy of all.
 
+use ringcat_wire::address::Position;
+use ringcat_wire::frame::MacAddress;
+
 use super::MainDevice;
 use super::states::SubDeviceState;
+use crate::config::SubDeviceConfig;
 use crate::declared::SubDeviceId;
+use crate::info::SubDeviceInfo;
+
+/// A declared SubDevice of the active declaration.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct DeclaredSubDevice {
+    /// Its declaration.
+    pub config: SubDeviceConfig,
+    /// What is known of it; `None` if it has never answered.
+    pub info: Option<SubDeviceInfo>,
+    /// Its position in the last scan.
+    pub position: Option<Position>,
+    /// It does not answer.
+    pub is_absent: bool,
+}
 
 impl MainDevice {
+    /// Addresses of the interfaces: main, redundant.
+    pub fn interfaces(&self) -> [Option<MacAddress>; 2] {
+        [Some(self.options.main), self.options.redundant]
+    }
+
+    /// Number of SubDevices of the active declaration; 0 without one.
+    pub fn declared_count(&self) -> usize {
+        self.active().map_or(0, |_| self.segment.view().members().count())
+    }
+
+    /// A SubDevice of the active declaration.
+    pub fn declared(&self, subdevice: SubDeviceId) -> Option<DeclaredSubDevice> {
+        self.active()?;
+        let view = self.segment.view();
+        let member = view.member(subdevice.0)?;
+        let found = || view.found()?.subdevices.iter().find(|info| info.station == member.station);
+        Some(DeclaredSubDevice {
+            config: (*member.config).clone(),
+            info: member.info.map(|info| (**info).clone()),
+            position: member.info.and_then(|_| found()).map(|info| info.position),
+            is_absent: SubDeviceState::from(member.phase) == SubDeviceState::Absent,
+        })
+    }
+
     /// Number of SubDevices of the last scan; `None` before a successful scan.
     pub fn scanned_count(&self) -> Option<usize> {
         self.segment.view().found().map(|found| found.subdevices.len())

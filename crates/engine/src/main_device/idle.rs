@@ -7,6 +7,7 @@ use core::time::Duration;
 use super::MainDevice;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
+use crate::procedures::loops::restore;
 use crate::procedures::services::ServiceError;
 use crate::role::{Function, MainDevicePhase};
 use crate::segment::{Addressed, Found, IdleObservation, Observation, Scan, UndeclaredObservation};
@@ -62,7 +63,11 @@ impl MainDevice {
     /// What the last scan has found. With idle operation an application may begin before the first scan has ended: it
     /// has found nothing then, and each SubDevice is configured when it comes. A requested scan goes on.
     pub(super) fn found_to_begin(&self) -> Option<Rc<Found>> {
-        if self.options.idle_operation && self.segment.view().found().is_none() && !self.scan_requested.get() {
+        let is_unknown = {
+            let view = self.segment.view();
+            view.found().is_none() && !view.is_requested_scan_under_way()
+        };
+        if self.options.idle_operation && is_unknown {
             self.segment.observe(Observation::ScanBegun);
             self.segment.observe(Observation::ScanEnded(Ok(Scan::nothing())));
         }
@@ -88,6 +93,7 @@ impl MainDevice {
             segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
         }
         self.supervisor.spawn(async move {
+            restore(&bus, &segment).await;
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {

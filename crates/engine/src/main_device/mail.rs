@@ -1,6 +1,5 @@
 //! Mailbox services of the MainDevice. Each starts a procedure; its result is fetched later.
 
-use alloc::vec::Vec;
 use core::future::Future;
 
 use ringcat_wire::al::AlState;
@@ -8,8 +7,7 @@ use ringcat_wire::al::AlState;
 use super::MainDevice;
 use super::pending::Pending;
 use crate::declared::{Address, SubDeviceId};
-use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
-use crate::mail::{EmergencyRing, Limits, Mailbox, MailboxError};
+use crate::mail::{EmergencyRing, Mailbox};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
@@ -129,42 +127,4 @@ impl MainDevice {
     pub fn start<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> Pending<T> {
         Pending::start(&self.supervisor.bus(), work)
     }
-
-    /// Starts a read of an object of at most `limit` bytes.
-    pub fn start_sdo_upload(
-        &mut self,
-        subdevice: impl Into<Address>,
-        object: SdoAddress,
-        limits: Limits,
-        limit: usize,
-    ) -> Pending<Result<Vec<u8>, SdoError>> {
-        let mailbox = self.mailbox(subdevice);
-        self.start(async move {
-            match mailbox {
-                Some(mailbox) => coe::read(&mailbox, object, limits, limit).await,
-                None => Err(closed(object)),
-            }
-        })
-    }
-
-    /// Starts a write of an object.
-    pub fn start_sdo_download(
-        &mut self,
-        subdevice: impl Into<Address>,
-        object: SdoAddress,
-        data: Vec<u8>,
-        limits: Limits,
-    ) -> Pending<Result<(), SdoError>> {
-        let mailbox = self.mailbox(subdevice);
-        self.start(async move {
-            match mailbox {
-                Some(mailbox) => coe::write(&mailbox, object, &data, limits).await,
-                None => Err(closed(object)),
-            }
-        })
-    }
-}
-
-fn closed(object: SdoAddress) -> SdoError {
-    SdoError { object, cause: SdoFailure::Mailbox(MailboxError::Closed) }
 }

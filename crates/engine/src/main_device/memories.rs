@@ -11,15 +11,6 @@ use super::image_memory::ImageMemory;
 use crate::domain::DomainId;
 use crate::layout::Layout;
 
-impl DomainConfig {
-    /// Puts the image of the domain into memory of the application ([`Declaration::place_image`]).
-    #[must_use]
-    pub fn with_memory(mut self, memory: &'static mut [u8]) -> DomainConfig {
-        self.memory = Some(ImageMemory::new(memory));
-        self
-    }
-}
-
 impl Declaration {
     /// Puts the image of a domain into memory of the application, which outlives the MainDevice: leaked, static, or
     /// mapped into several processes. The image is the beginning of the memory, with the content that it has at the

@@ -30,11 +30,9 @@ impl MainDevice {
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let (options, requested) = (self.scan_options(extent), self.scan_requested.clone());
-        requested.set(true);
+        let options = self.scan_options(extent);
         self.supervisor.spawn(async move {
             let result = scan(&bus, &options).await;
-            requested.set(false);
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
             end_scan(&segment, ended);
         });

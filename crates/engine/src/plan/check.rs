@@ -37,9 +37,9 @@ pub(super) fn check(info: &SubDeviceInfo, mailbox: &[SmPlan], areas: &[AreaPlan]
     match spans.windows(2).find(|pair| pair[0].end > u32::from(pair[1].start)) {
         Some([a, b]) => Err(PlanProblem::Overlap {
             first: a.index,
-            first_bytes: (a.start, a.end),
+            first_bytes: u32::from(a.start)..a.end,
             second: b.index,
-            second_bytes: (b.start, b.end),
+            second_bytes: u32::from(b.start)..b.end,
         }),
         _ => Ok(()),
     }

@@ -3,6 +3,7 @@
 use alloc::format;
 use alloc::string::String;
 use core::fmt;
+use core::ops::Range;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 use ringcat_wire::mailbox::soe::Idn;
@@ -132,12 +133,12 @@ pub enum PlanProblem {
     Overlap {
         /// The SyncManager of the first area.
         first: u8,
-        /// Bytes of the first area, all buffers included: start and first byte after it.
-        first_bytes: (u16, u32),
+        /// Bytes of the first area, all buffers included.
+        first_bytes: Range<u32>,
         /// The SyncManager of the second area.
         second: u8,
         /// Bytes of the second area.
-        second_bytes: (u16, u32),
+        second_bytes: Range<u32>,
     },
     /// More areas than the controller has FMMUs.
     TooFewFmmus {
@@ -310,8 +311,8 @@ impl PlanProblem {
             write!(f, "which ends at {memory_end:#06x}")?;
         }
         if let Self::Overlap { first, first_bytes, second, second_bytes } = self {
-            write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.0, first_bytes.1)?;
-            write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.0, second_bytes.1)?;
+            write!(f, "SM {first} ({:#06x}..{:#06x}) and ", first_bytes.start, first_bytes.end)?;
+            write!(f, "SM {second} ({:#06x}..{:#06x}) overlap", second_bytes.start, second_bytes.end)?;
         }
         Ok(())
     }

@@ -324,7 +324,7 @@ fn three_buffers_must_not_overlap_the_next_area() {
     assert!(plan(&any(), &info).is_ok());
     info.sync_managers[3].start = 0x1108;
     let expected =
-        PlanProblem::Overlap { first: 2, first_bytes: (0x1100, 0x1109), second: 3, second_bytes: (0x1108, 0x1114) };
+        PlanProblem::Overlap { first: 2, first_bytes: 0x1100..0x1109, second: 3, second_bytes: 0x1108..0x1114 };
     assert_eq!(problem(&any(), &info), expected);
 }
 

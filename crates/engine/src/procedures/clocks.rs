@@ -3,6 +3,7 @@
 //! * `measure`: the present connections of the SubDevices, and the times of frames from clock to clock;
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `offsets`: another time of the application;
+//! * `slide`: the rest of a jump of that time while SYNC signals run;
 //! * `signals`: SYNC signals of one SubDevice;
 //! * `drift`: the static drift compensation;
 //! * `watch`: the set-up, the differences, the links of the references.
@@ -17,6 +18,7 @@ mod not_locked;
 mod offsets;
 mod set_up;
 mod signals;
+mod slide;
 mod watch;
 
 pub(super) use drift::compensate_drift;

@@ -25,7 +25,6 @@ const TIME_EACH: Duration = Duration::from_micros(60);
 
 /// A mailbox in use.
 struct Open {
-    index: usize,
     station: StationAddress,
     /// Register with the mailbox-full bit.
     status: RegisterAddress,
@@ -38,14 +37,12 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     loop {
         bus.sleep(PAUSE.max(TIME_EACH.saturating_mul(alone))).await;
         open_mailboxes(&segment, &mut mapped, &mut others);
-        for open in &mapped {
-            if bus.has_stray_mail(open.station) {
-                open.mailbox.mail_available();
-            }
+        if bus.has_stray_mails() {
+            announce_stray_mails(&bus, &segment, &mapped);
         }
         // If some do not answer, it is unknown which: all are polled until the supervision has found and repaired them.
-        if !poll_together(&bus, &mapped).await {
-            others.append(&mut mapped);
+        if !poll_together(&bus, &segment, &mapped).await {
+            others.extend(mapped.drain(..).filter_map(|index| opened(&segment, index)));
         }
         alone = u32::try_from(others.len()).unwrap_or(u32::MAX);
         if !others.is_empty() {
@@ -54,28 +51,50 @@ pub(crate) async fn watch_mail(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// Lists those with a mapped status bit, and the others. The lists keep their memory from round to round.
-fn open_mailboxes(segment: &SharedSegment, mapped: &mut Vec<Open>, others: &mut Vec<Open>) {
+/// Lists the indices of those with a mapped status bit, and the others. The lists keep their memory from round to
+/// round.
+fn open_mailboxes(segment: &SharedSegment, mapped: &mut Vec<usize>, others: &mut Vec<Open>) {
     let view = segment.view();
     mapped.clear();
     others.clear();
     for (index, (member, mailbox)) in view.members().zip(segment.mailboxes()).enumerate() {
-        let Some((station, status)) = mailbox.send_status() else { continue };
-        let is_mapped = member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some());
-        let list = if is_mapped { &mut *mapped } else { &mut *others };
-        list.push(Open { index, station, status, mailbox: mailbox.clone() });
+        if !mailbox.is_open() {
+            continue;
+        }
+        if member.setup.as_ref().is_some_and(|setup| setup.mail_fmmu.is_some()) {
+            mapped.push(index);
+        } else {
+            others.extend(opened(segment, index));
+        }
     }
 }
 
-/// One read for all; false if not all answered.
-async fn poll_together(bus: &Bus, mapped: &[Open]) -> bool {
-    let Some(last) = mapped.iter().map(|open| open.index).max() else { return true };
+/// The mailbox of a member, if it is in use.
+fn opened(segment: &SharedSegment, index: usize) -> Option<Open> {
+    let mailbox = segment.mailboxes().get(index)?;
+    let (station, status) = mailbox.send_status()?;
+    Some(Open { station, status, mailbox: mailbox.clone() })
+}
+
+/// Mail came back after its read was given up: its mailbox is read, as if it were full.
+fn announce_stray_mails(bus: &Bus, segment: &SharedSegment, mapped: &[usize]) {
+    for mailbox in mapped.iter().filter_map(|index| segment.mailboxes().get(*index)) {
+        if mailbox.station().is_some_and(|station| bus.has_stray_mail(station)) {
+            mailbox.mail_available();
+        }
+    }
+}
+
+/// One read for all; false if not all answered. `mapped`: their indices, ascending.
+async fn poll_together(bus: &Bus, segment: &SharedSegment, mapped: &[usize]) -> bool {
+    let Some(last) = mapped.last() else { return true };
     let expected = Wkc(mapped.len() as u16);
     let (target, data) = (Target::Logical(BITS_AT), vec![0; last / 8 + 1]);
     let Ok(reply) = bus.transfer(Command::Lrd, target, data, Some(expected)).await else { return true };
-    for open in mapped {
-        if reply.data[open.index / 8] & 1 << (open.index % 8) != 0 {
-            open.mailbox.mail_available();
+    for (byte, bits) in reply.data.iter().enumerate().filter(|(_, bits)| **bits != 0) {
+        let full = (0..8).filter(|bit| bits & 1 << bit != 0).map(|bit| 8 * byte + bit);
+        for index in full.filter(|index| mapped.binary_search(index).is_ok()) {
+            segment.mailboxes()[index].mail_available();
         }
     }
     reply.wkc() == expected

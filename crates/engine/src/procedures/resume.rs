@@ -25,6 +25,7 @@ use crate::event::Notice;
 use crate::info::SubDeviceInfo;
 use crate::knowledge::{Handover, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::mail::InUse;
+use crate::ring_status::LinkCounts;
 use crate::segment::effect::Shown;
 use crate::segment::{Found, KeptState, Observation, UndeclaredObservation, UpkeepProgress};
 use crate::supervisor::{Bus, BusError};
@@ -175,8 +176,9 @@ async fn verified(
     }
 }
 
-fn counts_of(found: &Found) -> (u16, u16) {
-    (found.main_count as u16, found.subdevices.len().saturating_sub(found.main_count) as u16)
+fn counts_of(found: &Found) -> LinkCounts {
+    let redundant = found.subdevices.len().saturating_sub(found.main_count);
+    LinkCounts { main: found.main_count as u16, redundant: redundant as u16 }
 }
 
 /// Ports open and close by themselves again.

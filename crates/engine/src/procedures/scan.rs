@@ -49,6 +49,7 @@ use crate::event::{Event, Notice, Subject};
 use crate::info::{InfoWarning, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
+use crate::ring_status::LinkCounts;
 pub use crate::segment::Scan;
 use crate::supervisor::{Bus, BusError, Reply};
 use crate::topology::{Closing, NodeStatus, Topology, rings_shown};
@@ -78,7 +79,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError
     let mut expected = count::first(bus, options, begin).await?;
     loop {
         bus.step(Subject::Scan, || {
-            let (main, redundant) = expected.pair();
+            let LinkCounts { main, redundant } = expected.by_link();
             format!("scan: {main} SubDevices on MAIN, {redundant} on REDUNDANT; they go to INIT and get addresses")
         });
         expected = match attempt(bus, options, expected).await {
@@ -150,8 +151,8 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
     let subdevices: Vec<SubDeviceInfo> = subdevices.into_iter().collect::<Result<_, _>>()?;
     let counted = counted?;
     if (counted.main, counted.redundant) != (expected.main, expected.redundant) {
-        let after = (counted.main.0, counted.redundant.0);
-        return Err(ScanError::Changed { before: expected.pair(), after }.into());
+        let after = LinkCounts { main: counted.main.0, redundant: counted.redundant.0 };
+        return Err(ScanError::Changed { before: expected.by_link(), after }.into());
     }
     let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
     let Learned { topology, closings, not_learned } = connect(bus, options.junctions, &subdevices, main_count).await?;

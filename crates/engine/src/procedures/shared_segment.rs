@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::cell::{Cell, Ref, RefCell};
+use core::cell::{Ref, RefCell};
 use core::future::{Future, poll_fn};
 use core::pin::pin;
 use core::task::Poll;
@@ -33,8 +33,6 @@ pub struct SharedSegment {
     mailboxes: Rc<[Mailbox]>,
     /// Procedures to be started.
     tasks: Rc<RefCell<VecDeque<Task>>>,
-    /// A new observation that was not posted by the cyclic half.
-    has_changed: Rc<Cell<bool>>,
     changed: Signal,
     /// Words for the cyclic half.
     pub board: Arc<Board>,
@@ -92,7 +90,6 @@ impl SharedSegment {
             segment,
             mailboxes: Rc::default(),
             tasks: Rc::default(),
-            has_changed: Rc::default(),
             changed: bus.signal(),
             bus: bus.clone(),
             board: Arc::new(Board::new(0)),
@@ -118,8 +115,6 @@ impl SharedSegment {
 
     /// Passes an observation to the model, and executes its effects.
     pub fn observe(&self, seen: Observation<'_>) {
-        // Supervision need not run for these.
-        let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_));
         let effects = self.segment.borrow_mut().observe(seen, self.bus.now());
         for effect in effects.0 {
             match effect {
@@ -132,7 +127,6 @@ impl SharedSegment {
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
         }
-        self.has_changed.set(self.has_changed.get() || !is_apart);
         self.changed.notify();
     }
 
@@ -156,6 +150,11 @@ impl SharedSegment {
         self.observe(Observation::Undeclared(seen));
     }
 
+    /// Passes the posted words to the model. Words that it has processed before change nothing.
+    pub(super) fn observe_words(&self) {
+        self.observe(Observation::Words(self.words()));
+    }
+
     /// The posted words, in the form that the model takes.
     pub(super) fn words(&self) -> Words {
         Words {
@@ -165,12 +164,6 @@ impl SharedSegment {
             supervision: self.board.supervision(),
             cycles: self.board.cycles(),
         }
-    }
-
-    /// Waits until the cyclic half has posted words that differ from `seen`, until another observation, or until a
-    /// time.
-    pub(super) async fn until_changed(&self, seen: Posted, until: Instant) {
-        self.bus.until_posted(seen, until, &self.changed, || self.has_changed.replace(false)).await;
     }
 
     /// Waits until the cyclic half has posted words that differ from `seen`, until a time, or until `ready`, which is

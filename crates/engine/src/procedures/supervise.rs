@@ -29,10 +29,13 @@ const SEARCH_PAUSE: Duration = Duration::from_millis(10);
 pub(super) async fn supervise(bus: Bus, segment: SharedSegment) {
     segment.until_branches_are_open().await;
     loop {
-        let posted = bus.posted();
-        segment.observe(Observation::Words(segment.words()));
+        let (posted, words, seen) = (bus.posted(), segment.words(), segment.view().observed());
+        segment.observe(Observation::Words(words));
         let wake = segment.view().next_evaluation();
-        segment.until_changed(posted, wake).await;
+        let number = words.supervision.map_or(0, |(number, _)| number);
+        let posted = posted.with_next_result(wake.with_result.then_some(number));
+        let is_changed = || segment.view().observed() != seen;
+        segment.until_posted(posted, wake.at, is_changed).await;
     }
 }
 

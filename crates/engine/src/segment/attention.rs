@@ -8,6 +8,7 @@ use ringcat_wire::register::EcatEvent;
 use super::disturbance::Disturbance;
 use super::effect::{Effects, Task};
 use super::ring::Words;
+use super::wake::Wake;
 use crate::board::{RingWord, Supervision};
 use crate::ring::RingState;
 use crate::time::Instant;
@@ -37,6 +38,26 @@ pub struct Round {
     pub counts: bool,
 }
 
+/// Whether a round is under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reads {
+    /// None is; the next one begins at this time at the earliest.
+    Resting(Instant),
+    /// One is.
+    UnderWay,
+}
+
+/// Requests for a round by other triggers than posted words, the most urgent one last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Request {
+    /// None: the next round is routine.
+    Nothing,
+    /// One at a time: it is not routine.
+    AtATime,
+    /// One now.
+    Now,
+}
+
 /// Triggers of a round.
 #[derive(Debug)]
 pub(super) struct Attention {
@@ -49,19 +70,16 @@ pub(super) struct Attention {
     /// because of missed requests.
     checked: u32,
     missed: u8,
-    /// Another trigger requests a round.
-    is_wanted: bool,
-    is_awaited: bool,
+    /// Other triggers.
+    request: Request,
     next_routine: Instant,
-    /// Earliest time of the next round.
-    earliest: Instant,
-    is_under_way: bool,
+    reads: Reads,
     /// Result of the last round.
     pub round: Round,
     /// Consecutive rounds in which reads were lost though frames returned, or the reverse.
     pub blind: u8,
-    /// Time of the next evaluation if no words are posted before.
-    pub wake: Instant,
+    /// The next evaluation if no words are posted before.
+    pub wake: Wake,
 }
 
 impl Default for Attention {
@@ -72,14 +90,12 @@ impl Default for Attention {
             reported: RingState::Unknown,
             checked: 0,
             missed: 0,
-            is_wanted: false,
-            is_awaited: false,
+            request: Request::Nothing,
             next_routine: Instant::default(),
-            earliest: Instant::default(),
-            is_under_way: false,
+            reads: Reads::Resting(Instant::default()),
             round: Round::default(),
             blind: 0,
-            wake: Instant::default(),
+            wake: Wake::at(Instant::default()),
         }
     }
 }
@@ -90,7 +106,7 @@ impl Attention {
         words.supervision.is_some_and(|(_, supervision)| supervision != self.seen)
             || words.ring != self.ring
             || reported != self.reported
-            || self.is_wanted
+            || self.request == Request::Now
     }
 
     /// Ports have changed again directly after a round that cleared their ECAT event: the event is set again, as before
@@ -110,7 +126,7 @@ impl Attention {
         Some(is_missed)
     }
 
-    /// Starts a round if it is requested. Returns the time of the next evaluation if no words are posted before.
+    /// Starts a round if it is requested. Returns the next evaluation if no words are posted before.
     pub fn observe(
         &mut self,
         words: &Words,
@@ -118,27 +134,28 @@ impl Attention {
         disturbance: Option<Disturbance>,
         now: Instant,
         effects: &mut Effects,
-    ) -> Instant {
+    ) -> Wake {
         // A missing answer has no meaning while SubDevices are out of reach on purpose; the end of this state is an
         // observation.
-        if self.is_under_way || disturbance == Some(Disturbance::IsolateRings) {
-            return Instant::NEVER;
+        let Reads::Resting(earliest) = self.reads else { return Wake::NEVER };
+        if disturbance == Some(Disturbance::IsolateRings) {
+            return Wake::NEVER;
         }
-        if now < self.earliest {
-            return self.earliest;
+        if now < earliest {
+            return Wake::at(earliest);
         }
         let missed = self.has_missed(words);
         let changed = self.has_changed(words, reported) || missed == Some(true);
         if !changed && now < self.next_routine {
-            return if missed.is_some() { self.next_routine.min(now + PAUSE) } else { self.next_routine };
+            return Wake { at: self.next_routine, with_result: missed.is_some() };
         }
-        effects.start(Task::Round { routine: !changed && !self.is_awaited });
-        (self.is_under_way, self.is_awaited, self.is_wanted) = (true, false, false);
+        effects.start(Task::Round { routine: !changed && self.request == Request::Nothing });
+        (self.reads, self.request) = (Reads::UnderWay, Request::Nothing);
         self.seen = words.supervision.map_or(self.seen, |(_, supervision)| supervision);
         self.ring = words.ring;
         self.reported = reported;
         self.next_routine = now + ROUTINE;
-        Instant::NEVER
+        Wake::NEVER
     }
 
     /// The state of the ring that had been reported when the last round began.
@@ -148,19 +165,18 @@ impl Attention {
 
     /// Requests a round.
     pub fn want(&mut self) {
-        self.is_wanted = true;
+        self.request = Request::Now;
     }
 
     /// Requests a round after a pause at the latest.
     pub fn again_in(&mut self, pause: Duration, now: Instant) {
-        self.is_awaited = true;
+        self.request = self.request.max(Request::AtATime);
         self.next_routine = self.next_routine.min(now + pause);
     }
 
     /// A round has ended; `number` is the latest result's.
     pub fn end(&mut self, number: Option<u32>, now: Instant) {
-        self.is_under_way = false;
+        self.reads = Reads::Resting(now + PAUSE);
         self.checked = number.unwrap_or(0);
-        self.earliest = now + PAUSE;
     }
 }

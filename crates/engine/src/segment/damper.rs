@@ -57,6 +57,12 @@ impl Damper {
         self.is_prompt || held >= HOLD
     }
 
+    /// When a state that may not be reported yet may be, if it does not change again.
+    pub(crate) fn due(&self) -> Instant {
+        let pause = if self.is_unsteady { STEADY } else { HOLD };
+        self.changed_at.map_or(Instant::default(), |at| at + pause)
+    }
+
     /// Counts a report. True if from now on the state changes too often to be reported each time.
     pub(crate) fn count_report(&mut self, now: Instant) -> bool {
         let refills = now.since(self.refilled_at).as_nanos() / REFILL.as_nanos();
@@ -67,6 +73,11 @@ impl Damper {
         self.budget = self.budget.saturating_sub(1);
         let was = core::mem::replace(&mut self.is_unsteady, self.budget == 0);
         self.is_unsteady && !was
+    }
+
+    /// When it no longer changes too often, if it does not change again; `None` if it does not.
+    pub(crate) fn steady_at(&self, now: Instant) -> Option<Instant> {
+        self.changed_at.filter(|_| self.is_unsteady(now)).map(|at| at + STEADY)
     }
 
     /// Whether it changes too often to be reported each time.

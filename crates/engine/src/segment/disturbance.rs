@@ -1,11 +1,13 @@
 //! Disturbances: procedures that put SubDevices out of reach, take a link out of use or change station addresses on
 //! purpose, and procedures that need all of this unchanged. Only one runs at a time.
 //!
-//! A running disturbance cannot be cancelled: it runs until it is undone. If several are requested, the most urgent one
-//! is next. Each ends within its own time limit, and earlier if a more urgent one waits. In a segment that changes
-//! repeatedly the more urgent ones may be requested again and again: a kind that [`MOST_PASSED`] others have passed is
-//! next, and its turn is not shortened. So each kind waits for at most [`LONGEST_WAIT`] turns of others, also if its
-//! procedure gives up waiting and requests it again.
+//! The model does not cancel a running disturbance: it runs until it is undone. The end of an application ends its
+//! procedure; the link and the ports that it has changed are restored first then, before any SubDevice is stopped
+//! (`procedures/loops.rs`), and addresses that it was assigning are read by the scan that follows. If several are
+//! requested, the most urgent one is next. Each ends within its own time limit, and earlier if a more urgent one
+//! waits. In a segment that changes repeatedly the more urgent ones may be requested again and again: a kind that
+//! [`MOST_PASSED`] others have passed is next, and its turn is not shortened. So each kind waits for at most
+//! [`LONGEST_WAIT`] turns of others, also if its procedure gives up waiting and requests it again.
 
 use alloc::vec::Vec;
 

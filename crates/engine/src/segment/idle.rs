@@ -53,14 +53,28 @@ pub(super) struct Rescans {
     pub ended: (u64, Differences),
 }
 
+/// The procedure of idle operation that works on the segment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Work {
+    /// None.
+    #[default]
+    Nothing,
+    /// The first scan.
+    FirstScan,
+    /// The scan after a change, or by request.
+    Follow,
+    /// Reads of all states.
+    ReadStates,
+}
+
 /// Operation without an application.
 #[derive(Debug, Default)]
 pub(super) struct Idle {
     pub compared: Comparison,
     /// Consecutive broadcasts without an answer.
     pub silent: u8,
-    /// A procedure works on the segment: a scan, or reads of all states.
-    pub is_under_way: bool,
+    /// The procedure that works on the segment.
+    pub work: Work,
     pub next_routine: Instant,
     pub rescans: Rescans,
 }
@@ -70,6 +84,13 @@ impl Idle {
     pub fn renewed(&self) -> Idle {
         let asked = self.rescans.asked;
         Idle { rescans: Rescans { asked, ended: (asked, Differences::default()) }, ..Idle::default() }
+    }
+
+    /// A procedure has ended. Another one may be under way since.
+    pub fn end(&mut self, work: Work) {
+        if self.work == work {
+            self.work = Work::Nothing;
+        }
     }
 
     /// The number of the last request for a rescan, if it has no result yet.

@@ -5,11 +5,13 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::DlControl;
 
 use super::addresses::Addresses;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cabling::Cabling;
+use super::changes::{Changes, Compared};
 use super::choices::Choices;
 use super::clocks::Clocks;
 use super::crossings::{Crossings, LineCheck};
@@ -28,6 +30,7 @@ use super::subdevices::SubDevices;
 use super::unassigned::UnassignedView;
 use super::undeclared::Keeping;
 use super::versions::Versions;
+use super::wake::Wake;
 use crate::board::Board;
 use crate::board::clocks::References;
 use crate::clocks::KnownClocks;
@@ -74,6 +77,10 @@ impl Default for Declared {
 #[derive(Debug)]
 pub struct Segment {
     pub(super) stage: Stage,
+    /// Observations so far but those of words and clocks, which supervision need not follow.
+    pub(super) observed: u32,
+    /// Changes that posted words have shown.
+    pub(super) compared: Compared,
     /// The SubDevices that were found, and those that are declared and absent.
     pub(super) subdevices: SubDevices,
     /// Number of the first attempts to configure the members: findings of an earlier application are refused.
@@ -86,6 +93,8 @@ pub struct Segment {
     pub(super) blocked: Vec<BlockedPort>,
     /// Commands to junctions of local rings about their ports.
     pub(super) port_controls: Vec<PortControl>,
+    /// SubDevices with ports that are changed for a moment, and their settings before.
+    pub(super) altered: Vec<(StationAddress, DlControl)>,
     pub(super) board: Arc<Board>,
     pub(super) choices: Choices,
     pub(super) ring: Ring,
@@ -119,6 +128,8 @@ impl Segment {
         let Declared { subdevices, layout, cabling, clocks, ring, carriers, board } = declared;
         Segment {
             stage: Stage::default(),
+            observed: 0,
+            compared: Compared::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
             local_rings: LocalRings::new(&cabling, &subdevices),
@@ -134,6 +145,7 @@ impl Segment {
             frames_tested_until: Instant::default(),
             blocked: Vec::new(),
             port_controls: Vec::new(),
+            altered: Vec::new(),
             subdevices,
             first_attempt: 0,
             layout,
@@ -152,7 +164,22 @@ impl Segment {
 
     /// Whether a scan is under way.
     pub fn is_scanning(&self) -> bool {
-        matches!(self.stage, Stage::Scanning)
+        matches!(self.stage, Stage::Scanning { .. })
+    }
+
+    /// Whether a scan that the application has requested is under way.
+    pub fn is_requested_scan_under_way(&self) -> bool {
+        matches!(self.stage, Stage::Scanning { is_requested: true })
+    }
+
+    /// Changes of the segment that posted words have shown since the application began.
+    pub fn changes(&self) -> Changes {
+        self.compared.changes
+    }
+
+    /// Number of observations that supervision has to follow; it changes with each.
+    pub fn observed(&self) -> u32 {
+        self.observed
     }
 
     /// Whether an application is active.
@@ -203,14 +230,14 @@ impl Segment {
     /// Station addresses by position: those of the last scan, or of the rescan that was taken over.
     pub fn stations_by_position(&self) -> Vec<StationAddress> {
         match &self.stage {
-            Stage::Unscanned | Stage::Scanning => Vec::new(),
+            Stage::Unscanned | Stage::Scanning { .. } => Vec::new(),
             Stage::Scanned(scanned) => scanned.found.stations(),
             Stage::Active(_) => self.cabling.stations.clone(),
         }
     }
 
-    /// Time of the next evaluation if no words are posted before.
-    pub fn next_evaluation(&self) -> Instant {
+    /// The next evaluation if no words are posted before.
+    pub fn next_evaluation(&self) -> Wake {
         self.attention.wake
     }
 

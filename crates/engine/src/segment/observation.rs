@@ -6,7 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::DlControl;
 
@@ -27,7 +27,7 @@ use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
-use crate::declared::SubDeviceId;
+use crate::declared::Move;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::ring::FrameLimit;
@@ -129,7 +129,7 @@ pub enum Observation<'a> {
     /// A frame may hold this number of datagrams: no other test is necessary.
     FramesLimited(FrameLimit),
 
-    /// A scan of the segment begins, with new station addresses.
+    /// A scan that the application has requested begins, with new station addresses.
     ScanBegun,
     /// What it has found, in events; refused if it was given up.
     ScanShows(Vec<Event>),
@@ -282,8 +282,8 @@ pub enum Observation<'a> {
     Moved {
         /// Version of the model at the request.
         versions: Versions,
-        /// Index in the declaration, position before, position now.
-        moved: Vec<(SubDeviceId, Position, Position)>,
+        /// The moves.
+        moved: Vec<Move>,
     },
     /// A rescan of the whole segment has ended.
     Rescanned {
@@ -322,18 +322,23 @@ pub enum Observation<'a> {
         /// Words posted at that time.
         words: Words,
     },
-    /// A port command to a junction is about to be sent.
+    /// Port commands to this SubDevice are stored from now on.
+    PortsFollowed(StationAddress),
+    /// Ports of these SubDevices are about to be changed for a moment; with their settings before. None: they are
+    /// restored, or expire.
+    PortsAltered(&'a [(StationAddress, DlControl)]),
+    /// A port command to a SubDevice whose commands are stored is about to be sent.
     PortsOrdered {
-        /// The junction.
+        /// The SubDevice.
         station: StationAddress,
         /// The command.
         control: DlControl,
     },
-    /// The junction has got the command.
+    /// The SubDevice has got the command.
     PortsWritten(StationAddress),
-    /// The port control of a junction was read, after this number of commands.
+    /// The port control of such a SubDevice was read, after this number of commands.
     PortsRead {
-        /// The junction.
+        /// The SubDevice.
         station: StationAddress,
         /// Commands up to then.
         orders: u32,

@@ -1,4 +1,4 @@
-//! Port commands to SubDevices.
+//! Port commands to SubDevices, and settings of ports that are changed for a moment.
 //!
 //! When no frame returns, rings are examined by writing the loops of all ports of their junctions at once. A port that
 //! was closed on purpose must stay closed then, also if it was closed after the last scan, or if the answer to the
@@ -17,10 +17,10 @@ pub struct BlockedPort {
     pub port: u8,
 }
 
-/// The port control of a junction.
+/// The port control of a junction, or of a SubDevice whose ports are changed for a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct PortControl {
-    /// The junction.
+    /// The SubDevice.
     pub station: StationAddress,
     /// The last command.
     pub control: DlControl,

@@ -4,11 +4,10 @@
 //! All inputs are words posted by the exchange: nothing here waits for a frame, so the event comes in the cycle whose
 //! frames showed the change.
 
-use core::time::Duration;
-
 use super::damper::Damper;
 use super::disturbance::Disturbance;
 use super::effect::{Effect, Effects};
+use super::wake::Wake;
 use crate::board::{RingWord, Supervision};
 use crate::event::Event;
 use crate::link::{Link, LinkSet};
@@ -17,8 +16,6 @@ use crate::ring_status::{Cable, CableErrors, LinkCounts, LinkStatus, Redundancy,
 use crate::time::Instant;
 use crate::topology::{Topology, are_doubtful};
 
-/// Interval of evaluation while counts settle, or while a change is not yet reported.
-const PAUSE: Duration = Duration::from_micros(500);
 /// If the counts before the change are not known: supervision results after which two equal counts in a row are
 /// required. At the moment of a cut one copy may be processed by fewer SubDevices than are connected to its side.
 const SETTLING_RESULTS: u32 = 20;
@@ -100,7 +97,7 @@ impl Ring {
         self.reported
     }
 
-    /// Processes posted words. Returns when to evaluate again though nothing else is posted.
+    /// Processes posted words. Returns when to evaluate again though no other words are posted.
     pub fn observe(
         &mut self,
         words: &Words,
@@ -108,13 +105,13 @@ impl Ring {
         cabled: &Cabled<'_>,
         now: Instant,
         effects: &mut Effects,
-    ) -> Option<Instant> {
+    ) -> Wake {
         match disturbance {
             // The redundant link is down by our own command: not reported.
             Some(Disturbance::OpenByLink) => {
                 (self.changes, self.dead_way) = (words.ring.changes, words.ring.dead_way);
                 self.carriers = words.carriers;
-                return None;
+                return Wake::NEVER;
             }
             // While the ring is open on purpose by a port, the carrier of the interface does not change.
             Some(Disturbance::OpenByPort) => {
@@ -129,18 +126,12 @@ impl Ring {
         if words.links == LinkSet::Single {
             return again;
         }
-        let is_open = self.observe_ring(words, cabled, now, effects);
-        [again, is_open.then(|| now + PAUSE)].into_iter().flatten().min()
+        again.or(self.observe_ring(words, cabled, now, effects))
     }
 
     /// Reports changes of carriers. Returns when a change that is held back may be reported.
-    pub fn observe_carriers(
-        &mut self,
-        carriers: [Option<bool>; 2],
-        now: Instant,
-        effects: &mut Effects,
-    ) -> Option<Instant> {
-        let mut again = None;
+    pub fn observe_carriers(&mut self, carriers: [Option<bool>; 2], now: Instant, effects: &mut Effects) -> Wake {
+        let mut again = Wake::NEVER;
         for link in Link::ALL {
             let at = link.index();
             if carriers[at] != self.carriers[at] {
@@ -151,7 +142,7 @@ impl Ring {
                 continue;
             }
             if !self.cables[at].may_report(now) {
-                again = Some(now + PAUSE);
+                again = again.or(Wake::at(self.cables[at].due()));
                 continue;
             }
             let before = core::mem::replace(&mut self.reported_carriers[at], carriers[at]);
@@ -165,8 +156,8 @@ impl Ring {
         again
     }
 
-    /// True while a change is not yet reported or counts settle.
-    fn observe_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+    /// Returns when to evaluate again while a change is not yet reported or counts settle.
+    fn observe_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> Wake {
         let word = words.ring;
         if word.changes != self.changes {
             self.damper.changed(now);
@@ -176,18 +167,20 @@ impl Ring {
             self.ways.changed(now);
             self.dead_way = word.dead_way;
         }
-        let is_settled = self.report_ring(words, cabled, now, effects);
+        let settles = self.report_ring(words, cabled, now, effects);
         let is_reported = self.report_redundancy(word, now, effects);
         self.status.state = word.state;
         self.status.changes = word.changes;
         self.status.unsteady = self.damper.is_unsteady(now);
-        !is_settled || !is_reported || self.status.unsteady
+        let reported = if is_reported { Wake::NEVER } else { Wake::at(self.ways.due()) };
+        let steady = self.damper.steady_at(now).map_or(Wake::NEVER, Wake::at);
+        settles.or(reported).or(steady)
     }
 
-    /// True if the state was reported with steady counts.
-    fn report_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> bool {
+    /// Returns when to evaluate again until the state is reported with steady counts.
+    fn report_ring(&mut self, words: &Words, cabled: &Cabled<'_>, now: Instant, effects: &mut Effects) -> Wake {
         let word = words.ring;
-        let Some((number, supervision)) = words.supervision else { return true };
+        let Some((number, supervision)) = words.supervision else { return Wake::NEVER };
         let counts = (supervision.main.0, supervision.redundant.0);
         if word.state == self.reported {
             if self.last.is_some_and(|(before, same)| before != number && same == counts) {
@@ -195,21 +188,21 @@ impl Ring {
             }
             self.last = Some((number, counts));
             self.settling = 0;
-            return self.steady == supervision.total().0;
+            return if self.steady == supervision.total().0 { Wake::NEVER } else { Wake::RESULT };
         }
         if !self.damper.may_report(now) {
-            return false;
+            return Wake::at(self.damper.due());
         }
-        let Some((main, redundant)) = self.counts(word, number, supervision) else { return false };
+        let Some((main, redundant)) = self.counts(word, number, supervision) else { return Wake::RESULT };
         if !self.report_edge(word.state, (main, redundant), effects) {
-            return false;
+            return Wake::RESULT;
         }
         effects.0.push(Effect::MainCount(main));
         self.place_at_host(word, (main, redundant), cabled, effects);
         if self.damper.count_report(now) {
             effects.report(Event::RingUnsteady { changes: word.changes });
         }
-        false
+        Wake::RESULT
     }
 
     /// Reports another state of the ring; false if there is nothing to report.

@@ -12,7 +12,10 @@ pub(super) enum Stage {
     #[default]
     Unscanned,
     /// A scan is under way: nothing is known until it ends.
-    Scanning,
+    Scanning {
+        /// The application has requested it; otherwise it is one of idle operation.
+        is_requested: bool,
+    },
     /// The SubDevices of the last scan are known, and none is declared.
     Scanned(Scanned),
     /// An application is active.
@@ -31,7 +34,7 @@ impl Stage {
     /// The same, to take over what is learnt about them.
     pub fn scanned_mut(&mut self) -> Option<&mut Scanned> {
         match self {
-            Stage::Unscanned | Stage::Scanning => None,
+            Stage::Unscanned | Stage::Scanning { .. } => None,
             Stage::Scanned(scanned) | Stage::Active(scanned) => Some(scanned),
         }
     }
@@ -39,7 +42,7 @@ impl Stage {
     /// The SubDevices of the last scan.
     pub fn scanned(&self) -> Option<&Scanned> {
         match self {
-            Stage::Unscanned | Stage::Scanning => None,
+            Stage::Unscanned | Stage::Scanning { .. } => None,
             Stage::Scanned(scanned) | Stage::Active(scanned) => Some(scanned),
         }
     }

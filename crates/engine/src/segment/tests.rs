@@ -28,7 +28,7 @@ use super::start::Start;
 use super::*;
 use crate::board::{Board, RingWord, Supervision};
 use crate::config::SubDeviceConfig;
-use crate::declared::SubDeviceId;
+use crate::declared::{Move, SubDeviceId};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::JunctionMode;
@@ -71,7 +71,7 @@ fn ring_rules() -> Rules<'static> {
 }
 
 /// Choices of an application that wants nothing special.
-fn plain_choices() -> Choices {
+fn choices() -> Choices {
     Choices {
         enhanced_line_crossed: false,
         junctions: JunctionMode::Disabled,
@@ -80,6 +80,19 @@ fn plain_choices() -> Choices {
         supervision: true,
         retries: Retries::Always,
     }
+}
+
+/// SubDevices with these station addresses and product codes.
+fn found(stations: &[(u16, u32)]) -> Scan {
+    let info = |(at, (station, product_code)): (usize, &(u16, u32))| SubDeviceInfo {
+        position: Position(at as u16),
+        station: StationAddress(*station),
+        identity: Identity { vendor_id: 2, product_code: *product_code, revision: 1, serial: 0 },
+        ..SubDeviceInfo::default()
+    };
+    let subdevices: Vec<SubDeviceInfo> = stations.iter().enumerate().map(info).collect();
+    let topology = Topology::build(&vec![node(PASS); stations.len()], stations.len());
+    Scan { subdevices, topology, main_count: stations.len(), redundant_count: 0 }
 }
 
 impl Ring {
@@ -117,7 +130,7 @@ impl Ring {
             carriers: [Some(true); 2],
             board: Arc::new(Board::new(count)),
         };
-        let mut segment = Segment::new(plain_choices());
+        let mut segment = Segment::new(choices());
         segment.observe(Observation::ScanBegun, Instant(0));
         segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));
         segment.observe(Observation::Activated(Box::new(declared)), Instant(0));
@@ -372,6 +385,67 @@ fn without_changes_the_model_sleeps_until_the_next_routine_scan() {
     ring.scan(&[PASS; 4]);
     let effects = ring.cycle();
     assert_eq!(effects, []);
-    let wake = ring.segment.next_evaluation();
+    let wake = ring.segment.next_evaluation().at;
     assert!(wake > ring.now + Duration::from_millis(900), "an evaluation at {wake:?}, now {:?}", ring.now);
+}
+
+/// Evaluates the same words whenever the model asks for it, for a second; returns how often. Rounds end at once.
+fn evaluations_without_news(ring: &mut Ring, high: &[u8]) -> usize {
+    let (words, end) = (ring.words, ring.now + Duration::from_secs(1));
+    let mut count = 0;
+    loop {
+        let effects = ring.observe(Observation::Words(words));
+        if effects.iter().any(|effect| matches!(effect, Effect::Start(Task::Round { .. }))) {
+            ring.scan(high);
+            continue;
+        }
+        count += 1;
+        ring.now = ring.now.max(ring.segment.next_evaluation().at);
+        if ring.now >= end {
+            return count;
+        }
+    }
+}
+
+#[test]
+fn the_model_is_not_evaluated_again_and_again_when_an_application_stops_cycling() {
+    // The last result counts another number than the one before.
+    let mut ring = Ring::closed(4);
+    ring.counts(3, 0, RingState::Closed);
+    ring.words.ring.changes -= 1;
+    ring.cycle();
+    let count = evaluations_without_news(&mut ring, &[PASS, PASS, PASS, 0]);
+    assert!(count <= 5, "counts that never settle: {count} evaluations");
+    // The ring was opened, and no result shows it.
+    let mut ring = Ring::closed(4);
+    ring.now += QUIET;
+    ring.counts(4, 0, RingState::Open);
+    ring.words.ring.returned = None;
+    ring.words.supervision.as_mut().unwrap().1.returned = false;
+    ring.cycle();
+    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    assert!(count <= 5, "counts from before: {count} evaluations");
+    // The ECAT event of a port was set, and stays.
+    let mut ring = Ring::closed(4);
+    ring.words.supervision.as_mut().unwrap().1.irq = 4;
+    ring.cycle();
+    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    assert!(count <= 5, "an ECAT event: {count} evaluations");
+}
+
+// covers: ring-flap
+#[test]
+fn a_held_back_change_is_evaluated_when_it_may_be_reported_and_not_before() {
+    let mut ring = Ring::closed(4);
+    ring.now += QUIET;
+    ring.words.carriers[1] = Some(false);
+    ring.cycle();
+    ring.words.carriers[1] = Some(true);
+    ring.cycle();
+    ring.scan(&[PASS; 4]);
+    let since = ring.now;
+    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    assert!(count <= 6, "{count} evaluations");
+    assert!(ring.now > since);
+    assert!(reports(&ring.cycle()).is_empty(), "the carrier was reported when it was due");
 }

@@ -11,7 +11,6 @@ use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 use core::fmt;
 use core::future::Future;
 
@@ -22,7 +21,7 @@ use ringcat_wire::datagram::Target;
 
 use super::counters::AcyclicCounters;
 use super::reply::{BusError, Reply};
-use super::shared::Shared;
+use super::shared_cell::SharedCell;
 use super::signal::Signal;
 use super::transfer::Request;
 use crate::board::Board;
@@ -37,11 +36,11 @@ use future::TransferFuture;
 /// The handle of a procedure on the bus.
 #[derive(Clone)]
 pub struct Bus {
-    pub(super) shared: Rc<RefCell<Shared>>,
+    pub(super) shared: Rc<SharedCell>,
 }
 
 impl Bus {
-    pub(super) fn new(shared: Rc<RefCell<Shared>>) -> Bus {
+    pub(super) fn new(shared: Rc<SharedCell>) -> Bus {
         Bus { shared }
     }
 

@@ -5,20 +5,19 @@
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 use core::task::{Context, Poll, Waker};
 
-use super::shared::Shared;
+use super::shared_cell::SharedCell;
 use super::task::{Task, TaskId};
 
 pub(crate) struct Executor {
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<SharedCell>,
     tasks: Vec<Option<Task>>,
     free: Vec<u32>,
 }
 
 impl Executor {
-    pub(crate) fn new(shared: Rc<RefCell<Shared>>) -> Executor {
+    pub(crate) fn new(shared: Rc<SharedCell>) -> Executor {
         Executor { shared, tasks: Vec::new(), free: Vec::new() }
     }
 

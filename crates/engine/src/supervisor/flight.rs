@@ -1,12 +1,10 @@
 //! An acyclic frame on the wire, its datagrams, and the content of the copies received so far.
 
 use alloc::vec::Vec;
-use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::{CIRCULATING, HEADER_LEN, WKC_LEN};
-use ringcat_wire::frame::MAX_FRAME;
 
 use super::reply::Reply;
 use super::stray::Overdue;
@@ -62,7 +60,7 @@ impl Default for Flight {
         Flight {
             sequence: Sequence::default(),
             datagrams: Vec::new(),
-            bytes: Vec::with_capacity(MAX_FRAME),
+            bytes: Vec::new(),
             arrivals: Arrivals::default(),
             sent_at: Instant::NEVER,
             left_at: Instant::NEVER,
@@ -160,12 +158,12 @@ impl Flight {
         self.repeatable && !self.answered && !self.released && self.no_return == 0
     }
 
-    /// Whether copies of frames that were sent more than `margin` later have come back on the way of each missing copy,
-    /// which frames do not overtake each other on: it does not come back any more. `newest`: when the newest of these
-    /// was sent, by link.
-    pub fn is_overtaken(&self, newest: [Instant; 2], margin: Duration, links: LinkSet) -> bool {
+    /// Whether copies of frames that were sent more than `margin` nanoseconds later have come back on the way of each
+    /// missing copy, which frames do not overtake each other on: it does not come back any more. `newest`: when the
+    /// newest of these was sent, by link.
+    pub fn is_overtaken(&self, newest: [Instant; 2], margin: u64, links: LinkSet) -> bool {
         let missing = self.missing_links(links);
-        let is_overtaken = |link: &Link| newest[link.index()] > self.sent_at + margin;
+        let is_overtaken = |link: &Link| newest[link.index()].ns_since(self.sent_at) > margin;
         self.awaits_repeatable() && Link::ALL.iter().filter(|link| missing & link.bit() != 0).all(is_overtaken)
     }
 
@@ -216,11 +214,13 @@ impl SentDatagram {
         self.expected.is_some_and(|expected| self.total() == expected)
     }
 
-    /// The reply of the frame with this number, sent at this time.
-    pub fn reply(&self, bytes: &[u8], (frame, sent_at): (Sequence, Instant)) -> Reply {
+    /// The reply of the frame with this number, sent at this time. `data`: memory for its data.
+    pub fn reply(&self, bytes: &[u8], (frame, sent_at): (Sequence, Instant), mut data: Vec<u8>) -> Reply {
         let data_at = self.header_at + HEADER_LEN;
+        data.clear();
+        data.extend_from_slice(&bytes[data_at..data_at + self.length]);
         Reply {
-            data: bytes[data_at..data_at + self.length].to_vec(),
+            data,
             main: self.wkc[0],
             redundant: self.wkc[1],
             irq: u16::from_le_bytes([bytes[data_at - 2], bytes[data_at - 1]]),

@@ -36,8 +36,8 @@ pub(crate) struct Flights {
     sequence: Sequence,
     /// Ended flights, kept for reuse of their memory.
     spare: Vec<Flight>,
-    /// The redundant copy of the frame being sent.
-    redundant: Box<[u8]>,
+    /// The frame being built, then its redundant copy.
+    buffer: Box<[u8]>,
 }
 
 impl Flights {
@@ -51,7 +51,7 @@ impl Flights {
             released: 0,
             sequence: Sequence::default(),
             spare: Vec::new(),
-            redundant: vec![0; MAX_FRAME].into_boxed_slice(),
+            buffer: vec![0; MAX_FRAME].into_boxed_slice(),
         }
     }
 

@@ -23,7 +23,7 @@ const AHEAD: usize = 2 * MAX_FRAME;
 /// A read that has waited for this time is sent before all requests.
 const MAX_READ_WAIT: Duration = Duration::from_millis(5);
 /// The shortest round trip may grow by this part of itself per measurement.
-const FADING_PART: u32 = 256;
+const FADING_PART: u64 = 256;
 
 /// Urgent datagrams that are sent in a row while others wait.
 const URGENT_IN_A_ROW: usize = 16;
@@ -62,8 +62,8 @@ pub(crate) struct Outbox {
     under_way: usize,
     /// When the interface finishes sending.
     free_at: Instant,
-    /// The shortest recent round trip.
-    round_trip: Option<Duration>,
+    /// The shortest recent round trip in nanoseconds.
+    round_trip: Option<u64>,
 }
 
 impl Outbox {
@@ -146,7 +146,7 @@ impl Outbox {
     }
 
     fn has_room(&self) -> bool {
-        let round_trip = self.round_trip.unwrap_or_default().as_nanos() / u128::from(BYTE_TIME_NS);
+        let round_trip = self.round_trip.unwrap_or_default() / BYTE_TIME_NS;
         let limit = AHEAD.saturating_add(usize::try_from(round_trip).unwrap_or(usize::MAX));
         self.under_way + self.waiting.min(MAX_FRAME) <= limit
     }
@@ -154,7 +154,7 @@ impl Outbox {
     /// A frame is handed to the interface. Returns the earliest start and end of its transmission.
     pub(crate) fn hand_over(&mut self, length: usize, now: Instant) -> (Instant, Instant) {
         let begins = self.free_at.max(now);
-        self.free_at = begins + Duration::from_nanos(wire_time_ns(length));
+        self.free_at = Instant(begins.0.saturating_add(wire_time_ns(length)));
         (begins, self.free_at)
     }
 
@@ -168,10 +168,9 @@ impl Outbox {
         self.under_way = self.under_way.saturating_sub(bytes);
     }
 
-    /// A frame returned this long after its transmission.
-    pub(crate) fn note_round_trip(&mut self, round_trip: Duration) {
-        self.round_trip =
-            Some(self.round_trip.map_or(round_trip, |shortest| round_trip.min(shortest + shortest / FADING_PART)));
+    /// A frame returned this number of nanoseconds after its transmission.
+    pub(crate) fn note_round_trip(&mut self, ns: u64) {
+        self.round_trip = Some(self.round_trip.map_or(ns, |shortest| ns.min(shortest + shortest / FADING_PART)));
     }
 }
 
@@ -322,7 +321,7 @@ mod tests {
         assert!(outbox.is_ready(Instant(0)), "a second frame may be sent");
         outbox.reads_sent(MAX_FRAME);
         assert!(!outbox.is_ready(Instant(0)));
-        outbox.note_round_trip(Duration::from_nanos(MAX_FRAME as u64 * BYTE_TIME_NS));
+        outbox.note_round_trip(MAX_FRAME as u64 * BYTE_TIME_NS);
         assert!(outbox.is_ready(Instant(0)), "a third frame fills the round trip");
         outbox.reads_sent(MAX_FRAME);
         assert!(!outbox.is_ready(Instant(0)));

@@ -10,6 +10,8 @@ use crate::board::{RingWord, Supervision};
 pub struct Posted {
     /// Result of the latest supervision datagram.
     pub supervision: Option<Supervision>,
+    /// Its number, for those that wait for the next result ([`Posted::with_next_result`]).
+    pub result: Option<u32>,
     /// The state of the ring.
     pub ring: RingWord,
     /// By [`crate::link::Link::index`].
@@ -22,22 +24,35 @@ pub struct Posted {
     pub times: u32,
 }
 
+impl Posted {
+    /// The same words; with `number` another one are those with another supervision result, also with an equal one.
+    #[must_use]
+    pub fn with_next_result(self, number: Option<u32>) -> Posted {
+        Posted { result: number, ..self }
+    }
+}
+
 /// Procedures that wait for a changed word.
 #[derive(Debug, Default)]
 pub(super) struct Watchers {
     /// Waiting procedures.
     pub waiting: Vec<TaskId>,
+    /// One of them waits for the next supervision result, also for an equal one.
+    pub wants_result: bool,
     /// Words posted when they were last woken, packed.
     pub seen: PostedWords,
+    /// The carriers then.
+    pub seen_carriers: [Option<bool>; 2],
 }
 
-/// [`Posted`] as the words lie on the board: compared several times per cycle.
+/// [`Posted`] as the words of other threads lie on the board: compared several times per cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct PostedWords {
     /// The result of the latest supervision datagram, and whether there was any.
     pub supervision: (u64, bool),
+    /// Its number, if a procedure waits for the next one.
+    pub result: u32,
     pub ring: u64,
-    pub carriers: [Option<bool>; 2],
     pub requests: u32,
     pub holds: u32,
 }

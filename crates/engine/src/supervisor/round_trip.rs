@@ -27,31 +27,31 @@ pub(crate) const MAX_RETRIES: u8 = 9;
 /// Learns round-trip times.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RoundTrip {
-    /// The longest recent round trip; it decays.
-    longest: Option<Duration>,
+    /// The longest recent round trip in nanoseconds; it decays.
+    longest: Option<u64>,
 }
 
 impl RoundTrip {
-    /// A copy came back in time.
-    pub(crate) fn took(&mut self, time: Duration) {
-        let faded = self.longest.unwrap_or_default() * 15 / 16;
-        self.longest = Some(faded.max(time));
+    /// A copy came back in time, after this number of nanoseconds.
+    pub(crate) fn took(&mut self, ns: u64) {
+        let longest = self.longest.unwrap_or_default();
+        self.longest = Some((longest - longest.div_ceil(16)).max(ns));
     }
 
     /// A copy came back after it was given up.
     pub(crate) fn was_late(&mut self) {
-        let longest = self.longest.unwrap_or(UNKNOWN / FACTOR);
-        self.longest = Some((longest * 2 + MARGIN / 2).min(LONGEST));
+        let longest = self.longest.map_or(UNKNOWN / FACTOR, Duration::from_nanos);
+        self.longest = Some(longest.saturating_mul(2).saturating_add(MARGIN / 2).min(LONGEST).as_nanos() as u64);
     }
 
-    /// The longest recent round trip, 0 if none was measured.
-    pub(crate) fn longest(&self) -> Duration {
+    /// The longest recent round trip in nanoseconds, 0 if none was measured.
+    pub(crate) fn longest(&self) -> u64 {
         self.longest.unwrap_or_default()
     }
 
     /// Time limit of a frame whose datagrams were lost this number of times before.
     pub(crate) fn wait(&self, losses: u8) -> Duration {
-        let first = self.longest.map_or(UNKNOWN, |longest| longest * FACTOR + MARGIN);
+        let first = self.longest.map_or(UNKNOWN, |longest| Duration::from_nanos(longest) * FACTOR + MARGIN);
         GROWTH.get(usize::from(losses)).map_or(LONGEST, |factor| first.saturating_mul(*factor).min(LONGEST))
     }
 }
@@ -70,7 +70,7 @@ mod tests {
         };
         let unknown = limits(&trips);
         assert_eq!(unknown[..6], [5_000, 5_000, 5_000, 10_000, 10_000, 20_000], "no round trip was measured");
-        trips.took(Duration::from_micros(100));
+        trips.took(100_000);
         let known = limits(&trips);
         assert_eq!(known[..6], [2_400, 2_400, 2_400, 4_800, 4_800, 9_600]);
         assert_eq!(known[6..], [20_000; 4]);
@@ -89,9 +89,9 @@ mod tests {
     #[test]
     fn the_longest_round_trip_decays() {
         let mut trips = RoundTrip::default();
-        trips.took(Duration::from_millis(4));
+        trips.took(4_000_000);
         assert_eq!(trips.wait(0), Duration::from_millis(18));
-        (0..100).for_each(|_| trips.took(Duration::from_micros(100)));
+        (0..100).for_each(|_| trips.took(100_000));
         assert_eq!(trips.wait(0), Duration::from_micros(2_400));
     }
 }

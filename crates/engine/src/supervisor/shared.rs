@@ -140,9 +140,10 @@ impl Shared {
         }
     }
 
-    /// When [`super::Supervisor::poll`] has work to do, received frames aside; never if it has none.
-    pub(crate) fn next_deadline(&self) -> Instant {
-        if !self.ready.is_empty() || !self.spawned.is_empty() || self.is_posted() {
+    /// When [`super::Supervisor::poll`] has work to do, received frames and words of other threads aside; never if it
+    /// has none.
+    pub(super) fn own_deadline(&self) -> Instant {
+        if !self.ready.is_empty() || !self.spawned.is_empty() || self.has_carriers_to_show() {
             return self.now;
         }
         let timer = self.timers.peek().map_or(Instant::NEVER, |Reverse((at, _))| *at);
@@ -151,6 +152,11 @@ impl Shared {
             false => self.outbox.next_deadline(self.now),
         };
         timer.min(self.flights.next_deadline()).min(queue.unwrap_or(Instant::NEVER))
+    }
+
+    /// Whether there is work that does not wait for a time: a datagram to send, or a request to the link layer.
+    pub(super) fn has_work(&self) -> bool {
+        matches!(self.link_order, LinkOrder::Given { .. }) || self.wants_to_send()
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {

@@ -7,18 +7,18 @@ use core::fmt;
 use core::future::poll_fn;
 use core::task::Poll;
 
-use super::shared::Shared;
+use super::shared_cell::SharedCell;
 use super::task::TaskId;
 
 /// Wakes procedures that wait for a condition.
 #[derive(Clone)]
 pub struct Signal {
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<SharedCell>,
     waiting: Rc<RefCell<Vec<TaskId>>>,
 }
 
 impl Signal {
-    pub(super) fn new(shared: Rc<RefCell<Shared>>) -> Signal {
+    pub(super) fn new(shared: Rc<SharedCell>) -> Signal {
         Signal { shared, waiting: Rc::default() }
     }
 

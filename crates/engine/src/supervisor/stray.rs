@@ -102,6 +102,11 @@ impl Strays {
         self.mails.iter().any(|(of, _)| *of == station)
     }
 
+    /// Whether there is any mail.
+    pub(crate) fn has_any(&self) -> bool {
+        !self.mails.is_empty()
+    }
+
     /// Number of mails that were not fetched in time.
     pub(crate) fn dropped(&self) -> u64 {
         self.dropped

@@ -473,6 +473,57 @@ fn timers_fire_in_order_and_a_group_wakes_its_waiter_once() {
     assert_eq!(bench.supervisor.next_deadline(), None);
 }
 
+#[test]
+fn work_that_comes_between_two_questions_is_due_at_once() {
+    const MS: u64 = 1_000_000;
+    let mut bench = Bench::new(LinkSet::Single);
+    let (board, bell) = (Arc::new(Board::new(1)), Bell::default());
+    bench.supervisor.attach(board.clone());
+    bench.supervisor.attach_bell(bell.clone());
+    let (bus, signal) = (bench.supervisor.bus(), bench.supervisor.bus().signal());
+    bench.start(async move {
+        loop {
+            bus.until_posted(bus.posted(), Instant(7 * MS), &signal, || false).await;
+        }
+    });
+    let due = |bench: &Bench| [bench.supervisor.due_at(), bench.supervisor.due_at()];
+    let idle = |bench: &mut Bench| {
+        bench.step();
+        assert_eq!(due(bench), [Instant(7 * MS); 2], "asked twice");
+    };
+    idle(&mut bench);
+    // Words of other threads, and those of the links.
+    bell.ring();
+    assert_eq!(due(&bench), [bench.now; 2]);
+    idle(&mut bench);
+    board.post_supervision(1);
+    assert_eq!(due(&bench), [bench.now; 2]);
+    idle(&mut bench);
+    bench.supervisor.set_carriers([Some(true), None]);
+    assert_eq!(due(&bench), [bench.now; 2]);
+    assert_eq!(board.live.carrier(Link::Main), Some(true));
+    bench.supervisor.set_carriers([Some(true), None]);
+    idle(&mut bench);
+    // A new procedure, its timer, its datagram, the deadline of its frame.
+    let bus = bench.supervisor.bus();
+    bench.start(async move {
+        bus.sleep(Duration::from_millis(1)).await;
+        bus.fprd(STATION, map::AL_STATUS, 2).await
+    });
+    assert_eq!(due(&bench), [bench.now; 2]);
+    bench.supervisor.poll(bench.now);
+    assert_eq!(due(&bench), [Instant(MS); 2]);
+    bench.pass(Duration::from_millis(1));
+    bench.supervisor.poll(bench.now);
+    assert_eq!(due(&bench), [Instant(0); 2], "a datagram does not wait for a time");
+    bench.step();
+    assert!(due(&bench)[0] > bench.now && due(&bench)[0] < Instant(7 * MS), "the frame has a deadline");
+    let copy = answered(&bench.sent[0].1, 1, 8);
+    bench.supervisor.receive(Link::Main, &copy, bench.now);
+    assert_eq!(due(&bench), [bench.now; 2], "its reply");
+    idle(&mut bench);
+}
+
 proptest! {
     #[test]
     fn any_bytes_may_arrive(

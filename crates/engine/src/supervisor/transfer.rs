@@ -172,6 +172,11 @@ impl Transfers {
         if *generation == id.generation { transfer.as_mut() } else { None }
     }
 
+    /// The memory of the data that was sent, for the data of the reply.
+    pub(crate) fn take_data(&mut self, id: TransferId) -> Vec<u8> {
+        self.find(id).map_or_else(Vec::new, |transfer| core::mem::take(&mut transfer.request.data))
+    }
+
     pub(crate) fn remove(&mut self, id: TransferId) -> Option<Transfer> {
         let (generation, transfer) = self.entries.get_mut(id.index as usize)?;
         if *generation != id.generation {

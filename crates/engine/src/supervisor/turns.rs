@@ -21,6 +21,9 @@ pub(super) const SHARE: u64 = 256;
 /// datagram low.
 const ACCOUNTS: usize = 4096;
 
+/// Number of accounts that are not removed when no datagram waits.
+const KEPT_ACCOUNTS: usize = 16;
+
 /// Target of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Account {
@@ -51,8 +54,13 @@ pub(super) struct Turn {
 /// Accounts of bytes sent or waiting, by target.
 #[derive(Debug, Default)]
 pub(super) struct Accounts {
-    /// Bytes used by each account, on a scale on which a round has [`SHARE`] bytes.
+    /// Bytes used by each account, on a scale on which a round has [`SHARE`] bytes. Those of before `origin` count as
+    /// none.
     used: BTreeMap<Account, u64>,
+    /// Where the rounds began.
+    origin: u64,
+    /// The most that an account has used, on the same scale.
+    most: u64,
     /// Number of accounts at which those that are not ahead of the current round are dropped; at least [`ACCOUNTS`].
     limit: usize,
     order: u64,
@@ -62,7 +70,7 @@ impl Accounts {
     /// The turn of a datagram of this length. `now` is the round of the oldest waiting datagram: rounds that a target
     /// did not use are lost.
     pub(super) fn turn(&mut self, target: Target, bytes: usize, now: u64) -> Turn {
-        let begin = now * SHARE;
+        let begin = self.origin + now * SHARE;
         if self.used.len() >= self.limit.max(ACCOUNTS) {
             self.used.retain(|_, used| *used > begin);
             self.limit = 2 * self.used.len();
@@ -70,13 +78,17 @@ impl Accounts {
         let used = self.used.entry(Account::of(target)).or_default();
         let from = begin.max(*used);
         *used = from + bytes as u64;
+        self.most = self.most.max(*used);
         self.order += 1;
-        Turn { round: from / SHARE, order: self.order }
+        Turn { round: (from - self.origin) / SHARE, order: self.order }
     }
 
-    /// No datagram waits: all accounts are cleared.
+    /// No datagram waits: all accounts are cleared. A few keep their memory, for the next datagram to them.
     pub(super) fn forget(&mut self) {
-        self.used.clear();
+        if self.used.len() > KEPT_ACCOUNTS {
+            self.used.clear();
+        }
+        self.origin = self.most;
         self.limit = 0;
     }
 }
@@ -198,6 +210,25 @@ mod tests {
         }
         let bytes = [served[1] * 100, served[2] * 300];
         assert!(bytes[0].abs_diff(bytes[1]) <= 100 + 300 + SHARE as u32, "{served:?}");
+    }
+
+    // covers: byte-budget
+    #[test]
+    fn after_an_idle_time_all_accounts_are_equal_however_many_there_were() {
+        for others in [1, KEPT_ACCOUNTS as u16, 4 * KEPT_ACCOUNTS as u16] {
+            let mut bench = Bench::default();
+            for round in 0..3 {
+                (0..10).for_each(|_| bench.request(1, 1500));
+                (2..2 + others).for_each(|station| bench.request(station, 60));
+                while bench.next().is_some() {}
+                bench.accounts.forget();
+                assert!(bench.accounts.used.len() <= KEPT_ACCOUNTS, "round {round}");
+            }
+            let requested = [1, 2, 1, 3];
+            requested.iter().for_each(|station| bench.request(*station, 100));
+            let sent: Vec<u16> = core::iter::from_fn(|| bench.next()).collect();
+            assert_eq!(sent, requested, "after {others} others");
+        }
     }
 
     // covers: byte-budget

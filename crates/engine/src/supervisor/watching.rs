@@ -18,6 +18,7 @@ impl Shared {
         Posted {
             requests,
             supervision: board.supervision().map(|(_, supervision)| supervision),
+            result: None,
             ring: board.ring(),
             carriers: self.carriers,
             holds: board.clocks.holds(),
@@ -25,25 +26,37 @@ impl Shared {
         }
     }
 
+    #[inline(always)]
     fn posted_words(&self) -> PostedWords {
-        let (carriers, requests) = (self.carriers, self.bell.rung());
-        let Some(board) = &self.board else { return PostedWords { carriers, requests, ..PostedWords::default() } };
+        let requests = self.bell.rung();
+        let Some(board) = self.board.as_deref() else { return PostedWords { requests, ..PostedWords::default() } };
         let (supervision, ring, holds) = (board.supervision_word(), board.ring_word(), board.clocks.holds());
-        PostedWords { supervision, ring, carriers, requests, holds }
+        let result = if self.watchers.wants_result { board.supervision_number() } else { 0 };
+        PostedWords { supervision, result, ring, requests, holds }
     }
 
-    /// Whether a procedure waits for posted words, and these have changed.
-    #[inline]
+    /// Whether a procedure waits for posted words, and those of other threads have changed.
+    #[inline(always)]
     pub(super) fn is_posted(&self) -> bool {
         !self.watchers.waiting.is_empty() && self.posted_words() != self.watchers.seen
     }
 
+    /// Whether a procedure waits for posted words, and the carriers have changed.
+    pub(super) fn has_carriers_to_show(&self) -> bool {
+        !self.watchers.waiting.is_empty() && self.carriers != self.watchers.seen_carriers
+    }
+
+    fn see_posted_words(&mut self) {
+        (self.watchers.seen, self.watchers.seen_carriers) = (self.posted_words(), self.carriers);
+    }
+
     /// Wakes the procedures that wait for a change, if a posted word has changed.
     pub(super) fn wake_watchers(&mut self) {
-        if !self.is_posted() {
+        if !self.is_posted() && !self.has_carriers_to_show() {
             return;
         }
-        self.watchers.seen = self.posted_words();
+        self.watchers.wants_result = false;
+        self.see_posted_words();
         for task in core::mem::take(&mut self.watchers.waiting) {
             self.wake(task);
         }
@@ -71,12 +84,14 @@ impl Bus {
                 return Poll::Ready(());
             }
             let shared = &mut *self.shared.borrow_mut();
-            let posted = shared.posted();
+            let number = |_| shared.board.as_ref().map_or(0, |board| board.supervision_number());
+            let posted = shared.posted().with_next_result(seen.result.map(number));
             if posted != seen || shared.now >= until {
                 return Poll::Ready(());
             }
             let task = shared.current;
-            shared.watchers.seen = shared.posted_words();
+            shared.watchers.wants_result |= seen.result.is_some();
+            shared.see_posted_words();
             if !shared.watchers.waiting.contains(&task) {
                 shared.watchers.waiting.push(task);
             }

@@ -7,9 +7,9 @@ use std::ffi::c_int;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::bus::locked;
 use crate::code::{Code, Outcome, number};
 use crate::host::generation;
+use crate::locks::locked;
 
 /// Handles that have ended and whose memory is kept.
 const KEPT: usize = 4096;

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 
 use super::handle::{alive, bury, call, ending, give};
 use super::objects::{DomainObject, MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
-use crate::bus::locked;
 use crate::code::{Outcome, report};
 use crate::host::at_exit;
+use crate::locks::locked;
 use crate::master::Master;
 use crate::settings::Name;
 
@@ -64,15 +64,8 @@ extern "C" fn ecrt_request_master(master_index: c_uint) -> *mut ec_master_t {
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_reserve(master: *mut ec_master_t) -> c_int {
-    let reserve = |master: &MasterObject| {
-        let reserved = master.0.master.reserve();
-        if reserved.is_err() {
-            report(format_args!("Failed to reserve master: it is in use"));
-        }
-        reserved
-    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(master, reserve) }
+    unsafe { call(master, |master| master.0.master.reserve()) }
 }
 
 #[unsafe(no_mangle)]

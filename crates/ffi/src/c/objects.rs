@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex};
 use ringcat::{DomainId, EmergencyRing, RegisterRequest, SdoRequest, SoeRequest, SubDeviceId, VoeHandler};
 
 use super::handle::{Ending, Handle, Kind, bury, ending, give};
-use crate::bus::locked;
 use crate::claim::Claim;
 use crate::code::{Code, Outcome};
 use crate::domain_words::DomainWords;
+use crate::locks::locked;
 use crate::master::Master;
 use crate::request::Requested;
 use crate::settings::Name;
@@ -102,11 +102,18 @@ impl Owner {
         if let Some(known) = self.master.look(|draft| draft.known(name))?? {
             return Ok(known);
         }
-        self.master.refresh()?;
-        self.master.change(|draft| match draft.known(name)? {
-            Some(known) => Ok(known),
-            None => Ok(draft.add(name)),
-        })
+        let (index, is_found) = self.master.change(|draft| {
+            let index = match draft.known(name)? {
+                Some(known) => known,
+                None => draft.add(name),
+            };
+            Ok((index, draft.info(index).is_some()))
+        })?;
+        // It may have come since the last scan that the declaration knows. To ask for that takes long.
+        if !is_found {
+            self.master.refresh()?;
+        }
+        Ok(index)
     }
 
     /// The handle of a declared SubDevice: always the same one.

@@ -103,6 +103,8 @@ unsafe extern "C" fn ecrt_slave_config_pdos(
 ) -> c_int {
     let configure = |slave: &SlaveObject| -> Outcome {
         slave.owner.master.change(|_| Ok(()))?;
+        // No list is an empty one.
+        let n_syncs = if syncs.is_null() { 0 } else { n_syncs };
         let mut next = syncs;
         for _ in 0..n_syncs {
             // SAFETY: a list of C that is this long, or ends with index 0xff (ecrt.h).

@@ -107,6 +107,9 @@ static void of_slave(const struct handles *h)
     CODE(ecrt_slave_config_sync_manager, (sc, 2, EC_DIR_OUTPUT, EC_WD_ENABLE));
     CODE(ecrt_slave_config_watchdog, (sc, 0, 0));
     CODE(ecrt_slave_config_pdos, (sc, EC_END, &end));
+    /* No list is an empty one, in each phase. */
+    if (ecrt_slave_config_pdos(sc, EC_END, NULL) != ecrt_slave_config_pdos(sc, EC_END, &end))
+        printf("ecrt_slave_config_pdos refuses NULL as list\n");
     CODE(ecrt_slave_config_pdo_assign_clear, (sc, 5));
     CODE(ecrt_slave_config_pdo_assign_add, (sc, 5, 0x1A05));
     CODE(ecrt_slave_config_pdo_mapping_clear, (sc, 0x1A05));

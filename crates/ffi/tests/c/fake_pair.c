@@ -52,7 +52,8 @@ static int configure(void)
         unsigned int bit, second_bit;
         int place;
 
-        CHECK(sc && ecrt_slave_config_pdos(sc, EC_END, syncs) == 0);
+        CHECK(sc && ecrt_slave_config_pdos(sc, EC_END, NULL) == 0);
+        CHECK(ecrt_slave_config_pdos(sc, EC_END, syncs) == 0);
         CHECK(ecrt_slave_config_sdo16(sc, 0x8000, 3, 0x1234) == 0);
         CHECK(ecrt_slave_config_reg_pdo_entry(sc, 0x7000, 1, domain, NULL) == -EFAULT);
         CHECK((place = ecrt_slave_config_reg_pdo_entry(sc, 0x7001, 2, domain, &second_bit)) >= 0 && second_bit == 1);

@@ -1,5 +1,6 @@
 /*
- * Programs of several kinds on one library: hosts MODE. "locked": little memory may be locked. "fork":
+ * Programs of several kinds on one library: hosts MODE. "locked": little memory may be locked, "all-locked": that which
+ * the program has already, too. "fork":
  * a child beside the application. "threads": signals. "exit": ends without a release. "open": only requests a master.
  */
 #define _GNU_SOURCE
@@ -71,7 +72,7 @@ static unsigned long status(const char *file, const char *key, int base)
 }
 
 /* What the library takes is locked as it comes; its code, which depends on how it was compiled, is not. */
-static int locked(unsigned long more)
+static int locked(unsigned long more, int flags)
 {
     struct rlimit limit = {more * MIB, more * MIB};
 
@@ -79,7 +80,7 @@ static int locked(unsigned long more)
     /* With CAP_IPC_LOCK the limit has no effect. */
     if (!geteuid())
         CHECK(!setresgid(NO_RIGHTS, NO_RIGHTS, NO_RIGHTS) && !setresuid(NO_RIGHTS, NO_RIGHTS, NO_RIGHTS));
-    CHECK(!mlockall(MCL_FUTURE));
+    CHECK(!mlockall(flags));
     if (begin())
         return 1;
     printf("locked %lu of %lu kB\n", status("/proc/self/status", "VmLck", 10), more * MIB / 1024);
@@ -152,7 +153,9 @@ int main(int argc, char **argv)
 {
     CHECK(argc >= 2);
     if (!strcmp(argv[1], "locked"))
-        return locked(argc > 2 ? strtoul(argv[2], NULL, 10) : 4);
+        return locked(argc > 2 ? strtoul(argv[2], NULL, 10) : 4, MCL_FUTURE);
+    if (!strcmp(argv[1], "all-locked"))
+        return locked(argc > 2 ? strtoul(argv[2], NULL, 10) : 8, MCL_CURRENT | MCL_FUTURE);
     if (!strcmp(argv[1], "fork"))
         return with_child();
     if (!strcmp(argv[1], "threads"))

@@ -1,6 +1,6 @@
 //! Programs that get their bus from a daemon.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -35,7 +35,7 @@ struct Seen {
 }
 
 /// A daemon on the segment of a file.
-struct Bench {
+pub struct Bench {
     seen: Arc<Seen>,
     daemon: Option<Daemon>,
     segment: Option<JoinHandle<()>>,
@@ -43,7 +43,20 @@ struct Bench {
 }
 
 impl Bench {
-    fn start(file: &Path, name: &str) -> Bench {
+    /// A daemon on the segment of this file, with all SubDevices in PREOP.
+    pub fn start(file: &Path, name: &str) -> Bench {
+        Bench::start_for(file, name, Rights::default())
+    }
+
+    /// The same where other users have these rights.
+    pub fn start_for(file: &Path, name: &str, rights: Rights) -> Bench {
+        let bench = Bench::begin(file, name, rights);
+        bench.wait_for_preop();
+        bench
+    }
+
+    /// The same, without waiting for PREOP.
+    fn begin(file: &Path, name: &str, rights: Rights) -> Bench {
         let (near, far) = UnixStream::pair().expect("a pair");
         let (seen, file) = (Arc::new(Seen::default()), file.to_owned());
         let shown = seen.clone();
@@ -60,13 +73,11 @@ impl Bench {
         });
         let socket = std::env::temp_dir().join(format!("ringcat-ffi-{name}-{}", std::process::id()));
         let master = Master::new(0, name.to_owned(), Wires::to_segment(near).expect("it is right"));
-        let daemon = Daemon::start(vec![master], &socket, Rights::default(), STOP_LIMIT).expect("it listens");
-        let bench = Bench { seen, daemon: Some(daemon), segment: Some(segment), socket };
-        bench.wait_for_preop();
-        bench
+        let daemon = Daemon::start(vec![master], &socket, rights, STOP_LIMIT).expect("it listens");
+        Bench { seen, daemon: Some(daemon), segment: Some(segment), socket }
     }
 
-    fn wait_for_preop(&self) {
+    pub fn wait_for_preop(&self) {
         let begin = Instant::now();
         while !self.seen.in_preop.load(Ordering::Acquire) {
             assert!(begin.elapsed() < LONG, "not all are in PREOP");
@@ -74,11 +85,11 @@ impl Bench {
         }
     }
 
-    fn connected_ns(&self) -> u64 {
+    pub fn connected_ns(&self) -> u64 {
         self.seen.connected_ns.load(Ordering::Acquire)
     }
 
-    fn command(&self, program: &Path) -> Command {
+    pub fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         command.env("RINGCAT_SOCKET", &self.socket).stdout(Stdio::piped());
         command
@@ -96,7 +107,7 @@ impl Drop for Bench {
 }
 
 /// Reads lines of a program until one begins so.
-fn wait_for_line(child: &mut Child, begin: &str) -> BufReader<std::process::ChildStdout> {
+pub fn wait_for_line(child: &mut Child, begin: &str) -> BufReader<std::process::ChildStdout> {
     let mut lines = BufReader::new(child.stdout.take().expect("it is piped"));
     let mut line = String::new();
     while !line.starts_with(begin) {
@@ -148,4 +159,26 @@ fn a_killed_program_whose_child_lives_on_leaves_the_bus_to_the_daemon() {
     parent.wait().expect("it has ended");
     assert_eq!(bench.connected_ns(), connected, "the child has no bus to give back");
     bench.wait_for_preop();
+}
+
+/// What brings the SubDevices to PREOP for the first time is under way when the program comes.
+// covers: c-interface, daemon
+#[test]
+fn a_program_that_starts_with_its_daemon_reaches_op() {
+    let Some(cost) = program(&here().join("tests/c/cost.c"), &[]) else { return };
+    let segment = crate::library::workshop().join("four.toml");
+    let device = "[[device]]\ntype = \"digital-output-8\"\n";
+    std::fs::write(&segment, format!("[segment]\n{}", device.repeat(4))).expect("it can be written");
+    for round in 0..15 {
+        let bench = Bench::begin(&segment, "early", Rights::default());
+        std::thread::sleep(Duration::from_millis(2 * round));
+        let mut command = Command::new("timeout");
+        command.arg("10").arg(&cost).args(["cycles", "1000", "10"]).env("RINGCAT_SOCKET", &bench.socket);
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+        // It reads a line when all are in OP.
+        child.stdin.take().expect("it is piped").write_all(b"go\n").expect("there is room");
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "round {round}: {:?} {:?}", output.status, bench.seen);
+        bench.wait_for_preop();
+    }
 }

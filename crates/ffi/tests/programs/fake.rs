@@ -144,13 +144,19 @@ fn memory_that_does_not_fit_is_refused_and_changes_nothing() {
     let user = std::fs::metadata("/proc/self").map(|data| std::os::unix::fs::MetadataExt::uid(&data)).expect("proc");
     let name = place.prefix.trim_start_matches('/').replace('/', "_");
     let file = Path::new("/dev/shm").join(format!("{name}.{user}.0"));
-    for content in [vec![7; 100], vec![0; 2048 * 1025]] {
+    for content in [vec![7; 100], vec![7; 2048 * 1025]] {
         std::fs::write(&file, &content).expect("a file");
         let refused = place.command(&pair, "control").args(["control", "1", "1"]).output().expect("it runs");
         assert_eq!(refused.status.code(), Some(1), "{refused:?}");
         assert!(String::from_utf8_lossy(&refused.stderr).contains("shared memory"), "{refused:?}");
         assert_eq!(std::fs::read(&file).expect("the file"), content);
     }
+    // A program that made the memory was killed before its header was written.
+    std::fs::write(&file, vec![0; 2048 * 1025]).expect("a file");
+    drop(Running::start(place.command(&pair, "control").args(["control", "1", "1"])));
+    let data = std::fs::metadata(&file).expect("the file");
+    let blocks = std::os::unix::fs::MetadataExt::blocks(&data);
+    assert_eq!(blocks * 512, data.len().next_multiple_of(4096), "all of it is there, so that no store can fail");
 }
 
 // covers: c-interface

@@ -4,6 +4,9 @@
 use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 
+use ringcatd::rights::Rights;
+
+use crate::daemon::Bench;
 use crate::library::{here, installed, on_segment, outputs, program};
 
 fn ends_well(mode: &[&str]) {
@@ -18,6 +21,33 @@ fn ends_well(mode: &[&str]) {
 #[test]
 fn a_program_that_locks_its_memory_needs_at_most_6_mib_for_the_library() {
     ends_well(&["locked", "6"]);
+}
+
+// covers: c-interface
+#[test]
+fn a_program_with_too_little_memory_to_lock_is_told_which_limit_to_set() {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    for mib in ["1", "2", "3", "4", "5"] {
+        let (said, reported, status) = outputs(&hosts, &here().join("tests/c/services.toml"), &["locked", mib]);
+        let is_told = reported.contains("expected a limit of 16384 KiB at least") && status.code() == Some(1);
+        assert!(status.success() || is_told, "{mib} MiB: {status}\n{said}\n{reported}");
+        println!("{mib} MiB: {status}");
+    }
+}
+
+/// With the threads that answer questions of the daemon's clients.
+// covers: c-interface, daemon
+#[test]
+fn a_program_on_a_daemons_bus_that_locks_its_memory_needs_at_most_6_mib() {
+    let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
+    // The user that the program becomes.
+    let rights = Rights { group: Some(65534), mode: 0o666 };
+    let bench = Bench::start_for(&here().join("tests/c/services.toml"), "locked", rights);
+    let output = bench.command(&hosts).args(["locked", "6"]).output().expect("it runs");
+    let (said, reported) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}\n{reported}");
+    println!("{said}");
+    bench.wait_for_preop();
 }
 
 // covers: c-interface

@@ -61,6 +61,14 @@ pub fn installed() -> Option<&'static Path> {
     installed.as_deref()
 }
 
+/// Installs everything for a prefix of a running system below a directory, as packages do; `None` without a C compiler.
+pub fn installed_below(directory: &Path, prefix: &str) -> Option<()> {
+    installed()?;
+    let mut install = Command::new(here().join("install"));
+    run(install.arg("--archive").arg(archive()).args(["--prefix", prefix]).arg("--destdir").arg(directory));
+    Some(())
+}
+
 /// The shared library; `None` without a C compiler.
 pub fn library() -> Option<PathBuf> {
     Some(installed()?.join("lib/libethercat.so.1"))
@@ -68,7 +76,11 @@ pub fn library() -> Option<PathBuf> {
 
 /// Compiles a C program with strict warnings; `None` without a C compiler.
 pub fn program(source: &Path, arguments: &[&str]) -> Option<PathBuf> {
-    let prefix = installed()?;
+    Some(program_with(installed()?, source, arguments))
+}
+
+/// Compiles a C program against the library that is installed there.
+pub fn program_with(prefix: &Path, source: &Path, arguments: &[&str]) -> PathBuf {
     // Tests beside each other compile the same source.
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let (name, number) = (source.file_stem().expect("a file name"), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -79,7 +91,7 @@ pub fn program(source: &Path, arguments: &[&str]) -> Option<PathBuf> {
     let lib = prefix.join("lib");
     cc.arg("-L").arg(&lib).arg(format!("-Wl,-rpath,{}", lib.display())).args(["-lethercat", "-lpthread", "-ldl"]);
     run(&mut cc);
-    Some(program)
+    program
 }
 
 /// Runs a program on a simulated segment; its output, and whether it succeeded with its errors.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::library::{here, installed, on_segment, run, workshop};
+use crate::library::{here, installed, installed_below, on_segment, run, workshop};
 
 /// A C compiler for the smallest program, in a directory of its own.
 fn cc(prefix: &Path) -> Command {
@@ -97,6 +97,60 @@ fn the_archive_works_inside_another_shared_object_and_beside_another_rust_librar
         run(&mut link);
         counts_five(&program);
     }
+}
+
+/// The parts of the manual's layout (7.2.1) that a library has: bin, sbin and etc belong to the tool and its service.
+// covers: c-interface
+#[test]
+fn the_prefix_of_the_manual_has_its_layout_and_no_file_names_the_build() {
+    let place = target("layout");
+    let _ = std::fs::remove_dir_all(&place);
+    if installed_below(&place, "/opt/etherlab").is_none() {
+        return;
+    }
+    let mut found = Vec::new();
+    let mut directories = vec![place.clone()];
+    while let Some(directory) = directories.pop() {
+        for entry in std::fs::read_dir(&directory).expect("it is there").flatten() {
+            let (path, kind) = (entry.path(), entry.file_type().expect("it is there"));
+            if kind.is_dir() {
+                directories.push(path);
+                continue;
+            }
+            if kind.is_symlink() {
+                assert!(path.exists() && std::fs::read_link(&path).expect("a link").is_relative(), "{path:?}");
+            } else if !path.to_string_lossy().contains(".so.") && path.extension().is_none_or(|it| it != "a") {
+                let text = std::fs::read_to_string(&path).expect("it is text");
+                let build = place.to_str().expect("it is text");
+                assert!(!text.contains(build), "{path:?} names {build}");
+            }
+            found.push(path.strip_prefix(&place).expect("below it").to_str().expect("it is text").to_owned());
+        }
+    }
+    found.sort_unstable();
+    let expected = [
+        "include/ecrt.h",
+        "lib/cmake/EtherCAT/EtherCATConfig.cmake",
+        "lib/cmake/EtherCAT/EtherCATConfigVersion.cmake",
+        "lib/cmake/ethercat/ethercat-config-version.cmake",
+        "lib/cmake/ethercat/ethercat-config.cmake",
+        "lib/fakeethercat/libethercat.so.1",
+        "lib/libethercat.a",
+        "lib/libethercat.la",
+        "lib/libethercat.so",
+        "lib/libethercat.so.1",
+        "lib/libethercat.so.1.2.0",
+        "lib/libethercat_rtdm.a",
+        "lib/libethercat_rtdm.la",
+        "lib/libethercat_rtdm.so",
+        "lib/libfakeethercat.so",
+        "lib/libfakeethercat.so.1",
+        "lib/libfakeethercat.so.1.2.0",
+        "lib/pkgconfig/libethercat.pc",
+    ];
+    assert_eq!(found, expected.map(|path| format!("opt/etherlab/{path}")));
+    let pc = std::fs::read_to_string(place.join("opt/etherlab/lib/pkgconfig/libethercat.pc")).expect("it is there");
+    assert!(pc.starts_with("prefix=/opt/etherlab\n"), "{pc}");
 }
 
 // covers: c-interface

@@ -3,29 +3,40 @@
 //! A thread receives what the daemon says: questions of its clients, and the end of the connection. It tells the daemon
 //! what is known of the segment after each scan, so that a crash of this process costs no scan.
 
+use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use ringcat_control::Arriving;
 use ringcat_control::client::Client;
-use ringcat_control::connection::{Connection, ReceiveError};
-use ringcat_control::message::{Content, Message};
+use ringcat_control::connection::Connection;
+use ringcat_control::message::{Content, HandedLinks, Message};
 use ringcat_control::refusal::Refusal;
 use ringcat_control::wire::Limits;
+use ringcat_engine::Scan;
 use ringcat_engine::event::{ClientId, Subject, Subjects};
 use ringcat_engine::knowledge::{Handover, Knowledge};
+use ringcat_link::process::wait_readable;
 
 use super::error::DaemonError;
-use super::links::DaemonLinks;
+use super::links::{DaemonLinks, adopt_links};
 use super::questions::Questions;
+use crate::links::Links;
 use crate::main_device::Options;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 
 /// The daemon hands a bus over within this time: it waits for the end of a scan.
 const TAKE: Duration = Duration::from_secs(30);
+/// Stack of the thread that receives: a program may have locked its memory, and with it this.
+const STACK_BYTES: usize = 512 << 10;
+/// The daemon answers to a release within this time, unless it is stopped.
+const RELEASE: Duration = Duration::from_secs(2);
+/// Interval of looks for its answer.
+const PAUSE: Duration = Duration::from_micros(200);
 /// Interval of looks for new events of scans.
 const LOOK: Duration = Duration::from_millis(200);
 /// Events of scans that are kept between two looks: one is enough to tell that there were any.
@@ -35,6 +46,10 @@ const KEPT: usize = 1;
 #[derive(Debug)]
 pub struct OwnedBus {
     supervisor: SupervisorThread,
+    pub(super) scan: Option<Scan>,
+    handed: HandedLinks,
+    /// A daemon that is started anew sees by it that this process has the bus.
+    _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
     connection: Arc<Connection>,
     shared: Arc<Shared>,
@@ -53,8 +68,8 @@ struct Shared {
 
 impl OwnedBus {
     /// Takes the bus of a master from the daemon at this socket. `program` is the name with which the daemon names this
-    /// process to others; `prepare` runs first in the thread of the acyclic half. Returns when the SubDevices were
-    /// found as the daemon knows them; no SII is read.
+    /// process to others; `prepare` runs first in each thread: that of the acyclic half, and those for
+    /// questions of the daemon. Returns when the SubDevices were found as the daemon knows them; no SII is read.
     ///
     /// # Errors
     /// [`DaemonError::is_no_daemon`]: none answers. The daemon refuses: there is no such master, another process drives
@@ -64,17 +79,37 @@ impl OwnedBus {
         master: u32,
         program: &str,
         options: &Options,
-        prepare: impl FnOnce() + Send + 'static,
+        prepare: impl Fn() + Clone + Send + 'static,
     ) -> Result<OwnedBus, DaemonError> {
-        let connection = Arc::new(Client::connect(socket, program)?.into_connection());
+        OwnedBus::take_with(socket, master, program, options, prepare, |_, links| Ok(links))
+    }
+
+    /// As [`OwnedBus::take`], with something around the links of the acyclic half, such as a [`Tee`](crate::tee::Tee).
+    /// `around` also gets what the links are, and comes before the first frame.
+    ///
+    /// # Errors
+    /// As [`OwnedBus::take`]; that of `around`.
+    pub fn take_with<L: Links + Send + 'static>(
+        socket: &Path,
+        master: u32,
+        program: &str,
+        options: &Options,
+        prepare: impl Fn() + Clone + Send + 'static,
+        around: impl FnOnce(&HandedLinks, DaemonLinks) -> Result<L, DaemonError>,
+    ) -> Result<OwnedBus, DaemonError> {
+        // Whatever the daemon does: an application that drives the bus is not taken down because its messages wait.
+        let connection = Arc::new(Client::connect(socket, program)?.into_connection().patient());
         connection.send(&Content::Take { master }.into())?;
-        let (message, descriptors) = connection.receive(Limits::OWNER, Some(TAKE))?;
+        let (message, mut descriptors) = connection.receive_with_descriptors(Limits::OWNER, Some(TAKE))?;
         let handed = match message.content {
             Content::Taken(handed) => handed,
             Content::Refused(refusal) => return Err(refusal.into()),
             _ => return Err(Refusal::Unexpected { expected: "links of a master".to_owned() }.into()),
         };
-        let (cyclic, acyclic) = DaemonLinks::adopt(&handed, descriptors)?;
+        let lock = if descriptors.len() > handed.descriptors() { descriptors.pop() } else { None };
+        let in_threads = prepare.clone();
+        let (cyclic, acyclic) = adopt_links(&handed, descriptors)?;
+        let acyclic = around(&handed, acyclic)?;
         let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
         let options = options.clone().with_idle_operation(true);
         let supervisor = match knowledge {
@@ -86,12 +121,10 @@ impl OwnedBus {
         };
         let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
         let events = supervisor.register_client(scans, KEPT)?;
-        if !message.bytes.is_empty() {
-            // A segment that does not answer any more is watched as any other.
-            let _ = supervisor.finish_scan(|| ());
-        }
+        // A segment that does not answer any more is watched as any other.
+        let scan = if message.bytes.is_empty() { None } else { supervisor.finish_scan(|| ()).ok() };
         let shared = Arc::new(Shared::default());
-        let questions = Questions::start(&supervisor, &connection).map_err(crate::error::Error::Thread)?;
+        let questions = Questions::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
@@ -99,15 +132,24 @@ impl OwnedBus {
             questions,
             events,
         };
-        let thread = std::thread::Builder::new().name("daemon".into());
-        let receiver = thread.spawn(move || receiver.run()).map_err(crate::error::Error::Thread)?;
+        let thread = std::thread::Builder::new().name("daemon".into()).stack_size(STACK_BYTES);
+        let run = move || {
+            in_threads();
+            receiver.run();
+        };
+        let receiver = thread.spawn(run).map_err(crate::error::Error::Thread)?;
         let (links, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
-        Ok(OwnedBus { supervisor, links, connection, shared, receiver, process })
+        Ok(OwnedBus { supervisor, scan, handed, _lock: lock, links, connection, shared, receiver, process })
     }
 
     /// The acyclic half. It knows the SubDevices that the daemon knew.
     pub fn supervisor(&self) -> &SupervisorThread {
         &self.supervisor
+    }
+
+    /// What the links are: interfaces with their names, or pipes to a simulated segment.
+    pub fn handed(&self) -> &HandedLinks {
+        &self.handed
     }
 
     /// Takes the links of the cyclic half, for an activation.
@@ -130,7 +172,7 @@ impl OwnedBus {
     /// its outputs last until the daemon has its SubDevices in PREOP.
     ///
     /// # Errors
-    /// The daemon has ended, or has the bus already.
+    /// The daemon has ended, has the bus already, or has not answered for 2 s. It has the bus when it goes on.
     pub fn release(mut self) -> Result<(), DaemonError> {
         self.give_back()
     }
@@ -150,11 +192,18 @@ impl OwnedBus {
         self.links = None;
         let was_lost = self.shared.is_lost.load(Ordering::Acquire);
         self.shared.is_over.store(true, Ordering::Release);
-        let sent = self.connection.send(&Message { content: Content::Release, bytes });
-        // It ends at the daemon's answer, or at the end of the connection. Its panic was reported by itself.
+        let begin = Instant::now();
+        let sent = self.connection.send_within(&Message { content: Content::Release, bytes }, RELEASE);
+        while !receiver.is_finished() && sent.is_ok() && begin.elapsed() < RELEASE {
+            std::thread::sleep(PAUSE);
+        }
+        let is_answered = receiver.is_finished();
+        // A daemon that is stopped finds the end of the connection when it goes on. All threads end by it.
+        self.connection.shut_down();
+        // Its panic was reported by itself.
         let _ = receiver.join();
         // A daemon that does not listen any more has ended, or has taken the bus back.
-        if was_lost || sent.is_err() { Err(DaemonError::Lost) } else { Ok(()) }
+        if was_lost || sent.is_err() || !is_answered { Err(DaemonError::Lost) } else { Ok(()) }
     }
 }
 
@@ -176,15 +225,20 @@ struct Receiver {
 
 impl Receiver {
     fn run(self) {
+        let mut arriving = Arriving::new(Limits::OWNER);
         loop {
-            match self.connection.receive(Limits::OWNER, Some(LOOK)) {
-                Ok((message, _)) => match message.content {
+            if wait_readable(&[self.connection.as_fd()], LOOK) == 0 {
+                self.tell_knowledge();
+                continue;
+            }
+            match self.connection.receive_part(&mut arriving) {
+                Ok(None) => {}
+                Ok(Some(message)) => match message.content {
                     Content::Ask(question) => self.questions.take(question, message.bytes),
                     Content::Released => return self.end(),
                     // A daemon of this version says nothing else.
                     _ => {}
                 },
-                Err(ReceiveError::TimedOut) => self.tell_knowledge(),
                 Err(_) => return self.end(),
             }
         }

@@ -7,14 +7,18 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ringcat_control::Connection;
-use ringcat_control::message::{Answer, Ask, Content, Message, Numbered};
+use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, ToolAsk};
 use ringcat_control::refusal::Refusal;
 
 use super::serving::answer;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Threads, and so questions to slow SubDevices at a time.
-const THREADS: usize = 4;
+/// Stack of each: a program may have locked its memory, and with it these.
+const STACK_BYTES: usize = 256 << 10;
+/// Threads for questions that a mailbox answers, and so questions to slow SubDevices at a time.
+const SLOW: usize = 3;
+/// Threads for all others: slow SubDevices keep no register and no state waiting.
+const QUICK: usize = 1;
 /// Questions that wait for a thread. The daemon has no more under way.
 const WAITING: usize = 16;
 
@@ -23,30 +27,51 @@ type Question = (Numbered<Ask>, Vec<u8>);
 /// Where questions are put. The threads end when it is dropped.
 #[derive(Debug)]
 pub(super) struct Questions {
-    queue: SyncSender<Question>,
+    slow: SyncSender<Question>,
+    quick: SyncSender<Question>,
     connection: Arc<Connection>,
 }
 
 impl Questions {
-    /// Starts the threads.
+    /// Starts the threads. `prepare` runs first in each.
     ///
     /// # Errors
     /// The system cannot start one.
-    pub fn start(supervisor: &SupervisorThread, connection: &Arc<Connection>) -> std::io::Result<Questions> {
+    pub fn start(
+        supervisor: &SupervisorThread,
+        connection: &Arc<Connection>,
+        prepare: &(impl Fn() + Clone + Send + 'static),
+    ) -> std::io::Result<Questions> {
+        let start = |threads| Questions::queue(threads, supervisor, connection, prepare);
+        Ok(Questions { slow: start(SLOW)?, quick: start(QUICK)?, connection: connection.clone() })
+    }
+
+    /// A queue with so many threads.
+    fn queue(
+        threads: usize,
+        supervisor: &SupervisorThread,
+        connection: &Arc<Connection>,
+        prepare: &(impl Fn() + Clone + Send + 'static),
+    ) -> std::io::Result<SyncSender<Question>> {
         let (queue, waiting) = sync_channel(WAITING);
         let waiting = Arc::new(Mutex::new(waiting));
-        for _ in 0..THREADS {
+        for _ in 0..threads {
             let (supervisor, connection, waiting) = (supervisor.clone(), connection.clone(), waiting.clone());
-            let body = move || serve(&supervisor, &connection, &waiting);
-            std::thread::Builder::new().name("daemon answers".into()).spawn(body)?;
+            let prepare = prepare.clone();
+            let body = move || {
+                prepare();
+                serve(&supervisor, &connection, &waiting);
+            };
+            std::thread::Builder::new().name("daemon answers".into()).stack_size(STACK_BYTES).spawn(body)?;
         }
-        Ok(Questions { queue, connection: connection.clone() })
+        Ok(queue)
     }
 
     /// Takes a question, and says so.
     pub fn take(&self, question: Numbered<Ask>, bytes: Vec<u8>) {
         let (id, master) = (question.id, question.master);
-        match self.queue.try_send((question, bytes)) {
+        let queue = if is_quick(&question.what) { &self.quick } else { &self.slow };
+        match queue.try_send((question, bytes)) {
             Ok(()) => send(&self.connection, Content::Underway { id }.into()),
             Err(_) => {
                 let what = Err(Refusal::Failed("the application answers as many questions as it can".to_owned()));
@@ -54,6 +79,22 @@ impl Questions {
             }
         }
     }
+}
+
+/// Whether no mailbox and no procedure is needed for the answer.
+fn is_quick(ask: &Ask) -> bool {
+    matches!(
+        ask,
+        Ask::State
+            | Ask::Events { .. }
+            | Ask::AlStatus { .. }
+            | Ask::RegisterRead { .. }
+            | Ask::RegisterWrite { .. }
+            | Ask::Look
+            | Ask::Tool(
+                ToolAsk::Master | ToolAsk::SubDevices { .. } | ToolAsk::Description { .. } | ToolAsk::Ports { .. }
+            )
+    )
 }
 
 fn serve(supervisor: &SupervisorThread, connection: &Connection, waiting: &Mutex<Receiver<Question>>) {

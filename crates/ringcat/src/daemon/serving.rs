@@ -3,24 +3,31 @@
 //!
 //! Every number in a question is checked here. Waits until the answer is there.
 
-use std::time::Duration;
+mod faults;
+mod look;
 
 use ringcat_control::message::{Answer, Ask, EventLine};
 use ringcat_control::refusal::Refusal;
 use ringcat_wire::address::{Position, RegisterAddress};
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::soe::Idn;
 
+use self::faults::{LIMIT, expected};
+pub use self::look::look;
+use super::refusing::refusal;
+use super::tool;
 use crate::error::Error;
+use crate::limits::TransferLimits;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 use crate::text::{Names, describe};
 
 /// Most events in an answer.
 const MOST_EVENTS: usize = 256;
+/// Most bytes of the value of an IDN.
+const MOST_VALUE: usize = 16 << 20;
 /// Most bytes of registers.
 const MOST_REGISTERS: usize = 1024;
-/// Longest time for a service of a SubDevice, and for a scan.
-const LIMIT: Duration = Duration::from_secs(20);
 
 /// The answer to a question, and data that was read. `bytes` is data to write.
 ///
@@ -30,7 +37,9 @@ pub fn answer(supervisor: &SupervisorThread, ask: Ask, bytes: Vec<u8>) -> Result
     let done = |(): ()| (Answer::Done, Vec::new());
     let data = |bytes: Vec<u8>| (Answer::Data, bytes);
     let subdevice = |position: u16| supervisor.subdevice(Position(position)).within(LIMIT);
+    let largest = TransferLimits::default().with_bytes(MOST_VALUE);
     let result = match ask {
+        Ask::Tool(ask) => return tool::answer(supervisor, ask, bytes),
         Ask::Masters => return Err(expected("a question about one master")),
         Ask::State => supervisor.snapshot().map(|state| (Answer::State(Box::new(state)), Vec::new())),
         Ask::Events { from } => events(supervisor, from).map(|events| (events, Vec::new())),
@@ -61,9 +70,16 @@ pub fn answer(supervisor: &SupervisorThread, ask: Ask, bytes: Vec<u8>) -> Result
             subdevice(position).request_state(state).map(done)
         }
         Ask::Rescan => supervisor.rescan(LIMIT).map(|_| (Answer::Done, Vec::new())),
+        Ask::Look => look(supervisor).map(|look| (Answer::Look(look), Vec::new())),
+        Ask::IdnRead { position, drive, idn } => {
+            subdevice(position).limits(largest).soe_read::<Vec<u8>>(faults::drive(drive)?, Idn(idn)).map(data)
+        }
+        Ask::IdnWrite { position, drive, idn } => {
+            subdevice(position).soe_write(faults::drive(drive)?, Idn(idn), bytes).map(done)
+        }
         _ => return Err(expected("a question that this version knows")),
     };
-    result.map_err(|error: Error| Refusal::Failed(error.to_string()))
+    result.map_err(|error: Error| refusal(&error))
 }
 
 fn registers(length: usize) -> Result<usize, Refusal> {
@@ -72,10 +88,6 @@ fn registers(length: usize) -> Result<usize, Refusal> {
     } else {
         Err(expected(&format!("1 to {MOST_REGISTERS} bytes of registers, not {length}")))
     }
-}
-
-fn expected(expected: &str) -> Refusal {
-    Refusal::Unexpected { expected: expected.to_owned() }
 }
 
 fn events(supervisor: &SupervisorThread, from: u64) -> Result<Answer, Error> {

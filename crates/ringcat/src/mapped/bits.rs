@@ -3,37 +3,13 @@
 use std::fmt;
 
 use ringcat_engine::exchange::Entry;
-use ringcat_engine::main_device::SubDeviceId;
+use ringcat_engine::main_device::ObjectOf;
 
 /// An output with any number of bits up to 64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutputBits {
     entry: Entry,
     object: ObjectOf,
-}
-
-/// An object of a declared SubDevice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub struct ObjectOf {
-    /// The SubDevice.
-    pub subdevice: SubDeviceId,
-    /// Index.
-    pub index: u16,
-    /// Subindex.
-    pub sub_index: u8,
-}
-
-impl ObjectOf {
-    pub(crate) const fn new((subdevice, index, sub_index): (SubDeviceId, u16, u8)) -> ObjectOf {
-        ObjectOf { subdevice, index, sub_index }
-    }
-}
-
-impl fmt::Display for ObjectOf {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SubDevice {}: {:#06x}:{:02x}", self.subdevice, self.index, self.sub_index)
-    }
 }
 
 /// A value that has more bits than its place in the process data.
@@ -107,10 +83,12 @@ impl std::error::Error for DoesNotFit {}
 
 #[cfg(test)]
 mod tests {
+    use ringcat_engine::main_device::SubDeviceId;
+
     use super::*;
     use ringcat_engine::domain::DomainId;
 
-    const OBJECT: ObjectOf = ObjectOf { subdevice: SubDeviceId(3), index: 0x7010, sub_index: 1 };
+    const OBJECT: ObjectOf = ObjectOf::new(SubDeviceId(3), 0x7010, 1);
 
     fn bits(bit_length: u16) -> OutputBits {
         OutputBits::new(Entry { domain: DomainId(0), bit_offset: 0, bit_length }, OBJECT)

@@ -2,9 +2,9 @@
 
 use ringcat_engine::exchange::Entry;
 use ringcat_engine::info::{Direction, PdoInfo, SiiExtent, SubDeviceInfo};
-use ringcat_engine::main_device::{Directory, SubDeviceId};
+use ringcat_engine::main_device::{Directory, ObjectOf, SubDeviceId};
 
-use super::bits::{ObjectOf, OutputBits};
+use super::bits::OutputBits;
 use super::error::{MapError, MappedObject, Wanted};
 use crate::value::Number;
 
@@ -59,7 +59,7 @@ impl Search {
     pub fn bits(self, wanted: &Wanted, direction: Direction) -> Result<OutputBits, MapError> {
         let subdevice = self.subdevice;
         let object = self.find(wanted, direction)?;
-        Ok(OutputBits::new(object.entry, ObjectOf::new((subdevice, object.index, object.sub_index))))
+        Ok(OutputBits::new(object.entry, ObjectOf::new(subdevice, object.index, object.sub_index)))
     }
 
     /// Finds a mapped object. If it is mapped in both directions, the wanted direction counts. If it is mapped there

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use ringcat_engine::domain::DomainId;
+use ringcat_engine::main_device::ObjectOf;
 
-use super::bits::{DoesNotFit, ObjectOf};
+use super::bits::DoesNotFit;
 
 /// Process data was not written; nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

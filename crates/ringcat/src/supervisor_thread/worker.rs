@@ -4,7 +4,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use ringcat_engine::AcyclicCounters;
@@ -16,8 +16,10 @@ use ringcat_engine::time::Instant;
 
 use crate::acyclic::work;
 use crate::job::Task;
+use crate::link_figures::AcyclicSamples;
 use crate::links::Links;
 use crate::not_ready::Failures;
+use crate::observer::Observed;
 use crate::window::Window;
 
 /// Longest sleep while tasks read queues that do not end a sleep, or while links have no waker.
@@ -58,6 +60,13 @@ pub(super) struct Published {
     /// The thread ends after this turn: it sends nothing more.
     pub is_handed_over: AtomicBool,
     pub rest: Mutex<Rest>,
+    /// Frames while no application is active.
+    pub samples: Mutex<AcyclicSamples>,
+    /// What the active application shows of its process data.
+    pub observed: Mutex<Weak<Observed>>,
+    /// What the network interfaces of EoE publish.
+    #[cfg(feature = "eoe")]
+    pub ethernet: Mutex<Option<Weak<dyn std::any::Any + Send + Sync>>>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -235,5 +244,7 @@ impl<L: Links> Worker<L> {
         rest.failures = self.failures.clone();
         drop(rest);
         self.published.states_of(&self.engine);
+        let mut samples = self.published.samples.lock().unwrap_or_else(PoisonError::into_inner);
+        samples.take(now, self.engine.counters());
     }
 }

@@ -8,6 +8,7 @@ mod jobs;
 mod junctions;
 mod names;
 mod process_data;
+mod protocols;
 mod readiness;
 mod services;
 mod states;

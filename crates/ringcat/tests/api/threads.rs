@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    CycleJob, Direction, DomainId, Error, FramesIn, JobProbe, LastOutputs, Link, Links, NoSnapshot, Options, Position,
-    SubDeviceId, SupervisorThread, automatic,
+    CycleJob, Direction, DomainId, Error, FramesIn, JobProbe, LastOutputs, Link, Links, MainDeviceRole, NoSnapshot,
+    Options, Position, SubDeviceId, SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -73,6 +73,33 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     });
     assert_eq!(supervisor.scan()?.subdevices.len(), 3, "a stopped MainDevice scans again");
     assert!(links.now() > ringcat::Instant(0));
+    Ok(())
+}
+
+/// An application ends without a further frame where another MainDevice has the segment.
+// covers: 9.11, threads, stop
+#[test]
+fn no_cycle_runs_in_role_inactive_when_an_application_stops_or_deactivates() -> Result<(), Error> {
+    for deactivates in [true, false] {
+        let (cyclic, acyclic) = SharedSegment::halves(network());
+        let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+        let scan = supervisor.scan()?;
+        let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+        let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
+        until("all are in OP", || cycles.supervisor().all_settled());
+        let status = cycles.cyclic_status_handle();
+        let supervisor = cycles.supervisor().clone();
+        let application = cycles.end()?;
+        supervisor.with(|engine| engine.set_role(MainDeviceRole::Inactive))?;
+        let before = (status.pace().cycles, status.counters().sent);
+        assert!(before.1 > 0);
+        let error = match deactivates {
+            true => application.deactivate(LastOutputs::Zero, LIMIT).map(drop).expect_err("it is refused").error,
+            false => application.stop(LastOutputs::Zero, AlState::Init, LIMIT).map(drop).expect_err("it is refused"),
+        };
+        assert!(error.to_string().contains("INACTIVE"), "{error}");
+        assert_eq!((status.pace().cycles, status.counters().sent), before);
+    }
     Ok(())
 }
 

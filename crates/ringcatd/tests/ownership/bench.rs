@@ -78,6 +78,11 @@ impl Bench {
 
     /// The same where an owner may be stopped for this time.
     pub fn with_limit(count: usize, stop_limit: Duration) -> Bench {
+        Bench::with(count, stop_limit, AlState::PreOp)
+    }
+
+    /// The same with a safe state.
+    pub fn with(count: usize, stop_limit: Duration, safe_state: AlState) -> Bench {
         let turn = turn();
         let (near, far) = UnixStream::pair().expect("a pair");
         let (looks, asked) = channel::<Look>();
@@ -85,7 +90,7 @@ impl Bench {
         let wires = Wires::to_segment(near).expect("the segment is right");
         let directory = directory();
         let socket = directory.join("socket");
-        let master = Master::new(0, "test".to_owned(), wires);
+        let master = Master::new(0, "test".to_owned(), wires).with_safe_state(safe_state);
         let rights = Rights { group: None, mode: 0o666 };
         let daemon = Daemon::start(vec![master], &socket, rights, stop_limit).expect("it listens");
         let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));

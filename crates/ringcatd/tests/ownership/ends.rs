@@ -7,7 +7,7 @@ use ringcat::AlState;
 use crate::bench::{Bench, LONG, check_bar};
 use crate::owner_process::{OwnerProcess, Work};
 
-/// From SIGKILL to the first frame of the daemon: median and longest of 50 (issue 18).
+/// From SIGKILL to the first frame of the daemon: median and longest of 50.
 const FIRST_FRAME: [Duration; 2] = [Duration::from_millis(5), Duration::from_millis(20)];
 /// From then on all SubDevices are in PREOP within this time, beside what they take themselves.
 const PREOP: Duration = Duration::from_millis(100);
@@ -121,4 +121,47 @@ fn a_stopped_application_loses_the_bus_after_the_limit_and_sends_nothing_later()
     assert_eq!(bench.inside(|segment| segment.cyclic_frames()), frames, "none of its frames reaches the segment");
     assert!(bench.are_in(AlState::PreOp));
     bench.take().release().expect("the daemon drives it");
+}
+
+// covers: daemon
+#[test]
+fn subdevices_are_in_the_safe_state_of_their_master_after_any_end() {
+    for state in [AlState::Init, AlState::SafeOp] {
+        let bench = Bench::with(4, ringcatd::daemon::STOP_LIMIT, state);
+        assert!(bench.are_in(AlState::PreOp), "before there was an application");
+        for is_killed in [true, false] {
+            let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+            assert!(bench.are_in(AlState::Op));
+            if is_killed {
+                owner.child.kill().expect("it runs");
+            } else {
+                owner.end();
+            }
+            bench.wait_until("all in the safe state", |bench| bench.are_in(state));
+            // They stay there.
+            std::thread::sleep(Duration::from_millis(300));
+            assert!(bench.are_in(state), "{:?}", bench.states());
+        }
+    }
+}
+
+/// The next one comes while the daemon brings all SubDevices to PREOP.
+// covers: daemon
+#[test]
+fn an_application_that_is_killed_and_started_again_at_once_reaches_op() {
+    let bench = Bench::start(4);
+    for _ in 0..25 {
+        let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+        owner.child.kill().expect("it runs");
+        owner.child.wait().expect("it has ended");
+        let begin = Instant::now();
+        while begin.elapsed() < Duration::from_secs(2)
+            && !matches!(
+                crate::bench::ask(&mut bench.client(), ringcat::daemon::Ask::Masters),
+                ringcat::daemon::Answer::Masters(masters) if masters[0].owner.is_none()
+            )
+        {
+            std::thread::yield_now();
+        }
+    }
 }

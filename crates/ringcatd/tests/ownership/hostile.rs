@@ -26,10 +26,10 @@ fn is_answered(bench: &Bench) {
 /// What a hostile client sends.
 fn attacks() -> Vec<Vec<u8>> {
     let hello = ringcat_control::wire::encode(&Content::Hello { program: "x".repeat(3000) }.into()).expect("short");
-    let mut header = b"RCTL\x01\0\0\0".to_vec();
+    let mut header = b"RCTL\x03\0\0\0".to_vec();
     header.extend([0xFF; 8]);
     let mut deep = hello.clone();
-    deep.extend(b"RCTL\x01\0\0\0\xA0\x0F\0\0\0\0\0\0");
+    deep.extend(b"RCTL\x03\0\0\0\xA0\x0F\0\0\0\0\0\0");
     deep.extend([0x81; 4000]);
     let take = ringcat_control::wire::encode(&Content::Take { master: 0 }.into()).expect("short");
     let answer = Content::Answer(Numbered { id: 1, master: 0, what: Ok(Answer::Done) });
@@ -44,7 +44,7 @@ fn attacks() -> Vec<Vec<u8>> {
         take,
         [hello.clone(), answer].concat(),
         [hello.clone(), hello].concat(),
-        b"RCTL\x02\0\0\0\x01\0\0\0\0\0\0\0".to_vec(),
+        b"RCTL\x01\0\0\0\x01\0\0\0\0\0\0\0".to_vec(),
     ]
 }
 
@@ -89,7 +89,7 @@ fn clients_that_neither_speak_nor_read_keep_only_their_own_places() {
         silent.push(Connection::new(UnixStream::connect(&bench.socket).expect("it listens")).expect("a socket"));
     }
     let last = silent.last().expect("there are some");
-    let (message, _) = last.receive(Limits::OWNER, Some(Duration::from_secs(5))).expect("the daemon says why");
+    let message = last.receive(Limits::OWNER, Some(Duration::from_secs(5))).expect("the daemon says why");
     assert_eq!(message, Message::from(Content::Refused(Refusal::TooManyClients { limit: MOST_CLIENTS })));
     drop(silent);
     bench.wait_until("places are free", |bench| ringcat::daemon::Client::connect(&bench.socket, "next").is_ok());

@@ -4,6 +4,7 @@
 //! The segment is simulated in a thread of the test, which looks into its SubDevices; the daemon is in the test's
 //! process, the owners that are killed or stopped are processes of their own.
 
+mod application;
 mod bench;
 mod clients;
 mod ends;

@@ -1,4 +1,4 @@
-//! Instructions per process-data cycle (issue 2, "What it must reach"), counted by callgrind.
+//! Instructions per process-data cycle, counted by callgrind.
 //!
 //! A cycle is the work of the application's thread: receive all frames, evaluate, copy between image and application,
 //! queue, send on the in-memory links. The other end is a double that only writes working counters and the source bit.
@@ -23,7 +23,7 @@ use scenarios::figures::{Figures, verdict};
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
 /// Maximum instructions of a cycle with one SubDevice on one link, 2 % above what is measured with LWR and LRD, and the
-/// goal (issue 16).
+/// goal.
 const BAR: f64 = 597.0;
 const AIM: f64 = 500.0;
 /// Maximum cost of 50 SubDevices, as a multiple of one SubDevice with as many bytes.

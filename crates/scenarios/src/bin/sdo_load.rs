@@ -1,4 +1,4 @@
-//! Cost of 1,000 SDO requests per second for a cyclic task of 1 kHz (issue 4): instructions of the cyclic half per
+//! Cost of 1,000 SDO requests per second for a cyclic task of 1 kHz: instructions of the cyclic half per
 //! cycle, counted by callgrind within this half alone, and the delay of its frames in virtual time.
 //!
 //! Four drives are connected to one link. Both halves have links of their own, as in two threads; here they run
@@ -28,6 +28,7 @@ use ringcat_wire::frame::wire_time_ns;
 use scenarios::callgrind::{is_installed, profile_self_within};
 use scenarios::figures::{Figures, verdict};
 use scenarios::segments::{descriptions, line};
+use scenarios::uploads::start_upload;
 
 const PERIOD: Duration = Duration::from_millis(1);
 const DRIVES: usize = 4;
@@ -215,7 +216,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     for cycle in 0..cycles {
         if asks == Asks::AnotherThread {
             let drive = 1 + cycle as usize % DRIVES;
-            let pending = plant.engine.start_sdo_upload(SubDeviceId(drive), OBJECT, LIMITS, 4);
+            let pending = start_upload(&mut plant.engine, SubDeviceId(drive), OBJECT, LIMITS, 4);
             plant.waiting.push_back(pending);
         }
         begin += PERIOD;

@@ -54,6 +54,11 @@ impl Faults {
         self.cut.is_some() || self.off.is_some() || self.hung.is_some()
     }
 
+    /// The device that hangs.
+    pub fn hung(&self) -> Option<DeviceIndex> {
+        self.hung
+    }
+
     /// One change, as text.
     pub fn change(&mut self, dice: &mut Dice, network: &mut Network) -> String {
         let (cables, devices) = (network.cables().len() as u64, network.devices().len() as u64);

@@ -2,7 +2,8 @@
 //!
 //! The application fills all its outputs with one number per write. Inside a SubDevice outputs change only while an
 //! application is active, to a whole number that was queued since its activation, and never to an older one after a
-//! newer one; they may fall to zero at any time.
+//! newer one; they may fall to zero at any time. A device that hung takes what its buffer holds when it goes on, also
+//! from an application that has ended meanwhile.
 
 use std::fmt::Write;
 
@@ -31,6 +32,8 @@ pub struct Witness {
     writes: u64,
     /// The write that was queued last with each number.
     queued: Vec<u64>,
+    /// The same, before the activation.
+    queued_before: Vec<u64>,
     /// An application is active.
     is_active: bool,
     /// Changes of outputs that were compared.
@@ -59,13 +62,32 @@ impl Witness {
     /// An application begins: numbers of the previous one must not appear any more.
     pub fn begin(&mut self) {
         self.is_active = true;
-        self.queued = vec![0; NUMBERS as usize + 1];
+        let before = std::mem::replace(&mut self.queued, vec![0; NUMBERS as usize + 1]);
+        let newest = |(at, write): (usize, u64)| write.max(self.queued_before.get(at).copied().unwrap_or_default());
+        self.queued_before = before.into_iter().enumerate().map(newest).collect();
         self.devices.iter_mut().for_each(|seen| seen.newest = 0);
     }
 
     /// The application has ended.
     pub fn end(&mut self) {
         self.is_active = false;
+    }
+
+    /// A device that hung goes on, and takes at once what its buffer holds: nothing that was never queued.
+    ///
+    /// # Panics
+    /// If it holds anything else.
+    pub fn go_on(&mut self, network: &mut Network, device: DeviceIndex) {
+        let now = network.now();
+        network.device_mut(device).run(now);
+        self.devices.resize_with(network.devices().len(), Seen::default);
+        let seen = &mut self.devices[device.0];
+        let outputs = network.device(device).outputs();
+        let Some(byte) = outputs.iter().copied().find(|byte| *byte != 0) else { return };
+        let known = [&self.queued, &self.queued_before].map(|queued| queued.get(usize::from(byte)).copied());
+        let is_known = outputs.iter().all(|other| *other == byte) && known.into_iter().flatten().any(|write| write > 0);
+        assert!(is_known, "device {} goes on with outputs {outputs:02x?}, {}", device.0, describe(network));
+        seen.outputs = outputs.to_vec();
     }
 
     /// Looks into all devices.

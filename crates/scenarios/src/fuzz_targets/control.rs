@@ -1,6 +1,6 @@
 //! Messages of the daemon and any bytes: an error, or a message that survives a round trip.
 
-use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, Numbered, Right};
+use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
 use ringcat_control::wire::{decode, encode};
 use ringcat_control::{Content, Limits, Message, Refusal};
 
@@ -8,7 +8,7 @@ use ringcat_control::{Content, Limits, Message, Refusal};
 pub fn target(bytes: &[u8]) {
     check(bytes);
     let length = (bytes.len() as u32).to_le_bytes();
-    check(&[b"RCTL\x01\0\0\0", &length[..], &[0; 4], bytes].concat());
+    check(&[b"RCTL\x03\0\0\0", &length[..], &[0; 4], bytes].concat());
 }
 
 fn check(bytes: &[u8]) {
@@ -31,6 +31,8 @@ pub fn seeds() -> Vec<Vec<u8>> {
         Content::Welcome { right: Right::Change, pid: 1 },
         numbered(Ask::SdoUpload { position: 1, index: 0x1018, sub_index: None }),
         numbered(Ask::Events { from: 7 }),
+        numbered(Ask::Tool(ToolAsk::FileWrite { position: 1, name: "firmware".to_owned(), transfer: 7 })),
+        answered(Ok(Answer::Tool(ToolAnswer::Objects(vec![0x1000, 0x1018])))),
         Content::Underway { id: 1 },
         answered(Ok(Answer::State(Box::default()))),
         answered(Err(Refusal::NoMaster { master: 1, present: vec![0, 2] })),

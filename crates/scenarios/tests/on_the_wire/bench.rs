@@ -142,6 +142,18 @@ impl Bench {
         ip(&format!("-n {other} link set main1 up")).expect("the interface is there");
     }
 
+    /// A second MainDevice in the ring, in a namespace of its own: `main1`, the far end of the segment, becomes its
+    /// redundant interface, and its main interface `second0` has a cable to `active1` of the first one.
+    pub fn add_second_main_device(&mut self) {
+        self.give_away_main1();
+        let other = self.other.as_ref().expect("it was just made");
+        self.ip_main(&format!("link add active1 index 80 type veth peer name second0 index 90 netns {other}"));
+        for (namespace, end) in [(&self.main, "active1"), (other, "second0")] {
+            let _ = ip(&format!("-n {namespace} link set {end} addrgenmode none"));
+            ip(&format!("-n {namespace} link set {end} up")).expect("the interface is there");
+        }
+    }
+
     /// A computer in a separate network, with the MainDevice's host as its router: 10.1.0.2 behind 10.1.0.1.
     pub fn add_routed_computer(&mut self) {
         let other = self.add_namespace();
@@ -181,6 +193,17 @@ impl Bench {
     pub fn links_main(&self) -> String {
         let output = Command::new("ip").args(["-n", &self.main, "-o", "link"]).output().expect("ip starts");
         String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// Starts `ringcat` in the third namespace and reads its output.
+    pub fn run_other_ringcat(&self, arguments: &[&str]) -> Running {
+        Running::of(self.start_other_ringcat(arguments))
+    }
+
+    /// Switches an interface in the third namespace.
+    pub fn set_link_elsewhere(&self, interface: &str, state: &str) {
+        let other = self.other.as_ref().expect("there is one");
+        ip(&format!("-n {other} link set {interface} {state}")).expect("the interface is there");
     }
 
     /// Starts a program in the simulator's namespace.
@@ -276,10 +299,7 @@ impl Bench {
 
     /// Starts `ringcat` in the namespace of the MainDevice and reads its output.
     pub fn run_ringcat(&self, arguments: &[&str]) -> Running {
-        let mut child = self.start_ringcat(arguments);
-        let said = Said::by(child.stdout.take().expect("it is piped"));
-        let errors = Said::by(child.stderr.take().expect("it is piped"));
-        Running { child, said, errors }
+        Running::of(self.start_ringcat(arguments))
     }
 
     /// Starts a program in the namespace of the MainDevice.
@@ -349,6 +369,12 @@ pub struct Running {
 }
 
 impl Running {
+    fn of(mut child: Child) -> Running {
+        let said = Said::by(child.stdout.take().expect("it is piped"));
+        let errors = Said::by(child.stderr.take().expect("it is piped"));
+        Running { child, said, errors }
+    }
+
     /// Its output so far.
     pub fn said(&self) -> &Said {
         &self.said

@@ -59,7 +59,7 @@ fn check(plant: &Plant, bench: &Bench, client: Client, name: &str) -> Result<(),
 }
 
 /// Runs another MainDevice on a new segment, up to [`TRIES`] times.
-fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, name: &str, start: impl Fn(&Bench) -> Child) {
+pub fn exchange(bench: &mut Bench, plant: &Plant, ring: bool, name: &str, start: impl Fn(&Bench) -> Child) {
     for attempt in 1..=TRIES {
         bench.simulate(&plant.segment(), ring);
         plant.set_inputs(bench);
@@ -189,7 +189,7 @@ pub fn start(bench: &Bench, client: &Path, arguments: &[String]) -> Child {
     bench.start(Path::new("nice"), &words.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) -> Child {
+pub fn start_pysoem(bench: &Bench, python: &Path, interfaces: &str, count: usize) -> Child {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/pysoem_client.py");
     let arguments = [NO_CACHE, script, interfaces, &count.to_string(), &CYCLES.to_string()];
     start(bench, python, &arguments.map(str::to_owned))

@@ -1,4 +1,4 @@
-"""A client of a mailbox gateway (ETG.8200, facts 10.1), written from the protocol alone: it shares nothing with the
+"""A client of a mailbox gateway (ETG.8200, protocol 10.1), written from the protocol alone: it shares nothing with the
 gateway.
 
 Usage: gateway_client.py good|bad ADDRESS STATION, where the SubDevice STATION has the objects of `all-protocols`.

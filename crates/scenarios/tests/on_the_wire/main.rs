@@ -17,6 +17,7 @@ mod eni;
 mod ethernet;
 mod exit_codes;
 mod foreign;
+mod forwarding;
 mod frames;
 mod gateway;
 mod json;

@@ -1,4 +1,4 @@
-//! Calls of the shape of `ecrt.h` in every order that its clients use (issue 17), through [`scenarios::calls`].
+//! Calls of the shape of `ecrt.h` in every order that its clients use, through [`scenarios::calls`].
 
 mod clocks;
 mod cycles;

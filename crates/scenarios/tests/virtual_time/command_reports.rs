@@ -17,6 +17,7 @@ use ringcat_wire::frame::Frame;
 use ringcat_wire::register::map;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;
+use scenarios::uploads::start_upload;
 use scenarios::witness::{Frames, Passed, Witness};
 use scenarios::world::CYCLE;
 
@@ -183,9 +184,8 @@ fn mail_states_and_polls_of_an_undisturbed_segment_give_no_report() {
         main_device.set_log_filter(LogFilter::default());
         let client = main_device.register_client(Subjects::NONE.with(Subject::Commands), 1000).expect("there is room");
         let large = SdoAddress::new(0x2002, 0);
-        let read = Services::call(&mut main_device, move |engine| {
-            engine.start_sdo_upload(Position(1), large, LIMITS, 200_000)
-        });
+        let read =
+            Services::call(&mut main_device, move |engine| start_upload(engine, Position(1), large, LIMITS, 200_000));
         assert_eq!(read.expect("it answers").len(), 100_000);
         main_device.attend(Duration::from_secs(2));
         let declaration = automatic(&main_device.subdevices(), CYCLE);

@@ -93,7 +93,8 @@ fn a_rescan_finds_new_moved_and_missing_subdevices() {
     world.run_cycles(50);
     let mark = world.mark();
     let moved = rescan(&mut world);
-    assert_eq!(moved.moved().collect::<Vec<_>>(), [(SubDeviceId(3), Position(3), Position(6))]);
+    let moves: Vec<_> = moved.moved().map(|it| (it.subdevice, it.from, it.to)).collect();
+    assert_eq!(moves, [(SubDeviceId(3), Position(3), Position(6))]);
     let last = moved.topology.nodes[6];
     assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, crossed");
     let told = Event::Moved { subdevice: SubDeviceId(3), from: Position(3), to: Position(6) };

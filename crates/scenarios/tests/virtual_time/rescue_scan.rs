@@ -16,6 +16,7 @@ use ringcat_wire::frame::Frame;
 use ringcat_wire::register::map;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;
+use scenarios::uploads::start_upload;
 use scenarios::witness::{Frames, Passed, Witness};
 
 const FOLLOWED: Duration = Duration::from_millis(400);
@@ -88,7 +89,7 @@ fn disturbs(passed: &Passed, stayed: &[StationAddress]) -> bool {
 /// A rescan beside the read of a large object, and whether that was still running when the rescan ended.
 fn rescan_beside_a_transfer(main_device: &mut Watched) -> (Rescan, usize, bool) {
     let both = Services::call(main_device, |engine| {
-        let read = engine.start_sdo_upload(TALKER, LARGE, LIMITS, 200_000);
+        let read = start_upload(engine, TALKER, LARGE, LIMITS, 200_000);
         let rescan = engine.start_rescan(LIMIT);
         engine.start(async move {
             let rescan = rescan.ended().await?;

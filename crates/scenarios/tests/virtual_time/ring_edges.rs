@@ -1,5 +1,5 @@
 //! A copy that is looped back at a cut behind the other copy: outputs arrive twice, with the same bytes. This is
-//! visible only if the copy comes back (issue 5: a working counter above the expected one is an incomplete cycle).
+//! visible only if the copy comes back (a working counter above the expected one is an incomplete cycle).
 
 use std::time::Duration;
 

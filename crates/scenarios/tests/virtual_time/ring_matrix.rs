@@ -1,5 +1,5 @@
 //! Cut and repair of any one cable of a closed ring of 16 in OP at 1 ms: every cable, several detection delays, several
-//! moments of the cycle (issue 2, "What it must reach").
+//! moments of the cycle.
 
 use std::time::Duration;
 

@@ -15,6 +15,7 @@ use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;
+use scenarios::uploads::start_upload;
 use scenarios::witness::{Frames, Witness};
 use scenarios::world::CYCLE;
 
@@ -61,7 +62,7 @@ fn begin(engine: &mut Engine, number: usize) -> Box<dyn FnMut() -> bool> {
         Box::new(move || pending.is_running())
     }
     match number {
-        0 => running(engine.start_sdo_upload(DRIVE, SdoAddress::new(0x2002, 0), LIMITS, 200_000)),
+        0 => running(start_upload(engine, DRIVE, SdoAddress::new(0x2002, 0), LIMITS, 200_000)),
         1 => {
             let mailbox = engine.mailbox(DRIVE).expect("it has one");
             running(engine.start(async move {

@@ -75,7 +75,8 @@ impl SyncUnit {
         if was == is || self.first.is_none() {
             return;
         }
-        (self.before, self.first) = (self.pulses(was), self.next_sync0(was));
+        // A pulse at this instant has occurred.
+        (self.before, self.first) = (self.pulses(was), self.next_sync0(was.wrapping_add(1)));
         self.first = self.first.filter(|next| next.wrapping_sub(is) < 1 << 63);
     }
 
@@ -230,6 +231,19 @@ mod tests {
         assert_eq!((unit.pulses(7_900), unit.next_sync0(7_900)), (3, Some(13_000)));
         unit.offset_written(100_000, 12_700);
         assert_eq!((unit.pulses(112_700), unit.next_sync0(112_700)), (3, None));
+    }
+
+    // covers: 7.3
+    #[test]
+    fn a_step_back_at_the_instant_of_a_pulse_does_not_repeat_it() {
+        let mut unit = SyncUnit::default();
+        let cyclic = DcActivation { cyclic_unit: true, sync0: true, ..DcActivation::default() };
+        let settings = SyncSettings { start: 10_000, sync0_cycle_ns: 1_000, wide: true, ..SyncSettings::default() };
+        unit.activate(cyclic, settings, 0);
+        assert_eq!(unit.pulses(13_000), 4);
+        unit.offset_written(500_u64.wrapping_neg(), 13_000);
+        assert_eq!((unit.pulses(12_500), unit.pulses(13_000), unit.next_sync0(13_000)), (4, 4, Some(14_000)));
+        assert_eq!(unit.pulses(14_000), 5);
     }
 
     // covers: 7.3

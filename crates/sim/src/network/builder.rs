@@ -5,7 +5,7 @@ use core::time::Duration;
 use super::{Network, NetworkOptions};
 pub use crate::cable::DEFAULT_CABLE_DELAY;
 
-use crate::cable::{CableSpec, DeviceIndex, Endpoint, HostLink};
+use crate::cable::{CableSpec, DeviceIndex, Endpoint, Host, HostLink};
 use crate::device::Device;
 use crate::frame::Port;
 use crate::segment::SegmentError;
@@ -43,6 +43,17 @@ impl SegmentBuilder {
         let end = line.devices.len().checked_sub(1).map(|last| Endpoint::Device(DeviceIndex(last), Port::B));
         let end = end.unwrap_or(Endpoint::Host(HostLink::Main));
         line.cable(end, Endpoint::Host(HostLink::Redundant))
+    }
+
+    /// Devices between two MainDevices: the line begins at the main link of `near` and ends at the redundant link of
+    /// the other one; a cable joins the redundant link of `near` with the main link of the other one (protocol 9.1).
+    pub fn ring_of_two(devices: Vec<Device>, near: Host) -> SegmentBuilder {
+        let begin = Endpoint::Host(near.main());
+        let line = SegmentBuilder::new().chain(begin, devices);
+        let end = line.devices.len().checked_sub(1).map(|last| Endpoint::Device(DeviceIndex(last), Port::B));
+        let far = near.other();
+        line.cable(end.unwrap_or(begin), Endpoint::Host(far.redundant()))
+            .cable(Endpoint::Host(far.main()), Endpoint::Host(near.redundant()))
     }
 
     /// Devices in a line from a port of a device.

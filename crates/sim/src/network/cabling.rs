@@ -1,20 +1,20 @@
 //! Plugs in the cables: the outgoing cable of each port, and checks.
 
-use crate::cable::{CableId, CableSpec, Direction, Endpoint, LegId};
+use crate::cable::{CableId, CableSpec, Direction, Endpoint, HostLink, LegId};
 use crate::device::Device;
 use crate::segment::SegmentError;
 
 use ringcat_wire::register::PortKind;
 
-/// The outgoing direction of the cable at each port and at each interface of the MainDevice.
+/// The outgoing direction of the cable at each port and at each interface of the MainDevices.
 pub(super) struct Outlets {
     pub(super) devices: Vec<[Option<LegId>; 4]>,
-    pub(super) hosts: [Option<LegId>; 2],
+    pub(super) hosts: [Option<LegId>; HostLink::COUNT],
 }
 
 /// Plugs in all cables.
 pub(super) fn plug(devices: &[Device], cables: &[CableSpec]) -> Result<Outlets, SegmentError> {
-    let mut outlets = Outlets { devices: vec![[None; 4]; devices.len()], hosts: [None; 2] };
+    let mut outlets = Outlets { devices: vec![[None; 4]; devices.len()], hosts: [None; HostLink::COUNT] };
     for (number, cable) in cables.iter().enumerate() {
         let id = CableId(number);
         for (endpoint, direction) in [(cable.a, Direction::AToB), (cable.b, Direction::BToA)] {

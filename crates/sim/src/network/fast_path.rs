@@ -116,7 +116,7 @@ impl Network {
         }
         // The receiver of the first frame may change the segment at that time.
         let other = if link == HostLink::Main { HostLink::Redundant } else { HostLink::Main };
-        let entry = self.queue.next_in(other.entry_lane());
+        let entry = other.entry_lane().map_or(SimTime::NEVER, |lane| self.queue.next_in(lane));
         let route = &self.routes[other as usize];
         let there = if route.wiring == Some(self.wiring) { route.length_ns() } else { 0 };
         horizon.min(self.queue.next_in(Lane::Exit)).min(SimTime(entry.0.saturating_add(there)))

@@ -91,7 +91,7 @@ pub struct LinkStatistics {
 /// Counters of a whole segment since its creation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    pub(crate) links: [LinkStatistics; 2],
+    pub(crate) links: [LinkStatistics; HostLink::COUNT],
     pub(crate) lost: [u64; LossCause::ALL.len()],
     pub(crate) hops: u64,
 }

@@ -50,10 +50,9 @@ impl Network {
         counters.frames_sent += 1;
         counters.bytes_sent += bytes.len() as u64;
         let at = last_bit + Duration::from_nanos(self.legs[out.index()].delay_ns);
-        if leaves_paths_unchanged(self.frames.frame(slot)) {
-            self.queue.push(link.entry_lane(), at, Event::Entry { slot, link, leg: out });
-        } else {
-            self.queue.push(Lane::Any, at, Event::Arrival { slot, leg: out, faults_applied: false });
+        match link.entry_lane().filter(|_| leaves_paths_unchanged(self.frames.frame(slot))) {
+            Some(lane) => self.queue.push(lane, at, Event::Entry { slot, link, leg: out }),
+            None => self.queue.push(Lane::Any, at, Event::Arrival { slot, leg: out, faults_applied: false }),
         }
     }
 

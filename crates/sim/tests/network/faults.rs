@@ -1,4 +1,4 @@
-//! Effects of each injected fault (issue 2, part 3).
+//! Effects of each injected fault.
 
 use core::time::Duration;
 

@@ -1,5 +1,5 @@
 //! Tests of the network through its public API: paths of frames, arrival times, effects of faults (protocol 2, 9.4,
-//! 11.3; issue 2, part 3).
+//! 11.3).
 
 mod any_frames;
 mod clocks;

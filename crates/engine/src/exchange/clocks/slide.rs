@@ -1,15 +1,18 @@
 //! Application time and system time: the shift between them, and its gradual changes.
 //!
 //! When the application's time jumps while SYNC signals run, the system time goes on without a jump. The supervisor
-//! posts a new shift, by which both times differ from then on, and the rest of the jump is made up gradually: clocks
-//! that follow the reference stay together, and pulses keep their distance.
+//! posts a new shift, by which both times differ from then on, and makes the rest of the jump up: it sets the offsets
+//! of all clocks back in small equal steps, so that they stay together. The exchange takes these steps into account; a
+//! small rest in the other direction, which no step is made for, is made up by the control loop of the reference.
 
 use crate::board::clock_times::Timeline;
 use crate::time::Instant;
 
-/// Nanoseconds in which the system time is moved by one: 200 ppm. Control loops take out 760 ppm, of which up to 200
-/// compensate the drift of the clocks.
+/// Nanoseconds in which the control loop moves the system time by one: 200 ppm. Loops take out 760 ppm, of which up to
+/// 200 compensate the drift of the clocks.
 const SLOWNESS: u64 = 5_000;
+/// Readings of the two halves differ by up to this: other frames are on the wire in front of theirs.
+const SAME_NS: u64 = 50_000;
 /// Longest time between two steps that counts.
 const LONGEST_NS: u64 = 100_000_000;
 
@@ -21,25 +24,28 @@ pub(super) struct Slide {
     /// Sum of all jumps of the system time.
     jumped: u64,
     shift: u64,
-    /// Application time minus the system time that is written.
-    in_effect: u64,
+    /// Nanoseconds by which the system time goes back until the shift is reached; negative: forward.
+    left: i64,
+    /// Nanoseconds by which it has gone back in steps.
+    slid: u64,
     at: Instant,
-    /// Remainder of the last step, in nanoseconds of host time.
+    /// Remainder of the last step of the loop, in nanoseconds of host time.
     rest: u64,
     /// System time of the reference clock at host time zero when the system time was posted; `None` before.
     epoch: Option<u64>,
 }
 
 impl Slide {
-    /// Takes over a posted system time; returns its jump. `wanted` is the application time at host time zero towards
-    /// which the reference is steered. The system time that is written continues that of the reference.
-    pub fn follow(&mut self, timeline: Timeline, wanted: Option<u64>, now: Instant) -> u64 {
+    /// Takes over a posted system time; returns its jump. `continued` is the application time minus the system time
+    /// that was written last, if any: that goes on without a step.
+    pub fn follow(&mut self, timeline: Timeline, continued: Option<u64>, now: Instant) -> u64 {
         let jump = timeline.jumped.wrapping_sub(self.jumped);
         if timeline.number != self.number {
-            let continued = wanted.map(|epoch| epoch.wrapping_sub(timeline.epoch));
-            let Timeline { number, jumped, shift, epoch } = timeline;
-            let in_effect = continued.unwrap_or(shift);
-            *self = Slide { number, jumped, shift, in_effect, at: now, rest: 0, epoch: Some(epoch) };
+            let Timeline { number, jumped, shift, left, slid, epoch } = timeline;
+            let exact = continued.map(|continued| shift.wrapping_sub(continued) as i64);
+            let is_same = |exact: &i64| left > 0 && exact.wrapping_sub(left).unsigned_abs() <= SAME_NS;
+            let left = exact.filter(is_same).unwrap_or(left);
+            *self = Slide { number, jumped, shift, left, slid, at: now, rest: 0, epoch: Some(epoch) };
         }
         jump
     }
@@ -56,17 +62,26 @@ impl Slide {
 
     /// The shift in effect.
     pub const fn in_effect(&self) -> u64 {
-        self.in_effect
+        self.shift.wrapping_sub(self.left as u64)
+    }
+
+    /// Takes over the steps so far: nanoseconds by which the system time has gone back since the begin. Returns those
+    /// since the last call.
+    pub fn take_steps(&mut self, slid: u64) -> u64 {
+        let step = slid.wrapping_sub(self.slid);
+        self.left = self.left.wrapping_sub(step as i64);
+        self.slid = slid;
+        step
     }
 
     /// The shift in effect now.
     pub fn step(&mut self, now: Instant) -> u64 {
-        let left = self.shift.wrapping_sub(self.in_effect) as i64;
         let passed = now.0.saturating_sub(self.at.0).min(LONGEST_NS) + self.rest;
-        let most = (passed / SLOWNESS) as i64;
         (self.at, self.rest) = (now, passed % SLOWNESS);
-        self.in_effect = self.in_effect.wrapping_add(left.clamp(-most, most) as u64);
-        self.in_effect
+        if self.left < 0 {
+            self.left = self.left.saturating_add_unsigned(passed / SLOWNESS).min(0);
+        }
+        self.in_effect()
     }
 }
 
@@ -75,29 +90,46 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rest_of_a_jump_is_made_up_by_200_ns_per_millisecond_in_either_direction() {
-        for direction in [1, -1_i64] {
-            let mut slide = Slide::default();
-            let epoch = 5_000_000_u64;
-            let wanted = epoch.wrapping_add_signed(3_000_000 * 7 + direction * 250_000);
-            let timeline = Timeline { number: 1, jumped: 0, shift: 21_000_000, epoch };
-            assert_eq!(slide.follow(timeline, Some(wanted), Instant(0)), 0);
-            let begin = slide.in_effect();
-            assert_eq!(begin as i64, 21_000_000 + direction * 250_000);
-            for cycle in 1..=1_250 {
-                slide.step(Instant(cycle * 1_000_000));
-                assert_eq!(slide.in_effect().abs_diff(begin), cycle * 200);
-            }
-            assert_eq!(slide.step(Instant(1_251_000_000)), slide.shift());
-        }
+    fn the_shift_in_effect_follows_the_steps_of_the_offsets_and_nothing_else() {
+        let mut slide = Slide::default();
+        let timeline = Timeline { number: 1, jumped: 0, shift: 21_000_000, left: 250_000, slid: 1_000, epoch: 5 };
+        assert_eq!(slide.follow(timeline, None, Instant(0)), 0);
+        assert_eq!(slide.in_effect(), 20_750_000);
+        assert_eq!((slide.take_steps(1_000), slide.step(Instant(1_000_000))), (0, 20_750_000));
+        assert_eq!((slide.take_steps(1_400), slide.step(Instant(2_000_000))), (400, 20_750_400));
+        assert_eq!((slide.take_steps(251_000), slide.step(Instant(3_000_000))), (249_600, slide.shift()));
     }
 
     #[test]
-    fn a_jump_counts_once_and_continues_the_time_that_is_written() {
+    fn the_time_that_is_written_goes_on_where_the_reference_is() {
+        let timeline = Timeline { number: 1, jumped: 0, shift: 21_000_000, left: 250_000, slid: 0, epoch: 5 };
+        for (continued, in_effect) in [(20_757_000, 20_757_000), (20_690_000, 20_750_000)] {
+            let mut slide = Slide::default();
+            slide.follow(timeline, Some(continued), Instant(0));
+            assert_eq!(slide.in_effect(), in_effect);
+        }
         let mut slide = Slide::default();
-        let timeline = Timeline { number: 1, jumped: 77, shift: 0, epoch: 1_000 };
+        slide.follow(Timeline { left: 0, ..timeline }, Some(20_999_000), Instant(0));
+        assert_eq!(slide.in_effect(), slide.shift(), "no steps follow");
+    }
+
+    #[test]
+    fn a_small_rest_forward_is_made_up_by_200_ns_per_millisecond() {
+        let mut slide = Slide::default();
+        let timeline = Timeline { number: 1, jumped: 0, shift: 7_000_000, left: -10_000, slid: 0, epoch: 5 };
+        slide.follow(timeline, None, Instant(0));
+        for cycle in 1..=50 {
+            assert_eq!(slide.step(Instant(cycle * 1_000_000)), 7_010_000 - cycle * 200);
+        }
+        assert_eq!(slide.step(Instant(51_000_000)), slide.shift());
+    }
+
+    #[test]
+    fn a_jump_counts_once() {
+        let mut slide = Slide::default();
+        let timeline = Timeline { number: 1, jumped: 77, shift: 0, left: 0, slid: 0, epoch: 1_000 };
         assert_eq!(slide.follow(timeline, None, Instant(0)), 77);
-        assert_eq!(slide.follow(timeline, Some(5_000), Instant(0)), 0);
+        assert_eq!(slide.follow(timeline, None, Instant(0)), 0);
         assert_eq!(slide.step(Instant(1 << 40)), 0);
     }
 }

@@ -13,7 +13,6 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
-use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
@@ -23,6 +22,7 @@ use crate::event::Subject;
 use crate::link::{Link, LinkSet};
 use crate::order::InOrder;
 use crate::procedures::latch::{self as frames, Pauses};
+use crate::procedures::loops::{followed, restore, write};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -45,8 +45,6 @@ const LIMIT: Duration = Duration::from_secs(5);
 const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
 /// Interval of the check whether the ring is closed.
 const CLOSING_PAUSE: Duration = Duration::from_millis(1);
-/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
-const WRITTEN: usize = 2;
 
 /// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
@@ -161,11 +159,17 @@ async fn measure_open(
     let all: Vec<PortOf> = rings.iter().chain(branches).filter(is_reached).copied().collect();
     let ports: Vec<(StationAddress, u8)> = all.iter().map(|at| (survey.stations[at.node], at.port)).collect();
     let text = |error: BusError| error.to_string();
-    let before = controls(bus, &ports).await.map_err(text)?;
-    let closed = before.iter().map(|(station, control)| (*station, closed(*control, *station, &ports)));
+    let asked_at = bus.now();
     let Some(turn) = segment.disturb(Disturbance::OpenByPort, LIMIT).await else {
         return Err("rings cannot be opened: another procedure needs their ports".to_string());
     };
+    if bus.now() > asked_at {
+        check_again(bus, segment, survey).await?;
+    }
+    let before = controls(bus, segment, &ports).await?;
+    segment.observe(Observation::PortsAltered(&before));
+    let closed = segment.view().altered().into_iter();
+    let closed = closed.map(|(station, control)| (station, closed_at(control, station, &ports)));
     let result = match write(bus, closed.collect()).await {
         Ok(()) => {
             let mut open = survey.clone();
@@ -178,13 +182,19 @@ async fn measure_open(
         }
         Err(error) => Err(text(error)),
     };
-    // If this frame is lost too, the ports open when the temporary setting expires.
-    let _ = write(bus, before).await;
+    restore(bus, segment).await;
     if survey.is_closed {
         wait_for_ring(bus).await;
     }
     drop(turn);
     result
+}
+
+/// Other procedures had their turn since the survey: a ring that is open elsewhere by now must not be opened.
+async fn check_again(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<(), String> {
+    let now = survey_segment(bus, segment).await?;
+    let is_same = (&now.stations, &now.wiring, now.is_closed) == (&survey.stations, &survey.wiring, survey.is_closed);
+    if is_same { Ok(()) } else { Err("the segment has changed before its rings could be opened".to_string()) }
 }
 
 /// Measures the cables behind forks without a clock, branch by branch. Unmeasurable delays stay unknown.
@@ -439,32 +449,32 @@ pub(super) async fn latch(
     Ok(Frame { sent_at: latches.sent_at, latched: read })
 }
 
-/// The present loop settings of the SubDevices that have these ports.
-async fn controls(bus: &Bus, ports: &[(StationAddress, u8)]) -> Result<Vec<(StationAddress, DlControl)>, BusError> {
+/// The present loop settings of the SubDevices that have these ports. An error if one of the ports is closed.
+async fn controls(
+    bus: &Bus,
+    segment: &SharedSegment,
+    ports: &[(StationAddress, u8)],
+) -> Result<Vec<(StationAddress, DlControl)>, String> {
     let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
     stations.put_in_order();
     stations.dedup();
     let mut controls = Vec::new();
     for station in stations {
-        let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
-        controls.push((station, DlControl { temporary: false, ..control }));
+        let read = followed(bus, segment, station).await.map_err(|error| error.to_string())?;
+        let Some(control) = read else { return Err(format!("the ports of station {station} are being written")) };
+        let is_closed = |port: &u8| control.loops[usize::from(port & 3)] == LoopControl::Closed;
+        if ports.iter().any(|(of, port)| *of == station && is_closed(port)) {
+            return Err(format!("a port of station {station} that would be closed for a moment is closed already"));
+        }
+        controls.push((station, control));
     }
     Ok(controls)
 }
 
-fn closed(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
+fn closed_at(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
     let mut loops = control.loops;
     for (_, port) in ports.iter().filter(|(of, _)| *of == station) {
         loops[usize::from(port & 3)] = LoopControl::Closed;
     }
     DlControl { temporary: true, loops, ..control }
-}
-
-/// All in one frame: a second frame would be sent into a closed port.
-async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
-    let target = |station: StationAddress| Target::Station(station, map::DL_CONTROL);
-    let writes = controls
-        .iter()
-        .map(|(station, control)| (Command::Fpwr, target(*station), control.encode()[..WRITTEN].to_vec()));
-    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
 }

@@ -17,14 +17,15 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, DcSystemTimeDifference, map};
 
-use super::changes::{Change, SETTLE, answering, wait_for_change};
+use super::changes::{Change, SETTLE, wait_for_change};
 use super::measure::Opening;
 use super::offsets::{write_missed, write_offsets};
 use super::set_up::{measure_again, set_filters, set_up, write_delays};
+use super::slide::slide;
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::Observation;
 use crate::segment::clocks::{Answer, Answers, ClockObservation, Difference, Due, Node};
+use crate::segment::{Changes, Observation};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
 
@@ -83,18 +84,16 @@ async fn keep(bus: Bus, segment: SharedSegment) {
 
 async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
-    let mut seen = (segment.board.ring().changes, answering(segment));
-    let mut has_answered = seen.1 != (0, 0);
+    let mut seen = segment.view().changes();
     let mut seen_times = segment.board.clocks.times.posted();
     let mut next_measurement = Instant::default();
     let mut explained_until = Instant::default();
     loop {
-        wait(bus, segment, next_read, next_measurement, bus.now() < explained_until).await;
-        let now = (segment.board.ring().changes, answering(segment));
-        let is_beginning = !has_answered && is_as_measured(segment, now.1);
-        has_answered |= now.1 != (0, 0);
-        let changed = now != seen && !is_beginning;
-        if now.0 != seen.0 {
+        wait(bus, segment, (next_read, next_measurement), bus.now() < explained_until, seen).await;
+        segment.observe_words();
+        let now = segment.view().changes();
+        let changed = now.segment != seen.segment;
+        if now.ring != seen.ring {
             explained_until = bus.now() + EXPLAINED;
         }
         seen = now;
@@ -111,6 +110,7 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
         let is_explained = bus.now() < explained_until;
         if changed || bus.now() >= next_read || (is_explained && is_held) {
             read_all(bus, segment, is_explained).await;
+            slide(bus, segment, seen.ring).await;
             let is_routine = {
                 let view = segment.view();
                 let is_certain = !view.clocks().are_links_unconfirmed() && !view.clocks().is_time_pending();
@@ -126,18 +126,19 @@ async fn watch(bus: &Bus, segment: &SharedSegment) {
     }
 }
 
-/// Whether as many SubDevices answer as were measured: so it is when cycles begin, which is not a change.
-fn is_as_measured(segment: &SharedSegment, (main, redundant): (u16, u16)) -> bool {
-    segment.view().clocks().measured_count() == Some(usize::from(main) + usize::from(redundant))
-}
-
 fn doubtful_since(segment: &SharedSegment) -> Option<Instant> {
     segment.view().clocks().doubtful_since()
 }
 
 /// Waits until the differences have to be read or the segment measured, or until words are posted or a clock has come
 /// back. While clocks are outside or links change, differences are read every [`PAUSE`].
-async fn wait(bus: &Bus, segment: &SharedSegment, next_read: Instant, next_measurement: Instant, is_explained: bool) {
+async fn wait(
+    bus: &Bus,
+    segment: &SharedSegment,
+    (next_read, next_measurement): (Instant, Instant),
+    is_explained: bool,
+    seen: Changes,
+) {
     let posted = bus.posted();
     let doubtful = doubtful_since(segment);
     let is_held = segment.board.clocks.is_held();
@@ -151,7 +152,8 @@ async fn wait(bus: &Bus, segment: &SharedSegment, next_read: Instant, next_measu
     let measures = doubtful.map(|since| next_measurement.max(since + SETTLE));
     let until = measures.map_or(next_read, |at| at.min(next_read));
     let has_come_back = || doubtful.is_none() && doubtful_since(segment).is_some();
-    segment.until_posted(posted, until, has_come_back).await;
+    let is_changed = || has_come_back() || segment.view().changes() != seen;
+    segment.until_posted(posted, until, is_changed).await;
 }
 
 /// Measures the segment after a change.

@@ -25,6 +25,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
 
+use super::super::loops::write_of;
 use super::super::shared_segment::SharedSegment;
 use crate::order::InOrder;
 use crate::segment::disturbance::Disturbance;
@@ -32,8 +33,6 @@ use crate::segment::{Observation, Segment, is_down};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, LocalRing, NodeStatus, PortOf};
 
-/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
-const WRITTEN: usize = 2;
 /// Maximum number of examined rings: each takes some frames, and the settings last for about a second.
 const MOST: usize = 16;
 /// Pause after the examination.
@@ -122,6 +121,11 @@ async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeSta
         (if is_possible { rings } else { Vec::new() }, topology.nodes.len())
     };
     let mut found = vec![None; if rings.is_empty() { 0 } else { count }];
+    let before: Vec<(StationAddress, DlControl)> = {
+        let view = segment.view();
+        rings.iter().map(|ring| (ring.junction, view.control_of(ring.junction))).collect()
+    };
+    segment.observe(Observation::PortsAltered(&before));
     for ring in &rings {
         // Frames reach it through the rings around it.
         let broken_around = |other: &Ring| other.holds(ring.head) && other.is_broken(&found);
@@ -149,6 +153,7 @@ async fn examine_rings(bus: &Bus, segment: &SharedSegment) -> Vec<Option<NodeSta
         let write = |bus: Bus, (command, target, data)| async move { bus.transfer_once(command, target, data).await };
         let _ = bus.gather(open, write).await;
     }
+    segment.observe(Observation::PortsAltered(&[]));
     found
 }
 
@@ -184,10 +189,7 @@ fn loops(segment: &SharedSegment, rings: &[Ring], sides: impl Fn(&Ring) -> Sides
         }
         (ring.junction, control)
     });
-    let writes = controls.map(|(station, control)| {
-        (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
-    });
-    writes.collect()
+    controls.map(write_of).collect()
 }
 
 /// Reads the port states of a ring's junction and members.

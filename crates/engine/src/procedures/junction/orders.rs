@@ -24,7 +24,7 @@ impl Drop for UnderWay {
 }
 
 /// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
-/// write does not concern the ports of a junction with a ring.
+/// write does not concern ports that are followed: those of a junction with a ring, or changed for a measurement.
 pub(crate) fn ordering(
     segment: Option<&SharedSegment>,
     station: StationAddress,
@@ -32,7 +32,7 @@ pub(crate) fn ordering(
     data: &[u8],
 ) -> Option<UnderWay> {
     let segment = segment?;
-    if !segment.view().junctions().contains(&station) {
+    if !segment.view().follows_ports(station) {
         return None;
     }
     let mut bytes = segment.view().control_of(station).encode();

@@ -14,6 +14,7 @@ use crate::config::SubDeviceConfig;
 use crate::info::{ControllerInfo, SubDeviceInfo};
 use crate::mail::InUse;
 use crate::plan::{SmPlan, plan};
+use crate::ring_status::LinkCounts;
 use crate::supervisor::{Bus, BusError, Reply};
 
 /// Registers from TYPE to STATION_ALIAS.
@@ -33,7 +34,7 @@ pub(super) enum Check {
         /// Station addresses that other SubDevices have than were known.
         replaced: Vec<StationAddress>,
         /// SubDevices on each link.
-        counts: (u16, u16),
+        counts: LinkCounts,
     },
 }
 
@@ -82,7 +83,7 @@ pub(super) async fn check(bus: &Bus, known: &[Rc<SubDeviceInfo>]) -> Result<Chec
     let (places, counted) = bus.both(reading, bus.brd(map::TYPE, 1)).await;
     let counted = counted?;
     let places = places.into_iter().collect::<Result<Vec<Option<Place>>, BusError>>()?;
-    let counts = (counted.main.0, counted.redundant.0);
+    let counts = LinkCounts { main: counted.main.0, redundant: counted.redundant.0 };
     let is_as_known = |(place, info): (&Option<Place>, &Rc<SubDeviceInfo>)| {
         let is_it = |place: &Place| is_one(place, info) && is_cabled(place, info);
         place.as_ref().is_some_and(is_it)

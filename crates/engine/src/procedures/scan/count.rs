@@ -8,6 +8,7 @@ use ringcat_wire::register::map;
 use super::error::ScanError;
 use super::options::ScanOptions;
 use crate::event::Notice;
+use crate::ring_status::LinkCounts;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
@@ -31,8 +32,8 @@ impl Count {
         u32::from(self.main.0) + u32::from(self.redundant.0)
     }
 
-    pub(super) const fn pair(&self) -> (u16, u16) {
-        (self.main.0, self.redundant.0)
+    pub(super) const fn by_link(&self) -> LinkCounts {
+        LinkCounts { main: self.main.0, redundant: self.redundant.0 }
     }
 }
 
@@ -70,7 +71,7 @@ pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Res
             return Err(counted);
         }
     }
-    let (main, redundant) = expected.pair();
+    let LinkCounts { main, redundant } = expected.by_link();
     bus.notice(Notice::Counted { main, redundant });
     Ok(())
 }

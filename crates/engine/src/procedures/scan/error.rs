@@ -7,6 +7,7 @@ use ringcat_wire::address::Position;
 use super::stations::MAX_SUBDEVICES;
 use crate::procedures::sii::SiiReadError;
 use crate::ring::FrameLimit;
+use crate::ring_status::LinkCounts;
 use crate::supervisor::BusError;
 
 /// Why a scan ended without a result.
@@ -24,10 +25,10 @@ pub enum ScanError {
     },
     /// The segment changed repeatedly during the scan.
     Changed {
-        /// SubDevices on the main and on the redundant link at the beginning.
-        before: (u16, u16),
+        /// SubDevices on each link at the beginning.
+        before: LinkCounts,
         /// At the end.
-        after: (u16, u16),
+        after: LinkCounts,
     },
     /// Frames with as many datagrams as fit return unprocessed.
     FrameLimit(FrameLimit),
@@ -63,7 +64,7 @@ impl fmt::Display for ScanError {
                 f,
                 "the segment changes while it is scanned: {} SubDevices on the main and {} on the redundant link, then \
                  {} and {}",
-                before.0, before.1, after.0, after.1
+                before.main, before.redundant, after.main, after.redundant
             ),
             ScanError::FrameLimit(limit) => limit.fmt(f),
             ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),

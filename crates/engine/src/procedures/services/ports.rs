@@ -3,27 +3,19 @@
 pub use crate::segment::BlockedPort;
 
 use alloc::vec::Vec;
-use core::time::Duration;
 
-use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
 use crate::declared::SubDeviceId;
 use crate::order::InOrder;
 use crate::procedures::junction::ordering;
+use crate::procedures::loops::{LOOPS, lasting};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
-
-/// The byte of DL_CONTROL with the loop settings of all ports.
-const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
-
-/// Time after which temporary settings have certainly expired.
-const TEMPORARY: Duration = Duration::from_millis(1_300);
-/// Interval of the check for it.
-const PAUSE: Duration = Duration::from_millis(20);
 
 /// The loop control of a port.
 pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopControl, ServiceError> {
@@ -49,18 +41,9 @@ pub async fn set(
     Ok(())
 }
 
-/// The loop settings of a SubDevice. Waits until temporary settings have expired, as those of examined rings: a value
-/// written meanwhile would expire with them.
 async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, BusError> {
-    let until = bus.now() + TEMPORARY;
-    loop {
-        let [first, loops] = bus.fprd_array(station, map::DL_CONTROL).await?;
-        let is_temporary = DlControl::decode(&[first, loops, 0, 0]).temporary;
-        if !is_temporary || bus.now() >= until {
-            return Ok(loops);
-        }
-        bus.sleep(PAUSE).await;
-    }
+    let [_, loops, ..] = lasting(bus, station).await?.encode();
+    Ok(loops)
 }
 
 const fn check(port: u8) -> Result<(), ServiceError> {

@@ -5,6 +5,7 @@
 //! to, so duplicated, late and lost commands are detected.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
@@ -30,6 +31,7 @@ const POLL_LEN: usize = 14;
 #[derive(Clone, Copy, Debug)]
 struct Given {
     word: u32,
+    /// When its frame left.
     at: Instant,
 }
 
@@ -38,8 +40,10 @@ struct Poll {
     control: SiiControl,
     address: u32,
     data: [u8; 8],
-    /// The controller took the command that came with the poll.
-    taken: bool,
+    /// When its frame left.
+    at: Instant,
+    /// The controller took the command that came with the poll: when that command left.
+    taken: Option<Instant>,
 }
 
 /// Why a command returned no data.
@@ -114,11 +118,11 @@ impl Eeprom {
             let value = match self.word(word).or_else(|| known(word)) {
                 Some(value) => value,
                 None => {
-                    let beyond = word + self.width();
-                    let rest = (beyond..end).filter(|word| known(*word).is_none());
-                    let mut rest = rest.chain(then.filter(|then| !(word..beyond).contains(then)));
-                    let ahead = rest.find(|word| self.word(*word).is_none());
-                    self.fetch(word, ahead).await?
+                    let ahead = |eeprom: &Eeprom, read: Range<u32>| {
+                        let mut rest = (word..end).filter(|word| known(*word).is_none()).chain(then);
+                        rest.find(|word| eeprom.word(*word).is_none() && !read.contains(word))
+                    };
+                    self.fetch(word, &ahead).await?
                 }
             };
             bytes.extend_from_slice(&value.to_le_bytes());
@@ -140,8 +144,13 @@ impl Eeprom {
         self.words.get(word as usize).copied().flatten()
     }
 
-    /// Reads the data at a word. Afterwards a command for `ahead` is under way.
-    async fn fetch(&mut self, word: u32, ahead: Option<u32>) -> Result<u16, SiiReadError> {
+    /// Reads the data at a word. Afterwards a command is under way for the word that `ahead` returns: the next one that
+    /// is needed, but for those that are being read.
+    async fn fetch(
+        &mut self,
+        word: u32,
+        ahead: &dyn Fn(&Eeprom, Range<u32>) -> Option<u32>,
+    ) -> Result<u16, SiiReadError> {
         let mut failures = 0;
         loop {
             if let Some(value) = self.word(word) {
@@ -154,11 +163,13 @@ impl Eeprom {
                 self.command(word).await?;
                 continue;
             };
-            // After a failure no command is sent ahead.
+            // After a failure no command is sent ahead. A command that was sent ahead may return the word, but begin
+            // before it.
+            let read = given.word..given.word + self.width();
             let next = if failures > 0 {
                 None
-            } else if given.word == word {
-                ahead
+            } else if read.contains(&word) {
+                ahead(self, read)
             } else {
                 Some(word)
             };
@@ -175,12 +186,12 @@ impl Eeprom {
         }
     }
 
-    /// Writes from SII_CONTROL on; true if the controller took the command. It refuses commands while the EEPROM is
-    /// busy, also if the reply to a command was lost and the command is sent again.
-    async fn write(&self, data: Vec<u8>) -> Result<bool, BusError> {
+    /// Writes from SII_CONTROL on; returns when the command left, if the controller took it. It refuses commands while
+    /// the EEPROM is busy, also if the reply to a command was lost and the command is sent again.
+    async fn write(&self, data: Vec<u8>) -> Result<Option<Instant>, BusError> {
         let target = Target::Station(self.station, map::SII_CONTROL);
         let reply = self.bus.transfer(Command::Fpwr, target, data, Some(Wkc(1))).await?;
-        Ok(reply.wkc() == Wkc(1))
+        Ok((reply.wkc() == Wkc(1)).then_some(reply.sent_at))
     }
 
     fn read_command(word: u32) -> Vec<u8> {
@@ -190,26 +201,24 @@ impl Eeprom {
     }
 
     async fn command(&mut self, word: u32) -> Result<(), BusError> {
-        self.write(Eeprom::read_command(word)).await?;
-        self.given = Some(Given { word, at: self.bus.now() });
+        let sent_at = self.write(Eeprom::read_command(word)).await?;
+        self.given = Some(Given { word, at: sent_at.unwrap_or_else(|| self.bus.now()) });
         Ok(())
     }
 
-    /// Polls until a command has ended, and sends the next one at once.
+    /// Polls until a command has ended, and sends the next one at once. Times count from departure to departure: a
+    /// command and its poll take the same way, so the way of a long frame through many SubDevices costs no time.
     async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
         self.bus.sleep_until(given.at + self.pace.first()).await;
-        let mut first = true;
+        let mut early = None;
         loop {
             let poll = self.poll(next).await?;
-            let now = self.bus.now();
-            let elapsed = now.since(given.at);
-            if poll.taken
-                && let Some(word) = next
-            {
-                self.given = Some(Given { word, at: now });
+            let elapsed = poll.at.since(given.at);
+            if let (Some(at), Some(word)) = (poll.taken, next) {
+                self.given = Some(Given { word, at });
             }
             if !poll.control.busy {
-                self.pace.took(elapsed, first);
+                self.pace.took(elapsed, early);
                 if poll.control.command_error || poll.control.write_enable_error {
                     return Ok(Err(Failure::Command(poll.control)));
                 }
@@ -221,35 +230,40 @@ impl Eeprom {
                 self.keep(poll.address, poll.data);
                 return Ok(Ok(()));
             }
-            if poll.taken {
+            if poll.taken.is_some() {
                 // The EEPROM finished between the poll and the command behind it.
                 return Ok(Err(Failure::NotTaken));
             }
             if elapsed > COMMAND_LIMIT {
                 return Err(SiiReadError::Busy { word: given.word });
             }
-            if now >= self.until {
+            if self.bus.now() >= self.until {
                 return Err(SiiReadError::TooSlow { word: given.word });
             }
-            first = false;
+            early = Some(elapsed);
             self.bus.sleep(Pace::next(elapsed)).await;
         }
     }
 
     async fn poll(&self, next: Option<u32>) -> Result<Poll, BusError> {
         let length = if self.eight_bytes { POLL_LEN } else { POLL_LEN - 4 };
-        let read = self.bus.fprd(self.station, map::SII_CONTROL, length);
-        let (bytes, taken) = match next {
-            None => (read.await?, false),
+        let (target, expected) = (Target::Station(self.station, map::SII_CONTROL), Wkc(1));
+        let read = self.bus.transfer(Command::Fprd, target, alloc::vec![0; length], Some(expected));
+        let (reply, taken) = match next {
+            None => (read.await?, None),
             Some(word) => {
-                let (bytes, taken) = self.bus.both(read, self.write(Eeprom::read_command(word))).await;
-                (bytes?, taken?)
+                let (reply, taken) = self.bus.both(read, self.write(Eeprom::read_command(word))).await;
+                (reply?, taken?)
             }
         };
+        if reply.wkc() != expected {
+            return Err(BusError::Wkc { target, expected, got: reply.wkc() });
+        }
+        let (bytes, at) = (&reply.data, reply.sent_at);
         let mut data = [0; 8];
         data[..length - 6].copy_from_slice(&bytes[6..length]);
         let control = SiiControl::decode(&[bytes[0], bytes[1]]);
-        Ok(Poll { control, address: u32::from_le_bytes([bytes[2], bytes[3], bytes[4], bytes[5]]), data, taken })
+        Ok(Poll { control, address: u32::from_le_bytes([bytes[2], bytes[3], bytes[4], bytes[5]]), data, at, taken })
     }
 
     fn keep(&mut self, word: u32, data: [u8; 8]) {

@@ -10,23 +10,29 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(1);
 const LONGEST_WAIT: Duration = Duration::from_millis(5);
 
 /// The learned time is not refined below this.
-const NARROW: Duration = Duration::from_micros(40);
+const NARROW: Duration = Duration::from_micros(15);
+/// A poll at a time that was in time before, and is a little early now, makes the next one later by this.
+const STEP: Duration = Duration::from_micros(5);
+/// A command that takes this much longer than expected is a slow one, and not a poll that was a little early.
+const MUCH: Duration = Duration::from_micros(120);
 
 /// Learned speed of an EEPROM.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Pace {
     /// Time from a command to its first poll.
     wait: Option<Duration>,
+    /// A first poll after this time was in time.
+    good: Option<Duration>,
     /// A first poll after this time was too early.
     too_early: Duration,
-    /// Time of the last command, if its first poll was too early.
-    slow: Option<Duration>,
+    /// Time of the last command, if its first poll was too early, and time of the last poll that was.
+    slow: Option<(Duration, Duration)>,
 }
 
 impl Pace {
     /// An initial estimate.
     pub(super) const fn guess(wait: Option<Duration>) -> Pace {
-        Pace { wait, too_early: Duration::ZERO, slow: None }
+        Pace { wait, good: None, too_early: Duration::ZERO, slow: None }
     }
 
     /// Time from a command to its first poll.
@@ -39,23 +45,34 @@ impl Pace {
         (elapsed / 16).clamp(SHORTEST_PAUSE, LONGEST_PAUSE)
     }
 
-    /// A command was done after this time, at its first poll or at a later one. A single command that is slower than
+    /// A command was done after this time; `early`: time of the last poll before. A single command that is slower than
     /// the previous ones changes nothing. If the first poll is in time, the next one is sent a little earlier, down to
     /// a time that was too early.
-    pub(super) fn took(&mut self, time: Duration, at_first_poll: bool) {
-        if at_first_poll {
+    pub(super) fn took(&mut self, time: Duration, early: Option<Duration>) {
+        let tried = self.first();
+        let Some(early) = early else {
             self.slow = None;
-            if let Some(wait) = &mut self.wait {
-                let room = wait.saturating_sub(self.too_early);
-                *wait -= if room > NARROW { room / 4 } else { Duration::ZERO };
+            self.good = self.wait;
+            let room = tried.saturating_sub(self.too_early);
+            if room > NARROW {
+                self.wait = self.wait.map(|wait| wait - room / 4);
             }
             return;
+        };
+        if let Some(good) = self.good
+            && time <= good + MUCH
+        {
+            self.too_early = self.too_early.max(tried);
+            self.wait = Some(if good > tried { good } else { (good + STEP).min(time) });
+            self.slow = None;
+            return;
         }
-        self.too_early = self.too_early.max(self.first());
         if let Some(before) = self.slow {
-            self.wait = Some(before.min(time).min(LONGEST_WAIT));
+            let (time, early) = before.min((time, early));
+            self.wait = Some(time.min(LONGEST_WAIT));
+            (self.good, self.too_early) = (None, early.min(LONGEST_WAIT));
         }
-        self.slow = Some(time);
+        self.slow = Some((time, early));
     }
 
     /// The learned time.
@@ -74,12 +91,13 @@ mod tests {
 
     /// A command of an EEPROM that takes `busy`; returns the number of polls.
     fn command(pace: &mut Pace, busy: Duration) -> u32 {
-        let (mut elapsed, mut polls) = (pace.first(), 1);
+        let (mut elapsed, mut polls, mut early) = (pace.first(), 1, None);
         while elapsed < busy {
+            early = Some(elapsed);
             elapsed += Pace::next(elapsed);
             polls += 1;
         }
-        pace.took(elapsed, polls == 1);
+        pace.took(elapsed, early);
         polls
     }
 
@@ -103,9 +121,19 @@ mod tests {
         for busy in [us(90), us(500), us(530), us(2_100), us(4_700)] {
             let mut pace = Pace::guess(Some(us(5_000)));
             let polls: u32 = (0..100).map(|_| command(&mut pace, busy)).sum();
-            assert!((busy..busy + us(50)).contains(&pace.first()), "{busy:?}: {pace:?}");
+            assert!((busy..busy + us(20)).contains(&pace.first()), "{busy:?}: {pace:?}");
             assert!(polls < 130, "{busy:?}: {polls} polls");
         }
+    }
+
+    #[test]
+    fn an_eeprom_that_takes_a_little_longer_now_and_then_is_polled_once_per_command() {
+        let mut pace = Pace::default();
+        (0..20).for_each(|_| _ = command(&mut pace, us(500)));
+        let busy = [500, 500, 520, 511, 500].map(us);
+        let polls: u32 = (0..100).map(|number| command(&mut pace, busy[number % 5])).sum();
+        assert!(polls < 110, "{polls} polls");
+        assert!((us(520)..us(540)).contains(&pace.first()), "{pace:?}");
     }
 
     #[test]

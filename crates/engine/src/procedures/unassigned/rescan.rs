@@ -12,7 +12,7 @@ use ringcat_wire::register::{DlStatus, map};
 use ringcat_wire::sii::Identity;
 
 use super::address::view;
-use crate::declared::SubDeviceId;
+use crate::declared::{Move, SubDeviceId};
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
@@ -85,10 +85,10 @@ impl Rescan {
         self.subdevices.iter().all(|found| found.identified != Identified::Unknown)
     }
 
-    /// Declared SubDevices that have moved: old and new position.
-    pub fn moved(&self) -> impl Iterator<Item = (SubDeviceId, Position, Position)> + '_ {
+    /// Declared SubDevices that have moved.
+    pub fn moved(&self) -> impl Iterator<Item = Move> + '_ {
         self.subdevices.iter().filter_map(|found| match found.identified {
-            Identified::Declared(index) => Some((index, found.moved_from?, found.position)),
+            Identified::Declared(subdevice) => Some(Move { subdevice, from: found.moved_from?, to: found.position }),
             Identified::Undeclared(_) | Identified::Unknown => None,
         })
     }

@@ -115,6 +115,15 @@ pub enum ClockObservation<'a> {
         /// Clocks that did not answer.
         missed: &'a [StationAddress],
     },
+    /// The exchange has taken over a shift: it says how far all offsets are set back.
+    SlideBegun,
+    /// All offsets are about to be set back by this number of nanoseconds.
+    SteppingBack(u64),
+    /// They are written, except to these clocks.
+    SteppedBack {
+        /// Clocks that did not answer.
+        missed: &'a [StationAddress],
+    },
     /// DC_SYSTEM_TIME of the reference, and the host time at which the frame was sent.
     ReferenceTime {
         /// The lower half of the system time.

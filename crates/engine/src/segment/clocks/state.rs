@@ -183,9 +183,22 @@ impl Clocks {
         self.due() == Due::Offsets
     }
 
-    /// Whether readings of the reference are necessary, because the application's time is far from its time.
+    /// Whether readings of the reference are necessary, because the application's time is far from its time or was.
     pub fn is_time_pending(&self) -> bool {
-        self.times.is_pending() || self.are_offsets_due()
+        self.times.is_pending() || self.are_offsets_due() || self.times.is_sliding()
+    }
+
+    /// Whether all offsets are still to be set back in steps.
+    pub fn is_slide_left(&self) -> bool {
+        self.are_set_up() && self.times.left_ns() > 0
+    }
+
+    /// The next of these steps, so long after the last one; 0 while the paths of frames are doubtful.
+    pub fn next_step_ns(&self, passed_ns: u64) -> u64 {
+        let is_calm = self.running().is_some_and(|running| {
+            running.delays == Delays::Valid && running.unwritten == Unwritten::default() && running.due == Due::Nothing
+        });
+        if is_calm { self.times.step_ns(passed_ns) } else { 0 }
     }
 
     /// Application time minus system time.

@@ -12,8 +12,14 @@ const READINGS: usize = 16;
 /// These readings differ by no more than this, or by no more than this part of the difference, as a shift.
 const SAME_NS: i64 = 100_000;
 const SAME_SHARE: u32 = 3;
-/// Longest pattern of SYNC signals that is kept: the rest of a jump, at most half of it, is made up gradually.
+/// Longest pattern of SYNC signals that is kept: the rest of a jump, less than one pattern, is made up gradually.
 const LONGEST_PATTERN_NS: u64 = 20_000_000;
+/// A rest up to this is made up forward, by the control loop of the reference: the accuracy of the readings.
+const FORWARD_NS: i64 = 10_000;
+/// Nanoseconds in which the system time goes back by one: 400 ppm.
+const SLOWNESS: u64 = 2_500;
+/// Largest step: a clock whose offset is written later than that of another differs from it by this.
+const LARGEST_STEP_NS: u64 = 800;
 
 /// Application time and system time.
 #[derive(Debug, Default)]
@@ -22,6 +28,12 @@ pub struct Times {
     pub timeline: Timeline,
     /// System time to be reached minus system time, by each reading while they are far apart.
     far: Vec<i64>,
+    /// Nanoseconds by which the system time is still to go back in steps.
+    left_ns: u64,
+    /// The number of the last wanted time before; `None` once the exchange has said by how much it goes back.
+    unsaid: Option<u32>,
+    /// Nanoseconds by which it has gone back in steps.
+    slid: u64,
     /// The number of the last wanted time that was compared.
     compared: u32,
     /// The first time that the application has set was followed, or is not to be followed any more.
@@ -33,8 +45,13 @@ pub struct Times {
 pub enum Step {
     /// All clocks are set: their system time jumps by this, and the shift is 0.
     Jump(u64),
-    /// The system time goes on, with this shift from now on.
-    Shift(u64),
+    /// The system time goes on, with this shift once it has gone back by some nanoseconds; negative: forward.
+    Shift {
+        /// Application time minus system time.
+        shift: u64,
+        /// Nanoseconds by which it goes back.
+        left: i64,
+    },
 }
 
 impl Times {
@@ -91,26 +108,64 @@ impl Times {
         let whole = target.wrapping_sub(written).wrapping_add_signed(middle);
         Some(match pattern_ns {
             None => Step::Jump(whole),
-            Some(pattern) => Step::Shift(nearest_multiple(whole, pattern)),
+            Some(pattern) => {
+                let shift = next_multiple(whole.wrapping_sub(FORWARD_NS as u64), pattern);
+                Step::Shift { shift, left: shift.wrapping_sub(whole) as i64 }
+            }
         })
     }
 
-    /// Another system time begins: it jumps, and differs from the application time by a shift. `epoch` is the system
-    /// time at host time zero.
-    pub fn turn(&mut self, jump: u64, shift: u64, epoch: u64) -> Timeline {
+    /// Nanoseconds by which the system time is still to go back in steps.
+    pub fn left_ns(&self) -> u64 {
+        self.left_ns
+    }
+
+    /// Whether it goes back in steps now.
+    pub fn is_sliding(&self) -> bool {
+        self.left_ns > 0 && self.unsaid.is_none()
+    }
+
+    /// Takes the shift in effect of the first time that was written with a new shift.
+    pub fn take_shift_in_effect(&mut self, wanted: Option<Wanted>) {
+        let Some((before, wanted)) = self.unsaid.zip(wanted) else { return };
+        if wanted.number != before {
+            self.left_ns = (self.timeline.shift.wrapping_sub(wanted.shift) as i64).max(0).unsigned_abs();
+            self.unsaid = None;
+        }
+    }
+
+    /// The next step back, in nanoseconds, so long after the last one.
+    pub fn step_ns(&self, passed_ns: u64) -> u64 {
+        if self.is_sliding() { (passed_ns / SLOWNESS).min(LARGEST_STEP_NS).min(self.left_ns) } else { 0 }
+    }
+
+    /// The system time goes back by a step.
+    pub fn slide(&mut self, step_ns: u64) {
+        self.left_ns = self.left_ns.saturating_sub(step_ns);
+        self.slid = self.slid.wrapping_add(step_ns);
+    }
+
+    /// Nanoseconds by which it has gone back in steps.
+    pub fn slid(&self) -> u64 {
+        self.slid
+    }
+
+    /// Another system time begins: it jumps, and differs from the application time by a shift, once it has gone back by
+    /// `left` nanoseconds. `epoch` is the system time at host time zero.
+    pub fn turn(&mut self, jump: u64, (shift, left): (u64, i64), epoch: u64) -> Timeline {
         let Timeline { number, jumped, .. } = self.timeline;
         let (number, jumped) = (number.wrapping_add(1), jumped.wrapping_add(jump));
-        self.timeline = Timeline { number, jumped, shift, epoch };
+        (self.left_ns, self.unsaid) = (left.max(0).unsigned_abs(), Some(self.compared));
+        self.timeline = Timeline { number, jumped, shift, left, slid: self.slid, epoch };
         self.timeline
     }
 }
 
-/// The multiple of a pattern that is nearest to a signed time.
-fn nearest_multiple(time: u64, pattern_ns: u64) -> u64 {
+/// The smallest multiple of a pattern that is not less than a signed time.
+fn next_multiple(time: u64, pattern_ns: u64) -> u64 {
     let (time, pattern) = (time as i64, pattern_ns.max(1) as i64);
-    let rest = time.rem_euclid(pattern);
-    let down = time.wrapping_sub(rest);
-    if rest > pattern / 2 { down.wrapping_add(pattern) as u64 } else { down as u64 }
+    let more = time.wrapping_neg().rem_euclid(pattern);
+    time.wrapping_add(more) as u64
 }
 
 /// The time after which all these patterns of SYNC signals repeat together, in nanoseconds; that of the longest if this
@@ -169,20 +224,42 @@ mod tests {
     }
 
     #[test]
-    fn with_sync_signals_the_shift_is_the_nearest_multiple_of_their_pattern() {
-        for (jump, shift) in [(7_300_000_i64, 7 * MS as i64), (-7_300_000, -7 * MS as i64), (600_000, MS as i64)] {
+    fn with_sync_signals_the_shift_is_a_multiple_of_their_pattern_and_rests_go_back() {
+        let step = |jump: i64| {
             let mut times = Times::default();
             let application = (40 * MS).wrapping_add_signed(jump);
-            let step =
-                (1..=16).find_map(|number| times.compare(40 * MS, wanted(number, application, 0), None, Some(MS)));
-            assert_eq!(step, Some(Step::Shift(shift as u64)), "{jump}");
-        }
+            (1..=16).find_map(|number| times.compare(40 * MS, wanted(number, application, 0), None, Some(MS)))
+        };
+        let shift = |ms: i64, left| Some(Step::Shift { shift: (ms * MS as i64) as u64, left });
+        assert_eq!(step(7_300_000), shift(8, 700_000));
+        assert_eq!(step(-7_300_000), shift(-7, 300_000));
+        assert_eq!(step(600_000), shift(1, 400_000));
+        assert_eq!(step(-600_000), shift(0, 600_000));
+        // The accuracy of readings is no reason to go back by a whole pattern.
+        assert_eq!((step(5_009_000), step(4_991_000)), (shift(5, -9_000), shift(5, 9_000)));
         // While half a jump is made up, another one comes: the shift counts from the application's time.
         let mut times = Times::default();
         let (application, in_effect) = (40 * MS + 9_400_000, 9_200_000);
         let step =
             (1..=16).find_map(|number| times.compare(38 * MS, wanted(number, application, in_effect), None, Some(MS)));
-        assert_eq!(step, Some(Step::Shift(11 * MS)));
+        assert_eq!(step, shift(12, 600_000));
+    }
+
+    #[test]
+    fn the_rest_goes_back_by_400_ns_per_millisecond_and_800_ns_at_most() {
+        let mut times = Times::default();
+        times.turn(0, (3 * MS, 1_700), 0);
+        times.take_shift_in_effect(wanted(0, 0, 0));
+        assert_eq!(times.step_ns(1_000_000), 0, "the exchange has not said anything yet");
+        times.take_shift_in_effect(wanted(1, 0, 3 * MS - 1_500));
+        assert_eq!((times.step_ns(1_000_000), times.step_ns(50_000_000), times.left_ns()), (400, 800, 1_500));
+        times.slide(800);
+        assert_eq!((times.step_ns(50_000_000), times.slid()), (700, 800));
+        times.slide(700);
+        assert_eq!((times.step_ns(50_000_000), times.left_ns()), (0, 0));
+        // A rest forward has no steps.
+        assert_eq!(times.turn(0, (MS, -9_000), 0).slid, 1_500);
+        assert_eq!(times.left_ns(), 0);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{Position, StationAddress};
 
 use crate::board::clocks::References;
-use crate::clocks::{Cables, KnownClocks, Measured, extend};
+use crate::clocks::{Cables, KnownClocks, Measured};
 use crate::config::ReferenceClock;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
@@ -75,12 +75,7 @@ impl Segment {
                     node.has_signals = are_starting;
                 }
             }
-            ClockObservation::OffsetsWritten { missed } => self.observe_written_offsets(missed, effects),
-            ClockObservation::ReferenceTime { low, sent_at } => {
-                let near = sent_at.wrapping_add(self.clocks.epoch);
-                self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
-                self.compare_times(effects);
-            }
+            seen => self.observe_time(seen, effects),
         }
         self.post_clock_words();
     }
@@ -104,13 +99,15 @@ impl Segment {
             effects.report(Event::ClocksFailed { reason: reason.clone() });
         }
         self.clocks.life = Life::NotSetUp(Some(reason));
+        self.compared.begin(&self.board);
     }
 
     fn observe_set_up(&mut self, effects: &mut Effects) {
         self.clocks.life = Life::Running(Running::default());
+        self.compared.begin(&self.board);
         // What the exchange predicts until it has read a reference: the application's time may be another one by now.
         let epoch = self.clocks.epoch;
-        self.board.clocks.times.post_timeline(self.clocks.times.turn(0, 0, epoch));
+        self.board.clocks.times.post_timeline(self.clocks.times.turn(0, (0, 0), epoch));
         self.board.clocks.post_references(self.clocks.references());
         self.report_reference(effects);
         self.report_hidden(effects);

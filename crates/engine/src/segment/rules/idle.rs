@@ -9,7 +9,7 @@ use crate::event::Event;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
 use crate::segment::effect::{Effects, Task, Watch};
-use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, ROUTINE, SILENT};
+use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, ROUTINE, SILENT, Work};
 use crate::segment::model::Segment;
 use crate::segment::ring::Words;
 use crate::segment::scan::Found;
@@ -30,7 +30,7 @@ struct Shown {
 impl Segment {
     /// Whether a procedure of idle operation works on the segment.
     pub fn is_idle_busy(&self) -> bool {
-        self.idle.is_under_way
+        self.idle.work != Work::Nothing
     }
 
     /// Number of the last request for a rescan.
@@ -72,18 +72,18 @@ impl Segment {
                 self.ring.begin_idle(carriers, state);
             }
             IdleObservation::Unanswered(words) => self.observe_silence_of_all(&words, now, effects),
-            IdleObservation::Scanned => self.idle.is_under_way = false,
+            IdleObservation::Scanned => self.idle.end(Work::FirstScan),
             IdleObservation::RescanAsked => self.idle.rescans.asked += 1,
             IdleObservation::Followed { versions, found, wanted } => {
-                self.idle.is_under_way = false;
+                self.idle.end(Work::Follow);
                 self.end_follow((versions, found), wanted, now, effects);
             }
             IdleObservation::NotFollowed(reason) => {
-                self.idle.is_under_way = false;
+                self.idle.end(Work::Follow);
                 self.fail_to_follow(reason, effects);
             }
             IdleObservation::StatesRead(read) => {
-                self.idle.is_under_way = false;
+                self.idle.end(Work::ReadStates);
                 self.observe_idle_states(read, now, effects);
             }
         }
@@ -102,14 +102,14 @@ impl Segment {
     }
 
     fn evaluate_broadcast(&mut self, shown: Shown, ring: RingState, now: Instant, effects: &mut Effects) {
-        if self.is_scanning() || self.is_active() || self.idle.is_under_way {
+        if self.is_scanning() || self.is_active() || self.is_idle_busy() {
             return;
         }
         self.ring.observe_broadcast(ring, shown.counts, now, effects);
         let Some(scanned) = self.found().map(|found| found.counts()) else {
             if shown.counts != LinkCounts::default() {
-                self.begin_scan();
-                self.begin_work(Task::ScanSegment, effects);
+                self.begin_scan(false);
+                self.begin_work((Work::FirstScan, Task::ScanSegment), effects);
             }
             return;
         };
@@ -127,12 +127,12 @@ impl Segment {
         let is_other = self.expected_states().is_some_and(|expected| shown.al_status != expected);
         if now >= self.idle.next_routine || (is_other && self.are_undeclared_settled()) {
             self.idle.next_routine = now + ROUTINE;
-            self.begin_work(Task::ReadStates, effects);
+            self.begin_work((Work::ReadStates, Task::ReadStates), effects);
         }
     }
 
-    fn begin_work(&mut self, task: Task, effects: &mut Effects) {
-        self.idle.is_under_way = true;
+    fn begin_work(&mut self, (work, task): (Work, Task), effects: &mut Effects) {
+        self.idle.work = work;
         effects.start(task);
     }
 
@@ -145,7 +145,8 @@ impl Segment {
             }
             self.idle.compared = Comparison::CHANGED;
         }
-        self.begin_work(Task::FollowChange(Change { counts, ports_changed, is_unplugged, wanted }), effects);
+        let change = Change { counts, ports_changed, is_unplugged, wanted };
+        self.begin_work((Work::Follow, Task::FollowChange(change)), effects);
     }
 
     /// The segment is known again. A result from before another scan is refused.

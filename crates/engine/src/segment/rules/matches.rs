@@ -7,6 +7,7 @@ use ringcat_wire::address::StationAddress;
 
 use super::fit::fit;
 use super::group_matching;
+use crate::config::IdentityMismatch;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -109,7 +110,7 @@ impl Segment {
     /// If a SubDevice is in the place of the only absent member there: the difference to its declaration.
     pub(in crate::segment) fn mismatch(&self, it: UnassignedView<'_>, info: &SubDeviceInfo) -> Option<Event> {
         let [subdevice] = self.absent_between(it.between)[..] else { return None };
-        let (field, expected, got) = self.member(subdevice)?.config.expected.mismatch(info)?;
+        let IdentityMismatch { field, expected, got } = self.member(subdevice)?.config.expected.mismatch(info)?;
         Some(Event::Mismatch { subdevice: SubDeviceId(subdevice), position: it.position, field, expected, got })
     }
 }

@@ -10,12 +10,15 @@ use crate::segment::model::Segment;
 use crate::segment::observation::Observation;
 use crate::segment::ring::{Cabled, Words};
 use crate::segment::versions::Versions;
+use crate::segment::wake::Wake;
 use crate::time::Instant;
 
 impl Segment {
     /// Processes an observation. The effects must be executed in their order.
     pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
         let mut effects = Effects::default();
+        let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_));
+        self.observed = self.observed.wrapping_add(u32::from(!is_apart));
         self.take(seen, now, &mut effects);
         self.hot_connect.observe(&self.subdevices, &mut effects);
         self.keep_undeclared(now, &mut effects);
@@ -38,7 +41,7 @@ impl Segment {
             RoundWantedIn(pause) => self.attention.again_in(pause, now),
             FramesTested(until) => self.frames_tested_until = until,
             FramesLimited(limit) => self.limit_frames(limit, effects),
-            ScanBegun => self.begin_scan(),
+            ScanBegun => self.begin_scan(true),
             ScanShows(findings) => self.report_findings(findings, effects),
             Compared(event) => effects.report(event),
             ScanEnded(result) => self.end_scan(result, effects),
@@ -74,6 +77,8 @@ impl Segment {
             Wanted(wanted) => self.slot.want(wanted),
             Undisturbed(number) => self.slot.end(number),
             Isolated { versions, found, words } => self.observe_isolated(versions, found, (&words, now), effects),
+            PortsFollowed(station) => self.follow_ports(station),
+            PortsAltered(before) => self.alter_ports(before),
             PortsOrdered { station, control } => self.begin_order(station, control),
             PortsWritten(station) => self.end_order(station),
             PortsRead { station, orders, control } => self.note_control(station, orders, control),
@@ -104,12 +109,16 @@ impl Segment {
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
+        self.compared.observe(words, self.board.clocks.holds(), &self.clocks);
+        if !self.choices.supervision {
+            return;
+        }
         let disturbance = self.slot.running();
         let cabled = Cabled { topology: &self.cabling.topology, cables: &self.cabling.cables };
         let ring = self.ring.observe(words, disturbance, &cabled, now, effects);
         let silence = self.observe_silence(words, now, effects);
         let reported = self.ring.reported();
         let evaluation = self.attention.observe(words, reported, disturbance, now, effects);
-        self.attention.wake = [ring, silence, Some(evaluation)].into_iter().flatten().min().unwrap_or(Instant::NEVER);
+        self.attention.wake = ring.or(evaluation).or(silence.map_or(Wake::NEVER, Wake::at));
     }
 }

@@ -25,6 +25,31 @@ impl Segment {
         self.port_controls.iter().find(|entry| entry.station == junction)
     }
 
+    /// Whether commands to the ports of a SubDevice are stored.
+    pub fn follows_ports(&self, station: StationAddress) -> bool {
+        self.port_control(station).is_some() || self.junctions().contains(&station)
+    }
+
+    /// The SubDevices with ports that are changed for a moment, and the settings to restore: those that the application
+    /// has ordered by now.
+    pub fn altered(&self) -> Vec<(StationAddress, DlControl)> {
+        let restored = |(station, before): &(StationAddress, DlControl)| {
+            let loops = self.port_control(*station).map_or(before.loops, |entry| entry.control.loops);
+            (*station, DlControl { temporary: false, loops, ..*before })
+        };
+        self.altered.iter().map(restored).collect()
+    }
+
+    /// Commands to a SubDevice are stored from now on.
+    pub(in crate::segment) fn follow_ports(&mut self, station: StationAddress) {
+        self.entry(station);
+    }
+
+    /// Ports of these SubDevices are about to be changed for a moment; with their settings before.
+    pub(in crate::segment) fn alter_ports(&mut self, before: &[(StationAddress, DlControl)]) {
+        self.altered = before.to_vec();
+    }
+
     pub(in crate::segment) fn begin_order(&mut self, station: StationAddress, control: DlControl) {
         let entry = self.entry(station);
         (entry.control, entry.orders, entry.under_way) = (control, entry.orders.wrapping_add(1), entry.under_way + 1);

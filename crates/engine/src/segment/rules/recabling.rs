@@ -3,9 +3,9 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::StationAddress;
 
-use crate::declared::SubDeviceId;
+use crate::declared::Move;
 use crate::event::Event;
 use crate::link::LinkSet;
 use crate::ring::RingState;
@@ -34,14 +34,9 @@ impl Segment {
     }
 
     /// Declared SubDevices are at other positions than at the scan.
-    pub(in crate::segment) fn observe_moved(
-        &self,
-        versions: Versions,
-        moved: Vec<(SubDeviceId, Position, Position)>,
-        effects: &mut Effects,
-    ) {
+    pub(in crate::segment) fn observe_moved(&self, versions: Versions, moved: Vec<Move>, effects: &mut Effects) {
         if self.are_places_valid(versions) {
-            let event = |(subdevice, from, to)| Event::Moved { subdevice, from, to };
+            let event = |Move { subdevice, from, to }| Event::Moved { subdevice, from, to };
             moved.into_iter().map(event).for_each(|event| effects.report(event));
         }
     }

@@ -17,12 +17,12 @@ use crate::segment::subdevices::SubDevices;
 use crate::segment::versions::Versions;
 
 impl Segment {
-    /// A scan begins: it assigns new station addresses.
-    pub(in crate::segment) fn begin_scan(&mut self) {
+    /// A scan begins, by request or of idle operation: it assigns new station addresses.
+    pub(in crate::segment) fn begin_scan(&mut self, is_requested: bool) {
         if !self.is_active() {
             self.addresses.change();
             self.subdevices = SubDevices::default();
-            self.stage = Stage::Scanning;
+            self.stage = Stage::Scanning { is_requested };
             self.idle.compared = Comparison::Open;
         }
     }
@@ -147,9 +147,13 @@ impl Segment {
             declared.subdevices = declared.subdevices.keeping(before);
         }
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
-        let idle = self.idle.renewed();
+        // The procedures that would restore them have ended.
+        let altered = self.altered();
+        let (idle, observed) = (self.idle.renewed(), self.observed);
         *self = Segment {
             stage,
+            observed,
+            altered,
             addresses,
             keeping,
             slot,

@@ -1,6 +1,5 @@
 //! What an address names, without a bus.
 
-use super::stages::choices;
 use super::*;
 use crate::declared::Address;
 

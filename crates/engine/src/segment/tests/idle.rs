@@ -4,7 +4,6 @@ use crate::ring_status::LinkCounts;
 use crate::segment::effect::Watch;
 use crate::segment::idle::{Change, Comparison};
 
-use super::stages::choices;
 use super::*;
 
 const PREOP: u8 = 2;
@@ -12,14 +11,7 @@ const PREOP: u8 = 2;
 const PERIOD: Duration = Duration::from_millis(20);
 
 fn found(stations: &[u16]) -> Scan {
-    let info = |(at, station): (usize, &u16)| SubDeviceInfo {
-        position: Position(at as u16),
-        station: StationAddress(*station),
-        ..SubDeviceInfo::default()
-    };
-    let subdevices: Vec<SubDeviceInfo> = stations.iter().enumerate().map(info).collect();
-    let topology = Topology::build(&vec![node(PASS); stations.len()], stations.len());
-    Scan { subdevices, topology, main_count: stations.len(), redundant_count: 0 }
+    super::found(&stations.iter().map(|station| (*station, 0)).collect::<Vec<_>>())
 }
 
 /// A ring without an application.

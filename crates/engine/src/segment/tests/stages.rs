@@ -4,17 +4,6 @@ use crate::layout::Layout;
 
 use super::*;
 
-pub(super) fn choices() -> Choices {
-    Choices {
-        enhanced_line_crossed: false,
-        junctions: JunctionMode::Disabled,
-        follow_groups: false,
-        idle_operation: false,
-        supervision: true,
-        retries: Retries::Always,
-    }
-}
-
 fn scan(count: usize) -> Scan {
     let info = |index: usize| SubDeviceInfo { station: station(index), ..SubDeviceInfo::default() };
     let topology = Topology::build(&vec![node(PASS); count], count);

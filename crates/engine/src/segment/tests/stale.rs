@@ -300,7 +300,7 @@ fn a_rescan_is_not_taken_over_after_the_cabling_or_an_address_has_changed() {
 
 #[test]
 fn cable_errors_moves_and_missing_inputs_from_before_a_change_are_not_reported() {
-    let moved = || vec![(SubDeviceId(1), Position(1), Position(2))];
+    let moved = || vec![Move { subdevice: SubDeviceId(1), from: Position(1), to: Position(2) }];
     for is_stale in [true, false] {
         let mut ring = Ring::closed(3);
         let attempt = ring.member(0).attempt;

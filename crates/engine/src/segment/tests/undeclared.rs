@@ -4,22 +4,9 @@ use alloc::string::String;
 
 use crate::segment::view::View;
 
-use super::stages::choices;
 use super::*;
 
 const PREOP: AlState = AlState::PreOp;
-
-fn found(stations: &[(u16, u32)]) -> Scan {
-    let info = |(at, (station, product_code)): (usize, &(u16, u32))| SubDeviceInfo {
-        position: Position(at as u16),
-        station: StationAddress(*station),
-        identity: Identity { vendor_id: 2, product_code: *product_code, revision: 1, serial: 0 },
-        ..SubDeviceInfo::default()
-    };
-    let subdevices: Vec<SubDeviceInfo> = stations.iter().enumerate().map(info).collect();
-    let topology = Topology::build(&vec![node(PASS); stations.len()], stations.len());
-    Scan { subdevices, topology, main_count: stations.len(), redundant_count: 0 }
-}
 
 /// A segment without an application.
 struct Idle {

@@ -2,7 +2,6 @@
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 use core::future::{Future, poll_fn};
 use core::task::Poll;
 use core::time::Duration;
@@ -13,7 +12,7 @@ use ringcat_wire::datagram::Target;
 use crate::link::Link;
 use crate::supervisor::bus::Bus;
 use crate::supervisor::reply::{BusError, Reply};
-use crate::supervisor::shared::Shared;
+use crate::supervisor::shared_cell::SharedCell;
 use crate::supervisor::transfer::Request;
 
 impl Bus {
@@ -62,7 +61,7 @@ impl Bus {
 /// The exclusive right to latch receive times, until it is dropped: SubDevices keep the latched times until the next
 /// latching datagram.
 pub(crate) struct Turn {
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<SharedCell>,
 }
 
 impl Drop for Turn {

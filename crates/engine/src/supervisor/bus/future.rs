@@ -1,24 +1,23 @@
 //! Waiting for the reply to a datagram.
 
 use alloc::rc::Rc;
-use core::cell::RefCell;
 use core::future::Future;
 use core::pin::Pin;
 use core::task::{Context, Poll};
 
 use crate::supervisor::reply::{BusError, Reply};
-use crate::supervisor::shared::Shared;
+use crate::supervisor::shared_cell::SharedCell;
 use crate::supervisor::transfer::{Request, Stage, TransferId};
 
 /// Waits for the reply to a datagram. When it is dropped earlier, the reply is discarded.
 pub(in crate::supervisor) struct TransferFuture {
-    shared: Rc<RefCell<Shared>>,
+    shared: Rc<SharedCell>,
     request: Option<Request>,
     id: Option<TransferId>,
 }
 
 impl TransferFuture {
-    pub(super) fn new(shared: Rc<RefCell<Shared>>, request: Request) -> TransferFuture {
+    pub(super) fn new(shared: Rc<SharedCell>, request: Request) -> TransferFuture {
         TransferFuture { shared, request: Some(request), id: None }
     }
 }

@@ -36,8 +36,8 @@ impl Shared {
             self.counters.late += 1;
             return Received::Late;
         }
-        self.round_trip.took(self.now.since(flight.sent_at));
-        self.outbox.note_round_trip(self.now.since(flight.left_at));
+        self.round_trip.took(self.now.ns_since(flight.sent_at));
+        self.outbox.note_round_trip(self.now.ns_since(flight.left_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
                 self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
@@ -62,7 +62,7 @@ impl Shared {
     /// a round trip covers ways that become shorter when a ring opens or closes.
     fn end_overtaken(&mut self) {
         let (newest, margin) = (self.flights.newest_back, self.round_trip.longest());
-        if newest.into_iter().all(|newest| newest <= self.flights.oldest + margin) {
+        if newest.into_iter().all(|newest| newest.ns_since(self.flights.oldest) <= margin) {
             return;
         }
         for slot in 0..SLOTS {
@@ -90,7 +90,7 @@ impl Shared {
             }
             datagram.answered = true;
             if satisfied || !ring_changed {
-                let reply = datagram.reply(&flight.bytes, stamp);
+                let reply = datagram.reply(&flight.bytes, stamp, self.transfers.take_data(datagram.transfer));
                 self.finish(datagram.transfer, Ok(reply));
             } else {
                 self.lost(datagram.transfer);
@@ -177,7 +177,8 @@ impl Shared {
             }
             for datagram in flight.datagrams.iter().filter(|datagram| !datagram.answered) {
                 if enough || (datagram.is_answered_by_one() && !self.copies_differ(datagram.transfer)) {
-                    let reply = datagram.reply(&flight.bytes, (flight.sequence, flight.sent_at));
+                    let stamp = (flight.sequence, flight.sent_at);
+                    let reply = datagram.reply(&flight.bytes, stamp, self.transfers.take_data(datagram.transfer));
                     self.finish(datagram.transfer, Ok(reply));
                 } else {
                     self.lost(datagram.transfer);

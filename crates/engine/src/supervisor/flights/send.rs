@@ -41,7 +41,7 @@ impl Shared {
             transmit(Link::Main, &flight.bytes);
             if self.links == LinkSet::Ring {
                 self.silence.sent(Link::Redundant, self.now);
-                let copy = &mut self.flights.redundant[..flight.bytes.len()];
+                let copy = &mut self.flights.buffer[..flight.bytes.len()];
                 copy.copy_from_slice(&flight.bytes);
                 Identity::mark_redundant(copy, true);
                 adjust_auto_increment(copy, &flight.datagrams, self.main_count);
@@ -75,11 +75,10 @@ impl Shared {
     fn pack(&mut self, limit: usize) -> Option<Flight> {
         let sequence = self.flights.sequence.next();
         let mut flight = self.flights.fresh(sequence);
-        flight.bytes.resize(MAX_FRAME, 0);
         let mut retry = 0;
         let length = {
             let source = self.identity.source();
-            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
             let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
             let reads = self.outbox.may_read(self.now);
             while let Some((id, rank)) = self.outbox.front(reads, self.now) {
@@ -128,11 +127,10 @@ impl Shared {
     fn pack_alone(&mut self, id: TransferId, no_return: u8) -> Option<Flight> {
         let sequence = self.flights.sequence.next();
         let mut flight = self.flights.fresh(sequence);
-        flight.bytes.resize(MAX_FRAME, 0);
         flight.no_return = no_return;
         let length = {
             let source = self.identity.source();
-            let mut builder = FrameBuilder::ethernet(&mut flight.bytes, MacAddress::ETHERCAT_GROUP, source)?;
+            let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
             let transfer = self.transfers.find(id)?;
             let (request, index) = (&transfer.request, sequence.index(Class::Acyclic));
             let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
@@ -147,7 +145,7 @@ impl Shared {
     /// Completes a frame of this length for sending; `None` if it is empty.
     fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
         let sequence = flight.sequence;
-        flight.bytes.truncate(length);
+        flight.bytes.extend_from_slice(&self.flights.buffer[..length]);
         // The retry index has three bits (protocol SM-04).
         self.identity.stamp(&mut flight.bytes, sequence, retry.min(MAX_RETRY));
         if flight.datagrams.is_empty() {

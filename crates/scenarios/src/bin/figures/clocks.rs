@@ -1,4 +1,4 @@
-//! Distributed clocks (issue 6): error of delays, spread of clocks, phase of the host.
+//! Distributed clocks: error of delays, spread of clocks, phase of the host.
 //!
 //! All runs use virtual time and clocks with errors ([`scenarios::clocks`]): drift up to 50 or 100 ppm, slow wander, 40
 //! ns of jitter on every receive time, a fourth of them with 32 bits. The true times, which the MainDevice cannot read,

@@ -1,4 +1,4 @@
-//! Delays that are written during process data exchange (issue 14): rings of 2 to 64, local rings, random trees with
+//! Delays that are written during process data exchange: rings of 2 to 64, local rings, random trees with
 //! rings, compared with the true delays of the simulator ([`scenarios::delays`]). The environment variable `DELAYS` is
 //! the number of changes of each kind and seed; the default is a share of the full number. `SEED` selects other
 //! segments (`17` or `17..20`).

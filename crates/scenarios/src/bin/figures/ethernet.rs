@@ -1,4 +1,4 @@
-//! TCP through the mailbox of one SubDevice in virtual time (issue 4): throughput, and its independence of the
+//! TCP through the mailbox of one SubDevice in virtual time: throughput, and its independence of the
 //! application's cycle.
 //!
 //! The SubDevice has the simulator's IP stack behind its mailbox. It takes 200 us for a received message and no time

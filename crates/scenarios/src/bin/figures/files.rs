@@ -1,4 +1,4 @@
-//! A file of 1 MiB through the mailbox of one SubDevice in virtual time (issue 4): time and round trips per packet, and
+//! A file of 1 MiB through the mailbox of one SubDevice in virtual time: time and round trips per packet, and
 //! their independence of the application's cycle.
 //!
 //! The SubDevice responds at once, or after 200 us. Process data of the whole segment is exchanged meanwhile.

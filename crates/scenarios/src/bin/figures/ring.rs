@@ -1,4 +1,4 @@
-//! Figures of the ring (issue 5), in virtual time: incomplete cycles per edge for every cable of rings of 2, 5, 16 and
+//! Figures of the ring, in virtual time: incomplete cycles per edge for every cable of rings of 2, 5, 16 and
 //! 64 in every phase of their life, times until a break is reported and located, and until the original direction is
 //! restored, and ten thousand short random runs.
 //!

@@ -1,4 +1,4 @@
-//! A hundred drives with fifty objects each: from activation to OP (issue 4; see [`scenarios::start_lists`]).
+//! A hundred drives with fifty objects each: from activation to OP (see [`scenarios::start_lists`]).
 
 use std::process::ExitCode;
 use std::time::Duration;

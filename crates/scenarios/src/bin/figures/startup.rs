@@ -1,4 +1,4 @@
-//! From power-on to all in OP in virtual time, and its cost in bytes (issue 2, "What it must reach").
+//! From power-on to all in OP in virtual time, and its cost in bytes.
 //!
 //! Terminals as in [`scenarios::terminals`] are connected to one link; the application cycles after activation. The
 //! time is measured from power-on, when the MainDevice begins to scan, until the last SubDevice is in OP, as read
@@ -17,7 +17,7 @@
 //! # The limit of datagrams per frame
 //!
 //! Other software processes at most 15 datagrams of a frame. Start-up with that limit is compared with start-up
-//! without: a default of 15 is worth having where it costs at most [`LIMIT_BAR`] (issue 16).
+//! without: a default of 15 is worth having where it costs at most [`LIMIT_BAR`].
 
 use std::process::ExitCode;
 use std::time::Duration;

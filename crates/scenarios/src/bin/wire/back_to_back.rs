@@ -27,7 +27,7 @@ const UNDER_WAY: [Program; 2] = [
     Program::Ours { receive: "busy", one_thread: false, under_way: 3 },
 ];
 const OTHERS: [Program; 3] = [Program::Pysoem { spins: true }, Program::Pysoem { spins: false }, Program::Ethercrab];
-/// Our host's share while spinning, as a multiple of the best other that spins (issue 16).
+/// Our host's share while spinning, as a multiple of the best other that spins.
 const SPINNING_GOAL: f64 = 0.8;
 /// Our cycle while blocking, as a multiple of the best other that blocks: it is the kernel's wake-up.
 const BLOCKING_GOAL: f64 = 1.03;

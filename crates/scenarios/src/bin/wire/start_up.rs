@@ -13,7 +13,7 @@ const OURS: Program = Program::ours("busy", false);
 const OTHERS: [Program; 2] = [Program::Pysoem { spins: false }, Program::Ethercrab];
 /// Time on a machine of 50, as a multiple of the best other.
 const BAR: f64 = 0.5;
-/// Servos, and milliseconds to OP that issue 16 wants.
+/// Servos, and milliseconds to OP that are the goal.
 const GOALS: [(usize, f64); 4] = [(1, 25.0), (10, 30.0), (50, 35.0), (100, 40.0)];
 /// Runs of ours for each number of servos, and with `--full`.
 const RUNS: [usize; 2] = [3, 20];

@@ -138,6 +138,10 @@ fn assert_together(ecrt: &mut Ecrt, clocks: &[usize], reference: usize, text: &s
 
 /// As with an acyclic half of its own thread: the clocks are set up before the program gives a time and sends its first
 /// frame. The first time then differs from that of the set-up by anything.
+///
+/// Without the mend of decision 0078 this fails: in `crates/engine/src/exchange/clocks.rs` take `or_else(|| ...
+/// posted_time(now))` out of the prediction. Then the reference is written once, 820,000,000 s from the application's
+/// time, and each look at it finds the same shift again (`ApplicationTime`) for as long as the program runs.
 // covers: 7.2, api, dc-reference
 #[test]
 fn a_first_time_between_the_set_up_and_the_first_cycle_moves_all_clocks() {
@@ -166,14 +170,14 @@ fn a_first_time_between_the_set_up_and_the_first_cycle_moves_all_clocks() {
 
 /// Seconds from 2000 to 2026: CLOCK_REALTIME instead of CLOCK_MONOTONIC.
 const FAR_NS: u64 = 820_000_000_000_377_123;
-/// Time in which pulses are at their phase again: half a cycle at 200 ppm, and 2.5 s.
-const PHASE: usize = 5_000;
+/// Time in which pulses are at their phase again: a cycle at 400 ppm, and 0.5 s.
+const PHASE: usize = 3_000;
 
-/// The program gives another clock from one cycle to the next. No pulse is missing, all stay in OP, and after 5 s the
+/// The program gives another clock from one cycle to the next. No pulse is missing, all stay in OP, and after 3 s the
 /// pulses are at their phase in the new time.
 // covers: 7.3, api, dc-reference, dc-sync
 #[test]
-fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_5_s() {
+fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_3_s() {
     for (count, mut ecrt) in requested().filter(|(count, _)| [1, 12].contains(count)) {
         for jump in [FAR_NS, FAR_NS.wrapping_neg(), 499_000] {
             let (_, configs) = configure(&mut ecrt, 0..count);
@@ -206,8 +210,7 @@ fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_5_s() {
             let text = format!("{count}, jump of {} ns", jump as i64);
             println!("{text}: {off} ns from the phase, {worst} ns from the cycle, {apart} ns apart, {fewest} pulses");
             assert!(off <= 20_000, "{text}: {off} ns from the phase");
-            // The control loop of the reference runs at its limit meanwhile.
-            assert!(worst <= 2_000 && apart <= 80_000, "{text}: {worst} ns, {apart} ns");
+            assert!(worst <= 1_000 && apart <= 1_000, "{text}: {worst} ns, {apart} ns");
             assert!(fewest >= PHASE as u64 + 495, "{text}: {fewest} pulses");
             assert!(ecrt.is_running(), "{text}: {}", ecrt.describe());
             ecrt.deactivate().expect("all follow");

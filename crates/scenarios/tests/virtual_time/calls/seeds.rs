@@ -14,6 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use ringcat::{DomainId, EmergencyRing, LastOutputs, SubDeviceId};
+use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::register::map;
@@ -269,16 +270,28 @@ impl Sequence {
 
     fn disturb(&mut self) {
         let mut faults = std::mem::take(&mut self.ecrt.faults);
+        let hung = faults.hung();
         let text = faults.change(&mut self.dice, self.ecrt.network());
+        self.go_on(hung.filter(|device| faults.hung() != Some(*device)));
         self.ecrt.faults = faults;
         self.ecrt.note(text);
+    }
+
+    /// A device does not hang any more.
+    fn go_on(&mut self, device: Option<DeviceIndex>) {
+        let Some(device) = device else { return };
+        let mut witness = std::mem::take(&mut self.ecrt.witness);
+        witness.go_on(self.ecrt.network(), device);
+        self.ecrt.witness = witness;
     }
 
     /// The segment recovers: all SubDevices are idle, reach OP, and are idle again.
     fn end(&mut self) {
         let count = self.described.len();
         let mut faults = std::mem::take(&mut self.ecrt.faults);
+        let hung = faults.hung();
         faults.end(self.ecrt.network());
+        self.go_on(hung);
         self.ecrt.note("all faults end");
         if self.ecrt.is_active() && self.dice.one_in(2) {
             self.ecrt.cycles(CALM.as_millis() as usize);

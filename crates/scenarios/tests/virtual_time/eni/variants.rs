@@ -9,6 +9,7 @@ use ringcat::{DomainId, Event, JunctionConnection, MainDevice, Options, SubDevic
 use ringcat_sim::cable::{CableId, CableSpec, DeviceIndex, Endpoint};
 use ringcat_sim::frame::Port;
 use ringcat_sim::network::Network;
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{PortKind, map};
 
@@ -132,8 +133,8 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let found = main_device.scan().expect("a scan").subdevices;
     main_device.load(file.declaration(false)).expect("it is sound");
-    let at = |station| file.configuration.at_station(station).expect("it is in the file");
-    let connection = JunctionConnection::new(SubDeviceId(at(1001)), 1, SubDeviceId(at(1004)), 1);
+    let at = |station| file.configuration.at_station(StationAddress(station)).expect("it is in the file");
+    let connection = JunctionConnection::new(at(1001), 1, at(1004), 1);
     main_device.add_junction_connection(connection).expect("it fits");
     let application = main_device.apply().map_err(ringcat::Error::from).expect("it fits");
     let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");

@@ -1,10 +1,11 @@
-//! Another program writes a station address while no application runs, and the SubDevice that had it loses its power:
-//! the address then is unique and known, and names another SubDevice.
+//! A station address that is unique and known, and names another SubDevice: another program has written it while no
+//! application runs, and the SubDevice that had it loses its power; or a part of the segment was isolated during the
+//! scan and comes in the place of another part.
 
 use std::time::Duration;
 
 use ringcat::{Event, MainDevice, Position};
-use ringcat_sim::cable::{DeviceIndex, HostLink};
+use ringcat_sim::cable::{CableId, DeviceIndex, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
@@ -108,4 +109,39 @@ fn an_address_that_another_program_has_written_is_noticed_within_a_second() {
             assert_eq!(servo.state().expect("it answers").0.al_state(), Some(AlState::PreOp));
         }
     }
+}
+
+/// The end of a ring has the addresses of an isolated part, because that part kept those of an earlier program. Then
+/// the isolated part comes where the end was seen, and the end leaves, both between two broadcasts.
+// covers: states, rescan
+#[test]
+fn an_isolated_part_that_comes_in_the_place_of_another_one_is_read() {
+    let mut cases = 0;
+    for count in [3, 6, 9, 12] {
+        for (first, end) in (1..count - 1).flat_map(|first| (first + 1..count).map(move |end| (first, end))) {
+            let [_, ring] = networks(count);
+            let what = format!("{count} SubDevices, {first} to {end} isolated");
+            let mut network = idle(ring).into_links().into_network();
+            let (near, far) = (CableId(first), CableId(end));
+            network.apply(Fault::Cut(near));
+            network.apply(Fault::Cut(far));
+            let mut main_device = idle(network);
+            assert_eq!(main_device.subdevices().len(), count - (end - first), "{what}");
+            let network = main_device.links_mut().network_mut();
+            network.apply(Fault::Heal(near));
+            network.apply(Fault::Cut(CableId(count)));
+            main_device.attend(2 * FOLLOWED);
+            assert_eq!(main_device.subdevices().len(), end, "{what}");
+            assert_known(&mut main_device, &what);
+            assert_eq!(statuses(&mut main_device)[..end], vec![PREOP; end], "{what}");
+            let network = main_device.links_mut().network_mut();
+            network.apply(Fault::Heal(far));
+            network.apply(Fault::Heal(CableId(count)));
+            main_device.attend(2 * FOLLOWED);
+            assert_eq!(statuses(&mut main_device), vec![PREOP; count], "{what}");
+            assert_known(&mut main_device, &what);
+            cases += 1;
+        }
+    }
+    assert!(cases > 50, "{cases}");
 }

@@ -133,13 +133,43 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
                 let now = lock(main_device, &frames, &text);
                 println!("{text}: {} latches, {:?}; then {}, {:?}", first.latches, first.took, now.latches, now.took);
                 assert!(now.latches <= WITHOUT_MEASUREMENT, "{text}, round {round}: {} latches", now.latches);
-                let took = now.took.saturating_sub(SAMPLES);
-                assert!(took <= first.took, "{text}, round {round}: {:?} after {:?}", now.took, first.took);
+                // In a tree of 40 some sample is out of the window, at another time in each run: see the next test.
+                let is_exact = count != 40;
+                assert!(
+                    !is_exact || now.took <= first.took,
+                    "{text}, round {round}: {:?} after {:?}",
+                    now.took,
+                    first.took
+                );
                 assert_eq!(now.delays, first.delays, "{text}, round {round}");
                 application = now.application;
             }
         }
     }
+}
+
+/// The lock of a tree of 40 begins again with each sample out of the window, which the jitter of receive times and the
+/// wander of the clocks decide: single runs differ by a tenth of a second. On average known clocks are not slower.
+// covers: dc-lock, states
+#[test]
+fn known_clocks_of_a_tree_of_40_lock_as_fast_on_average() {
+    let (mut first_times, mut known_times) = (Vec::new(), Vec::new());
+    for start in 0..12 {
+        let (mut main_device, frames) = watched(Tap::new(network("tree", 40)));
+        main_device.attend(Duration::from_millis(1_000 + 97 * start));
+        let first = lock(main_device, &frames, "first");
+        let (links, bytes) = left(first.application, Handover::Orderly);
+        let (mut main_device, frames) = watched(links);
+        let knowledge = Knowledge::from_bytes(&bytes).expect("they were written");
+        main_device.resume(knowledge, Handover::Orderly).expect("the segment answers");
+        main_device.attend(Duration::from_millis(300));
+        let known = lock(main_device, &frames, "known");
+        first_times.push(first.took);
+        known_times.push(known.took);
+    }
+    let sum = |times: &[Duration]| times.iter().sum::<Duration>();
+    println!("{first_times:?}, known {known_times:?}");
+    assert!(sum(&known_times) <= sum(&first_times), "{first_times:?}, known {known_times:?}");
 }
 
 // covers: dc-remeasure, states

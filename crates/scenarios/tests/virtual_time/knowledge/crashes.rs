@@ -3,6 +3,7 @@
 use super::*;
 use ringcat::{Limits, SdoAddress};
 use scenarios::segments::describe;
+use scenarios::uploads::start_upload;
 
 const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(500));
 
@@ -136,9 +137,9 @@ fn a_crash_during_segments_of_an_object_leaves_the_mailbox_usable() {
             let mut former = idle(networks().into_iter().nth(network).expect("two networks"));
             let bytes = to_bytes(&former);
             for position in [Position(0), Position(3)] {
-                drop(former.engine_mut().start_sdo_upload(position, object, LIMITS, 1_000));
+                drop(start_upload(former.engine_mut(), position, object, LIMITS, 1_000));
             }
-            let read = former.engine_mut().start_sdo_upload(Position(3), object, LIMITS, 1_000);
+            let read = start_upload(former.engine_mut(), Position(3), object, LIMITS, 1_000);
             former.attend(Duration::from_micros(after_us));
             drop(read);
             go_on(former.into_links(), &bytes, &format!("after {after_us} us"));

@@ -5,6 +5,7 @@ use super::*;
 use ringcat::{Limits, SdoAddress};
 use ringcat_sim::application::mailbox::faults::MailFault;
 use ringcat_sim::fault::Fault;
+use scenarios::uploads::start_upload;
 
 const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(500));
 const SERVO: Position = Position(3);
@@ -18,7 +19,7 @@ fn read_times(main_device: &mut MainDevice<Tap>, times: usize) {
 
 /// Begins to read an object, and lets a time pass.
 fn begin(main_device: &mut MainDevice<Tap>, object: SdoAddress, time: Duration) {
-    let pending = main_device.engine_mut().start_sdo_upload(SERVO, object, LIMITS, 1_000);
+    let pending = start_upload(main_device.engine_mut(), SERVO, object, LIMITS, 1_000);
     main_device.attend(time);
     drop(pending);
 }

@@ -9,6 +9,7 @@ use ringcat_engine::mail::stream::{Bounded, Bytes};
 use ringcat_sim::application::foe::firmware;
 use ringcat_wire::mailbox::Protocol;
 use scenarios::segments::describe;
+use scenarios::uploads::start_upload;
 
 const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_millis(500));
 const DRIVE: Position = Position(1);
@@ -25,7 +26,7 @@ fn owner(is_ring: bool) -> MainDevice<Tap> {
 }
 
 fn upload(main_device: &mut MainDevice<Tap>) -> Pending<Result<Vec<u8>, SdoError>> {
-    main_device.engine_mut().start_sdo_upload(DRIVE, LARGE, LIMITS, 200_000)
+    start_upload(main_device.engine_mut(), DRIVE, LARGE, LIMITS, 200_000)
 }
 
 fn file_options() -> FoeOptions {
@@ -60,7 +61,7 @@ fn check(main_device: &mut MainDevice<Tap>, text: &str) {
     let vendor = main_device.subdevices()[1].identity.vendor_id;
     let read = main_device.subdevice(DRIVE).sdo_read::<u32>(0x1018, 1);
     assert_eq!(read.unwrap_or_else(|error| panic!("{text}: {error}")), vendor, "{text}");
-    let large = main_device.engine_mut().start_sdo_upload(DRIVE, LARGE, LIMITS, 200_000);
+    let large = start_upload(main_device.engine_mut(), DRIVE, LARGE, LIMITS, 200_000);
     main_device.attend(Duration::from_secs(5));
     let mut large = large;
     assert!(large.take().is_some_and(|read| read.is_ok_and(|bytes| bytes.len() == 100_000)), "{text}: in segments");

@@ -1,4 +1,4 @@
-//! Faults of a device's mail for tests (issue 4).
+//! Faults of a device's mail for tests.
 //!
 //! Input: [`MailFault`]s from a test. Output: their effect on the next messages. Faults stay across a reopening of the
 //! mailbox, until they are used up or cleared by [`MailFault::Heal`].

@@ -3,8 +3,9 @@
 use ringcat_wire::address::StationAddress;
 
 use crate::board::clocks::References;
+use crate::clocks::extend;
 use crate::event::Event;
-use crate::segment::clocks::{Delays, Due, Life, Running, Step, Unwritten};
+use crate::segment::clocks::{ClockObservation, Delays, Due, Life, Running, Step, Unwritten};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 
@@ -16,8 +17,26 @@ impl Segment {
         self.clocks.reference = self.clocks.elect(|_| true);
     }
 
+    /// Processes an observation of offsets that were changed, or of the time of the reference.
+    pub(super) fn observe_time(&mut self, seen: ClockObservation<'_>, effects: &mut Effects) {
+        match seen {
+            ClockObservation::OffsetsWritten { missed } => self.observe_written_offsets(missed, effects),
+            ClockObservation::SlideBegun => {
+                self.clocks.times.take_shift_in_effect(self.board.clocks.times.wanted());
+            }
+            ClockObservation::SteppingBack(step_ns) => self.observe_step_back(step_ns),
+            ClockObservation::SteppedBack { missed } => self.observe_stepped_back(missed),
+            ClockObservation::ReferenceTime { low, sent_at } => {
+                let near = sent_at.wrapping_add(self.clocks.epoch);
+                self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
+                self.compare_times(effects);
+            }
+            _ => debug_assert!(false, "it is an observation of another kind"),
+        }
+    }
+
     /// Compares a reading of the reference with the application's time.
-    pub(super) fn compare_times(&mut self, effects: &mut Effects) {
+    fn compare_times(&mut self, effects: &mut Effects) {
         let is_calm = match &self.clocks.life {
             Life::Running(Running { delays: Delays::Valid, unwritten, due: Due::Nothing, .. }) => {
                 *unwritten == Unwritten::default() && !self.board.clocks.is_held()
@@ -33,8 +52,8 @@ impl Segment {
         match self.clocks.times.compare(epoch, wanted, first, pattern_ns) {
             None => {}
             Some(Step::Jump(jump)) => self.begin_jump(jump),
-            Some(Step::Shift(shift)) => {
-                words.post_timeline(self.clocks.times.turn(0, shift, epoch));
+            Some(Step::Shift { shift, left }) => {
+                words.post_timeline(self.clocks.times.turn(0, (shift, left), epoch));
                 self.board.clocks.post_references(self.clocks.references());
                 effects.report(Event::ApplicationTime { jump_ns: 0, shift_ns: shift as i64 });
             }
@@ -48,13 +67,13 @@ impl Segment {
         for node in &mut self.clocks.nodes {
             node.offset_ns = node.offset_ns.wrapping_add(jump as i64);
         }
-        self.clocks.times.turn(jump, 0, self.clocks.epoch);
+        self.clocks.times.turn(jump, (0, 0), self.clocks.epoch);
         if let Some(running) = self.clocks.running_mut() {
             running.due = Due::Offsets;
         }
     }
 
-    pub(super) fn observe_written_offsets(&mut self, missed: &[StationAddress], effects: &mut Effects) {
+    fn observe_written_offsets(&mut self, missed: &[StationAddress], effects: &mut Effects) {
         for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
             node.missed_offset |= node.link.is_none() || missed.contains(&node.station);
         }
@@ -69,5 +88,23 @@ impl Segment {
             jump_ns: timeline.jumped.wrapping_sub(before) as i64,
             shift_ns: timeline.shift as i64,
         });
+    }
+
+    /// The system time of all clocks goes back by a step: their offsets are about to be written.
+    fn observe_step_back(&mut self, step_ns: u64) {
+        self.clocks.times.slide(step_ns);
+        self.clocks.epoch = self.clocks.epoch.wrapping_sub(step_ns);
+        for node in &mut self.clocks.nodes {
+            node.offset_ns = node.offset_ns.wrapping_sub(step_ns as i64);
+        }
+        // The frame leaves before the next cycle, which reckons with the step.
+        self.board.clocks.times.post_slid(self.clocks.times.slid());
+    }
+
+    /// The offsets of a step are written. A clock that did not answer is set up when it does.
+    fn observe_stepped_back(&mut self, missed: &[StationAddress]) {
+        for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
+            node.missed_offset |= node.link.is_none() || missed.contains(&node.station);
+        }
     }
 }

@@ -1,0 +1,93 @@
+//! Loop settings of ports that are changed for a moment, and restored (protocol 2.2, DL control bit 1).
+//!
+//! They are restored to what the application orders by then: a port that it closes meanwhile stays closed. If the
+//! application ends meanwhile, they are restored before anything else is done; without a frame they expire.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
+use ringcat_wire::register::{DlControl, map};
+
+use super::shared_segment::SharedSegment;
+use crate::segment::Observation;
+use crate::supervisor::{Bus, BusError};
+
+/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
+const WRITTEN: usize = 2;
+/// Time after which temporary settings have certainly expired.
+const TEMPORARY: Duration = Duration::from_millis(1_300);
+/// Interval of the check for it.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Attempts to restore settings: a frame that opens a path may not return itself.
+const TRIES: usize = 2;
+/// Attempts to read settings while the application writes them.
+const READS: usize = 4;
+
+/// The byte of DL_CONTROL with the loop settings of all ports.
+pub(super) const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
+
+/// The settings of a SubDevice. Waits until temporary settings have expired, as those of examined rings: a value
+/// written meanwhile would expire with them.
+pub(super) async fn lasting(bus: &Bus, station: StationAddress) -> Result<DlControl, BusError> {
+    let until = bus.now() + TEMPORARY;
+    loop {
+        let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
+        if !control.temporary || bus.now() >= until {
+            return Ok(DlControl { temporary: false, ..control });
+        }
+        bus.sleep(PAUSE).await;
+    }
+}
+
+/// The settings of a SubDevice, which the model follows from now on: what the application orders later is known. `None`
+/// if the application writes them again and again.
+pub(super) async fn followed(
+    bus: &Bus,
+    segment: &SharedSegment,
+    station: StationAddress,
+) -> Result<Option<DlControl>, BusError> {
+    segment.observe(Observation::PortsFollowed(station));
+    for _ in 0..READS {
+        let before = orders(segment, station);
+        let control = lasting(bus, station).await?;
+        if let Some((orders, 0)) = before.filter(|before| Some(*before) == orders(segment, station)) {
+            segment.observe(Observation::PortsRead { station, orders, control });
+            return Ok(Some(control));
+        }
+    }
+    Ok(None)
+}
+
+fn orders(segment: &SharedSegment, station: StationAddress) -> Option<(u32, u32)> {
+    segment.view().port_control(station).map(|it| (it.orders, it.under_way))
+}
+
+/// Writes settings, all in one frame: a second frame would be sent into a closed port.
+pub(super) async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
+    let writes = controls.into_iter().map(write_of);
+    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
+}
+
+/// The datagram with these settings.
+pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Command, Target, Vec<u8>) {
+    (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
+}
+
+/// Restores what the model knows to be changed, if anything is. All in one frame: behind one end of a ring that is open
+/// again, frames are lost until the other end is open too.
+pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) {
+    for _ in 0..TRIES {
+        let altered = segment.view().altered();
+        if altered.is_empty() {
+            return;
+        }
+        if write(bus, altered).await.is_ok() {
+            break;
+        }
+    }
+    // Those that were not reached restore themselves when the temporary settings expire.
+    segment.observe(Observation::PortsAltered(&[]));
+}

@@ -1,0 +1,34 @@
+//! The commands, one file for each.
+
+pub mod alias;
+pub mod config;
+mod config_details;
+pub mod crc;
+pub mod cstruct;
+pub mod data;
+pub mod debug;
+pub mod domains;
+pub mod download;
+pub mod eoe;
+pub mod foe_read;
+pub mod foe_write;
+pub mod graph;
+pub mod ip;
+pub mod master;
+mod matlab;
+pub mod pdos;
+pub mod reg_read;
+pub mod reg_write;
+pub mod rescan;
+pub mod sdos;
+mod sii_image;
+pub mod sii_read;
+pub mod sii_write;
+mod slave_details;
+pub mod slaves;
+pub mod soe_read;
+pub mod soe_write;
+pub mod states;
+pub mod upload;
+pub mod version;
+pub mod xml;

@@ -1,0 +1,104 @@
+//! `domains`: domains of the application with their process data.
+
+use ringcat_control::message::{Answer, Ask};
+use ringcat_control::tool::{DomainLine, ToolAnswer, ToolAsk};
+
+use crate::failure::Failure;
+use crate::hex;
+use crate::session::{Session, unexpected};
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "domains",
+    summary: "Show configured domains.",
+    forms: &[""],
+    help: "One line for each domain of the active application: logical address,
+bytes, working counter and its expected value. With two link devices the
+working counters of both follow in parentheses.
+
+With --verbose the process data of each slave configuration.
+",
+    options: "  --domain -d <index>  Domains; all by default.\n",
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let masters = session.masters()?;
+    let (is_several, is_verbose) = (masters.len() > 1, session.arguments.verbose);
+    for master in masters {
+        let domains = selected(session, master.master)?;
+        if is_several && !domains.is_empty() {
+            writeln!(session, "Master{}", master.master)?;
+        }
+        let indent = if is_several { "  " } else { "" };
+        for (number, domain, image) in domains {
+            session.write(text(indent, number, &domain).as_bytes())?;
+            if is_verbose {
+                session.write(areas(indent, &domain, &image).as_bytes())?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The selected domains of a master: number, domain, image.
+pub(super) fn selected(session: &mut Session<'_>, master: u32) -> Result<Vec<(u32, DomainLine, Vec<u8>)>, Failure> {
+    let list = session.list(session.arguments.domain.as_deref(), "domain")?;
+    let (answer, images) = session.ask(master, Ask::Tool(ToolAsk::Domains), Vec::new())?;
+    let Answer::Tool(ToolAnswer::Domains(domains)) = answer else { return Err(unexpected()) };
+    let mut rest = &images[..];
+    let mut selected = Vec::new();
+    for (number, domain) in (0..).zip(domains) {
+        let length = (domain.bytes as usize).min(rest.len());
+        let (image, behind) = rest.split_at(length);
+        rest = behind;
+        if list.has(number) {
+            selected.push((number, domain, image.to_vec()));
+        }
+    }
+    Ok(selected)
+}
+
+fn text(indent: &str, number: u32, domain: &DomainLine) -> String {
+    let by_link = domain.by_link.map(|[main, backup]| format!(" ({main}+{backup})")).unwrap_or_default();
+    let DomainLine { logical, bytes, wkc, expected, .. } = domain;
+    format!(
+        "{indent}Domain{number}: LogBaseAddr 0x{logical:08x}, Size {bytes:>3}, \
+         WorkingCounter {wkc}/{expected}{by_link}\n"
+    )
+}
+
+fn areas(indent: &str, domain: &DomainLine, image: &[u8]) -> String {
+    let mut text = String::new();
+    for area in &domain.areas {
+        let (alias, position) = area.subdevice;
+        let direction = if area.is_output { "Output" } else { " Input" };
+        text += &format!("{indent}  SlaveConfig {alias}:{position}, SM{} ({direction}), ", area.sync_manager);
+        text += &format!("LogAddr 0x{:08x}, Size {}\n", area.logical, area.length);
+        let begin = area.offset as usize;
+        let bytes = image.get(begin..begin.saturating_add(area.length.into())).unwrap_or_default();
+        text += &hex::lines(&format!("{indent}    "), bytes);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ringcat_control::tool::AreaLine;
+
+    // covers: daemon
+    #[test]
+    fn domains_have_working_counters_by_link_and_process_data() {
+        let area =
+            AreaLine { subdevice: (1000, 0), sync_manager: 3, logical: 1, offset: 1, length: 2, ..AreaLine::default() };
+        let domain = DomainLine { bytes: 3, wkc: 2, expected: 3, areas: vec![area], ..DomainLine::default() };
+        let wanted = "Domain0: LogBaseAddr 0x00000000, Size   3, WorkingCounter 2/3\n";
+        assert_eq!(text("", 0, &domain), wanted);
+        let ring = DomainLine { by_link: Some([2, 1]), ..domain.clone() };
+        assert_eq!(text("  ", 0, &ring), format!("  {} (2+1)\n", wanted.trim_end()));
+        let wanted = "  SlaveConfig 1000:0, SM3 ( Input), LogAddr 0x00000001, Size 2\n    02 03 \n";
+        assert_eq!(areas("", &domain, &[1, 2, 3]), wanted);
+    }
+}

@@ -1,0 +1,64 @@
+//! `eoe`: network interfaces of Ethernet over EtherCAT.
+
+use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolAsk};
+
+use crate::failure::Failure;
+use crate::session::{Session, unexpected};
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "eoe",
+    summary: "Display Ethernet over EtherCAT statistics.",
+    forms: &[""],
+    help: "One line for each network interface of a slave: state, bytes and bytes per
+second of both directions (Tx: to the slave), and frames that wait to be
+sent. Without interfaces there is no output.
+",
+    options: "",
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    for master in session.masters()? {
+        let answer = session.tool(master.master, ToolAsk::Ethernet)?;
+        let ToolAnswer::Ethernet(lines) = answer else { return Err(unexpected()) };
+        if !lines.is_empty() {
+            session.write(table(master.master, &lines).as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+fn table(master: u32, lines: &[EthernetLine]) -> String {
+    let mut text = format!("Master{master}\n  Interface  Slave  State  RxBytes  RxRate  TxBytes  TxRate  TxQueue\n");
+    for line in lines {
+        let (state, [queued, size]) = (if line.is_up { "up" } else { "down" }, line.queue);
+        let ([rx, tx], [rx_rate, tx_rate]) = (line.bytes, line.rates);
+        text += &format!("  {:>9}  {:>5}  {state:>5}  {rx:>7}  {rx_rate:>6}  ", line.name, line.position);
+        text += &format!("{tx:>7}  {tx_rate:>6}  {:>7}\n", format!("{queued}/{size}"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn columns_are_right_aligned() {
+        let line = EthernetLine {
+            name: "eoe0s2".to_owned(),
+            position: 2,
+            is_up: true,
+            bytes: [1, 20],
+            rates: [3, 4],
+            queue: [0, 32],
+        };
+        let header = "  Interface  Slave  State  RxBytes  RxRate  TxBytes  TxRate  TxQueue";
+        let row = "     eoe0s2      2     up        1       3       20       4     0/32";
+        let wanted = format!("Master0\n{header}\n{row}\n");
+        assert_eq!(table(0, &[line]), wanted);
+    }
+}

@@ -1,0 +1,41 @@
+//! `foe_read`: reads a file by FoE.
+
+use std::fs;
+
+use ringcat_control::tool::ToolAsk;
+
+use crate::aborts::of_foe;
+use crate::failure::Failure;
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "foe_read",
+    summary: "Read a file from a slave via FoE.",
+    forms: &["<SOURCEFILE>"],
+    help: "One slave must be selected. SOURCEFILE is the name of the file on the
+slave. Its content goes to the standard output, or to a file; at most
+16 MiB.
+",
+    options: "  --output-file -o <file>   Local file to write.
+  --alias       -a <alias>  Alias of the slave.
+  --position    -p <pos>    Its position. See the help of 'slaves'.
+",
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let [name] = session.words() else { return Err(Failure::usage("'foe_read' takes one argument: the file!")) };
+    let name = name.clone();
+    let (master, position) = session.single_slave()?;
+    let asked = session.done(master, ToolAsk::FileRead { position, name }, Vec::new());
+    let bytes = asked.map_err(|failure| of_foe(failure, "read"))?;
+    session.say_if_verbose(&format!("Read {} bytes of FoE data.", bytes.len()));
+    match session.arguments.output_file.clone().filter(|file| file != "-") {
+        Some(file) => {
+            fs::write(&file, bytes).map_err(|error| Failure::failed(format!("Failed to open '{file}'! ({error})")))
+        }
+        None => session.write(&bytes),
+    }
+}

@@ -1,0 +1,73 @@
+//! `pdos`: SyncManagers, PDOs and entries.
+
+use ringcat_control::tool::{Description, SyncManagerLine};
+
+use super::matlab;
+use super::slaves::description;
+use crate::failure::Failure;
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "pdos",
+    summary: "List sync managers, PDO assignment and mapping.",
+    forms: &[""],
+    help: "For each sync manager its registers, the PDOs that are assigned to it and
+their entries. Skin 'etherlab' prints a MATLAB function instead.
+",
+    options: "  --alias    -a <alias>  Aliases of slaves.
+  --position -p <pos>    Their positions. See the help of 'slaves'.
+  --skin     -s <skin>   'default' or 'etherlab'.
+",
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let is_matlab = match session.arguments.skin.as_deref() {
+        None | Some("default") => false,
+        Some("etherlab") => true,
+        Some(other) => return Err(Failure::usage(format!("Invalid skin '{other}'!"))),
+    };
+    let masters = session.masters()?;
+    let is_several = masters.len() > 1;
+    for master in masters {
+        let number = master.master;
+        let slaves = session.slaves(number)?;
+        let has_header = is_several || slaves.len() > 1;
+        for slave in slaves {
+            let details = description(session, number, slave.line.position)?;
+            if details.sync_managers.is_empty() {
+                continue;
+            }
+            if is_matlab {
+                session.write(matlab::function(number, &slave, &details).as_bytes())?;
+                continue;
+            }
+            if has_header {
+                writeln!(session, "=== Master {number}, Slave {} ===", slave.line.position)?;
+            }
+            session.write(listed(&details).as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+fn listed(details: &Description) -> String {
+    (0..).zip(&details.sync_managers).map(sync_manager).collect()
+}
+
+fn sync_manager((number, own): (u8, &SyncManagerLine)) -> String {
+    let SyncManagerLine { start, length, control, enable, .. } = own;
+    let mut text = format!("SM{number}: PhysAddr 0x{start:04x}, DefaultSize {length:>4}, ");
+    text += &format!("ControlRegister 0x{control:02x}, Enable {enable}\n");
+    let kind = if own.is_output { "RxPDO" } else { "TxPDO" };
+    for pdo in &own.pdos {
+        text += &format!("  {kind} 0x{:04x} \"{}\"\n", pdo.index, pdo.name);
+        for entry in &pdo.entries {
+            let (index, sub_index, bits) = (entry.index, entry.sub_index, entry.bits);
+            text += &format!("    PDO entry 0x{index:04x}:{sub_index:02x}, {bits:>2} bit, \"{}\"\n", entry.name);
+        }
+    }
+    text
+}

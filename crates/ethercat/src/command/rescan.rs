@@ -1,0 +1,24 @@
+//! `rescan`: scans the ring again.
+
+use ringcat_control::message::Ask;
+
+use crate::failure::Failure;
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "rescan",
+    summary: "Rescan the bus.",
+    forms: &[""],
+    help: "Slaves that did not change keep their states. Ends when the scan has ended.\n",
+    options: "",
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    for master in session.masters()? {
+        session.ask(master.master, Ask::Rescan, Vec::new())?;
+    }
+    Ok(())
+}

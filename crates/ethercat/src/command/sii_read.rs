@@ -1,0 +1,41 @@
+//! `sii_read`: reads an SII.
+
+use ringcat_control::message::Ask;
+
+use super::sii_image::{HEAD_WORDS, categories, category_name};
+use crate::failure::Failure;
+use crate::hex;
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "sii_read",
+    summary: "Output a slave's SII contents.",
+    forms: &[""],
+    help: "One slave must be selected. Its SII goes to the standard output as it is;
+with --verbose as text, category by category.
+",
+    options: super::reg_read::SINGLE,
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let (master, position) = session.single_slave()?;
+    let (_, image) = session.ask(master, Ask::SiiRead { position }, Vec::new())?;
+    if !session.arguments.verbose {
+        return session.write(&image);
+    }
+    let corrupted = || Failure::failed("SII data seem to be corrupted!");
+    let head = image.get(..2 * HEAD_WORDS).ok_or_else(corrupted)?;
+    let mut text = "SII Area:\n".to_owned() + &hex::trimmed_lines("  ", head);
+    let Some(categories) = categories(&image) else {
+        session.write(text.as_bytes())?;
+        return Err(corrupted());
+    };
+    for (category, data) in categories {
+        text += &format!("SII Category 0x{category:04x} ({}), {} words\n", category_name(category), data.len() / 2);
+        text += &hex::trimmed_lines("  ", data);
+    }
+    session.write(text.as_bytes())
+}

@@ -1,0 +1,39 @@
+//! `states`: requests states.
+
+use ringcat_control::tool::ToolAsk;
+
+use crate::failure::Failure;
+use crate::selection_help::SELECTION;
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "states",
+    summary: "Request application-layer states.",
+    forms: &["<STATE>"],
+    help: "STATE is INIT, PREOP, BOOT, SAFEOP or OP. The command does not wait until
+the slaves have reached it.
+",
+    options: SELECTION,
+    run,
+};
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let [text] = session.words() else { return Err(Failure::usage("'states' takes one argument: the state!")) };
+    let state = match text.to_uppercase().as_str() {
+        "INIT" => 1,
+        "PREOP" => 2,
+        "BOOT" => 3,
+        "SAFEOP" => 4,
+        "OP" => 8,
+        _ => return Err(Failure::usage(format!("Invalid state '{text}'!"))),
+    };
+    for master in session.masters()? {
+        for slave in session.slaves(master.master)? {
+            let position = slave.line.position;
+            session.done(master.master, ToolAsk::StartState { position, state }, Vec::new())?;
+        }
+    }
+    Ok(())
+}

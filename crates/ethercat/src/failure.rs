@@ -1,0 +1,85 @@
+//! Why a command ends with exit code 1.
+
+use std::io;
+
+use ringcat_control::client::ClientError;
+use ringcat_control::refusal::{Refusal, ServiceFault};
+
+/// Why a command ends with exit code 1.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Failure {
+    /// It was called in a wrong way: the help of the command follows.
+    Usage(String),
+    /// A text as it is.
+    Message(String),
+    /// The output was closed: nothing more is said.
+    Closed,
+    /// The daemon gave no answer, or refuses.
+    Asked(ClientError),
+}
+
+impl Failure {
+    /// What was done failed.
+    pub fn failed(text: impl Into<String>) -> Failure {
+        Failure::Message(text.into() + "\n")
+    }
+
+    /// The command was called in a wrong way.
+    pub fn usage(text: impl Into<String>) -> Failure {
+        Failure::Usage(text.into())
+    }
+
+    /// The code with which a SubDevice has refused.
+    pub fn aborted(&self) -> Option<u32> {
+        match self {
+            Failure::Asked(ClientError::Refused(Refusal::Service { fault: ServiceFault::Aborted(code), .. })) => {
+                Some(*code)
+            }
+            _ => None,
+        }
+    }
+
+    /// How a service of a SubDevice has failed.
+    pub fn fault(&self) -> Option<ServiceFault> {
+        match self {
+            Failure::Asked(ClientError::Refused(Refusal::Service { fault, .. })) => Some(*fault),
+            _ => None,
+        }
+    }
+
+    /// With the help of the command where it was called in a wrong way.
+    #[must_use]
+    pub fn with_help(self, help: impl FnOnce() -> String) -> Failure {
+        match self {
+            Failure::Usage(text) => Failure::Message(format!("{text}\n\n{}", help())),
+            other => other,
+        }
+    }
+
+    /// What the standard error gets.
+    pub fn text(&self) -> String {
+        match self {
+            Failure::Usage(text) => format!("{text}\n"),
+            Failure::Message(text) => text.clone(),
+            Failure::Closed => String::new(),
+            Failure::Asked(error) => format!("{error}\n"),
+        }
+    }
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Failure {
+        Failure::Asked(error)
+    }
+}
+
+/// The output cannot be written.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Failure {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Failure::Closed,
+            _ => Failure::failed(format!("Failed to write the output: {error}")),
+        }
+    }
+}

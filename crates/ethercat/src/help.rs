@@ -1,0 +1,68 @@
+//! How the tool and its commands are used.
+
+use std::fmt::Write;
+
+use crate::commands::ALL;
+use crate::shape::Command;
+
+/// Options of all commands.
+pub const COMMON: &str = "  --master  -m <master>  Masters: comma-separated numbers and ranges, such
+                         as '1,3', '5-7', '-3', '2-'. All by default.
+  --force   -f           Do it although it may be wrong.
+  --quiet   -q           Say less.
+  --verbose -v           Say more.
+  --help    -h           Show this help, or that of the command.
+";
+
+/// How numbers are written.
+pub const NUMBERS: &str = "Numbers are decimal, octal with 0 before them, or hexadecimal with 0x\nbefore them.\n";
+
+/// How the tool is used.
+pub fn usage() -> String {
+    let mut text = "Usage: ethercat <COMMAND> [OPTIONS] [ARGUMENTS]\n\nCommands (can be abbreviated):\n".to_owned();
+    let width = ALL.iter().map(|command| command.name.len()).max().unwrap_or(0);
+    for command in ALL {
+        // A string takes everything.
+        let _ = writeln!(text, "  {:width$}  {}", command.name, command.summary);
+    }
+    text += "\nOptions of all commands:\n";
+    text += COMMON;
+    text.push('\n');
+    text + NUMBERS + "Call 'ethercat <COMMAND> --help' for more about a command.\n"
+}
+
+/// How a command is used.
+pub fn of(command: &Command) -> String {
+    let mut text = String::new();
+    for form in command.forms {
+        // A string takes everything.
+        let _ = writeln!(text, "ethercat {} [OPTIONS]{}{form}", command.name, if form.is_empty() { "" } else { " " });
+    }
+    let _ = write!(text, "\n{}\n", command.summary);
+    for part in [command.help, command.options] {
+        if !part.is_empty() {
+            text.push('\n');
+        }
+        if std::ptr::eq(part, command.options) && !part.is_empty() {
+            text.push_str("Options of this command:\n");
+        }
+        text.push_str(part);
+    }
+    text + "\n" + NUMBERS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn all_commands_are_sorted_and_have_help() {
+        assert!(ALL.is_sorted_by_key(|command| command.name));
+        for command in ALL {
+            assert!(!command.forms.is_empty() && command.summary.len() > 10, "{}", command.name);
+            let help = of(command);
+            assert!(help.lines().all(|line| line.len() <= 80), "{help}");
+        }
+    }
+}

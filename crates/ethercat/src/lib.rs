@@ -1,0 +1,78 @@
+//! The command line tool `ethercat`: commands, options, output and exit codes as users of the IgH EtherCAT Master know
+//! them. It asks the daemon `ringcatd`, and through it the application that drives a segment.
+//!
+//! * [`arguments`]: options and words of the command line; [`numbers`]: numbers and lists of them;
+//! * [`shape`]: what a command is; [`commands`]: all of them, found by abbreviations; [`help`]: how they are used;
+//! * [`completion`], [`manual`]: scripts for shells and manual pages, from [`options_help`] and the same help;
+//! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;
+//! * [`data_types`]: values of objects, registers and IDNs; [`aborts`]: codes of refusals;
+//! * `command`: one file per command.
+//!
+//! Data goes to the standard output, everything else to the standard error; the exit code is 0 or 1.
+#![forbid(unsafe_code)]
+
+pub mod aborts;
+pub mod arguments;
+mod command;
+pub mod commands;
+pub mod completion;
+pub mod data_types;
+pub mod failure;
+pub mod help;
+pub mod hex;
+pub mod inputs;
+pub mod ipv4;
+pub mod manual;
+pub mod numbers;
+pub mod options_help;
+pub mod selection;
+pub mod selection_help;
+pub mod session;
+pub mod shape;
+
+use std::ffi::OsString;
+use std::io::Write;
+
+use arguments::Arguments;
+use commands::Found;
+use failure::Failure;
+use session::Session;
+
+/// Runs the tool with these arguments, the name of the program left out. False is exit code 1.
+pub fn run(arguments: &[OsString], output: &mut dyn Write, errors: &mut dyn Write) -> bool {
+    match try_run(arguments, output, errors) {
+        Ok(()) => true,
+        Err(failure) => {
+            // Where the standard error is closed nothing can be said.
+            let _ = errors.write_all(failure.text().as_bytes());
+            false
+        }
+    }
+}
+
+fn try_run(words: &[OsString], output: &mut dyn Write, errors: &mut dyn Write) -> Result<(), Failure> {
+    let wrong = |text: String| Failure::Message(format!("ethercat: {text}\n\n{}", help::usage()));
+    let arguments = Arguments::parse(words).map_err(wrong)?;
+    let Some(name) = arguments.words.first() else {
+        if arguments.help {
+            output.write_all(help::usage().as_bytes())?;
+            return Ok(());
+        }
+        return Err(Failure::Message(format!("Please specify a command!\n\n{}", help::usage())));
+    };
+    let command = match commands::find(name) {
+        Found::One(command) => command,
+        Found::Several(candidates) => {
+            let names: Vec<&str> = candidates.iter().map(|it| it.name).collect();
+            let text = format!("Ambiguous command abbreviation! Matching:\n{}\n", names.join("\n"));
+            return Err(Failure::Message(text));
+        }
+        Found::None => return Err(Failure::Message(format!("Unknown command {name}!\n\n{}", help::usage()))),
+    };
+    if arguments.help {
+        output.write_all(help::of(command).as_bytes())?;
+        return Ok(());
+    }
+    let mut session = Session::new(command.name, arguments, output, errors);
+    (command.run)(&mut session).map_err(|failure| failure.with_help(|| help::of(command)))
+}

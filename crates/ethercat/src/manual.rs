@@ -1,0 +1,96 @@
+//! Manual pages, from the same source as the help: one of the tool, one of each command.
+
+use std::fmt::Write;
+
+use crate::commands::ALL;
+use crate::help::NUMBERS;
+use crate::options_help::{Told, common, of};
+use crate::shape::Command;
+
+/// A text as roff takes it: no line begins a request, and a minus sign can be copied.
+fn roff(text: &str) -> String {
+    let lines = text.lines().map(|line| {
+        let line = line.replace('\\', "\\e").replace('-', "\\-");
+        if line.starts_with(['.', '\'']) { format!("\\&{line}") } else { line }
+    });
+    lines.collect::<Vec<String>>().join("\n")
+}
+
+fn head(name: &str, summary: &str) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let (title, summary) = (roff(&name.to_uppercase()), roff(summary.trim_end_matches('.')));
+    format!(".TH \"{title}\" 8 \"\" \"RingCAT {version}\"\n.SH NAME\n{} \\- {summary}\n", roff(name))
+}
+
+fn options(title: &str, options: &[Told]) -> String {
+    if options.is_empty() {
+        return String::new();
+    }
+    let mut text = format!(".SH {title}\n");
+    for Told { name, letter, value, text: about } in options {
+        let value = if value.is_empty() { String::new() } else { format!(" \\fI{}\\fR", roff(value)) };
+        // A string takes everything; so below.
+        let _ = write!(text, ".TP\n\\fB\\-{letter}\\fR, \\fB\\-\\-{}\\fR{value}\n{}\n", roff(name), roff(about));
+    }
+    text
+}
+
+/// Text whose lines stay as they are.
+fn as_it_is(text: &str) -> String {
+    format!(".nf\n{}\n.fi\n", roff(text.trim_end()))
+}
+
+const END: &str = ".SH EXIT STATUS\n0, or 1 after a failure.\n.SH ENVIRONMENT\n.TP\n.B RINGCAT_SOCKET\n\
+                   Socket of the daemon, /run/ringcat/control by default.\n";
+
+/// The page of a command: `ethercat-slaves.8`.
+pub fn page(command: &Command) -> String {
+    let mut text = head(&format!("ethercat-{}", command.name), command.summary) + ".SH SYNOPSIS\n";
+    for form in command.forms {
+        let _ = writeln!(text, ".B ethercat {}\n[OPTIONS] {}\n.br", roff(command.name), roff(form));
+    }
+    if !command.help.is_empty() {
+        text += ".SH DESCRIPTION\n";
+        text += &as_it_is(command.help);
+    }
+    text += &options("OPTIONS OF THIS COMMAND", &of(command));
+    text += &options("OPTIONS OF ALL COMMANDS", &common());
+    text + &as_it_is(NUMBERS) + END + ".SH SEE ALSO\n.BR ethercat (8)\n"
+}
+
+/// The page of the tool: `ethercat.8`.
+pub fn overview() -> String {
+    let mut text = head("ethercat", "look at and change EtherCAT masters and slaves");
+    text +=
+        ".SH SYNOPSIS\n.B ethercat\n\\fICOMMAND\\fR [OPTIONS] [ARGUMENTS]\n.SH COMMANDS\nThey can be abbreviated.\n";
+    for command in ALL {
+        let _ = write!(text, ".TP\n.BR ethercat\\-{} (8)\n{}\n", roff(command.name), roff(command.summary));
+    }
+    text + &options("OPTIONS OF ALL COMMANDS", &common()) + &as_it_is(NUMBERS) + END
+}
+
+/// All pages by file name.
+pub fn pages() -> Vec<(String, String)> {
+    let commands = ALL.into_iter().map(|command| (format!("ethercat-{}.8", command.name), page(command)));
+    commands.chain([("ethercat.8".to_owned(), overview())]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn texts_begin_no_requests_and_keep_their_characters() {
+        assert_eq!(roff(".so x\n'y\na-\\b"), "\\&.so x\n\\&'y\na\\-\\eb");
+        for (name, page) in pages() {
+            let is_known = |line: &str| {
+                !line.starts_with('.')
+                    || [".TH", ".SH", ".TP", ".nf", ".fi", ".br", ".B", ".BR"]
+                        .iter()
+                        .any(|known| line.split_whitespace().next() == Some(known))
+            };
+            assert!(page.lines().all(is_known) && !page.lines().any(|line| line.starts_with('\'')), "{name}: {page}");
+        }
+    }
+}

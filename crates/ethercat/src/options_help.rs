@@ -1,0 +1,87 @@
+//! Options as the help tells them, for completion and manual pages.
+
+use crate::help::COMMON;
+use crate::shape::Command;
+
+/// An option in the help.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Told {
+    /// Its name, without minus signs.
+    pub name: &'static str,
+    /// Its letter.
+    pub letter: &'static str,
+    /// The name of its value; empty if it takes none.
+    pub value: &'static str,
+    /// What it is for: one paragraph.
+    pub text: String,
+}
+
+/// The options that all commands have.
+pub fn common() -> Vec<Told> {
+    told(COMMON)
+}
+
+/// A command's own options.
+pub fn of(command: &Command) -> Vec<Told> {
+    told(command.options)
+}
+
+/// A line with an option begins with two blanks and two minus signs; the lines behind it go on with its text.
+fn told(text: &'static str) -> Vec<Told> {
+    let mut all: Vec<Told> = Vec::new();
+    for line in text.lines() {
+        let line = line.trim();
+        let Some(option) = line.strip_prefix("--") else {
+            if let Some(last) = all.last_mut() {
+                last.text += " ";
+                last.text += line;
+            }
+            continue;
+        };
+        let (name, rest) = word(option);
+        let (letter, rest) = word(rest);
+        let (value, rest) = match rest.strip_prefix('<') {
+            Some(value) => value.split_once('>').unwrap_or((value, "")),
+            None => ("", rest),
+        };
+        all.push(Told { name, letter: letter.trim_start_matches('-'), value, text: rest.trim().to_owned() });
+    }
+    all
+}
+
+fn word(text: &str) -> (&str, &str) {
+    let (word, rest) = text.split_once(' ').unwrap_or((text, ""));
+    (word, rest.trim_start())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arguments::OPTIONS;
+    use crate::commands::ALL;
+
+    // covers: daemon
+    #[test]
+    fn options_in_the_help_are_those_of_the_parser() {
+        let all = || ALL.into_iter().flat_map(of).chain(common());
+        for told in all() {
+            let wanted = (told.name, told.letter, !told.value.is_empty());
+            let is_known = |(letter, name, has_value): &(char, &str, bool)| {
+                wanted == (*name, letter.to_string().as_str(), *has_value) && told.text.len() > 5
+            };
+            assert!(OPTIONS.iter().any(is_known), "{told:?}");
+        }
+        for (_, name, _) in OPTIONS {
+            assert!(all().any(|told| told.name == name), "--{name} is not in the help");
+        }
+    }
+
+    // covers: daemon
+    #[test]
+    fn the_text_of_an_option_is_one_paragraph() {
+        let master = &common()[0];
+        assert_eq!((master.name, master.letter, master.value), ("master", "m", "master"));
+        assert!(master.text.starts_with("Masters: comma-separated numbers and ranges, such as '1,3',"), "{master:?}");
+    }
+}

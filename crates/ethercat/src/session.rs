@@ -1,0 +1,218 @@
+//! A command at work: its arguments, its output, the daemon and its masters.
+
+use std::fmt::Arguments as Formatted;
+use std::io::Write;
+use std::path::PathBuf;
+
+use ringcat_control::client::ClientError;
+use ringcat_control::message::{Answer, Ask, MasterState};
+use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolAsk};
+use ringcat_control::{Client, DEFAULT_SOCKET, Refusal};
+
+use crate::arguments::Arguments;
+use crate::failure::Failure;
+use crate::numbers::List;
+use crate::selection::{self, Slave};
+
+/// Names the socket of the daemon.
+const SOCKET: &str = "RINGCAT_SOCKET";
+
+/// A command at work.
+pub struct Session<'a> {
+    /// Name of the command.
+    pub name: &'static str,
+    /// Its arguments.
+    pub arguments: Arguments,
+    client: Option<Client>,
+    output: &'a mut dyn Write,
+    errors: &'a mut dyn Write,
+}
+
+impl<'a> Session<'a> {
+    /// A command with these arguments. The daemon is called when it is needed.
+    pub fn new(
+        name: &'static str,
+        arguments: Arguments,
+        output: &'a mut dyn Write,
+        errors: &'a mut dyn Write,
+    ) -> Session<'a> {
+        Session { name, arguments, client: None, output, errors }
+    }
+
+    /// The arguments behind the command.
+    pub fn words(&self) -> &[String] {
+        self.arguments.words.get(1..).unwrap_or_default()
+    }
+
+    /// Writes data.
+    ///
+    /// # Errors
+    /// The output is closed.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        Ok(self.output.write_all(bytes)?)
+    }
+
+    /// Writes text; for `write!`.
+    ///
+    /// # Errors
+    /// The output is closed.
+    pub fn write_fmt(&mut self, text: Formatted<'_>) -> Result<(), Failure> {
+        Ok(self.output.write_fmt(text)?)
+    }
+
+    /// Says something on the standard error.
+    pub fn say(&mut self, text: &str) {
+        // Where it is closed nothing can be said.
+        let _ = writeln!(self.errors, "{text}");
+    }
+
+    /// As [`Session::say`], with `--verbose` only.
+    pub fn say_if_verbose(&mut self, text: &str) {
+        if self.arguments.verbose {
+            self.say(text);
+        }
+    }
+
+    fn client(&mut self) -> Result<&mut Client, ClientError> {
+        if self.client.is_none() {
+            let socket = std::env::var_os(SOCKET).filter(|path| !path.is_empty());
+            let socket = socket.map_or_else(|| PathBuf::from(DEFAULT_SOCKET), PathBuf::from);
+            self.client = Some(Client::connect(&socket, "ethercat")?);
+        }
+        self.client.as_mut().ok_or(ClientError::Refused(Refusal::Unexpected { expected: "a daemon".to_owned() }))
+    }
+
+    /// Asks about a master; `bytes` is data to write. Returns data that was read, too.
+    ///
+    /// # Errors
+    /// The daemon refuses, or is not there.
+    pub fn ask(&mut self, master: u32, ask: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
+        Ok(self.client()?.ask(master, ask, bytes)?)
+    }
+
+    /// Asks a question of the tool.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn tool(&mut self, master: u32, ask: ToolAsk) -> Result<ToolAnswer, Failure> {
+        match self.ask(master, Ask::Tool(ask), Vec::new())? {
+            (Answer::Tool(answer), _) => Ok(answer),
+            _ => Err(unexpected()),
+        }
+    }
+
+    /// Asks for something to be done, or for data.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn done(&mut self, master: u32, ask: ToolAsk, bytes: Vec<u8>) -> Result<Vec<u8>, Failure> {
+        Ok(self.ask(master, Ask::Tool(ask), bytes)?.1)
+    }
+
+    /// All masters.
+    ///
+    /// # Errors
+    /// There is no daemon.
+    pub fn all_masters(&mut self) -> Result<Vec<MasterState>, Failure> {
+        let explicit = self.list(self.arguments.master.as_deref(), "master")?.single();
+        let asked = self.ask(0, Ask::Masters, Vec::new());
+        let failed = |text: String| match explicit {
+            Some(number) => Failure::failed(format!("Failed to open master {number}: {text}")),
+            None => Failure::failed(format!("Failed to obtain number of masters: {text}")),
+        };
+        match asked {
+            Ok((Answer::Masters(mut masters), _)) => {
+                masters.sort_by_key(|master| master.master);
+                Ok(masters)
+            }
+            Ok(_) => Err(unexpected()),
+            Err(Failure::Asked(error)) => Err(failed(error.to_string())),
+            Err(other) => Err(other),
+        }
+    }
+
+    /// A list of an option; all without it.
+    ///
+    /// # Errors
+    /// It is none.
+    pub fn list(&self, text: Option<&str>, what: &str) -> Result<List, Failure> {
+        let Some(text) = text else { return Ok(List::all()) };
+        List::parse(text).ok_or_else(|| Failure::usage(format!("Invalid {what} list '{text}'!")))
+    }
+
+    /// The masters that were selected, by number.
+    ///
+    /// # Errors
+    /// There is no daemon, or no master with a number that was named.
+    pub fn masters(&mut self) -> Result<Vec<MasterState>, Failure> {
+        let list = self.list(self.arguments.master.as_deref(), "master")?;
+        let all = self.all_masters()?;
+        if let Some(missing) = list.singles().find(|number| all.iter().all(|master| master.master != *number)) {
+            let present = all.iter().map(|master| master.master).collect();
+            let refusal = Refusal::NoMaster { master: missing, present };
+            return Err(Failure::failed(format!("Failed to open master {missing}: {refusal}")));
+        }
+        Ok(all.into_iter().filter(|master| list.has(master.master)).collect())
+    }
+
+    /// The only master of a command that needs one.
+    ///
+    /// # Errors
+    /// None or several are selected.
+    pub fn single_master(&mut self) -> Result<u32, Failure> {
+        match &self.masters()?[..] {
+            [master] => Ok(master.master),
+            _ => Err(Failure::usage(format!("{} requires to select a single master!", self.name))),
+        }
+    }
+
+    /// All SubDevices of a master, with the aliases that they are counted from.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn all_slaves(&mut self, master: u32) -> Result<Vec<Slave>, Failure> {
+        let mut lines: Vec<SubDeviceLine> = Vec::new();
+        loop {
+            let from = u16::try_from(lines.len()).unwrap_or(u16::MAX);
+            let answer = self.tool(master, ToolAsk::SubDevices { from })?;
+            let ToolAnswer::SubDevices(Piece { total, these }) = answer else { return Err(unexpected()) };
+            let is_last = these.len() < MOST_SUBDEVICES;
+            lines.extend(these);
+            if is_last || lines.len() >= total as usize || from == u16::MAX {
+                return Ok(selection::counted(lines));
+            }
+        }
+    }
+
+    /// The selected SubDevices of a master.
+    ///
+    /// # Errors
+    /// As [`Session::ask`]; a list is wrong.
+    pub fn slaves(&mut self, master: u32) -> Result<Vec<Slave>, Failure> {
+        let aliases = self.arguments.alias.as_deref().map(|text| self.list(Some(text), "alias")).transpose()?;
+        let positions = self.arguments.position.as_deref().map(|text| self.list(Some(text), "position"));
+        let positions = positions.transpose()?;
+        let all = self.all_slaves(master)?;
+        Ok(selection::slaves(all, aliases.as_ref(), positions.as_ref()))
+    }
+
+    /// Master and position of the only SubDevice of a command that needs one.
+    ///
+    /// # Errors
+    /// None or several are selected.
+    pub fn single_slave(&mut self) -> Result<(u32, u16), Failure> {
+        let master = self.single_master()?;
+        match &self.slaves(master)?[..] {
+            [slave] => Ok((master, slave.line.position)),
+            selected => {
+                let text = format!("'{}' requires a single slave to be selected: {} are!", self.name, selected.len());
+                Err(Failure::usage(text))
+            }
+        }
+    }
+}
+
+/// The daemon answers something else; one of this version does not.
+pub fn unexpected() -> Failure {
+    Failure::failed("The daemon has answered another question.")
+}

@@ -1,0 +1,22 @@
+//! What a command is.
+
+use crate::failure::Failure;
+use crate::session::Session;
+
+/// A command.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Command {
+    /// Its name.
+    pub name: &'static str,
+    /// What it does, for the list of commands.
+    pub summary: &'static str,
+    /// Forms of its arguments, one for each line.
+    pub forms: &'static [&'static str],
+    /// Further help, in lines.
+    pub help: &'static str,
+    /// Its own options, as in the help.
+    pub options: &'static str,
+    /// Runs it.
+    pub run: fn(&mut Session<'_>) -> Result<(), Failure>,
+}

@@ -1,0 +1,15 @@
+//! The tool beside a daemon and an application, on simulated segments.
+//!
+//! `golden` compares with outputs of the original tool, where they are there; all others have the expected text here.
+
+mod bench;
+mod beside;
+mod dot;
+mod golden;
+mod golden_bus;
+mod hostile;
+mod idle;
+mod operation;
+mod outputs;
+mod several;
+mod shells;

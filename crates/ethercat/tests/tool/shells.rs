@@ -1,0 +1,74 @@
+//! Completion scripts and manual pages in the programs that they are for, where those are there.
+
+use std::process::{Command, Stdio};
+
+use ethercat::commands::ALL;
+use ethercat::{completion, manual};
+
+use crate::bench::directory;
+
+/// What bash offers for the last of these words.
+fn offered(words: &[&str]) -> Vec<String> {
+    let line: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
+    let script = format!(
+        "set -eu\n{}\nCOMP_WORDS=({})\nCOMP_CWORD={}\n_ethercat\nprintf '%s\\n' \"${{COMPREPLY[@]}}\"\n",
+        completion::bash(),
+        line.join(" "),
+        words.len() - 1
+    );
+    let output = Command::new("bash").arg("-c").arg(script).output().expect("there is bash");
+    assert!(output.status.success() && output.stderr.is_empty(), "{words:?}: {output:?}");
+    String::from_utf8(output.stdout).expect("it is text").lines().map(str::to_owned).collect()
+}
+
+// covers: daemon
+#[test]
+fn bash_offers_commands_and_their_options() {
+    assert_eq!(offered(&["ethercat", "sl"]), ["slaves"]);
+    assert_eq!(offered(&["ethercat", "-m", "0", "sii"]), ["sii_read", "sii_write"]);
+    assert_eq!(offered(&["ethercat", "pdos", "--s"]), ["--skin"]);
+    assert_eq!(offered(&["ethercat", "crc", "r"]), ["reset"]);
+    assert_eq!(offered(&["ethercat", "--quiet", "reg_write", "--em"]), ["--emergency"]);
+    let all = offered(&["ethercat", ""]);
+    assert!(ALL.iter().all(|command| all.iter().any(|word| word == command.name)), "{all:?}");
+}
+
+/// Whether a program takes a file without a word; true where it is not there.
+fn takes(program: &str, options: &[&str], file: &std::path::Path) -> bool {
+    let output = Command::new(program).args(options).arg(file).stdin(Stdio::null()).output();
+    let Ok(output) = output else {
+        println!("{program} is not there: {} was not checked", file.display());
+        return true;
+    };
+    println!("{program} {}: {}{}", file.display(), output.status, String::from_utf8_lossy(&output.stderr));
+    output.status.success() && output.stderr.is_empty()
+}
+
+// covers: daemon
+#[test]
+fn scripts_and_pages_are_taken_by_their_programs() {
+    let directory = directory();
+    for (program, name, text) in
+        [("bash", "ethercat.bash", completion::bash()), ("zsh", "_ethercat", completion::zsh())].into_iter().chain([(
+            "fish",
+            "ethercat.fish",
+            completion::fish(),
+        )])
+    {
+        let path = directory.join(name);
+        std::fs::write(&path, &text).expect("it can be written");
+        assert!(takes(program, &["-n"], &path), "{program}");
+        for command in ALL {
+            assert!(text.contains(command.name), "{name}: {}", command.name);
+        }
+    }
+    let pages = manual::pages();
+    assert_eq!(pages.len(), ALL.len() + 1);
+    for (name, page) in pages {
+        let path = directory.join(name);
+        std::fs::write(&path, &page).expect("it can be written");
+        assert!(takes("groff", &["-man", "-Tutf8", "-ww", "-z"], &path), "{page}");
+        assert!(takes("mandoc", &["-Tlint", "-Wwarning"], &path), "{page}");
+    }
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}

@@ -1,0 +1,143 @@
+//! Where questions about a master are answered: by the acyclic half in this process, or through a daemon by the process
+//! that drives the master. The answers are the same.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use ringcat::SupervisorThread;
+use ringcat::daemon::{Answer, Ask, Client, ClientError, Refusal, SegmentLook, ServiceFault, serving};
+
+use crate::code::{Code, Outcome};
+use crate::environment::program_name;
+use crate::locks::locked;
+
+/// A question waits so long while the master passes from one process to another.
+const CHANGE: Duration = Duration::from_secs(5);
+/// Interval of tries meanwhile.
+const PAUSE: Duration = Duration::from_millis(5);
+/// Most data of a question through a daemon, in bytes.
+const MOST_DATA: usize = 64 << 10;
+
+/// Where questions about a master are answered.
+#[derive(Debug)]
+pub enum Door {
+    /// By the acyclic half in this process.
+    Here(SupervisorThread),
+    /// By a daemon, or the application that drives the master.
+    Daemon(DaemonDoor),
+}
+
+/// A master of a daemon, for questions.
+#[derive(Debug)]
+pub struct DaemonDoor {
+    socket: PathBuf,
+    master: u32,
+    /// Connections that no question uses: several threads may ask at once.
+    idle: Mutex<Vec<Client>>,
+}
+
+impl DaemonDoor {
+    /// Connects to the daemon at this socket.
+    ///
+    /// # Errors
+    /// None answers, or it has no such master.
+    pub fn open(socket: &Path, master: u32) -> Result<DaemonDoor, ClientError> {
+        let mut client = Client::connect(socket, &program_name())?;
+        let (answer, _) = client.ask(master, Ask::Masters, Vec::new())?;
+        let present = match answer {
+            Answer::Masters(all) => all.into_iter().map(|state| state.master).collect(),
+            _ => Vec::new(),
+        };
+        if !present.contains(&master) {
+            return Err(ClientError::Refused(Refusal::NoMaster { master, present }));
+        }
+        Ok(DaemonDoor { socket: socket.to_owned(), master, idle: Mutex::new(vec![client]) })
+    }
+
+    /// The socket of the daemon.
+    pub fn socket(&self) -> &Path {
+        &self.socket
+    }
+
+    /// Number of the master.
+    pub fn master(&self) -> u32 {
+        self.master
+    }
+
+    fn ask(&self, what: &Ask, bytes: &[u8]) -> Result<(Answer, Vec<u8>), Refusal> {
+        if bytes.len() > MOST_DATA {
+            let text = format!("expected at most {MOST_DATA} bytes of data, got {}", bytes.len());
+            return Err(Refusal::Service { fault: ServiceFault::TooLong, text });
+        }
+        let begin = Instant::now();
+        loop {
+            match self.ask_once(what.clone(), bytes.to_vec()) {
+                Err(Refusal::Changing { .. } | Refusal::TooManyQuestions { .. }) if begin.elapsed() < CHANGE => {
+                    std::thread::sleep(PAUSE);
+                }
+                answered => return answered,
+            }
+        }
+    }
+
+    fn ask_once(&self, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
+        let told = |error: ClientError| match error {
+            ClientError::Refused(refusal) => refusal,
+            error => Refusal::Failed(error.to_string()),
+        };
+        // A daemon that was started anew, or has ended an idle connection, is connected to again.
+        let idle = locked(&self.idle).pop().filter(Client::is_open);
+        let client = idle.map_or_else(|| Client::connect(&self.socket, &program_name()), Ok);
+        let mut client = client.map_err(told)?;
+        let answered = client.ask(self.master, what, bytes);
+        if matches!(answered, Ok(_) | Err(ClientError::Refused(_))) {
+            locked(&self.idle).push(client);
+        }
+        answered.map_err(told)
+    }
+}
+
+impl Door {
+    /// Asks, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
+    ///
+    /// # Errors
+    /// What [`code_of`] turns into a return code.
+    pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
+        match self {
+            Door::Here(supervisor) => serving::answer(supervisor, what, bytes),
+            Door::Daemon(door) => door.ask(&what, &bytes),
+        }
+    }
+
+    /// What a broadcast shows of all SubDevices now. A lost frame counts as no answer.
+    ///
+    /// # Errors
+    /// The acyclic half has ended, or the daemon does not answer.
+    pub fn look(&self) -> Outcome<SegmentLook> {
+        match self.ask(Ask::Look, Vec::new()) {
+            Ok((Answer::Look(seen), _)) => Ok(seen),
+            Ok(_) => Err(Code::IO),
+            Err(refusal) => Err(code_of(&refusal)),
+        }
+    }
+}
+
+/// The return code of a refusal.
+pub fn code_of(refusal: &Refusal) -> Code {
+    match refusal {
+        Refusal::ReadOnly => Code::NOT_RESERVED,
+        Refusal::Owned { .. } | Refusal::Changing { .. } | Refusal::TooManyQuestions { .. } => Code::BUSY,
+        Refusal::NoMaster { .. } | Refusal::Fault { .. } => Code::GONE,
+        Refusal::Silent { .. } => Code::TIMED_OUT,
+        Refusal::Unexpected { .. } => Code::INVALID,
+        Refusal::Service { fault, .. } => match fault {
+            ServiceFault::NoSubDevice => Code::INVALID,
+            ServiceFault::NoProtocol => Code::NO_PROTOCOL,
+            ServiceFault::TooLong => Code::OVERFLOW,
+            ServiceFault::NoAnswer => Code::TIMED_OUT,
+            _ => Code::IO,
+        },
+        _ => Code::IO,
+    }
+}

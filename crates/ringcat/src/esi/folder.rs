@@ -1,0 +1,217 @@
+//! A folder of device descriptions with its index, which is kept between runs: only files that are new or have changed
+//! are read.
+
+use std::fs::{self, Metadata};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use ringcat_config::esi::Esi;
+use ringcat_config::esi::index::{Described, Index, IndexedFile, Stamp};
+
+use super::file::{EsiFailure, bytes_of, load};
+
+/// Folders below the folder, one in the other.
+const MAX_DEPTH: usize = 6;
+/// Files of a folder at most; the others are left out.
+pub const MAX_FILES: usize = 10_000;
+
+/// A folder of device descriptions.
+#[derive(Debug)]
+pub struct EsiFolder {
+    path: PathBuf,
+    index: Index,
+    read: usize,
+    not_kept: Option<io::Error>,
+}
+
+impl EsiFolder {
+    /// Opens a folder with all folders in it. `kept`: the file in which the index is kept; without one all files are
+    /// read. A file that is refused is in the index with its reason.
+    ///
+    /// # Errors
+    /// The folder cannot be read.
+    pub fn open(path: &Path, kept: Option<&Path>) -> Result<EsiFolder, EsiFailure> {
+        let mut found = Vec::new();
+        collect(path, MAX_DEPTH, &mut found).map_err(|error| EsiFailure::Read { path: path.to_owned(), error })?;
+        found.sort_by(|a, b| a.0.cmp(&b.0));
+        let bytes = kept.and_then(|kept| bytes_of(kept).ok());
+        let before = bytes.and_then(|bytes| Index::from_text(std::str::from_utf8(&bytes).ok()?)).unwrap_or_default();
+        let mut read = 0;
+        let files = found.into_iter().map(|(file, stamp)| {
+            let name = file.strip_prefix(path).unwrap_or(&file).to_string_lossy().into_owned();
+            before.unchanged(&name, stamp).cloned().unwrap_or_else(|| {
+                read += 1;
+                entry(&file, &name, stamp)
+            })
+        });
+        let index = Index::new(files.collect());
+        let has_changed = read > 0 || index.files().len() != before.files().len();
+        let not_kept = kept.filter(|_| has_changed).and_then(|kept| keep(kept, &index).err());
+        Ok(EsiFolder { path: path.to_owned(), index, read, not_kept })
+    }
+
+    /// The file in which the index of a folder is kept by default, in the cache of the user; `None` without a home.
+    pub fn default_index(path: &Path) -> Option<PathBuf> {
+        let absolute = |path: PathBuf| Some(path).filter(|path| path.is_absolute());
+        let cache = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).and_then(absolute);
+        let home = || Some(absolute(PathBuf::from(std::env::var_os("HOME")?))?.join(".cache"));
+        let mut hasher = DefaultHasher::new();
+        fs::canonicalize(path).ok()?.hash(&mut hasher);
+        Some(cache.or_else(home)?.join("ringcat").join(format!("esi-{:016x}.index", hasher.finish())))
+    }
+
+    /// The index.
+    pub fn index(&self) -> &Index {
+        &self.index
+    }
+
+    /// Files that were read, the others were in the index.
+    pub fn files_read(&self) -> usize {
+        self.read
+    }
+
+    /// Why the index could not be kept for the next time.
+    pub fn not_kept(&self) -> Option<&io::Error> {
+        self.not_kept.as_ref()
+    }
+
+    /// Reads the whole description of a device.
+    ///
+    /// # Errors
+    /// The file is no longer what the index says.
+    pub fn load(&self, described: &Described<'_>) -> Result<Esi, EsiFailure> {
+        load(&self.path.join(&described.file.path))
+    }
+}
+
+/// All files of a folder with the ending `xml`, with size and time.
+fn collect(folder: &Path, depth: usize, found: &mut Vec<(PathBuf, Stamp)>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        // A link to nothing is no file.
+        let Ok(metadata) = fs::metadata(&path) else { continue };
+        if metadata.is_dir() && depth > 0 {
+            // A folder that must not be read is none of ours.
+            let _ = collect(&path, depth - 1, found);
+        } else if metadata.is_file()
+            && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
+            && found.len() < MAX_FILES
+        {
+            found.push((path, stamp(&metadata)));
+        }
+    }
+    Ok(())
+}
+
+fn stamp(metadata: &Metadata) -> Stamp {
+    let since = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
+    Stamp { bytes: metadata.len(), modified_ns: u64::try_from(since.as_nanos()).unwrap_or(u64::MAX) }
+}
+
+/// Reads a file for the index.
+fn entry(file: &Path, name: &str, stamp: Stamp) -> IndexedFile {
+    match load(file) {
+        Ok(esi) => IndexedFile::of(name, stamp, &esi),
+        Err(error) => IndexedFile::refused(name, stamp, &error.to_string()),
+    }
+}
+
+/// Writes the index beside its place first, so that another process never reads a half of it.
+fn keep(kept: &Path, index: &Index) -> io::Result<()> {
+    if let Some(folder) = kept.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let beside = kept.with_extension(format!("{}.new", std::process::id()));
+    fs::write(&beside, index.to_text())?;
+    fs::rename(&beside, kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder of its own, removed on drop.
+    struct Place(PathBuf);
+
+    impl Place {
+        fn new(name: &str) -> Place {
+            let place = Place(std::env::temp_dir().join(format!("ringcat-esi-{}-{name}", std::process::id())));
+            fs::create_dir_all(place.0.join("descriptions/more")).expect("a temporary folder");
+            place
+        }
+
+        fn write(&self, name: &str, text: &str) {
+            fs::write(self.0.join("descriptions").join(name), text).expect("it is ours");
+        }
+
+        fn open(&self) -> EsiFolder {
+            EsiFolder::open(&self.0.join("descriptions"), Some(&self.kept())).expect("a folder")
+        }
+
+        fn kept(&self) -> PathBuf {
+            self.0.join("cache/kept.index")
+        }
+    }
+
+    impl Drop for Place {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn description(product: u32, name: &str) -> String {
+        format!(
+            "<EtherCATInfo><Vendor><Id>71</Id></Vendor><Descriptions><Groups/><Devices><Device Physics=\"YY\"><Type \
+             ProductCode=\"{product}\" RevisionNo=\"1\">A{product}</Type><Name LcId=\"1033\">{name}</Name></Device>\
+             </Devices></Descriptions></EtherCATInfo>"
+        )
+    }
+
+    // covers: esi-read
+    #[test]
+    fn only_new_and_changed_files_are_read_again_and_removed_ones_are_gone() {
+        let place = Place::new("changes");
+        place.write("one.xml", &description(1, "first"));
+        place.write("more/two.XML", &description(2, "second"));
+        place.write("notes.txt", "no description");
+        let read = |place: &Place| {
+            let folder = place.open();
+            assert!(folder.not_kept().is_none());
+            (folder.files_read(), folder.index().devices().count())
+        };
+        assert_eq!(read(&place), (2, 2));
+        assert_eq!(read(&place), (0, 2));
+        place.write("one.xml", &description(1, "first, with another length"));
+        place.write("three.xml", &description(3, "third"));
+        assert_eq!(read(&place), (2, 3));
+        fs::remove_file(place.0.join("descriptions/more/two.XML")).expect("it is ours");
+        assert_eq!(read(&place), (0, 2));
+        let folder = place.open();
+        let found = folder.index().find(71, 3, 1, false).expect("it is described");
+        assert_eq!(folder.load(&found).expect("it is there").devices[0].name.english(), "third");
+    }
+
+    // covers: esi-read
+    #[test]
+    fn a_damaged_index_and_one_that_cannot_be_kept_cost_only_time() {
+        let place = Place::new("damage");
+        place.write("one.xml", &description(1, "first"));
+        place.write("bad.xml", "<EtherCATInfo>");
+        let folder = place.open();
+        assert_eq!((folder.files_read(), folder.index().devices().count()), (2, 1));
+        let refused: Vec<&str> = folder.index().files().iter().filter_map(|file| file.refused.as_deref()).collect();
+        assert!(refused.len() == 1 && refused[0].contains("bad.xml"), "{refused:?}");
+        let text = fs::read_to_string(place.kept()).expect("it was kept");
+        for damaged in ["", "other\n", &text[..text.len() / 2]] {
+            fs::write(place.kept(), damaged).expect("it is ours");
+            assert_eq!(place.open().files_read(), 2, "{damaged}");
+        }
+        fs::remove_dir_all(place.0.join("cache")).expect("it is ours");
+        fs::write(place.0.join("cache"), "a file in the place of the folder").expect("it is ours");
+        let folder = place.open();
+        assert!(folder.not_kept().is_some() && folder.index().devices().count() == 1);
+        assert!(EsiFolder::open(&place.0.join("nowhere"), None).is_err());
+    }
+}

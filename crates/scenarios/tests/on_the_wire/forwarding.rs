@@ -1,0 +1,88 @@
+//! A ring that leads through a second MainDevice, `ringcat standby`: another process in another namespace, which stores
+//! and forwards. The first one is ours or another stack's.
+
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, Running, await_op, is_asked_for};
+use crate::foreign::{FOREIGN, exchange, python, start_pysoem};
+use crate::{RING_OF_10, states};
+
+/// Pause after an edge.
+const PAUSE: Duration = Duration::from_millis(700);
+/// Limit of the start of the second MainDevice.
+const START_LIMIT: Duration = Duration::from_secs(5);
+
+/// A bench with the second MainDevice, forwarding.
+fn ring_of_two() -> Option<(Bench, Running)> {
+    let mut bench = Bench::new(2)?;
+    bench.add_second_main_device();
+    let second = bench.run_other_ringcat(&["standby", "--main", "second0", "--redundant", "main1"]);
+    let until = Instant::now() + START_LIMIT;
+    while !second.said().so_far().contains("INACTIVE: forwarding") {
+        assert!(Instant::now() < until, "{}", second.said().so_far());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    Some((bench, second))
+}
+
+// covers: CF-01, 9.7.5, standby
+#[test]
+fn the_active_runs_its_ring_through_the_standby_with_each_kind_of_cut() {
+    let Some((mut bench, second)) = ring_of_two() else { return };
+    bench.simulate(&RING_OF_10.segment(), true);
+    let run = bench.run_ringcat(&["run", "--main", "main0", "--redundant", "active1", "--all-events"]);
+    await_op(&bench, 10);
+    std::thread::sleep(PAUSE);
+    type Switch<'a> = &'a dyn Fn(&Bench, bool);
+    let inner: Switch<'_> = &|bench, is_cut| drop(bench.order(if is_cut { "cut 4-5" } else { "heal 4-5" }));
+    let state = |is_cut: bool| if is_cut { "down" } else { "up" };
+    let between: Switch<'_> = &|bench, is_cut| bench.set_link_elsewhere("second0", state(is_cut));
+    let far_end: Switch<'_> = &|bench, is_cut| bench.set_link_elsewhere("main1", state(is_cut));
+    let near_end: Switch<'_> = &|bench, is_cut| bench.set_link("main0", state(is_cut));
+    for (what, switch) in
+        [("inner cable", inner), ("cable between both", between), ("far end", far_end), ("near end", near_end)]
+    {
+        for is_cut in [true, false] {
+            let begin = Instant::now();
+            switch(&bench, is_cut);
+            std::thread::sleep(PAUSE);
+            let lines = run.said().between(begin, Instant::now());
+            let told = lines.iter().filter(|(_, line)| line.contains("ring open:") || line.contains("Line is fixed"));
+            assert_eq!(told.count(), 1, "{what}, cut: {is_cut}: {lines:?}");
+            assert_eq!(states(&bench, "OP"), 10, "{what}, cut: {is_cut}: {}", bench.order("status"));
+        }
+    }
+    let (output, errors) = run.interrupt();
+    assert!(!output.contains("no longer answers"), "{output}{errors}");
+    let (said, errors) = second.interrupt();
+    println!("{}", said.lines().filter(|line| line.starts_with("forwarded")).collect::<String>());
+    assert!(said.contains(" frames forwarded"), "{said}{errors}");
+    assert!(said.contains(" back; ") && !said.contains(" these 0 back"), "{said}{errors}");
+    bench.show_simulator_lateness();
+}
+
+// covers: sim-foreign
+#[test]
+fn pysoem_runs_its_ring_through_the_standby() {
+    if !is_asked_for(FOREIGN) {
+        return;
+    }
+    let Some((mut bench, second)) = ring_of_two() else { return };
+    let Some(python) = python() else { return };
+    let count = RING_OF_10.count();
+    exchange(&mut bench, &RING_OF_10, true, "pysoem through a standby", |bench| {
+        start_pysoem(bench, &python, "main0,active1", count)
+    });
+    let (said, errors) = second.interrupt();
+    assert!(said.contains(" frames forwarded"), "{said}{errors}");
+    println!("{}", said.lines().filter(|line| line.starts_with("forwarded")).collect::<String>());
+}
+
+#[test]
+fn a_standby_that_hears_no_frame_says_so() {
+    let Some((bench, second)) = ring_of_two() else { return };
+    std::thread::sleep(PAUSE);
+    let (said, errors) = second.interrupt();
+    assert!(said.contains("FAILED: no frame of another MainDevice came"), "{said}{errors}");
+    drop(bench);
+}
