@@ -160,13 +160,13 @@ impl Tap {
     /// From now on this many of a thousand frames are lost, on their way out or back, at random from a seed.
     pub fn lose_per_mille(&mut self, lost: u64, seed: u64) {
         self.lost_per_mille = lost;
-        self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
+        self.reseed(seed);
     }
 
     /// As [`Tap::lose_per_mille`], one in so many frames: for rare losses.
     pub fn lose_one_in(&mut self, frames: u64, seed: u64) {
         self.lost_one_in = frames;
-        self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
+        self.reseed(seed);
     }
 
     fn is_lost(&mut self, outward: bool, bytes: &[u8]) -> bool {
@@ -202,6 +202,11 @@ impl Tap {
     /// From now on each frame is sent with a random delay up to this time, each copy by itself.
     pub fn send_late(&mut self, most: std::time::Duration) {
         self.late_sending_ns = most.as_nanos() as u64;
+    }
+
+    /// Random delays and losses are those of this seed from now on.
+    pub fn reseed(&mut self, seed: u64) {
+        self.random = FNV_OFFSET ^ seed.wrapping_mul(FNV_PRIME);
     }
 
     /// A random number up to `most`.

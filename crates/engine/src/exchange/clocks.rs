@@ -12,6 +12,7 @@ use ringcat_wire::datagram::HEADER_LEN;
 use ringcat_wire::register::{EcatEvent, map};
 
 mod calls;
+mod gap;
 mod lead;
 mod slide;
 

@@ -11,14 +11,9 @@
 //! * a reference that follows the host is steered in every cycle, by a small part of a long mean. The written value is
 //!   that much less than its last reading: the jitter of one cycle is taken back in the next.
 
+use super::gap::{Finding, Found};
 use crate::time::Instant;
 
-/// Smallest number of cycles for a mean of the difference between the ways from the host to both references. For
-/// references that have followed one clock until now, the number of cycles that makes the mean as exact as
-/// [`EXACT_NS`].
-const GAP_CYCLES: u32 = 16;
-/// Most cycles of that mean: free-running clocks drift apart meanwhile.
-const MOST_GAP_CYCLES: u32 = 4_096;
 /// Required accuracy of means in spite of random sending delays of the host.
 const EXACT_NS: i64 = 300;
 /// Depth of the longest mean: the drift of free-running clocks within it must not exceed the jitter.
@@ -99,12 +94,9 @@ pub(super) struct Lead {
     law: Law,
     /// The difference while both show the same time, because their ways from the host have different lengths.
     gap: i64,
-    /// Sum of the differences of this mean, and their largest number.
-    sum: i64,
-    most_cycles: u32,
-    /// Number of differences so far, while they determine the gap; then [`MOST_GAP_CYCLES`].
-    cycles: u32,
-    /// Mean deviation of the differences from their mean; while the gap is not known, the sum of the deviations.
+    /// While the gap is not known.
+    finding: Option<Finding>,
+    /// Mean deviation of the differences from their mean, with as many fractional bits as [`NOISE_DEPTH`].
     noise: i64,
     /// Filter depth of the difference that decides what to do.
     depth: u32,
@@ -126,15 +118,12 @@ impl Lead {
     /// A second reference and the first one, which show the same time: because they have followed one clock until now
     /// (`together`), or as an assumption.
     pub const fn begin(difference: i64, together: bool, seen_at: Instant) -> Lead {
-        let most_cycles = if together { MOST_GAP_CYCLES } else { GAP_CYCLES };
-        let (gap, sum, cycles, noise) = (difference, difference, 1, 0);
+        let (gap, finding, noise) = (difference, Some(Finding::begin(together)), 0);
         let (law, depth, mode) = (SECOND, SECOND.slow_depth, Mode::Free);
         Lead {
             law,
             gap,
-            sum,
-            most_cycles,
-            cycles,
+            finding,
             noise,
             depth,
             ahead: 0,
@@ -151,7 +140,7 @@ impl Lead {
     /// A reference that is to show the host's time, which it has never followed.
     pub const fn behind_host(seen_at: Instant) -> Lead {
         let (law, depth, mode) = (HOST, HOST.slow_depth, Mode::Far);
-        Lead { law, depth, cycles: MOST_GAP_CYCLES, mode, ..Lead::begin(0, false, seen_at) }
+        Lead { law, depth, finding: None, mode, ..Lead::begin(0, false, seen_at) }
     }
 
     /// Whether the last difference is recent enough.
@@ -161,8 +150,8 @@ impl Lead {
 
     /// Takes another difference.
     pub fn go_on(self, difference: i64, seen_at: Instant) -> Lead {
-        if self.cycles < MOST_GAP_CYCLES {
-            return self.find_gap(difference.clamp(-ABSURD_NS, ABSURD_NS), seen_at);
+        if let Some(finding) = self.finding {
+            return self.find_gap(finding.take(difference.clamp(-ABSURD_NS, ABSURD_NS)), seen_at);
         }
         let passed = seen_at.0.saturating_sub(self.seen_at.0).clamp(1, LONGEST_NS) as i64;
         let expected = self.ahead + ((self.change_ppb * passed) << FRACTION) / 1_000_000_000;
@@ -198,19 +187,12 @@ impl Lead {
         Lead { ahead, change_ppb, slow, seen_at, mode, calm, noise, depth, calm_ahead, calm_change, ..self }
     }
 
-    /// Takes a difference into the gap, until that is known well enough.
-    fn find_gap(self, difference: i64, seen_at: Instant) -> Lead {
-        let cycles = self.cycles + 1;
-        let sum = self.sum.saturating_add(difference);
-        let gap = sum / i64::from(cycles);
-        let noise = self.noise.saturating_add((difference - gap).saturating_abs().min(MOST_NOISE_NS));
-        let mean = noise / i64::from(cycles);
-        let enough = (mean / EXACT_NS).saturating_mul(mean / EXACT_NS).max(i64::from(GAP_CYCLES));
-        if i64::from(cycles) < enough.min(self.most_cycles.into()) {
-            return Lead { gap, sum, noise, cycles, seen_at, ..self };
-        }
-        let known = Lead { gap, sum, cycles: MOST_GAP_CYCLES, noise: mean << NOISE_DEPTH, seen_at, ..self };
-        known.widen(mean)
+    /// Takes the gap once it is known.
+    fn find_gap(self, finding: Finding, seen_at: Instant) -> Lead {
+        let Some(Found { gap, noise_ns }) = finding.found() else {
+            return Lead { finding: Some(finding), seen_at, ..self };
+        };
+        Lead { gap, finding: None, noise: noise_ns << NOISE_DEPTH, seen_at, ..self }.widen(noise_ns)
     }
 
     /// Takes the size of the jitter: the more there is, the longer means have to be. They never get shorter.
@@ -270,7 +252,7 @@ mod tests {
     fn jitter_of_the_host_is_no_reason_to_steer() {
         let lead = after(Lead::begin(7_100, true, Instant(0)), jitter(5_000));
         assert_eq!((lead.mode, lead.steering_ns()), (Mode::Free, None));
-        assert!((lead.gap - 9_500).abs() < 800, "{lead:?}");
+        assert!((lead.gap - 9_500).abs() < 300, "{lead:?}");
     }
 
     #[test]
