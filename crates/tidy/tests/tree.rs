@@ -5,7 +5,8 @@ use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
     Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources, toolchain, words,
+    interface, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources, toolchain,
+    words,
 };
 
 fn tree() -> Tree {
@@ -175,6 +176,12 @@ fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
     let tree = tree();
     let page = tree.file("docs/performance.md").expect("the page exists");
     assert!(page.text.contains("\n## Before and after the model of the segment\n"));
+}
+
+// covers: api
+#[test]
+fn the_handle_of_a_subdevice_can_do_all_that_its_mailbox_can_do() {
+    none(mailboxes::without_method(&tree()).unwrap_or_else(|finding| vec![finding]));
 }
 
 // covers: api

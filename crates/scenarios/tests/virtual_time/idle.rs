@@ -100,7 +100,7 @@ fn a_segment_is_scanned_without_a_call_and_all_are_in_preop_with_mailboxes() {
         assert_eq!(main_device.subdevices().len(), MIXED.len());
         assert_eq!(Services::phase(&mut main_device), MainDevicePhase::Idle);
         for servo in [0, 3] {
-            assert!(main_device.mailbox(Position(servo)).expect("it has one").is_open());
+            assert!(main_device.engine().mailbox(Position(servo)).expect("it has one").is_open());
             let servo = main_device.subdevice(Position(servo));
             assert_eq!(servo.state().expect("it answers").0, PREOP);
             let servo = main_device.subdevice(Position(3));
