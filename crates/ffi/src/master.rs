@@ -349,14 +349,14 @@ impl Master {
             words.set_memory(std::ptr::null_mut());
             locked(&self.memory).extend(application.exchange_mut().give_memory_back(DomainId(number)));
         }
-        let (_, links) = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
-            Ok(parts) => parts,
+        let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+            Ok(ended) => ended,
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
                 refused.main_device
             }
         };
-        bus.give_links_back(links);
+        bus.give_links_back(ended.links);
         *draft = Draft::default();
         draft.set_found(bus.found()?);
         self.application_time.store(0, Ordering::Relaxed);

@@ -144,12 +144,11 @@ pub use parts::ProbedParts;
 pub use probe::{CycleJob, CycleProbe, FramesIn, JobProbe, JobTime, JobTimes};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
-pub use stop::Deactivated;
+pub use stop::{Deactivated, Ended};
 pub use subdevice::{ListLengths, MailboxStatus, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
 pub use supervisor_thread::SupervisorThread;
 pub use value::{Number, ObjectValue};
 
-pub use ringcat_engine::Acknowledge;
 pub use ringcat_engine::BlockedPort;
 pub use ringcat_engine::PortOf;
 pub use ringcat_engine::ReadPdos;
@@ -184,7 +183,9 @@ pub use ringcat_engine::mail::foe::{FoeError, FoeFailure, FoeOptions, FoeProgres
 pub use ringcat_engine::mail::soe::command::CommandState;
 pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
-pub use ringcat_engine::mail::{EmergencyRing, Limits, Mailbox, MailboxError, Unclaimed, Unsolicited};
+pub use ringcat_engine::mail::{
+    EmergencyRing, Limits, Mailbox, MailboxError, ReceivedEmergency, Unclaimed, Unsolicited,
+};
 pub use ringcat_engine::main_device::snapshot::{
     Activity, AcyclicSnapshot, CableSnapshot, ClockSnapshot, GroupSnapshot, LinkSnapshot, Progress, RingSnapshot,
     Snapshot, SubDeviceSnapshot,
@@ -201,9 +202,10 @@ pub use ringcat_engine::request::{
     VoeHeader,
 };
 pub use ringcat_engine::ring_status::{
-    Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
+    Cable, CableErrors, CableReport, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
 };
 pub use ringcat_engine::time::Instant;
+pub use ringcat_engine::{Acknowledge, AlRegisters};
 pub use ringcat_engine::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::{Classified, Identity};

@@ -67,16 +67,11 @@ impl<L: Links> Application<L, SupervisorThread> {
     ///
     /// # Errors
     /// SubDevices do not reach the state in time, or the bus fails.
-    pub fn stop(
-        mut self,
-        outputs: LastOutputs,
-        state: AlState,
-        limit: Duration,
-    ) -> Result<(SupervisorThread, L), Error> {
+    pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<Ended<L>, Error> {
         let is_allowed = self.acyclic.with(|engine| is_allowed(engine, Function::Stop))?;
         self.end_cycles(outputs, is_allowed);
         self.acyclic.stop(state, limit)?;
-        Ok((self.acyclic, self.links))
+        Ok(Ended { supervisor: self.acyclic, links: self.links })
     }
 
     /// Ends the application, as in one thread. The returned thread keeps the scan, and may activate another declaration
@@ -90,7 +85,7 @@ impl<L: Links> Application<L, SupervisorThread> {
             self.end_cycles(outputs, is_allowed);
             self.acyclic.deactivate(limit)
         });
-        let main_device = (self.acyclic, self.links);
+        let main_device = Ended { supervisor: self.acyclic, links: self.links };
         match ended {
             Ok(()) => Ok(main_device),
             Err(error) => Err(Box::new(Refused { error, main_device })),
@@ -98,5 +93,15 @@ impl<L: Links> Application<L, SupervisorThread> {
     }
 }
 
-/// The handle and the links of a deactivated application; the same if it was not complete.
-pub type Deactivated<L> = Result<(SupervisorThread, L), Box<Refused<(SupervisorThread, L)>>>;
+/// What an application of two threads leaves: another one may be activated with both.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Ended<L> {
+    /// The thread of the acyclic half.
+    pub supervisor: SupervisorThread,
+    /// The links of the cycles.
+    pub links: L,
+}
+
+/// What a deactivated application leaves; the same if the deactivation was not complete.
+pub type Deactivated<L> = Result<Ended<L>, Box<Refused<Ended<L>>>>;

@@ -54,9 +54,9 @@ unsafe extern "C" fn ecrt_slave_config_emerg_pop(sc: *mut ec_slave_config_t, tar
         if target.is_null() {
             return Err(Code::FAULT);
         }
-        let (_, emergency) = slave.emergencies(|ring| ring.pop())?.ok_or(Code::NOT_FOUND)?;
+        let received = slave.emergencies(|ring| ring.pop())?.ok_or(Code::NOT_FOUND)?;
         // SAFETY: eight bytes of C (ecrt.h).
-        unsafe { put(target.cast::<[u8; EMERGENCY_BYTES]>(), emergency.encode()) }
+        unsafe { put(target.cast::<[u8; EMERGENCY_BYTES]>(), received.emergency.encode()) }
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(sc, pop) }

@@ -15,8 +15,8 @@ impl<S: Services> SubDevice<S> {
     /// /// Prints the emergencies of a drive, of which the last 200 are kept.
     /// fn watch(supervisor: &SupervisorThread, drive: SubDeviceId) -> Result<(), Error> {
     ///     let emergencies = supervisor.subdevice(drive).create_emergency_ring(200)?;
-    ///     while let Some((at, emergency)) = emergencies.pop() {
-    ///         println!("{} ns: {:#06x}", at.0, emergency.error_code);
+    ///     while let Some(received) = emergencies.pop() {
+    ///         println!("{} ns: {:#06x}", received.at.0, received.emergency.error_code);
     ///     }
     ///     println!("{} more were not kept", emergencies.overruns());
     ///     Ok(())

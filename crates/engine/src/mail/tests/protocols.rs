@@ -151,7 +151,7 @@ fn an_emergency_between_request_and_response_is_kept_and_is_an_event() {
         bench.run(async move { read(&mailbox, SdoAddress::new(0x2000, 1), LIMITS, 4).await }),
         Ok(vec![1, 2, 3])
     );
-    assert_eq!(bench.mailbox.pop_emergency().map(|(_, emergency)| emergency), Some(emergency));
+    assert_eq!(bench.mailbox.pop_emergency().map(|received| received.emergency), Some(emergency));
     assert_eq!(bench.mailbox.pop_emergency(), None);
     let subdevice = Address::Declared(SubDeviceId(0));
     let expected = crate::event::Event::Emergency { subdevice, emergency };
