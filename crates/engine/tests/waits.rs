@@ -33,7 +33,7 @@ use Reason::{Cyclic, Limit, Pace, Register, Retry, Settle, Turn};
 
 /// The table of docs/ARCHITECTURE.md that lists tasks with a period.
 const PERIODS: &str = "<!-- polling tasks of the engine -->";
-/// Files in that table without a pause of their own: times at which the model is evaluated (`Segment::next_evaluation`).
+/// Files in that table without a pause of their own: when the model is evaluated (`Segment::next_evaluation`).
 const EVALUATIONS: [&str; 3] = ["segment/attention.rs", "segment/idle.rs", "segment/silence.rs"];
 
 /// The table of docs/ARCHITECTURE.md that lists pauses for another part of the engine.

@@ -296,7 +296,7 @@ impl Master {
             Ok(application) => application,
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
-                let (supervisor, links) = refused.main_device;
+                let ringcat::Ended { supervisor, links, .. } = refused.main_device;
                 let unused = (0..domains).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
                 locked(&self.memory).extend(unused);
                 bus.give_links_back(links);

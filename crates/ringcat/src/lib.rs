@@ -144,9 +144,9 @@ pub use parts::ProbedParts;
 pub use probe::{CycleJob, CycleProbe, FramesIn, JobProbe, JobTime, JobTimes};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
-pub use stop::{Deactivated, Ended};
+pub use stop::Deactivated;
 pub use subdevice::{ListLengths, MailboxStatus, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
-pub use supervisor_thread::SupervisorThread;
+pub use supervisor_thread::{Ended, SupervisorThread};
 pub use value::{Number, ObjectValue};
 
 pub use ringcat_engine::BlockedPort;

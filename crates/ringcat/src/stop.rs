@@ -10,7 +10,7 @@ use crate::application::{Application, LastOutputs};
 use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::{MainDevice, Refused};
-use crate::supervisor_thread::SupervisorThread;
+use crate::supervisor_thread::{Ended, SupervisorThread};
 
 /// Whether last cycles may be sent: in role INACTIVE the segment belongs to another MainDevice.
 fn is_allowed(engine: &Engine, function: Function) -> bool {
@@ -91,16 +91,6 @@ impl<L: Links> Application<L, SupervisorThread> {
             Err(error) => Err(Box::new(Refused { error, main_device })),
         }
     }
-}
-
-/// What an application of two threads leaves: another one may be activated with both.
-#[derive(Debug)]
-#[non_exhaustive]
-pub struct Ended<L> {
-    /// The thread of the acyclic half.
-    pub supervisor: SupervisorThread,
-    /// The links of the cycles.
-    pub links: L,
 }
 
 /// What a deactivated application leaves; the same if the deactivation was not complete.

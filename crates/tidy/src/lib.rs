@@ -19,7 +19,7 @@
 //! * [`deny`]: licences, versions and sources of crates match `deny.toml`;
 //! * [`evidence`]: the lists of tests in `docs/` are current;
 //! * [`explorers`]: the list of random scenarios in `ci/explorers.toml` is complete;
-//! * [`paths`]: the paths in `docs/ARCHITECTURE.md` exist;
+//! * [`paths`], [`links`]: the paths in `docs/ARCHITECTURE.md` exist, and what pages link to;
 //! * [`toolchain`]: the same minimum Rust version everywhere;
 //! * [`circles`]: the files of a crate name each other without circles, over [`names`] and [`arrows`];
 //! * [`limits`]: lines of functions and files, columns of lines, names of tests;
@@ -50,6 +50,7 @@ pub mod handed_on;
 pub mod interface;
 pub mod known;
 pub mod limits;
+pub mod links;
 pub mod mailboxes;
 pub mod modules;
 pub mod names;

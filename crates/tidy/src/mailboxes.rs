@@ -152,7 +152,7 @@ mod tests {
     fn functions_and_methods_of_mailboxes_without_a_method_of_the_handle_are_found() {
         let mailbox = "//! It.\n\nimpl Mailbox {\n    pub fn counters(&self) {}\n    pub fn is_idle(&self) {}\n    \
                        pub(crate) fn near(&self) {}\n}\n";
-        let upload = "//! It.\n\npub async fn upload(mailbox: &Mailbox) {}\n\npub async fn read(mailbox: &Mailbox) {}\n\n\
+        let upload = "//! It.\n\npub async fn upload(mailbox: &Mailbox) {}\n\npub async fn read(mailbox: &Mailbox) {}\n\
                       pub fn other(bytes: &[u8]) {}\n";
         let handle = "//! It.\n\nfn f(mailbox: Mailbox) {\n    mailbox.counters();\n    coe::upload(&mailbox);\n}\n";
         let file = |name: &str, text: &str| File::new(&format!("{ENGINE}{name}"), text);

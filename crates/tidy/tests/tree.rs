@@ -5,8 +5,8 @@ use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
     Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources, toolchain,
-    words,
+    interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources,
+    toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -149,6 +149,13 @@ fn the_list_of_random_scenarios_is_complete() {
 #[test]
 fn paths_in_the_architecture_page_exist() {
     none(paths::leading_nowhere(&tree()));
+}
+
+// covers: tree
+#[test]
+fn relative_links_of_pages_lead_to_files_and_headings() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    none(links::broken(&tree(), |path| root.join(path).exists()));
 }
 
 #[test]

@@ -32,7 +32,7 @@ fn state_of(slave: &SlaveObject) -> Outcome<SlaveConfigState> {
     let position = master.look(|draft| draft.info(slave.index).map(|info| info.position))?;
     let Some(Position(position)) = position else { return Ok(pack(false, false, 0)) };
     let read = master.bus()?.supervisor().subdevice(Position(position)).state();
-    let al_state = read.ok().and_then(|(status, _)| status.al_state());
+    let al_state = read.ok().and_then(|it| it.status.al_state());
     Ok(pack(al_state.is_some(), false, al_state.map_or(0, |state| state.code())))
 }
 

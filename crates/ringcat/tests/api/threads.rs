@@ -202,7 +202,7 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
     wrong.domains[0].members[0].subdevice = SubDeviceId(99);
     let refused = supervisor.activate(wrong, cyclic).expect_err("there is no SubDevice 99");
     assert!(refused.error.to_string().starts_with("activation: "), "{}", refused.error);
-    let (supervisor, cyclic) = refused.main_device;
+    let Ended { supervisor, links: cyclic, .. } = refused.main_device;
     assert!(supervisor.activate(good, cyclic).is_ok());
     Ok(())
 }

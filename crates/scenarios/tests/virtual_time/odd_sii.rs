@@ -184,7 +184,11 @@ fn mailboxes_on_other_sync_managers_work_as_in_the_sii() {
         let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
         assert!(world.network_mut().device_mut(DeviceIndex(ODD)).application.emergency(&emergency));
         world.run_cycles(50);
-        assert_eq!(mailbox.pop_emergency().map(|(_, kept)| kept), Some(emergency), "shows mail: {shows_mail}");
+        assert_eq!(
+            mailbox.pop_emergency().map(|received| received.emergency),
+            Some(emergency),
+            "shows mail: {shows_mail}"
+        );
         world.power_off(DeviceIndex(ODD));
         world.run_cycles(20);
         world.power_on(DeviceIndex(ODD));
