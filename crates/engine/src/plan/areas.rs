@@ -79,7 +79,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     };
     let bits: u64 = pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
     // The default length of the SII does not apply if the dictionary was read and assigns no PDO.
-    let is_known = assignment.is_some() || !pdos.is_empty() || info.read_online.contains(&index);
+    let is_known = assignment.is_some() || !pdos.is_empty() || info.pdo_source.is_of_dictionary();
     let length = if is_known {
         let too_long = PlanProblem::TooLong { sync_manager: index, bits };
         u16::try_from(bits.div_ceil(8)).map_err(|_| too_long)?

@@ -20,7 +20,9 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Addressed, IdleObservation, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
+use crate::segment::{
+    Addressed, IdleObservation, MemberFinding, Observation, PdoFinding, Segment, UndeclaredObservation, Words,
+};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -163,6 +165,16 @@ impl SharedSegment {
             ring: self.board.ring(),
             supervision: self.board.supervision(),
             cycles: self.board.cycles(),
+        }
+    }
+
+    /// Passes to the model which members have got mail that has changed their PDOs since they were known.
+    pub(crate) fn observe_written_pdos(&self) {
+        for (index, mailbox) in self.mailboxes.iter().enumerate().filter(|(_, mailbox)| mailbox.has_written_pdos()) {
+            mailbox.forget_written_pdos();
+            let attempt = self.view().member(index).map(|member| member.attempt);
+            let outdated = |attempt| self.observe_member((index, attempt), MemberFinding::Pdos(PdoFinding::Outdated));
+            attempt.into_iter().for_each(outdated);
         }
     }
 

@@ -6,4 +6,4 @@ mod upkeep;
 
 pub(super) use keeping::Keeping;
 pub use observation::{KeptState, StateRead, UndeclaredObservation};
-pub use upkeep::{AttemptFailure, Upkeep, UpkeepProgress};
+pub use upkeep::{AttemptFailure, PdoReading, Upkeep, UpkeepProgress};

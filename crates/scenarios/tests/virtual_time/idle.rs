@@ -3,6 +3,8 @@
 
 mod foreign;
 mod load;
+mod on_the_way;
+mod pdos;
 mod sequences;
 
 use std::time::Duration;

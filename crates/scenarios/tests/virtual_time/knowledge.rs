@@ -7,6 +7,7 @@ mod changes;
 mod clocks;
 mod crashes;
 mod mail;
+mod pdos;
 mod rounds;
 mod under_way;
 

@@ -10,11 +10,11 @@ use ringcat_wire::register::map;
 use super::places::wrong_addresses;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::dictionary::complete;
-use crate::procedures::scan::{Learned, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
+use crate::procedures::scan::{Learned, Said, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
-use crate::segment::Found;
 use crate::segment::view::View;
+use crate::segment::{Found, Given};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -45,14 +45,15 @@ pub(crate) async fn scan_again(
     };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let places: Vec<(Position, StationAddress)> = (0..).map(Position).zip(now.stations.iter().copied()).collect();
-    let fresh = places.iter().copied().filter(|(_, station)| given.contains(station)).collect();
+    let of = |station: StationAddress| given.iter().find(|given| given.station == station);
+    let fresh = places.iter().filter_map(|(position, station)| Some((*position, *of(*station)?))).collect();
     let mut read = read_new(bus, options, fresh).await?.into_iter();
     let registers =
         bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
     let mut subdevices = Vec::with_capacity(now.stations.len());
     for registers in registers.await {
         let registers = registers?;
-        let known = known.iter().find(|info| info.station == registers.station && !given.contains(&info.station));
+        let known = known.iter().find(|info| info.station == registers.station && of(info.station).is_none());
         subdevices.push(match known {
             Some(info) => info.seen_at(&registers),
             None => {
@@ -98,18 +99,19 @@ fn unknown(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
 async fn read_new(
     bus: &Bus,
     options: &ScanOptions,
-    fresh: Vec<(Position, StationAddress)>,
+    fresh: Vec<(Position, Given)>,
 ) -> Result<Vec<SubDeviceInfo>, ScanError> {
     if fresh.is_empty() {
         return Ok(Vec::new());
     }
     let cache = options.cache.clone();
-    let read = bus.gather(fresh, |bus, (position, station)| {
-        let cache = cache.clone();
+    let read = bus.gather(fresh, |bus, (position, given)| {
+        let (cache, station) = (cache.clone(), given.station);
         async move {
             level(&bus, station).await?;
-            let contents = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
-            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &contents))
+            let said = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
+            let said = Said { pdo_source: given.pdo_source(), ..said };
+            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &said))
         }
     });
     let subdevices = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;

@@ -11,6 +11,7 @@ use crate::segment::choices::Retries;
 use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
+use crate::segment::pdo_finding::PdoFinding;
 use crate::segment::reading::Reading;
 use crate::segment::undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
 use crate::time::Instant;
@@ -95,6 +96,7 @@ impl Segment {
             UndeclaredObservation::AttemptEnded { key, attempt, failure } => {
                 self.end_attempt((key, attempt), failure, now, effects);
             }
+            UndeclaredObservation::Pdos { key, finding } => self.observe_undeclared_pdos(key, finding, effects),
             UndeclaredObservation::StatesRead(read) => self.observe_states(read, now, effects),
             UndeclaredObservation::Forced(key) => self.leave(key),
         }
@@ -135,6 +137,7 @@ impl Segment {
             self.take_over(now);
         }
         self.keeping.observe(&self.subdevices, effects);
+        self.read_open_pdos(effects);
     }
 
     /// Begins the attempts that are due.
@@ -187,6 +190,10 @@ impl Segment {
         let is_due = upkeep.end(failure.as_ref(), retries, now);
         match failure {
             None if upkeep.target == AlState::Op => effects.start(Task::KeepOutputs { key, attempt }),
+            // A boot loader may bring another dictionary.
+            None if upkeep.target == AlState::Boot => {
+                self.observe_undeclared_pdos(key, PdoFinding::Outdated, effects);
+            }
             None => {}
             Some(AttemptFailure { reason, .. }) if is_due && is_kept => {
                 effects.report(Event::UndeclaredFailed { position, reason });

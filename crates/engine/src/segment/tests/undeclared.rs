@@ -1,5 +1,7 @@
 //! SubDevices without a declaration: requested states, attempts, mailboxes, and findings that are refused.
 
+mod pdos;
+
 use alloc::string::String;
 
 use crate::segment::view::View;
@@ -321,7 +323,7 @@ fn a_subdevice_that_is_found_beside_an_application_is_kept_as_well() {
         stations: stations.into_iter().chain([TEMPORARY]).collect(),
     };
     let versions = idle.segment.versions();
-    idle.observe(Observation::Given { versions, view: &view, given: &[TEMPORARY] });
+    idle.observe(Observation::Given { versions, view: &view, given: &[given(TEMPORARY)] });
     let key = idle.key(3);
     let info = SubDeviceInfo { station: TEMPORARY, ..SubDeviceInfo::default() };
     assert_eq!(mailboxes(&idle.observe(Observation::Read { key, read: Ok(Rc::new(info)) })), None, "may be a member");

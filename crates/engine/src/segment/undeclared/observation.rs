@@ -6,6 +6,7 @@ use ringcat_wire::al::AlState;
 use super::upkeep::{AttemptFailure, UpkeepProgress};
 use crate::segment::effect::Shown;
 use crate::segment::key::SubDeviceKey;
+use crate::segment::pdo_finding::PdoFinding;
 use crate::segment::reading::Reading;
 
 /// The state of a SubDevice without a declaration was read.
@@ -52,6 +53,13 @@ pub enum UndeclaredObservation<'a> {
         attempt: u32,
         /// Why it has failed; `None` if the state was reached.
         failure: Option<AttemptFailure>,
+    },
+    /// Something was found about the PDOs in the dictionary of one.
+    Pdos {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// The finding.
+        finding: PdoFinding<'a>,
     },
     /// States were read.
     StatesRead(&'a [StateRead]),
