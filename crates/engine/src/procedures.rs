@@ -25,6 +25,7 @@ pub mod mail_watch;
 pub(crate) mod own_objects;
 mod presence;
 mod read_again;
+mod read_state;
 pub(crate) mod reconcile;
 pub mod recover;
 pub(crate) mod request_state;

@@ -79,7 +79,7 @@ pub use scan::{Found, Scan};
 pub use seen::Seen;
 pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
-pub use undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, UpkeepProgress};
+pub use undeclared::{AttemptFailure, KeptState, ShownState, StateRead, UndeclaredObservation, UpkeepProgress};
 pub use versions::Versions;
 
 #[cfg(test)]

@@ -98,13 +98,15 @@ impl MainDevice {
         let is_kept = self.options.idle_operation;
         if is_kept {
             segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
+            segment.observe_idle(IdleObservation::Deactivating);
+            segment.observe_idle(IdleObservation::Begun);
         }
         self.supervisor.spawn(async move {
             restore(&bus, &segment).await;
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {
-                segment.observe_idle(IdleObservation::Begun);
+                segment.observe_idle(IdleObservation::Deactivated);
             }
         });
         Ok(())

@@ -179,33 +179,35 @@ async fn attempt(
 }
 
 /// Reads the data of the counted SubDevices while the count settles. A changed count ends the attempt at once,
-/// regardless of the reading.
+/// regardless of the reading: also later, because slow EEPROMs may take long.
 async fn read_while_settling(
     bus: &Bus,
     options: &ScanOptions,
     expected: &Count,
     power_ons: &mut PowerOns,
 ) -> Result<Vec<Said>, Failure> {
-    let settling = async { count::settle(bus, expected, options.settle).await.map_err(Failure::Unsettled) };
-    let mut settling = pin!(settling);
     let mut reading = pin!(identify(bus, expected.total() as u16, options, power_ons));
-    let (mut settled, mut read) = (false, None);
+    let mut read = None;
+    let mut settling = pin!(count::settle(bus, expected, options.settle));
     poll_fn(|context| {
-        if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
-            if let Err(failure) = result {
-                return Poll::Ready(Err(failure));
-            }
-            settled = true;
-        }
         if read.is_none()
             && let Poll::Ready(result) = reading.as_mut().poll(context)
         {
             read = Some(result);
         }
-        if !settled {
-            return Poll::Pending;
-        }
-        read.take().map_or(Poll::Pending, |result| Poll::Ready(result.map_err(Failure::from)))
+        settling.as_mut().poll(context).map_err(Failure::Unsettled)
+    })
+    .await?;
+    if let Some(read) = read {
+        return read.map_err(Failure::from);
+    }
+    let mut changed = pin!(count::until_changed(bus, expected));
+    poll_fn(|context| match reading.as_mut().poll(context) {
+        Poll::Ready(result) => Poll::Ready(result.map_err(Failure::from)),
+        Poll::Pending => changed.as_mut().poll(context).map(|after| {
+            let before = expected.by_link();
+            Err(ScanError::Changed { before, after }.into())
+        }),
     })
     .await
 }

@@ -71,15 +71,22 @@ impl SharedSegment {
     /// continue beside it share procedures to be started, and changes wake them as well.
     pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
         let Beside { mailboxes, cache, statistics } = beside;
+        // No broadcast follows.
+        self.board.post_end();
         let eeproms = EepromTurns::new(bus);
         let (mailboxes, results) = (mailboxes.into(), AttemptResults::default());
         SharedSegment { mailboxes, results, cache, statistics, board, eeproms, ..self.clone() }
     }
 
     /// The same model, without an application and on another bus.
+    /// While broadcasts follow, what is shown of the segment as a whole goes on.
     pub fn without_application(&self, bus: &Bus) -> SharedSegment {
         let undeclared = self.undeclared.renewed(bus);
-        SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared)
+        let without = SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared);
+        if self.view().has_idle_operation() {
+            without.board.go_on_from(&self.board);
+        }
+        without
     }
 
     fn without(

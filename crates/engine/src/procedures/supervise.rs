@@ -76,7 +76,7 @@ fn observe_states(segment: &SharedSegment, settled: &[(SubDeviceKey, u32)], read
     let reading = |key: SubDeviceKey| read.iter().find(|(other, _)| *other == key).map(|(_, reading)| *reading);
     let read = settled
         .iter()
-        .filter_map(|(key, attempt)| Some(StateRead { key: *key, attempt: *attempt, reading: reading(*key)? }));
+        .filter_map(|(key, attempt)| Some(StateRead { key: *key, attempt: *attempt, shown: reading(*key)?.into() }));
     let read: Vec<StateRead> = read.collect();
     if !read.is_empty() {
         segment.observe_undeclared(UndeclaredObservation::StatesRead(&read));

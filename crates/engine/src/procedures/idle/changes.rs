@@ -3,6 +3,9 @@
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
@@ -14,7 +17,7 @@ use crate::procedures::scan::{Learned, Said, Scan, ScanError, ScanOptions, ask, 
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
 use crate::segment::view::View;
-use crate::segment::{Found, Given};
+use crate::segment::{Found, Given, IdleObservation};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -34,7 +37,9 @@ pub(crate) async fn scan_again(
         return Ok(Some(nothing()));
     }
     let mut others = unknown(&before, known);
-    others.extend(wrong_addresses(bus, segment, (&before, last), known).await?);
+    let wrong = while_reading(segment, &[], wrong_addresses(bus, segment, (&before, last), known)).await;
+    let Some(wrong) = wrong else { return Ok(None) };
+    others.extend(wrong?);
     let (given, now) = if others.is_empty() {
         (Vec::new(), before)
     } else {
@@ -47,7 +52,8 @@ pub(crate) async fn scan_again(
     let places: Vec<(Position, StationAddress)> = (0..).map(Position).zip(now.stations.iter().copied()).collect();
     let of = |station: StationAddress| given.iter().find(|given| given.station == station);
     let fresh = places.iter().filter_map(|(position, station)| Some((*position, *of(*station)?))).collect();
-    let mut read = read_new(bus, options, fresh).await?.into_iter();
+    let Some(read) = while_reading(segment, &others, read_new(bus, options, fresh)).await else { return Ok(None) };
+    let mut read = read?.into_iter();
     let registers =
         bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
     let mut subdevices = Vec::with_capacity(now.stations.len());
@@ -66,6 +72,26 @@ pub(crate) async fn scan_again(
     let infos: Vec<SubDeviceInfo> = subdevices.iter().map(|info| (**info).clone()).collect();
     let Learned { topology, .. } = connect(bus, options.junctions, &infos, main_count).await?;
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
+}
+
+/// Runs a procedure that only reads, and may take long because of slow EEPROMs; `None` as soon as broadcasts show another
+/// change. `readdressed`: former addresses of SubDevices that have got others.
+async fn while_reading<T>(
+    segment: &SharedSegment,
+    readdressed: &[StationAddress],
+    procedure: impl Future<Output = T>,
+) -> Option<T> {
+    segment.observe_idle(IdleObservation::ReadingBegun(readdressed));
+    let begun = segment.view().idle_changes();
+    let mut procedure = pin!(procedure);
+    let mut changed = pin!(segment.until(|model| (model.idle_changes() != begun).then_some(())));
+    let result = poll_fn(|context| match procedure.as_mut().poll(context) {
+        Poll::Ready(result) => Poll::Ready(Some(result)),
+        Poll::Pending => changed.as_mut().poll(context).map(|()| None),
+    });
+    let result = result.await;
+    segment.observe_idle(IdleObservation::ReadingEnded);
+    result
 }
 
 /// A segment without SubDevices.

@@ -12,14 +12,20 @@ use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
 use crate::segment::pdo_finding::PdoFinding;
-use crate::segment::reading::Reading;
-use crate::segment::undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
+use crate::segment::undeclared::{
+    AttemptFailure, KeptState, ShownState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress,
+};
 use crate::time::Instant;
 
 impl Segment {
     /// Whether SubDevices without a declaration are kept in their requested states.
     pub fn keeps_undeclared(&self) -> bool {
         self.keeping.is_on
+    }
+
+    /// Whether broadcasts watch the segment without an application.
+    pub fn has_idle_operation(&self) -> bool {
+        self.choices.idle_operation
     }
 
     /// What follows a failed configuration.
@@ -64,7 +70,12 @@ impl Segment {
 
     /// All with a requested state, reached or not, with the numbers of their last attempts.
     pub fn kept(&self) -> Vec<(SubDeviceKey, u32)> {
-        self.upkeeps().map(|(key, it)| (key, it.attempt)).collect()
+        self.kept_from(0).collect()
+    }
+
+    /// The same without the first ones.
+    pub fn kept_from(&self, first: usize) -> impl Iterator<Item = (SubDeviceKey, u32)> + '_ {
+        self.upkeeps().skip(first).map(|(key, it)| (key, it.attempt))
     }
 
     /// Station addresses of the others.
@@ -223,8 +234,8 @@ impl Segment {
         if !self.keeping.is_on {
             return;
         }
-        for StateRead { key, attempt, reading } in read {
-            let Reading::Answer { status, code, .. } = *reading else { continue };
+        for StateRead { key, attempt, shown } in read {
+            let ShownState::Shown((status, code)) = *shown else { continue };
             let Some((_, it)) = self.subdevices.unassigned_mut(*key) else { continue };
             let position = it.position;
             if it.upkeep.as_mut().is_some_and(|upkeep| upkeep.has_left(*attempt, status, now)) {

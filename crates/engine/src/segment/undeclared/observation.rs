@@ -7,7 +7,6 @@ use super::upkeep::{AttemptFailure, UpkeepProgress};
 use crate::segment::effect::Shown;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::pdo_finding::PdoFinding;
-use crate::segment::reading::Reading;
 
 /// The state of a SubDevice without a declaration was read.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +16,18 @@ pub struct StateRead {
     /// The attempt that had reached its state when the read was requested.
     pub attempt: u32,
     /// The result.
-    pub reading: Reading,
+    pub shown: ShownState,
+}
+
+/// What a read of the state of one SubDevice has shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownState {
+    /// Its frames were lost: no information.
+    Unknown,
+    /// Its station address is not, or not only, its own.
+    Elsewhere,
+    /// Its AL status and code.
+    Shown(Shown),
 }
 
 /// The requested state of a SubDevice that another process has kept, as its registers show it now.
