@@ -9,6 +9,7 @@ mod areas;
 mod check;
 mod declared;
 mod error;
+mod pdos;
 mod sdos;
 mod subdevice;
 
@@ -69,7 +70,7 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
             let mailbox = layout.map(|layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
             let mailbox = mailbox.unwrap_or_default();
             let process_data = areas::areas(config, info, &mailbox)?;
-            let pdos = sdos::pdo_plans(config, info, &process_data, &mut warnings);
+            let pdos = pdos::pdo_plans(config, info, &process_data, &mut warnings);
             (mailbox, process_data, pdos)
         }
     };

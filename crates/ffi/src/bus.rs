@@ -215,7 +215,8 @@ impl Bus {
     }
 
     /// Waits until the scan has ended and the PDOs of the dictionaries are known. SubDevices that are not in PREOP yet
-    /// are on their way; what needs their mailboxes waits for that, and an activation leads them on from where they are.
+    /// are on their way; what needs their mailboxes waits for that, and an activation leads them on from where they
+    /// are.
     pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {

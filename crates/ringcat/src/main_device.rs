@@ -44,9 +44,7 @@ pub struct Options {
     /// in [`MainDevice::bring_up`]. The less, the sooner SubDevices are in OP; the rest is read in the background
     /// afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
     pub sii_extent: Option<SiiExtent>,
-    /// Dictionaries that are read for PDOs: after a scan, which brings the SubDevice to PREOP and back for this, and of
-    /// SubDevices without a declaration in PREOP. `None`, the default: after a scan those of SubDevices whose SII lacks
-    /// PDOs, in PREOP with idle operation those of all SubDevices with CoE.
+    /// Dictionaries read for PDOs. `None`: [`ReadPdos::Missing`], in PREOP with idle operation [`ReadPdos::Always`].
     pub pdos: Option<ReadPdos>,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
     /// automatically.

@@ -52,8 +52,8 @@ impl MainDevice {
         }
     }
 
-    /// Options of scans that no application has requested. SubDevices that are kept in PREOP have their dictionaries read
-    /// there.
+    /// Options of scans that no application has requested. SubDevices that are kept in PREOP have their dictionaries
+    /// read there.
     pub(super) fn own_scan_options(&self) -> ScanOptions {
         let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
         let pdos = if self.options.idle_operation { ReadPdos::Never } else { options.pdos };

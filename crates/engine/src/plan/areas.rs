@@ -9,12 +9,10 @@ use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan};
-use crate::config::{PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
+use crate::config::{ASSIGNMENT_BASE, PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
 use crate::info::{Direction, PdoInfo, SubDeviceInfo};
 use crate::order::InOrder;
 
-/// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
-pub(super) const ASSIGNMENT_BASE: u16 = 0x1C10;
 /// Largest number of PDOs in an assignment, and of entries in a PDO: subindices 1 to 254.
 const MAX_OBJECT_ENTRIES: usize = 254;
 

@@ -84,9 +84,9 @@ async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut 
 }
 
 /// One frame with a broadcast read of AL status and reads of single SubDevices; `None` if it is lost.
-async fn ask(bus: &Bus, kept: &[(SubDeviceKey, u32)]) -> Option<(Supervision, Vec<StateRead>)> {
+async fn ask(bus: &Bus, kept: &[(SubDeviceKey, Option<u32>)]) -> Option<(Supervision, Vec<StateRead>)> {
     let all = (Command::Brd, Target::Broadcast(map::AL_STATUS), vec![0; AlStatus::LEN]);
-    let one = |(key, _): &(SubDeviceKey, u32)| {
+    let one = |(key, _): &(SubDeviceKey, Option<u32>)| {
         (Command::Fprd, Target::Station(key.station, map::AL_STATUS), vec![0; read_state::LEN])
     };
     let reads: Vec<_> = core::iter::once(all).chain(kept.iter().map(one)).collect();

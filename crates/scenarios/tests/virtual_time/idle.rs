@@ -75,12 +75,16 @@ fn events(main_device: &mut MainDevice<Tap>) -> Vec<TimedEvent> {
 /// Time from now on until an event.
 fn noticed(main_device: &mut MainDevice<Tap>, is_it: impl Fn(&Event) -> bool) -> Duration {
     let begun = main_device.now();
+    let mut others = Vec::new();
     loop {
         main_device.attend(Duration::from_millis(1));
-        if let Some(event) = events(main_device).into_iter().find(|timed| is_it(&timed.event)) {
+        let happened = events(main_device);
+        if let Some(event) = happened.iter().find(|timed| is_it(&timed.event)) {
             return event.at.since(begun);
         }
-        assert!(main_device.now().since(begun) < Duration::from_secs(5), "it is not noticed");
+        others.extend(happened.into_iter().map(|timed| timed.event));
+        let is_late = main_device.now().since(begun) >= Duration::from_secs(5);
+        assert!(!is_late, "it is not noticed: {others:?}, {} are known", main_device.subdevices().len());
     }
 }
 

@@ -13,7 +13,9 @@ use ringcat_wire::register::map;
 use super::places::wrong_addresses;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::dictionary::complete;
-use crate::procedures::scan::{Learned, Said, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
+use crate::procedures::scan::{
+    Learned, MAX_SUBDEVICES, Said, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers,
+};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
 use crate::segment::view::View;
@@ -37,22 +39,18 @@ pub(crate) async fn scan_again(
         return Ok(Some(nothing()));
     }
     let mut others = unknown(&before, known);
-    let wrong = while_reading(segment, &[], wrong_addresses(bus, segment, (&before, last), known)).await;
+    let lost = lost(&before, known);
+    let wrong = while_reading(segment, &lost, wrong_addresses(bus, segment, (&before, last), known)).await;
     let Some(wrong) = wrong else { return Ok(None) };
     others.extend(wrong?);
-    let (given, now) = if others.is_empty() {
-        (Vec::new(), before)
-    } else {
-        let (given, is_complete) = give(bus, segment, &before, &others).await?;
-        let now = if is_complete { seen(bus).await? } else { None };
-        let Some(now) = now else { return Ok(None) };
-        (given, now)
-    };
+    let readdressed = [others.clone(), lost].concat();
+    let Some((given, now)) = give_all(bus, segment, before, others).await? else { return Ok(None) };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let places: Vec<(Position, StationAddress)> = (0..).map(Position).zip(now.stations.iter().copied()).collect();
     let of = |station: StationAddress| given.iter().find(|given| given.station == station);
     let fresh = places.iter().filter_map(|(position, station)| Some((*position, *of(*station)?))).collect();
-    let Some(read) = while_reading(segment, &others, read_new(bus, options, fresh)).await else { return Ok(None) };
+    let reading = while_reading(segment, &readdressed, read_new(bus, options, fresh));
+    let Some(read) = reading.await else { return Ok(None) };
     let mut read = read?.into_iter();
     let registers =
         bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
@@ -74,8 +72,31 @@ pub(crate) async fn scan_again(
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
 }
 
-/// Runs a procedure that only reads, and may take long because of slow EEPROMs; `None` as soon as broadcasts show another
-/// change. `readdressed`: former addresses of SubDevices that have got others.
+/// Gives each SubDevice with one of these addresses one of its own, in as many rounds as that takes. `None` if no
+/// address could be given in one of them.
+async fn give_all(
+    bus: &Bus,
+    segment: &SharedSegment,
+    mut now: View,
+    mut old: Vec<StationAddress>,
+) -> Result<Option<(Vec<Given>, View)>, BusError> {
+    let mut given: Vec<Given> = Vec::new();
+    while !old.is_empty() {
+        let (more, is_complete) = give(bus, segment, &now, &old).await?;
+        let is_stuck = more.is_empty() || given.len() > usize::from(MAX_SUBDEVICES);
+        given.extend(more);
+        let Some(view) = seen(bus).await?.filter(|_| is_complete || !is_stuck) else { return Ok(None) };
+        now = view;
+        if is_complete {
+            break;
+        }
+        old.retain(|station| now.positions(*station).next().is_some());
+    }
+    Ok(Some((given, now)))
+}
+
+/// Runs a procedure that only reads, and may take long because of slow EEPROMs; `None` as soon as broadcasts show
+/// another change. `readdressed`: addresses of which it is known that no SubDevice, or several, have them.
 async fn while_reading<T>(
     segment: &SharedSegment,
     readdressed: &[StationAddress],
@@ -119,6 +140,12 @@ fn unknown(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
         }
     }
     unknown
+}
+
+/// Addresses of known SubDevices that none has any more, or several have.
+fn lost(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
+    let stations = known.iter().map(|info| info.station);
+    stations.filter(|station| view.position(*station).is_none()).collect()
 }
 
 /// Reads SubDevices with new addresses; they are in INIT.

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::SubDeviceKey;
 
-/// SubDevices per broadcast: 100 have had their turn after 80 ms.
-const TURN: usize = 25;
+/// SubDevices per broadcast: 100 have had their turn after 60 ms.
+const TURN: usize = 34;
 
 /// Whose turn it is.
 #[derive(Debug, Default)]
@@ -16,14 +16,14 @@ pub(super) struct StateTurns {
 }
 
 impl StateTurns {
-    /// The next SubDevices, with the numbers of their last attempts; none while a scan gives
-    /// addresses or changes ports.
-    pub fn next(&mut self, segment: &SharedSegment) -> Vec<(SubDeviceKey, u32)> {
+    /// The next SubDevices, with the attempts that have reached their states; none while a scan gives addresses or
+    /// changes ports.
+    pub fn next(&mut self, segment: &SharedSegment) -> Vec<(SubDeviceKey, Option<u32>)> {
         let view = segment.view();
         if !view.is_segment_visible() {
             return Vec::new();
         }
-        let mut next: Vec<(SubDeviceKey, u32)> = view.kept_from(self.done).take(TURN).collect();
+        let mut next: Vec<(SubDeviceKey, Option<u32>)> = view.kept_from(self.done).take(TURN).collect();
         if next.is_empty() {
             self.done = 0;
             next.extend(view.kept_from(0).take(TURN));

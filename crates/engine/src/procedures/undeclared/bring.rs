@@ -24,11 +24,12 @@ use crate::procedures::al_state;
 use crate::procedures::assign_pdos::{Known, assign};
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::dictionary::{self, Dictionary};
+use crate::procedures::read_state;
 use crate::procedures::recover::is_of_bus;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::visit::visit;
 use crate::segment::setup::SetupError;
-use crate::segment::{PdoFinding, SubDeviceKey, UndeclaredObservation};
+use crate::segment::{PdoFinding, ShownState, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::{Bus, BusError};
 
 /// Time limits of one request for PDOs.
@@ -71,7 +72,7 @@ impl Bringing<'_> {
             return true;
         }
         self.mailbox.forget_written_pdos();
-        let dictionary = dictionary::read(self.bus, &self.info, &self.mailbox).await;
+        let dictionary = self.while_in_preop(dictionary::read(self.bus, &self.info, &self.mailbox)).await;
         let finding = match &dictionary {
             Dictionary::Held(held) => PdoFinding::Held(held),
             Dictionary::None => PdoFinding::Unreadable,
@@ -87,6 +88,25 @@ impl Bringing<'_> {
             self.info = info.clone();
         }
         true
+    }
+
+    /// Reads its dictionary until it shows a state without mail: no answer is waited for then.
+    async fn while_in_preop(&self, reading: impl Future<Output = Dictionary>) -> Dictionary {
+        let left = async {
+            loop {
+                self.bus.sleep(READ_PAUSE).await;
+                let shown = read_state::read(self.bus, self.info.station).await;
+                if matches!(shown, ShownState::Shown((status, _)) if status.al_state() == Some(AlState::Init)) {
+                    return Dictionary::Interrupted;
+                }
+            }
+        };
+        let (mut reading, mut left) = (pin!(reading), pin!(left));
+        poll_fn(|context| match reading.as_mut().poll(context) {
+            Poll::Ready(dictionary) => Poll::Ready(dictionary),
+            Poll::Pending => left.as_mut().poll(context),
+        })
+        .await
     }
 
     /// Has its dictionary hold what is known of it, if another owner may have written it and it cannot be read.

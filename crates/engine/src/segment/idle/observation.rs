@@ -39,7 +39,8 @@ pub enum IdleObservation<'a> {
     StatesRead(&'a [StateRead]),
     /// The states of some of them were read, beside a broadcast.
     SomeRead(&'a [StateRead]),
-    /// The scan under way reads EEPROMs from now on; former addresses of SubDevices that it has given others.
+    /// The scan under way reads EEPROMs from now on; addresses of which it knows that no SubDevice, or several, have
+    /// them.
     ReadingBegun(&'a [StationAddress]),
     /// It no longer does.
     ReadingEnded,

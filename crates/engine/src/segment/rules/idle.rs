@@ -163,14 +163,14 @@ impl Segment {
     /// Another number of SubDevices is reported at once, also while a procedure works on the segment: what it finds is
     /// outdated then.
     fn note_change(&mut self, shown: &Shown, effects: &mut Effects) {
-        let Shown { counts, ports_changed, .. } = *shown;
+        let counts = shown.counts;
         // The first scan counts by itself.
         let Some(found) = self.found().map(|found| found.counts()) else { return };
         let is_counted = self.idle.counted.replace(counts).unwrap_or(found) == counts;
         if !is_counted {
             effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
         }
-        if !is_counted || (ports_changed && self.idle.work == Work::FollowReads) {
+        if !is_counted {
             self.idle.changes = self.idle.changes.wrapping_add(1);
         }
     }

@@ -2,6 +2,7 @@
 
 use alloc::rc::Rc;
 use alloc::string::ToString;
+use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
@@ -13,7 +14,11 @@ use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
 use crate::segment::pdo_finding::PdoFinding;
-use crate::segment::undeclared::{PdoReading, UpkeepProgress};
+use crate::segment::undeclared::{PdoReading, Upkeep, UpkeepProgress};
+
+/// Dictionaries of SubDevices in their states that are read at once: requests of the application do not wait for those
+/// of 100.
+const READ_AT_ONCE: usize = 8;
 
 impl Segment {
     /// Processes a finding about the PDOs of the SubDevice with a station address.
@@ -89,13 +94,15 @@ impl Segment {
             }
     }
 
-    /// Whether dictionaries are about to be read, or are being read, of SubDevices on their first way to PREOP or in it.
+    /// Whether dictionaries are about to be read, or are being read, of SubDevices on their first way to a state with
+    /// mail, or in it.
     pub fn are_pdos_awaited(&self) -> bool {
         self.subdevices.unassigned().filter(|it| it.is_undeclared()).any(|it| {
             let is_open = it.knowledge.info().is_some_and(|info| self.wants_pdos(info, false));
             is_open
                 && match &it.upkeep {
                     None => self.choices.idle_operation,
+                    Some(upkeep) if !has_mail(upkeep.target) => false,
                     Some(upkeep) if upkeep.progress == UpkeepProgress::Reached => upkeep.reading != PdoReading::Ended,
                     Some(upkeep) => upkeep.is_on_its_first_way(),
                 }
@@ -108,19 +115,24 @@ impl Segment {
         if self.choices.pdos == ReadPdos::Never {
             return;
         }
-        let is_due = |segment: &Segment, key| {
-            let it = segment.unassigned(key)?;
-            let (upkeep, info) = (it.upkeep.as_ref()?, it.knowledge.info()?);
-            let has_mail = matches!(upkeep.target, AlState::PreOp | AlState::SafeOp | AlState::Op);
-            let is_open = upkeep.progress == UpkeepProgress::Reached && upkeep.reading == PdoReading::Open;
-            (is_open && has_mail && segment.wants_pdos(info, false)).then_some(upkeep.attempt)
-        };
-        let keys: alloc::vec::Vec<SubDeviceKey> = self.subdevices.unassigned().map(|it| it.key).collect();
-        for key in keys {
-            let Some(attempt) = is_due(self, key) else { continue };
+        let kept = || self.subdevices.unassigned().filter_map(|it| Some((it, it.unassigned.upkeep.as_ref()?)));
+        let in_state = || kept().filter(|(_, upkeep)| upkeep.progress == UpkeepProgress::Reached);
+        let under_way = in_state().filter(|(_, upkeep)| upkeep.reading == PdoReading::UnderWay).count();
+        let is_open = |upkeep: &Upkeep| upkeep.reading == PdoReading::Open && has_mail(upkeep.target);
+        let due = in_state().filter(|(it, upkeep)| {
+            is_open(upkeep) && it.knowledge.info().is_some_and(|info| self.wants_pdos(info, false))
+        });
+        let due = due.map(|(it, upkeep)| (it.key, upkeep.attempt)).take(READ_AT_ONCE.saturating_sub(under_way));
+        let due: Vec<(SubDeviceKey, u32)> = due.collect();
+        for (key, attempt) in due {
             let upkeep = self.subdevices.unassigned_mut(key).and_then(|(_, it)| it.upkeep.as_mut());
             upkeep.into_iter().for_each(|upkeep| upkeep.reading = PdoReading::UnderWay);
             effects.start(Task::ReadPdos { key, attempt });
         }
     }
+}
+
+/// Whether a dictionary can be read in a state.
+const fn has_mail(state: AlState) -> bool {
+    matches!(state, AlState::PreOp | AlState::SafeOp | AlState::Op)
 }

@@ -68,14 +68,14 @@ impl Segment {
         self.upkeeps().filter(|(_, it)| it.is_settled()).map(|(key, it)| (key, it.attempt)).collect()
     }
 
-    /// All with a requested state, reached or not, with the numbers of their last attempts.
-    pub fn kept(&self) -> Vec<(SubDeviceKey, u32)> {
+    /// All with a requested state, with the numbers of the attempts that have reached it.
+    pub fn kept(&self) -> Vec<(SubDeviceKey, Option<u32>)> {
         self.kept_from(0).collect()
     }
 
     /// The same without the first ones.
-    pub fn kept_from(&self, first: usize) -> impl Iterator<Item = (SubDeviceKey, u32)> + '_ {
-        self.upkeeps().skip(first).map(|(key, it)| (key, it.attempt))
+    pub fn kept_from(&self, first: usize) -> impl Iterator<Item = (SubDeviceKey, Option<u32>)> + '_ {
+        self.upkeeps().skip(first).map(|(key, it)| (key, it.reached()))
     }
 
     /// Station addresses of the others.
@@ -235,10 +235,10 @@ impl Segment {
             return;
         }
         for StateRead { key, attempt, shown } in read {
-            let ShownState::Shown((status, code)) = *shown else { continue };
+            let (ShownState::Shown((status, code)), Some(attempt)) = (*shown, *attempt) else { continue };
             let Some((_, it)) = self.subdevices.unassigned_mut(*key) else { continue };
             let position = it.position;
-            if it.upkeep.as_mut().is_some_and(|upkeep| upkeep.has_left(*attempt, status, now)) {
+            if it.upkeep.as_mut().is_some_and(|upkeep| upkeep.has_left(attempt, status, now)) {
                 effects.report(Event::UndeclaredState { position, status, code });
             }
         }

@@ -219,7 +219,7 @@ fn a_retry_of_a_member_counts_for_it_alone() {
 fn a_state_that_was_left_is_reported_once_and_brought_back() {
     let mut idle = Idle::kept(&THREE);
     let (key, attempt) = idle.segment.settled()[1];
-    let read = |shown| [StateRead { key, attempt, shown }];
+    let read = |shown| [StateRead { key, attempt: Some(attempt), shown }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read(answer(PREOP)))), []);
     assert_eq!(
         idle.seen(UndeclaredObservation::StatesRead(&read(ShownState::Elsewhere))),
@@ -237,12 +237,14 @@ fn a_state_that_was_read_before_a_request_is_not_taken_for_a_lost_one() {
     let mut idle = Idle::kept(&THREE);
     let (key, attempt) = idle.segment.settled()[0];
     let begun = attempts(&idle.request(0, AlState::Op))[0];
+    assert_eq!(idle.segment.kept()[0], (key, None), "a read that is requested now shows no state that was left");
     idle.end(begun, None);
+    assert_eq!(idle.segment.kept()[0], (key, Some(begun.1)));
     // The read was requested in PREOP, and its answer is evaluated in OP.
-    let early = [StateRead { key, attempt, shown: answer(PREOP) }];
+    let early = [StateRead { key, attempt: Some(attempt), shown: answer(PREOP) }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&early)), []);
     assert_eq!(idle.progress(0), (AlState::Op, UpkeepProgress::Reached));
-    let late = [StateRead { key, attempt: begun.1, shown: answer(PREOP) }];
+    let late = [StateRead { key, attempt: Some(begun.1), shown: answer(PREOP) }];
     assert_eq!(reports(&idle.seen(UndeclaredObservation::StatesRead(&late))).len(), 1);
 }
 
@@ -255,7 +257,7 @@ fn a_forced_state_ends_the_attempt_and_stays_until_the_next_request() {
     assert_eq!(idle.end(begun, refusal()), []);
     assert_eq!((idle.progress(0).1, idle.segment.expected_states()), (UpkeepProgress::Left, None));
     let settled = idle.segment.settled();
-    let read = [StateRead { key, attempt: settled[0].1, shown: answer(AlState::SafeOp) }];
+    let read = [StateRead { key, attempt: Some(settled[0].1), shown: answer(AlState::SafeOp) }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read)), []);
     idle.observe(Observation::Retried(None));
     assert_eq!(idle.seen(UndeclaredObservation::AttemptsDue), []);

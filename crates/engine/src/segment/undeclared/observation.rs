@@ -13,8 +13,8 @@ use crate::segment::pdo_finding::PdoFinding;
 pub struct StateRead {
     /// The SubDevice.
     pub key: SubDeviceKey,
-    /// The attempt that had reached its state when the read was requested.
-    pub attempt: u32,
+    /// The attempt that had reached its state when the read was requested; without one only the address counts.
+    pub attempt: Option<u32>,
     /// The result.
     pub shown: ShownState,
 }

@@ -106,6 +106,11 @@ impl Upkeep {
         self.attempt == attempt && self.progress == UpkeepProgress::Reached
     }
 
+    /// The attempt that has reached its state, which is still requested.
+    pub(in crate::segment) fn reached(&self) -> Option<u32> {
+        Some(self.attempt).filter(|attempt| self.is_reached(*attempt))
+    }
+
     /// Begins another attempt. Returns its number.
     fn begin(&mut self) -> u32 {
         (self.progress, self.reading) = (UpkeepProgress::UnderWay, PdoReading::Open);

@@ -1,5 +1,5 @@
-//! An application is activated while SubDevices are on their way to PREOP: by the same MainDevice, or by the next owner,
-//! which does not wait for them.
+//! An application is activated while SubDevices are on their way to PREOP: by the same MainDevice, or by the next
+//! owner, which does not wait for them.
 
 use ringcat::{AlState, Handover, Knowledge, Required};
 use ringcat_sim::description::{DeviceDescription, TransitionTimes};
@@ -166,7 +166,8 @@ fn an_eeprom_that_is_read_on_the_way_to_preop_is_no_obstacle() {
     });
 }
 
-/// One SubDevice does not react to a request: the others answer and reach OP as without it, and it follows when it does.
+/// One SubDevice does not react to a request: the others answer and reach OP as without it, and it follows when it
+/// does.
 // covers: states, refused-states
 #[test]
 fn a_request_that_is_never_followed_delays_others_by_its_limit_only() {

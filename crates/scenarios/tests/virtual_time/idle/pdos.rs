@@ -62,7 +62,8 @@ fn a_dictionary_with_a_part_of_the_pdos_replaces_nothing() {
         let device = DeviceDescription { left_out: left_out.clone(), ..drive_with_another_sii() };
         let mut main_device = idle_with(vec![device], &options());
         assert_eq!(bits(&main_device.subdevices()[0]), OF_SII, "{left_out:x?}");
-        let told = |timed: &TimedEvent| matches!(&timed.event, Event::SiiOddity { what, .. } if what.contains("cannot be read"));
+        let is_it = |what: &str| what.contains("cannot be read");
+        let told = |timed: &TimedEvent| matches!(&timed.event, Event::SiiOddity { what, .. } if is_it(what));
         assert_eq!(events(&mut main_device).iter().any(told), is_told, "{left_out:x?}");
         main_device.attend(Duration::from_secs(3));
         assert!(events(&mut main_device).is_empty(), "it is said once");

@@ -103,3 +103,21 @@ fn a_dictionary_that_cannot_be_read_is_tried_again_with_the_next_attempt() {
     assert_eq!(idle.pdos(key, PdoFinding::Held(&held(0x1A00))), []);
     assert_eq!(idle.segment.found().unwrap().subdevices[1].pdo_source, PdoSource::Outdated);
 }
+
+/// A program that waits for the PDOs does not wait for a SubDevice whose state has no mail.
+#[test]
+fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
+    for (state, is_awaited) in [(PREOP, true), (AlState::Op, true), (AlState::Boot, false), (AlState::Init, false)] {
+        let mut idle = with_dictionary(PdoSource::Sii);
+        assert!(idle.segment.are_pdos_awaited(), "{state:?}: nothing is requested yet");
+        keep(&mut idle);
+        assert!(idle.segment.are_pdos_awaited(), "{state:?}: they are being read");
+        let begun = attempts(&idle.request(1, state))[0];
+        assert_eq!(idle.segment.are_pdos_awaited(), is_awaited, "{state:?}, on its way");
+        idle.end(begun, None);
+        assert_eq!(idle.segment.are_pdos_awaited(), is_awaited, "{state:?}, reached");
+        let key = idle.key(1);
+        idle.pdos(key, PdoFinding::Held(&held(0x1A00)));
+        assert!(!idle.segment.are_pdos_awaited(), "{state:?}, known");
+    }
+}
