@@ -7,10 +7,12 @@ mod address;
 mod builder;
 mod clocks;
 mod declared;
+mod dictionary;
 mod groups;
 mod ip;
 mod matching;
 mod pdo;
+mod refused_pdos;
 mod register;
 mod repetition;
 mod resolution;
@@ -34,7 +36,9 @@ pub use declared::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
+pub(crate) use pdo::{ASSIGNMENT_BASE, is_of_pdos};
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
+pub use refused_pdos::RefusedPdos;
 pub use register::{RegisterAccess, RegisterCommand};
 pub use repetition::Repetition;
 pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
@@ -139,6 +143,8 @@ pub struct SubDeviceConfig {
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs by SyncManager; SyncManagers without an assignment, or all if this is `None`, have the PDOs of the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
+    /// What follows if it refuses their assignment or mapping.
+    pub refused_pdos: RefusedPdos,
     /// All its SyncManagers from a configuration file; `None` takes them from the SII. If they are given,
     /// `sync_managers` and `pdos` are ignored, PDO assignment and mapping are not written, and the mailboxes of the
     /// file replace those of the SII.
@@ -181,6 +187,7 @@ impl Default for SubDeviceConfig {
             group: None,
             sync_managers: Vec::new(),
             pdos: None,
+            refused_pdos: RefusedPdos::default(),
             declared: None,
             declared_bootstrap: None,
             watchdog_divider: None,

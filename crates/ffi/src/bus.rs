@@ -214,14 +214,16 @@ impl Bus {
         self.door.clone()
     }
 
-    /// Waits until the scan has ended. SubDevices that are not in PREOP yet are on their way; what needs their
-    /// mailboxes waits for that, and an activation leads them on from where they are.
+    /// Waits until the scan has ended and the PDOs of the dictionaries are known. SubDevices that are not in PREOP yet
+    /// are on their way; what needs their mailboxes waits for that, and an activation leads them on from where they
+    /// are.
     pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {
             let Ok(seen) = self.door.look() else { return };
             let (responding, found) = (seen.responding(), seen.found);
-            if seen.is_scanned && found == u32::from(responding) && found > 0 {
+            let is_found = seen.is_scanned && found == u32::from(responding) && found > 0;
+            if is_found && !self.supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false) {
                 return;
             }
             let elapsed = begin.elapsed();
