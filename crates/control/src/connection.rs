@@ -274,7 +274,8 @@ mod tests {
         let (near, far) = pair();
         let limit = Some(Duration::from_millis(20));
         assert!(matches!(far.receive(Limits::CLIENT, limit), Err(ReceiveError::TimedOut)));
-        (&near.stream).write_all(b"RCTL\x03\x00\x00\x00\x10\x00\x00\x00").expect("there is room");
+        let whole = wire::encode(&Content::Take { master: 1 }.into()).expect("it is short");
+        (&near.stream).write_all(&whole[..12]).expect("there is room");
         let begin = Instant::now();
         assert!(matches!(far.receive(Limits::CLIENT, limit), Err(ReceiveError::TimedOut)));
         assert!((WHOLE..2 * WHOLE).contains(&begin.elapsed()));

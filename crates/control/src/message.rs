@@ -65,14 +65,19 @@ pub enum Content {
     },
     /// The client drives it. Descriptors come with the message, those of the links and a lock, which the client keeps
     /// for as long as it drives the master; its bytes are what is known of the segment, empty if nothing is known.
-    Taken(HandedLinks),
+    Taken(HandedBus),
     /// An owner tells what it knows after a scan, in the bytes.
     Knowledge,
     /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
     /// nothing.
     Release,
-    /// The daemon drives the master again.
+    /// The daemon drives the master again, after a release.
     Released,
+    /// The daemon drives the master again, without a release: what the client sends reaches no SubDevice.
+    TakenBack {
+        /// Why, as in the log of the daemon.
+        cause: String,
+    },
     /// The connection ends, and why.
     Refused(Refusal),
 }
@@ -289,6 +294,15 @@ pub struct EventLine {
     pub at_ns: u64,
     /// One line for the operator.
     pub text: String,
+}
+
+/// A master that is handed over.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HandedBus {
+    /// Its links.
+    pub links: HandedLinks,
+    /// Level of messages: 0 to 2, above as 2 ([`ToolAsk::SetDebugLevel`]). It outlasts hand-overs.
+    pub debug_level: u32,
 }
 
 /// The links of a master that is handed over. Descriptors follow in this order: cyclic half main, redundant; acyclic

@@ -2,20 +2,17 @@
 
 use std::fmt::Arguments as Formatted;
 use std::io::Write;
-use std::path::PathBuf;
 
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, Ask, MasterState};
+use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolAsk};
-use ringcat_control::{Client, DEFAULT_SOCKET, Refusal};
+use ringcat_control::{Client, Refusal};
 
 use crate::arguments::Arguments;
 use crate::failure::Failure;
 use crate::numbers::List;
 use crate::selection::{self, Slave};
-
-/// Names the socket of the daemon.
-const SOCKET: &str = "RINGCAT_SOCKET";
 
 /// A command at work.
 pub struct Session<'a> {
@@ -75,8 +72,7 @@ impl<'a> Session<'a> {
 
     fn client(&mut self) -> Result<&mut Client, ClientError> {
         if self.client.is_none() {
-            let socket = std::env::var_os(SOCKET).filter(|path| !path.is_empty());
-            let socket = socket.map_or_else(|| PathBuf::from(DEFAULT_SOCKET), PathBuf::from);
+            let socket = to_connect_to(|name| std::env::var_os(name));
             self.client = Some(Client::connect(&socket, "ethercat")?);
         }
         self.client.as_mut().ok_or(ClientError::Refused(Refusal::Unexpected { expected: "a daemon".to_owned() }))

@@ -2,7 +2,7 @@
 //!
 //! * [`source`]: the links of a master as an option names them; [`wires`]: opened, revoked, opened anew;
 //! * [`segment_process`]: a simulated segment in a process of its own;
-//! * [`master`]: a master with the process that drives it;
+//! * [`master`]: a master with the process that drives it; [`driving`]: this daemon while it does;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod daemon;
+pub mod driving;
 pub mod listening;
 pub mod log;
 pub mod master;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use ringcat_control::DEFAULT_SOCKET;
+use ringcat_control::socket::to_listen_at;
 use ringcat_link::HeldSignals;
 use ringcat_link::capabilities::{Capabilities, keep};
 use ringcat_link::process::raise_descriptors;
@@ -34,8 +34,11 @@ struct Arguments {
     #[arg(long = "master", value_name = "NUMBER=LINKS", required_unless_present = "simulate")]
     masters: Vec<MasterOption>,
     /// Where the daemon listens
-    #[arg(long, value_name = "PATH", default_value = DEFAULT_SOCKET)]
-    socket: PathBuf,
+    ///
+    /// By default /run/ringcat/control as root; as another user ringcat/control in XDG_RUNTIME_DIR or /run/user/UID, or
+    /// /tmp/ringcat-UID/control where there is neither.
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
     /// Mode of the socket, in octal: which users can connect, and read
     #[arg(long, default_value = "0660", value_parser = mode)]
     mode: u32,
@@ -85,7 +88,11 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     raise_descriptors(DESCRIPTORS);
     std::panic::set_hook(Box::new(|panic| say(format_args!("{panic}"))));
     let rights = Rights { group: arguments.group, mode: arguments.mode };
-    let socket = Prepared::new(&arguments.socket, rights)?;
+    let path = match &arguments.socket {
+        Some(path) => path.clone(),
+        None => to_listen_at(|name| std::env::var_os(name))?,
+    };
+    let socket = Prepared::new(&path, rights)?;
     // Before there are threads and segments, which inherit what is left.
     let has_interfaces = arguments.masters.iter().any(|it| matches!(it.source, Source::Interfaces(..)));
     let kept = if has_interfaces { Capabilities::NETWORK } else { Capabilities::NONE };
@@ -93,7 +100,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let mut masters = Vec::new();
     for option in &arguments.masters {
         let failed = |error| format!("master {}: {error}", option.master);
-        let lock = OwnerLock::open(&arguments.socket, option.master).map_err(failed)?;
+        let lock = OwnerLock::open(&path, option.master).map_err(failed)?;
         let wires = Wires::of(&option.source).map_err(failed)?;
         let master = Master::with_lock(option.master, option.source.to_string(), wires, lock);
         masters.push(match arguments.safe_states.iter().find(|it| it.master == option.master) {
@@ -103,7 +110,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     }
     let stop_limit = Duration::from_millis(arguments.stop_limit);
     let daemon = Daemon::serve(masters, socket, stop_limit)?;
-    say(format_args!("listens at {}", arguments.socket.display()));
+    say(format_args!("listens at {}", path.display()));
     while held.wait(LOOK).is_none() {
         daemon.look_after();
     }

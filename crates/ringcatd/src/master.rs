@@ -3,31 +3,25 @@
 //! The daemon drives it, or an application; while it passes from one to the other nothing does. Fresh links are opened
 //! each time it comes back, so that nothing that had it before reaches the segment any more.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ringcat::daemon::{adopt_links, serving};
-use ringcat::{
-    Activity, AlState, Error, Handover, Knowledge, Options, Retries, Services, StateScope, SupervisorThread,
-};
-use ringcat_control::message::{Ask, MasterState};
+use ringcat::daemon::{Lines, serving};
+use ringcat::{AlState, Handover, Knowledge};
+use ringcat_control::message::{Ask, HandedBus, MasterState, ToolAsk};
 use ringcat_control::{Content, Message, Refusal};
 
+use crate::driving::{Driving, Lasting};
 use crate::log::say;
 use crate::owner::{Answered, OwnerLink};
 use crate::owner_lock::OwnerLock;
 use crate::wires::{Opened, Wires};
 
-/// A hand-over waits so long for the end of a scan.
-const SCAN: Duration = Duration::from_secs(20);
-/// A hand-over waits so long for SubDevices that change their states.
-const SETTLE: Duration = Duration::from_secs(3);
-/// States that do not change for this time stay as they are.
-const STILL: Duration = Duration::from_millis(100);
-/// SubDevices reach their safe state within this time.
-const LEAD: Duration = Duration::from_secs(10);
-/// Interval of looks at a scan.
-const LOOK: Duration = Duration::from_millis(1);
+/// An owner is told within this time that the daemon has failed.
+const TELL: Duration = Duration::from_millis(100);
+/// What it is told, and the operator.
+const FAILED: &str = "a thread of the daemon has failed";
 
 /// A master.
 #[derive(Debug)]
@@ -40,13 +34,17 @@ pub struct Master {
     driver: Mutex<Driver>,
     /// What is known of the segment while the daemon does not drive it.
     knowledge: Mutex<Vec<u8>>,
+    /// What was printed of the bus.
+    lines: Arc<Mutex<Lines>>,
+    /// Level of messages, whatever drives the master.
+    debug_level: AtomicU32,
 }
 
 /// What drives a master.
 #[derive(Debug)]
 enum Driver {
     /// This daemon, with descriptors for the next owner.
-    Daemon(SupervisorThread, Opened),
+    Daemon(Driving, Opened),
     /// An application.
     Owner(Arc<OwnerLink>),
     /// It passes from one process to another.
@@ -88,7 +86,7 @@ impl Drop for Tenancy<'_> {
     fn drop(&mut self) {
         if !self.is_over {
             self.opened.revoke();
-            self.master.fail("a thread of the daemon has failed");
+            self.master.fail(FAILED);
         }
     }
 }
@@ -118,6 +116,8 @@ impl Master {
             lock: Mutex::new(lock),
             driver: Mutex::new(Driver::Changing),
             knowledge: Mutex::default(),
+            lines: Arc::default(),
+            debug_level: AtomicU32::new(0),
         };
         master.drive(Handover::Orderly);
         master.prepare();
@@ -159,9 +159,21 @@ impl Master {
 
     /// Answers a question, from the process that drives it.
     pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+        let level = match what {
+            Ask::Tool(ToolAsk::SetDebugLevel { level }) => Some(level),
+            _ => None,
+        };
+        let answered = self.ask_driver(what, bytes);
+        if let Some(level) = level.filter(|_| answered.is_ok()) {
+            self.debug_level.store(level, Ordering::Release);
+        }
+        answered
+    }
+
+    fn ask_driver(&self, what: Ask, bytes: Vec<u8>) -> Answered {
         let master = self.number;
         let supervisor = match &*locked(&self.driver) {
-            Driver::Daemon(supervisor, _) => Ok(supervisor.clone()),
+            Driver::Daemon(driving, _) => Ok(driving.supervisor().clone()),
             Driver::Owner(owner) => Err(owner.clone()),
             Driver::Changing => return Err(Refusal::Changing { master }),
             Driver::Fault(cause) => return Err(Refusal::Fault { master, cause: cause.clone() }),
@@ -184,16 +196,13 @@ impl Master {
     /// # Errors
     /// Why not. The daemon drives the master then, as far as it did before.
     pub fn hand_over(&self, owner: &Arc<OwnerLink>) -> Result<Tenancy<'_>, Refusal> {
-        let (supervisor, opened) = self.begin_change()?;
+        let (driving, opened) = self.begin_change()?;
         let tenancy = Tenancy { master: self, opened, is_over: false };
-        wait_for_scan(&supervisor);
-        wait_until_settled(&supervisor);
-        // A thread that has ended knows nothing.
-        let knowledge = supervisor.hand_over().ok().flatten();
-        drop(supervisor);
-        let bytes = knowledge.as_ref().map(Knowledge::to_bytes).unwrap_or_default();
+        let bytes = driving.hand_over();
         locked(&self.knowledge).clone_from(&bytes);
-        let message = Message { content: Content::Taken(tenancy.opened.links.clone()), bytes };
+        let debug_level = self.debug_level.load(Ordering::Acquire);
+        let handed = HandedBus { links: tenancy.opened.links.clone(), debug_level };
+        let message = Message { content: Content::Taken(handed), bytes };
         let mut raw: Vec<_> = tenancy.opened.descriptors.iter().map(std::os::fd::AsRawFd::as_raw_fd).collect();
         if let Some(lock) = &mut *locked(&self.lock) {
             lock.note(owner.owner());
@@ -212,11 +221,11 @@ impl Master {
     }
 
     /// Takes what the daemon drives out of its hands.
-    fn begin_change(&self) -> Result<(SupervisorThread, Opened), Refusal> {
+    fn begin_change(&self) -> Result<(Driving, Opened), Refusal> {
         let master = self.number;
         let mut driver = locked(&self.driver);
         match std::mem::replace(&mut *driver, Driver::Changing) {
-            Driver::Daemon(supervisor, opened) => Ok((supervisor, opened)),
+            Driver::Daemon(driving, opened) => Ok((driving, opened)),
             Driver::Changing => Err(Refusal::Changing { master }),
             Driver::Owner(owner) => {
                 let by = owner.owner().clone();
@@ -244,6 +253,9 @@ impl Master {
         say(format_args!("master {} is not driven: {cause}", self.number));
         if let Driver::Owner(owner) = std::mem::replace(&mut *locked(&self.driver), Driver::Fault(cause.to_owned())) {
             owner.end();
+            // It may have ended.
+            let told = Content::TakenBack { cause: cause.to_owned() };
+            let _ = owner.connection().send_within(&told.into(), TELL);
         }
     }
 
@@ -274,26 +286,6 @@ impl Master {
         self.lead_to_safe_state();
     }
 
-    /// Brings all SubDevices to the safe state, in a thread: PREOP needs none.
-    fn lead_to_safe_state(&self) {
-        let (state, number) = (self.safe_state, self.number);
-        let supervisor = match &*locked(&self.driver) {
-            Driver::Daemon(supervisor, _) if state != AlState::PreOp => supervisor.clone(),
-            _ => return,
-        };
-        let lead = move || {
-            wait_for_scan(&supervisor);
-            match supervisor.request_state_of_all(state, StateScope::All, LEAD) {
-                // The next application has the master already.
-                Ok(()) | Err(Error::Gone) => {}
-                Err(error) => say(format_args!("master {number}: not all SubDevices are in {state}: {error}")),
-            }
-        };
-        if let Err(error) = std::thread::Builder::new().name("safe state".into()).spawn(lead) {
-            say(format_args!("master {number}: all SubDevices stay in PREOP: {error}"));
-        }
-    }
-
     /// Tries again what was not possible before, and prepares sockets for the next owner's end.
     pub fn look_after(&self) {
         self.prepare();
@@ -306,7 +298,7 @@ impl Master {
     /// Drives the master on fresh links, and goes on with what is known.
     fn drive(&self, handover: Handover) {
         let driver = match self.start(handover) {
-            Ok((supervisor, opened)) => Driver::Daemon(supervisor, opened),
+            Ok((driving, opened)) => Driver::Daemon(driving, opened),
             Err(cause) => {
                 if !matches!(&*locked(&self.driver), Driver::Fault(before) if *before == cause) {
                     say(format_args!("master {} is not driven: {cause}", self.number));
@@ -317,49 +309,21 @@ impl Master {
         *locked(&self.driver) = driver;
     }
 
-    fn start(&self, handover: Handover) -> Result<(SupervisorThread, Opened), String> {
+    fn start(&self, handover: Handover) -> Result<(Driving, Opened), String> {
         // Never beside a process that may still drive it.
         locked(&self.lock).as_mut().map_or(Ok(()), OwnerLock::hold)?;
         let opened = locked(&self.wires).open()?;
-        let adopted = adopt_links(&opened.links, opened.duplicates()?);
-        let (_cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
-        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let supervisor = match Knowledge::from_bytes(&locked(&self.knowledge)) {
-            Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
-            // Nothing is known yet.
-            Err(_) => SupervisorThread::start(acyclic, &options, || ()),
-        };
-        let supervisor = supervisor.map_err(|error| error.to_string())?;
-        Ok((supervisor, opened))
+        let knowledge = locked(&self.knowledge);
+        let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
+        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level };
+        let driving = Driving::start(&opened, &lasting, handover)?;
+        Ok((driving, opened))
     }
-}
 
-/// Waits until no SubDevice changes its state any more: after the end of an application, or when they have just got
-/// power, they are on their way to PREOP, and what leads them there is not interrupted. OP does not depend on it
-/// (decision 0094); it stays because an application that asks for mailboxes first finds them in use.
-fn wait_until_settled(supervisor: &SupervisorThread) {
-    let settled = AlState::PreOp.code();
-    let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());
-    while let Ok(seen) = serving::look(supervisor) {
-        if seen.al_states != last {
-            (last, since) = (seen.al_states, Instant::now());
-        }
-        // Some may be in a safe state, or in an error that nothing ends.
-        let is_still = since.elapsed() >= STILL || begin.elapsed() >= SETTLE;
-        if seen.al_states == settled || seen.responding() == 0 || is_still {
-            return;
-        }
-        std::thread::sleep(LOOK);
-    }
-}
-
-/// Waits for the end of a scan that runs.
-fn wait_for_scan(supervisor: &SupervisorThread) {
-    let begin = Instant::now();
-    while begin.elapsed() < SCAN {
-        match supervisor.with(|engine| engine.snapshot().activity) {
-            Ok(Activity::Scanning) => std::thread::sleep(LOOK),
-            _ => return,
+    /// Brings all SubDevices to the safe state, if the daemon drives the master.
+    fn lead_to_safe_state(&self) {
+        if let Driver::Daemon(driving, _) = &*locked(&self.driver) {
+            driving.lead_to(self.safe_state, self.number);
         }
     }
 }
@@ -372,6 +336,7 @@ mod tests {
     use ringcat::piped::segment::PipedSegment;
     use ringcat::sim::network::Network;
     use ringcat::sim::segment::Segment;
+    use ringcat_control::Limits;
 
     use super::*;
     use crate::owner::for_tests;
@@ -388,7 +353,7 @@ mod tests {
             segment_process::serve(&mut PipedSegment::new(network), &far, |_| true).expect("a socket");
         });
         let master = Master::new(0, "test".to_owned(), Wires::to_segment(near).expect("it is right"));
-        let (owner, _far) = for_tests().expect("a pair");
+        let (owner, far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let _tenancy = master.hand_over(&owner).expect("the daemon drives it");
@@ -397,7 +362,11 @@ mod tests {
         assert!(failed.is_err());
         assert!(matches!(owner.ask(Ask::State, Vec::new()), Err(Refusal::Changing { .. })));
         let fault = master.state().fault.expect("nothing drives it");
-        assert_eq!(fault, "a thread of the daemon has failed");
+        assert_eq!(fault, FAILED);
+        let told = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
+        assert!(matches!(told, Content::Taken(_)), "{told:?}");
+        let told = far.receive(Limits::OWNER, None).expect("it is told");
+        assert_eq!(told, Content::TakenBack { cause: FAILED.to_owned() }.into());
         master.look_after();
         assert_eq!((master.state().fault, master.state().owner), (None, None));
         master.hand_over(&owner).expect("the daemon drives it").end(End::Ended);

@@ -13,7 +13,7 @@ use ringcat_link::process::Peer;
 use crate::log::say;
 use crate::master::Master;
 use crate::owner::{Answered, OwnerLink};
-use crate::tenure::{self, Signs};
+use crate::tenure::{self, Ended, Signs};
 
 /// A client greets within this time.
 const GREETING: Duration = Duration::from_secs(5);
@@ -129,10 +129,11 @@ fn own(
     let owner = Arc::new(OwnerLink::new(master.number(), owner, connection.clone()));
     let tenancy = master.hand_over(&owner)?;
     say(format_args!("master {}: driven by {}", master.number(), owner.owner()));
-    let (end, why) = tenure::serve(master, &owner, signs, masters.stop_limit);
-    tenancy.end(end);
+    let Ended { how, is_release, why } = tenure::serve(master, &owner, signs, masters.stop_limit);
+    tenancy.end(how);
     say(format_args!("master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner()));
-    reply(connection, Content::Released.into());
+    let told = if is_release { Content::Released } else { Content::TakenBack { cause: why.to_owned() } };
+    reply(connection, told.into());
     master.prepare();
     Ok(())
 }

@@ -56,8 +56,20 @@ impl Signs {
     }
 }
 
-/// Serves an owner until its time ends. Returns how, and why for the log.
-pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: Duration) -> (End, &'static str) {
+/// The end of the time of an owner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// How it has ended.
+    pub how: End,
+    /// The owner has given the master back itself.
+    pub is_release: bool,
+    /// Why, for the log.
+    pub why: &'static str,
+}
+
+/// Serves an owner until its time ends.
+pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: Duration) -> Ended {
+    let ended = |how, why| Ended { how, is_release: false, why };
     let connection = owner.connection();
     let mut arriving = Arriving::new(Limits::OWNER);
     let mut stopped: Option<Instant> = None;
@@ -69,21 +81,21 @@ pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: D
             match connection.receive_part(&mut arriving) {
                 Ok(message) => {
                     if let Some(end) = message.and_then(|message| said(master, owner, message)) {
-                        return (end, "it has given the master back");
+                        return Ended { how: end, is_release: true, why: "it has given the master back" };
                     }
                 }
-                Err(ReceiveError::Ended) => return (signs.of_connection(), "its connection has ended"),
-                Err(_) => return (End::MayGoOn, "it has sent something that is no message"),
+                Err(ReceiveError::Ended) => return ended(signs.of_connection(), "its connection has ended"),
+                Err(_) => return ended(End::MayGoOn, "it has sent something that is no message"),
             }
         }
         if ready & 2 != 0 {
-            return (End::Ended, "its process has ended");
+            return ended(End::Ended, "its process has ended");
         }
         match signs.file.as_mut().and_then(ProcessFile::look) {
-            Some(ProcessState::Ends) => return (End::Ended, "a signal has ended its process"),
+            Some(ProcessState::Ends) => return ended(End::Ended, "a signal has ended its process"),
             Some(ProcessState::Stopped) => {
                 if stopped.get_or_insert_with(Instant::now).elapsed() >= stop_limit {
-                    return (End::MayGoOn, "its process was stopped");
+                    return ended(End::MayGoOn, "its process was stopped");
                 }
             }
             Some(ProcessState::Runs) | None => stopped = None,
@@ -138,7 +150,7 @@ mod tests {
         let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("sleep is there");
         let end = ringcat_link::process::watch(child.id()).map(Some);
         let signs = Signs::new(child.id(), end).expect("it lives");
-        std::io::Write::write_all(&mut far.stream(), b"RCTL\x02").expect("there is room");
+        std::io::Write::write_all(&mut far.stream(), b"RCTL").expect("there is room");
         let begin = Instant::now();
         let killed = std::thread::scope(|scope| {
             let served = scope.spawn(|| serve(&master, &owner, signs, Duration::from_secs(60)));
@@ -146,7 +158,7 @@ mod tests {
             child.kill().expect("it runs");
             served.join().expect("no panic")
         });
-        assert_eq!(killed.0, End::Ended, "{}", killed.1);
+        assert_eq!((killed.how, killed.is_release), (End::Ended, false), "{}", killed.why);
         assert!(begin.elapsed() < Duration::from_secs(1), "{:?}", begin.elapsed());
         child.wait().expect("it has ended");
     }
@@ -158,7 +170,7 @@ mod tests {
         let pid = std::process::id();
         let signs = || Signs::new(pid, ringcat_link::process::watch(pid).map(Some)).expect("it lives");
         far.shut_down();
-        assert_eq!(serve(&master, &owner, signs(), Duration::from_secs(60)).0, End::MayGoOn);
+        assert_eq!(serve(&master, &owner, signs(), Duration::from_secs(60)).how, End::MayGoOn);
     }
 
     // covers: daemon

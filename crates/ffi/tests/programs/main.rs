@@ -9,5 +9,8 @@ mod fake;
 mod hosts;
 mod library;
 mod linking;
+mod lost;
 mod machine;
+mod operator;
+mod readme;
 mod shape;

@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use ringcat_control::DEFAULT_SOCKET;
+use ringcat_control::socket::to_connect_to as find_socket;
 use ringcat_engine::Scan;
 use ringcat_engine::main_device::Declaration;
 
@@ -16,10 +16,10 @@ use crate::error::Error;
 use crate::main_device::Options;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Where the daemon listens: the variable `RINGCAT_SOCKET` of the environment, or the default socket.
+/// Where the daemon listens: the variable `RINGCAT_SOCKET` of the environment, or the usual place of this user or of
+/// root ([`find_socket`]).
 pub fn socket() -> PathBuf {
-    let named = std::env::var_os("RINGCAT_SOCKET").filter(|path| !path.is_empty());
-    named.unwrap_or_else(|| DEFAULT_SOCKET.into()).into()
+    find_socket(|name| std::env::var_os(name))
 }
 
 /// Name of this program, without its directory.

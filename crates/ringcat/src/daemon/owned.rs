@@ -6,23 +6,23 @@
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat_control::Arriving;
 use ringcat_control::client::Client;
 use ringcat_control::connection::Connection;
-use ringcat_control::message::{Content, HandedLinks, Message};
+use ringcat_control::message::{Content, HandedBus, HandedLinks, Message};
 use ringcat_control::refusal::Refusal;
 use ringcat_control::wire::Limits;
 use ringcat_engine::Scan;
-use ringcat_engine::event::{ClientId, Subject, Subjects};
+use ringcat_engine::event::{ClientId, LogFilter, LogLevel, Subject, Subjects};
 use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_link::process::wait_readable;
 
 use super::error::DaemonError;
 use super::links::{DaemonLinks, adopt_links};
+use super::ownership::{Ownership, OwnershipWatch};
 use super::questions::Questions;
 use crate::links::Links;
 use crate::main_device::Options;
@@ -52,18 +52,10 @@ pub struct OwnedBus {
     _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
     connection: Arc<Connection>,
-    shared: Arc<Shared>,
+    ownership: OwnershipWatch,
     receiver: Option<JoinHandle<()>>,
     /// A child of `fork` has no threads of this: it gives nothing back.
     process: u32,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    /// The bus is given back.
-    is_over: AtomicBool,
-    /// The daemon has ended the connection before.
-    is_lost: AtomicBool,
 }
 
 impl OwnedBus {
@@ -101,7 +93,7 @@ impl OwnedBus {
         let connection = Arc::new(Client::connect(socket, program)?.into_connection().patient());
         connection.send(&Content::Take { master }.into())?;
         let (message, mut descriptors) = connection.receive_with_descriptors(Limits::OWNER, Some(TAKE))?;
-        let handed = match message.content {
+        let HandedBus { links: handed, debug_level } = match message.content {
             Content::Taken(handed) => handed,
             Content::Refused(refusal) => return Err(refusal.into()),
             _ => return Err(Refusal::Unexpected { expected: "links of a master".to_owned() }.into()),
@@ -119,16 +111,17 @@ impl OwnedBus {
             }
             None => SupervisorThread::start(acyclic, &options, prepare)?,
         };
+        supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(debug_level)))?;
         let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
         let events = supervisor.register_client(scans, KEPT)?;
         // A segment that does not answer any more is watched as any other.
         let scan = if message.bytes.is_empty() { None } else { supervisor.finish_scan(|| ()).ok() };
-        let shared = Arc::new(Shared::default());
+        let ownership = OwnershipWatch::default();
         let questions = Questions::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
-            shared: shared.clone(),
+            ownership: ownership.clone(),
             questions,
             events,
         };
@@ -139,7 +132,7 @@ impl OwnedBus {
         };
         let receiver = thread.spawn(run).map_err(crate::error::Error::Thread)?;
         let (links, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
-        Ok(OwnedBus { supervisor, scan, handed, _lock: lock, links, connection, shared, receiver, process })
+        Ok(OwnedBus { supervisor, scan, handed, _lock: lock, links, connection, ownership, receiver, process })
     }
 
     /// The acyclic half. It knows the SubDevices that the daemon knew.
@@ -162,17 +155,17 @@ impl OwnedBus {
         self.links = Some(links);
     }
 
-    /// Whether the daemon drives the bus again, because this process was stopped; or the daemon has ended, then the bus
-    /// can still be driven.
-    pub fn is_lost(&self) -> bool {
-        self.shared.is_lost.load(Ordering::Acquire)
+    /// Whether this process has the bus still: a loss without a release shows here, for any thread.
+    pub fn ownership(&self) -> &OwnershipWatch {
+        &self.ownership
     }
 
     /// Gives the bus back, and waits until the daemon has it. An active application is to be ended before; otherwise
     /// its outputs last until the daemon has its SubDevices in PREOP.
     ///
     /// # Errors
-    /// The daemon has ended, has the bus already, or has not answered for 2 s. It has the bus when it goes on.
+    /// The daemon has ended, has taken the bus back already, or has not answered for 2 s. It has the bus when it goes
+    /// on.
     pub fn release(mut self) -> Result<(), DaemonError> {
         self.give_back()
     }
@@ -190,8 +183,7 @@ impl OwnedBus {
             Ok(None) | Err(_) => Vec::new(),
         };
         self.links = None;
-        let was_lost = self.shared.is_lost.load(Ordering::Acquire);
-        self.shared.is_over.store(true, Ordering::Release);
+        let before = self.ownership.release();
         let begin = Instant::now();
         let sent = self.connection.send_within(&Message { content: Content::Release, bytes }, RELEASE);
         while !receiver.is_finished() && sent.is_ok() && begin.elapsed() < RELEASE {
@@ -202,8 +194,11 @@ impl OwnedBus {
         self.connection.shut_down();
         // Its panic was reported by itself.
         let _ = receiver.join();
-        // A daemon that does not listen any more has ended, or has taken the bus back.
-        if was_lost || sent.is_err() || !is_answered { Err(DaemonError::Lost) } else { Ok(()) }
+        match before {
+            Ownership::TakenBack => Err(DaemonError::TakenBack { cause: self.ownership.cause().to_owned() }),
+            Ownership::Held if sent.is_ok() && is_answered => Ok(()),
+            _ => Err(DaemonError::Lost),
+        }
     }
 }
 
@@ -218,7 +213,7 @@ impl Drop for OwnedBus {
 struct Receiver {
     supervisor: SupervisorThread,
     connection: Arc<Connection>,
-    shared: Arc<Shared>,
+    ownership: OwnershipWatch,
     questions: Questions,
     events: Option<ClientId>,
 }
@@ -235,19 +230,14 @@ impl Receiver {
                 Ok(None) => {}
                 Ok(Some(message)) => match message.content {
                     Content::Ask(question) => self.questions.take(question, message.bytes),
-                    Content::Released => return self.end(),
+                    Content::Released => return,
+                    Content::TakenBack { cause } => return self.ownership.taken_back(cause),
                     // A daemon of this version says nothing else.
                     _ => {}
                 },
-                Err(_) => return self.end(),
+                Err(_) => return self.ownership.daemon_ended(),
             }
         }
-    }
-
-    /// The daemon drives the bus from now on, or is gone. Without a release the bus is lost.
-    fn end(&self) {
-        let is_over = self.shared.is_over.load(Ordering::Acquire);
-        self.shared.is_lost.store(!is_over, Ordering::Release);
     }
 
     /// Tells the daemon what is known, if a scan has ended since the last time.

@@ -10,5 +10,8 @@ mod clients;
 mod ends;
 mod handover;
 mod hostile;
+mod lines;
+mod locks;
 mod owner_process;
 mod program;
+mod running;

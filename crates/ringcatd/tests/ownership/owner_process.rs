@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use ringcat::daemon::OwnedBus;
-use ringcat::{Options, automatic};
+use ringcat::{Options, Services, automatic};
 
 /// Socket of the daemon, for the process that is an application.
 const SOCKET: &str = "RINGCAT_TEST_OWNER";
@@ -83,6 +83,15 @@ impl OwnerProcess {
         self.input = None;
     }
 
+    /// Tells it to end in order. The debug level that it had.
+    pub fn end_with_level(mut self) -> String {
+        self.input_ends();
+        let said = self.wait_for("debug level");
+        self.wait_for("ended");
+        self.child.wait().expect("it ends");
+        said
+    }
+
     /// Tells it to end in order, and waits.
     pub fn end(mut self) -> String {
         self.input_ends();
@@ -112,7 +121,7 @@ fn an_application_drives_the_bus_until_its_input_ends() {
     let bench = crate::bench::Bench::start(4);
     let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
     assert!(bench.are_in(ringcat::AlState::Op), "{:?}", bench.states());
-    assert_eq!(owner.end(), "ended: Ok(()), lost false");
+    assert_eq!(owner.end(), "ended: Ok(()), Held");
     bench.wait_until("all in PREOP", |bench| bench.are_in(ringcat::AlState::PreOp));
 }
 
@@ -159,7 +168,9 @@ fn run(socket: &Path, work: Work) {
         }
     }
     drop(memory);
-    let lost = bus.is_lost();
+    let had = bus.ownership().now();
+    let level = bus.supervisor().log_filter().map(|filter| filter.level.number()).unwrap_or_default();
     let released = bus.release().map_err(|error| error.to_string());
-    say(&format!("ended: {released:?}, lost {lost}"));
+    say(&format!("debug level {level}"));
+    say(&format!("ended: {released:?}, {had:?}"));
 }

@@ -1,14 +1,14 @@
 //! Messages of the daemon and any bytes: an error, or a message that survives a round trip.
 
-use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
+use ringcat_control::message::{Answer, Ask, HandedBus, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
 use ringcat_control::wire::{decode, encode};
-use ringcat_control::{Content, Limits, Message, Refusal};
+use ringcat_control::{Content, Limits, Message, Refusal, VERSION};
 
 /// Takes a message from bytes as they are, and from the same as content behind a header that fits.
 pub fn target(bytes: &[u8]) {
     check(bytes);
     let length = (bytes.len() as u32).to_le_bytes();
-    check(&[b"RCTL\x03\0\0\0", &length[..], &[0; 4], bytes].concat());
+    check(&[b"RCTL", &VERSION.to_le_bytes()[..], &[0; 2], &length, &[0; 4], bytes].concat());
 }
 
 fn check(bytes: &[u8]) {
@@ -37,7 +37,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
         answered(Ok(Answer::State(Box::default()))),
         answered(Err(Refusal::NoMaster { master: 1, present: vec![0, 2] })),
         Content::Take { master: 0 },
-        Content::Taken(links),
+        Content::Taken(HandedBus { links, debug_level: 1 }),
         Content::Release,
         Content::Refused(Refusal::TooManyClients { limit: 64 }),
     ];
