@@ -4,13 +4,15 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
+use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
 use ringcat::{
-    Activity, AlState, Error, Handover, Knowledge, LogFilter, LogLevel, Options, Retries, Services, StateScope,
+    Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, StateScope,
     SupervisorThread,
 };
 
+use crate::ethernet::EthernetInterfaces;
 use crate::log::{print, say};
-use crate::wires::Opened;
+use crate::opened::Opened;
 
 /// A hand-over waits so long for the end of a scan.
 const SCAN: Duration = Duration::from_secs(20);
@@ -34,6 +36,8 @@ pub struct Lasting<'a> {
     pub lines: Arc<Mutex<Lines>>,
     /// Level of messages.
     pub debug_level: u32,
+    /// Network interfaces of EoE; `None`: there are none.
+    pub interfaces: Option<Arc<EthernetInterfaces>>,
 }
 
 /// The daemon drives a master.
@@ -41,6 +45,8 @@ pub struct Lasting<'a> {
 pub struct Driving {
     supervisor: SupervisorThread,
     log: BusLog,
+    /// Moves frames of EoE.
+    ethernet: Option<Ethernet>,
 }
 
 impl Driving {
@@ -49,8 +55,8 @@ impl Driving {
     /// # Errors
     /// What is wrong, for the operator.
     pub fn start(opened: &Opened, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
-        let adopted = adopt_links(&opened.links, opened.duplicates()?);
-        let (_cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
+        let adopted = adopt_links(opened.links(), opened.duplicates()?);
+        let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
@@ -71,7 +77,13 @@ impl Driving {
             },
         );
         let log = log.map_err(|error| format!("a thread cannot be started: {error}"))?;
-        Ok(Driving { supervisor, log })
+        let ethernet = lasting.interfaces.clone().zip(u16::try_from(number).ok());
+        let ethernet = ethernet.map(|(interfaces, index)| {
+            let options = EthernetOptions::new(index, cyclic.addresses().main.0);
+            supervisor.start_lasting_ethernet(options, move |name, mac| interfaces.make(name, mac).map(Some))
+        });
+        let ethernet = ethernet.transpose().map_err(|error| error.to_string())?;
+        Ok(Driving { supervisor, log, ethernet })
     }
 
     /// The acyclic half, for questions.
@@ -79,9 +91,14 @@ impl Driving {
         &self.supervisor
     }
 
+    /// What has changed with network interfaces of EoE, for the operator.
+    pub fn changes(&self) -> Vec<EthernetEvent> {
+        self.ethernet.as_ref().map(Ethernet::take_events).unwrap_or_default()
+    }
+
     /// Ends it without a further frame. What is known of the segment; empty if nothing is.
     pub fn hand_over(self) -> Vec<u8> {
-        let Driving { supervisor, log } = self;
+        let Driving { supervisor, log, ethernet: _ethernet } = self;
         wait_for_scan(&supervisor);
         wait_until_settled(&supervisor);
         // What has changed last is printed by the next process that drives the master.

@@ -6,12 +6,13 @@
 //! never whole, keeps no sign from being seen.
 
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::time::{Duration, Instant};
 
 use ringcat_control::{Arriving, Content, Limits, Message, ReceiveError, Refusal};
 use ringcat_link::process::wait_readable;
 
+use crate::log::say;
 use crate::master::{End, Master};
 use crate::owner::OwnerLink;
 use crate::process_state::{ProcessFile, ProcessState};
@@ -112,10 +113,25 @@ fn said(master: &Master, owner: &OwnerLink, message: Message) -> Option<End> {
         // Without its knowledge the counters are those from before its time.
         Content::Release if master.keep(message.bytes) => return Some(End::Released),
         Content::Release => return Some(End::Ended),
+        Content::MakeInterface { name, mac } => make_interface(master, owner, name, mac),
+        Content::SwitchLink { is_redundant, up } => {
+            if let Err(cause) = master.switch_link(is_redundant, up) {
+                say(format_args!("master {}: {cause}", master.number()));
+            }
+        }
         // An owner of this version says nothing else.
         _ => {}
     }
     None
+}
+
+/// Makes a network interface for an owner, and answers it.
+fn make_interface(master: &Master, owner: &OwnerLink, name: String, mac: [u8; 6]) {
+    let made = master.make_interface(&name, mac);
+    let descriptors: Vec<_> = made.iter().map(|tap| tap.as_fd().as_raw_fd()).collect();
+    let answer = Content::Interface { name, fault: made.as_ref().err().cloned() };
+    // Of an owner that is gone, or does not read, the connection shows the end.
+    let _ = owner.connection().send_with(&answer.into(), &descriptors);
 }
 
 #[cfg(test)]
@@ -123,13 +139,15 @@ mod tests {
     use ringcat_control::Content;
 
     use super::*;
+    use crate::opener::Opener;
     use crate::owner::for_tests;
     use crate::source::Source;
     use crate::wires::Wires;
 
     fn master() -> Master {
         let source = Source::Interfaces("nonexistent".to_owned(), None);
-        Master::new(0, source.to_string(), Wires::of(&source).expect("it has a name"))
+        let wires = Wires::of(&source, &std::sync::Arc::new(Opener::Here)).expect("it has a name");
+        Master::new(0, source.to_string(), wires)
     }
 
     // covers: daemon

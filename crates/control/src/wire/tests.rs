@@ -24,7 +24,7 @@ fn a_message_is_a_header_its_content_and_its_data() {
 fn messages_are_decoded_as_they_were() {
     for content in [
         Content::Hello { program: "a \"quoted\" program".to_owned() },
-        Content::Take { master: 3 },
+        Content::Take { master: 3, ethernet: true },
         Content::Knowledge,
         Content::Refused(Refusal::Version { here: 1, there: 2 }),
         Content::Answer(Numbered { id: 9, master: 0, what: Err(Refusal::ReadOnly) }),

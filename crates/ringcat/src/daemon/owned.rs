@@ -1,44 +1,38 @@
 //! A bus that a daemon has handed over to this process.
 //!
-//! A thread receives what the daemon says: questions of its clients, and the end of the connection. It tells the daemon
-//! what is known of the segment after each scan, so that a crash of this process costs no scan.
+//! A thread receives what the daemon says ([`Receiver`]): questions of its clients, and the end of the connection. It
+//! tells the daemon what is known of the segment after each scan, so that a crash of this process costs no scan.
 
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use ringcat_control::Arriving;
 use ringcat_control::client::Client;
 use ringcat_control::connection::Connection;
-use ringcat_control::message::{Content, HandedBus, HandedLinks, Message};
-use ringcat_control::refusal::Refusal;
-use ringcat_control::wire::Limits;
+use ringcat_control::message::{Content, HandedLinks, Message};
 use ringcat_engine::Scan;
-use ringcat_engine::event::{ClientId, LogFilter, LogLevel, Subject, Subjects};
-use ringcat_engine::knowledge::{Handover, Knowledge};
-use ringcat_link::process::wait_readable;
+use ringcat_engine::event::{LogFilter, LogLevel, Subject, Subjects};
+use ringcat_engine::knowledge::Handover;
 
 use super::error::DaemonError;
-use super::links::{DaemonLinks, adopt_links};
+use super::ethernet::Ethernet;
+use super::links::DaemonLinks;
+use super::orders::Orders;
 use super::ownership::{Ownership, OwnershipWatch};
 use super::questions::Questions;
+use super::received::Received;
+use super::receiver::Receiver;
 use crate::links::Links;
 use crate::main_device::Options;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 
-/// The daemon hands a bus over within this time: it waits for the end of a scan.
-const TAKE: Duration = Duration::from_secs(30);
-/// Stack of the thread that receives: a program may have locked its memory, and with it this.
-const STACK_BYTES: usize = 512 << 10;
 /// The daemon answers to a release within this time, unless it is stopped.
 const RELEASE: Duration = Duration::from_secs(2);
 /// Interval of looks for its answer.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Interval of looks for new events of scans.
-const LOOK: Duration = Duration::from_millis(200);
 /// Events of scans that are kept between two looks: one is enough to tell that there were any.
 const KEPT: usize = 1;
 
@@ -51,6 +45,7 @@ pub struct OwnedBus {
     /// A daemon that is started anew sees by it that this process has the bus.
     _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
+    _ethernet: Ethernet,
     connection: Arc<Connection>,
     ownership: OwnershipWatch,
     receiver: Option<JoinHandle<()>>,
@@ -91,19 +86,13 @@ impl OwnedBus {
     ) -> Result<OwnedBus, DaemonError> {
         // Whatever the daemon does: an application that drives the bus is not taken down because its messages wait.
         let connection = Arc::new(Client::connect(socket, program)?.into_connection().patient());
-        connection.send(&Content::Take { master }.into())?;
-        let (message, mut descriptors) = connection.receive_with_descriptors(Limits::OWNER, Some(TAKE))?;
-        let HandedBus { links: handed, debug_level } = match message.content {
-            Content::Taken(handed) => handed,
-            Content::Refused(refusal) => return Err(refusal.into()),
-            _ => return Err(Refusal::Unexpected { expected: "links of a master".to_owned() }.into()),
-        };
-        let lock = if descriptors.len() > handed.descriptors() { descriptors.pop() } else { None };
+        let orders = Orders::new()?;
+        let received = Received::take(&connection, master, &orders)?;
+        let Received { bus: handed, cyclic, acyclic, lock, interfaces, knowledge } = received;
         let in_threads = prepare.clone();
-        let (cyclic, acyclic) = adopt_links(&handed, descriptors)?;
-        let acyclic = around(&handed, acyclic)?;
-        let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
-        let options = options.clone().with_idle_operation(true);
+        let main = acyclic.addresses().main;
+        let acyclic = around(&handed.links, acyclic)?;
+        let (options, is_known) = (options.clone().with_idle_operation(true), knowledge.is_some());
         let supervisor = match knowledge {
             Some(knowledge) => {
                 let known = (knowledge, Handover::Orderly);
@@ -111,28 +100,27 @@ impl OwnedBus {
             }
             None => SupervisorThread::start(acyclic, &options, prepare)?,
         };
-        supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(debug_level)))?;
+        supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(handed.debug_level)))?;
+        let ethernet = Ethernet::start(&supervisor, (master, main), interfaces, &orders)?;
         let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
         let events = supervisor.register_client(scans, KEPT)?;
         // A segment that does not answer any more is watched as any other.
-        let scan = if message.bytes.is_empty() { None } else { supervisor.finish_scan(|| ()).ok() };
-        let ownership = OwnershipWatch::default();
+        let scan = if is_known { supervisor.finish_scan(|| ()).ok() } else { None };
         let questions = Questions::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
+        let (ownership, links) = (OwnershipWatch::default(), handed.links);
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
             ownership: ownership.clone(),
             questions,
+            orders,
+            ethernet: ethernet.clone(),
             events,
         };
-        let thread = std::thread::Builder::new().name("daemon".into()).stack_size(STACK_BYTES);
-        let run = move || {
-            in_threads();
-            receiver.run();
-        };
-        let receiver = thread.spawn(run).map_err(crate::error::Error::Thread)?;
-        let (links, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
-        Ok(OwnedBus { supervisor, scan, handed, _lock: lock, links, connection, ownership, receiver, process })
+        let receiver = receiver.start(in_threads).map_err(crate::error::Error::Thread)?;
+        let (cyclic, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
+        let (handed, links, _lock, _ethernet) = (links, cyclic, lock, ethernet);
+        Ok(OwnedBus { supervisor, scan, handed, _lock, links, _ethernet, connection, ownership, receiver, process })
     }
 
     /// The acyclic half. It knows the SubDevices that the daemon knew.
@@ -206,50 +194,5 @@ impl Drop for OwnedBus {
     fn drop(&mut self) {
         // The daemon takes the bus back at the end of the connection, too.
         let _ = self.give_back();
-    }
-}
-
-/// The thread that receives what the daemon says.
-struct Receiver {
-    supervisor: SupervisorThread,
-    connection: Arc<Connection>,
-    ownership: OwnershipWatch,
-    questions: Questions,
-    events: Option<ClientId>,
-}
-
-impl Receiver {
-    fn run(self) {
-        let mut arriving = Arriving::new(Limits::OWNER);
-        loop {
-            if wait_readable(&[self.connection.as_fd()], LOOK) == 0 {
-                self.tell_knowledge();
-                continue;
-            }
-            match self.connection.receive_part(&mut arriving) {
-                Ok(None) => {}
-                Ok(Some(message)) => match message.content {
-                    Content::Ask(question) => self.questions.take(question, message.bytes),
-                    Content::Released => return,
-                    Content::TakenBack { cause } => return self.ownership.taken_back(cause),
-                    // A daemon of this version says nothing else.
-                    _ => {}
-                },
-                Err(_) => return self.ownership.daemon_ended(),
-            }
-        }
-    }
-
-    /// Tells the daemon what is known, if a scan has ended since the last time.
-    fn tell_knowledge(&self) {
-        let Some(events) = self.events else { return };
-        match self.supervisor.client_events(events) {
-            Ok(Some(events)) if !events.events.is_empty() => {}
-            _ => return,
-        }
-        if let Ok(Some(knowledge)) = self.supervisor.knowledge() {
-            // If the daemon is gone the next look finds that.
-            let _ = self.connection.send(&Message { content: Content::Knowledge, bytes: knowledge.to_bytes() });
-        }
     }
 }

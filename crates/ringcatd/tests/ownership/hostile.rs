@@ -32,7 +32,7 @@ fn attacks() -> Vec<Vec<u8>> {
     let mut deep = hello.clone();
     deep.extend([&beginning[..], b"\xA0\x0F\0\0\0\0\0\0"].concat());
     deep.extend([0x81; 4000]);
-    let take = ringcat_control::wire::encode(&Content::Take { master: 0 }.into()).expect("short");
+    let take = ringcat_control::wire::encode(&Content::Take { master: 0, ethernet: true }.into()).expect("short");
     let answer = Content::Answer(Numbered { id: 1, master: 0, what: Ok(Answer::Done) });
     let answer = ringcat_control::wire::encode(&answer.into()).expect("short");
     vec![
