@@ -10,13 +10,13 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{BusLog, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal};
-use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread};
+use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
 
 use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
 use crate::door::{DaemonDoor, Door, code_of};
 use crate::environment::{program_name, source};
-use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable};
+use crate::host::{HeldSignals, generation, memory_hint, variable};
 use crate::locks::locked;
 
 /// Longest wait of a request for the scan.
@@ -136,7 +136,7 @@ impl Bus {
             )
         })?;
         let (cyclic, acyclic) = any_links::open(&source)?;
-        let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
+        let started = SupervisorThread::start(acyclic, &options, realtime::leave);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
         Bus::with(master, supervisor, cyclic, None)
     }
@@ -144,7 +144,7 @@ impl Bus {
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, be_an_ordinary_thread)?;
+        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
         Bus::with(master, owned.supervisor().clone(), AnyLinks::Second(links), Some(owned)).map_err(other)
@@ -158,7 +158,7 @@ impl Bus {
     ) -> Result<Bus, String> {
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
-        let log = BusLog::start(followed, be_an_ordinary_thread, move |priority, line| match master {
+        let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),
         });

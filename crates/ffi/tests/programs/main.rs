@@ -5,6 +5,7 @@
 mod beside;
 mod conformance;
 mod daemon;
+mod exits;
 mod fake;
 mod hosts;
 mod library;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use ringcat_control::socket::to_connect_to as find_socket;
 use ringcat_engine::Scan;
 use ringcat_engine::main_device::Declaration;
+use ringcat_link::realtime;
 
 use super::error::DaemonError;
 use super::links::DaemonLinks;
@@ -29,12 +30,13 @@ fn program() -> String {
 }
 
 impl OwnedBus {
-    /// Takes the bus of a master from the daemon at [`socket`], as [`OwnedBus::take`].
+    /// Takes the bus of a master from the daemon at [`socket`], as [`OwnedBus::take`]. Its threads have normal priority
+    /// on all processors, whatever the calling thread has.
     ///
     /// # Errors
     /// As [`OwnedBus::take`].
     pub fn request(master: u32, options: &Options) -> Result<OwnedBus, DaemonError> {
-        OwnedBus::take(&socket(), master, &program(), options, || ())
+        OwnedBus::take(&socket(), master, &program(), options, realtime::leave)
     }
 
     /// What is on the bus: what the daemon knew and was found again at the hand-over, otherwise a new scan.

@@ -12,6 +12,8 @@ mod handover;
 mod hostile;
 mod lines;
 mod locks;
+mod outputs;
 mod owner_process;
 mod program;
 mod running;
+mod versions;
