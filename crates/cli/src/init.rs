@@ -3,7 +3,7 @@
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use ringcat::config::network::model::CheckRevision;
@@ -87,7 +87,9 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     if !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
         return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
     }
+    let begin = Instant::now();
     let bus = arguments.bus.scan(|_| arguments.firmware)?;
+    let scanned = Instant::now();
     let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
     options.ring = bus.ring;
     options.clocks = arguments.clocks;
@@ -111,9 +113,12 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
     let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
+    let us = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+    let (scan_us, file_us) = (us(scanned - begin), us(scanned.elapsed()));
     let digest = file.digest().to_string();
     let variables = file.configuration().image.variables.len();
     let subdevices = file.subdevice.len();
+    say!("scan {:.1} ms, file {:.1} ms", scan_us as f64 / 1e3, file_us as f64 / 1e3);
     say!("digest {digest}");
     let held = format!(
         "{} with {} at {} in {}",
@@ -122,6 +127,6 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
         in_words(arguments.cycle),
         out.display()
     );
-    let data = Data::Init(Init { subdevices, variables, bytes: text.len(), digest });
+    let data = Data::Init(Init { subdevices, variables, bytes: text.len(), scan_us, file_us, digest });
     Ok(Report { verdict: Verdict::Held(held), data })
 }

@@ -120,7 +120,7 @@ pub fn run(arguments: &SiiArguments) -> Result<Report, Failure> {
 
 fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     let failed = |text: String| Failure::new(text);
-    let esi = load(&arguments.esi).map_err(|error| failed(error.to_string()))?;
+    let esi = read(&arguments.esi)?;
     let device = chosen(&esi, arguments)?;
     let profile = match arguments.profile {
         Profile::Twincat => SiiProfile::TwinCat,
@@ -145,6 +145,13 @@ fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     Ok(Report { verdict: Verdict::Held(held), data: Data::SiiBuilt(data) })
 }
 
+/// A description; what is not used of it is reported.
+fn read(path: &Path) -> Result<Esi, Failure> {
+    let esi = load(path).map_err(|error| Failure::new(error.to_string()))?;
+    esi.notices.iter().for_each(|notice| warn(format!("{}: {notice}", esi.file)));
+    Ok(esi)
+}
+
 /// The device of the command line.
 fn chosen<'a>(esi: &'a Esi, arguments: &BuildArguments) -> Result<&'a Device, Failure> {
     let wanted = |device: &&Device| {
@@ -167,7 +174,7 @@ fn chosen<'a>(esi: &'a Esi, arguments: &BuildArguments) -> Result<&'a Device, Fa
 /// The descriptions of a file or a folder; a file that is refused is named and left out.
 fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
     if !path.is_dir() {
-        return Ok(vec![load(path).map_err(|error| Failure::new(error.to_string()))?]);
+        return Ok(vec![read(path)?]);
     }
     let entries = fs::read_dir(path);
     let entries = entries.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;

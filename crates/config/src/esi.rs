@@ -15,18 +15,19 @@ mod number;
 mod parse;
 mod references;
 mod rules;
+mod schema;
 pub mod sii;
 mod values;
 
 pub use error::{EsiError, EsiProblem, Notice};
 pub use limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_ELEMENTS, MAX_REFERENCES, MAX_TEXT_BYTES};
 pub use model::{
-    Access, AllowedModule, ArrayBounds, Check, ClockSettings, CoeCommand, CoeSettings, Controller, DataType, Device,
-    Dictionary, Eeprom, EepromCategory, EepromContent, EoeSettings, Esi, Flags, Fmmu, FmmuRole, Group, Info, Mailbox,
-    Module, ModuleClass, Names, Object, ObjectInfo, OpMode, OpModeSyncManager, OtherIdentity, Pdo, PdoEntry, PortKind,
-    PortSettings, Profile, RawCommand, Reference, RevisionCheck, ScaledTime, Slot, SlotDistances, SlotGroupData,
-    SlotIndex, Slots, SoeCommand, StateTimes, SubDeviceOf, SubItem, SubItemInfo, SyncManager, SyncManagerRole,
-    SyncUnit, Transition, Vendor,
+    Access, AllowedModule, AoeSettings, ArrayBounds, Check, ClockSettings, CoeCommand, CoeSettings, Controller,
+    DataType, Device, Dictionary, Eeprom, EepromCategory, EepromContent, EoeSettings, Esi, Flags, Fmmu, FmmuRole,
+    Group, Info, Mailbox, Module, ModuleClass, Names, Object, ObjectInfo, OpMode, OpModeSyncManager, OtherIdentity,
+    Pdo, PdoEntry, PortKind, PortSettings, Profile, RawCommand, Reference, RevisionCheck, ScaledTime, Slot,
+    SlotDistances, SlotGroupData, SlotIndex, Slots, SoeCommand, StateTimes, SubDeviceOf, SubItem, SubItemInfo,
+    SyncManager, SyncManagerRole, SyncUnit, Transition, Vendor,
 };
 pub use modules::{PlacedModule, place_modules};
 pub use references::{NoReferences, References, read_with};

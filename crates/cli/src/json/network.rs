@@ -12,6 +12,10 @@ pub struct Init {
     pub variables: usize,
     /// Bytes of the file
     pub bytes: usize,
+    /// Time of the scan, and of firmware versions where they are read, in microseconds
+    pub scan_us: u64,
+    /// Time until the file was written, in microseconds
+    pub file_us: u64,
     /// SHA-256 of the canonical text of the file, in hexadecimal digits
     pub digest: String,
 }

@@ -52,7 +52,14 @@ fn what_cannot_be_done_is_an_object_too() {
         "clocks --main no-such",
         "capture --main no-such --out /tmp/never.pcapng",
         "sim --main no-such --segment FILE",
+        "standby --main no-such --redundant no-such-2",
+        "init --main no-such --out /tmp/never.toml",
+        "compare --main no-such --network FILE.missing",
         "eni FILE.xml",
+        "esi list FILE.missing",
+        "sii build FILE.missing --out /tmp/never.bin",
+        "sii compare FILE.missing --esi FILE.missing",
+        "sii skeleton FILE.missing --out /tmp/never.xml",
         "demo --segment FILE.missing",
         "bench echo --main no-such",
         "bench round-trip --main no-such",
@@ -62,19 +69,43 @@ fn what_cannot_be_done_is_an_object_too() {
         "nonsense",
     ];
     std::fs::write(&file, "[[device]]\ntype = \"coupler\"\n").expect("the temporary directory is writable");
+    let mut named = std::collections::BTreeSet::new();
     for line in commands {
         let output = ringcat(&format!("{} --json", line.replace("FILE", &file.display().to_string())));
         let command = match line.split(' ').collect::<Vec<_>>().as_slice() {
-            ["bench", what, ..] => format!("bench {what}"),
+            [group @ ("bench" | "esi" | "sii"), what, ..] => format!("{group} {what}"),
             [command, ..] => (*command).to_owned(),
             [] => String::new(),
         };
+        named.insert(command.clone());
         let result = page.check(&command, &text(&output.stdout));
         let (outcome, message) = (&result["result"]["outcome"], result["result"]["message"].as_str().unwrap_or("none"));
         assert_eq!((outcome.as_str(), output.status.code()), (Some("error"), Some(2)), "{line}");
         assert!(text(&output.stderr).ends_with(&format!("result: FAILED: {message}\n")), "{line}: {message}");
     }
     std::fs::remove_file(&file).expect("it was just written");
+    for command in all_commands() {
+        assert!(named.contains(&command), "`{command}` is missing in the list");
+    }
+}
+
+/// Every command that the help names, with those of a group.
+fn all_commands() -> Vec<String> {
+    let under = |line: &str| -> Vec<String> {
+        let output = text(&ringcat(line).stdout);
+        let list = output.split("Commands:").nth(1).unwrap_or_default().split("\n\n").next().unwrap_or_default();
+        let names = list.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+        names.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect()
+    };
+    let mut all = Vec::new();
+    for command in under("-h").into_iter().filter(|command| command != "help") {
+        match under(&format!("{command} -h")) {
+            none if none.is_empty() => all.push(command),
+            some => all.extend(some.iter().filter(|it| *it != "help").map(|it| format!("{command} {it}"))),
+        }
+    }
+    assert!(all.len() > 15, "{all:?}");
+    all
 }
 
 // covers: json

@@ -4,4 +4,5 @@ mod daemon;
 mod demo;
 mod documented;
 mod exit_codes;
+mod files;
 mod json;

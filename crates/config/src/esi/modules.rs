@@ -104,7 +104,12 @@ fn allowed(esi: &Esi, slot: &Slot) -> String {
     let fitting: Vec<String> =
         esi.modules.iter().filter(|module| fits(esi, slot, module)).map(|module| shown(module.kind.trim())).collect();
     match fitting.len() {
-        0 => "no module of the file fits it".to_owned(),
+        0 => match &esi.missing[..] {
+            [] => "no module of the file fits it".to_owned(),
+            [gone, ..] => {
+                format!("no module of the file fits it, and the file {} with modules is missing", shown(&gone.path))
+            }
+        },
         count if count > NAMED => {
             format!("expected {} or one of {} others", fitting[..NAMED].join(", "), count - NAMED)
         }

@@ -2,6 +2,7 @@
 //! files if they are beside the repository.
 
 mod bad_files;
+mod editions;
 mod images;
 mod reading;
 mod real_files;

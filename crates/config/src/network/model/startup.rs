@@ -128,7 +128,7 @@ pub struct Write {
     pub data: Bytes,
     /// Retries of a write that the SubDevice did not process.
     #[serde(default)]
-    pub retries: u8,
+    pub retries: u16,
     /// The SubDevice must process the write.
     #[serde(default)]
     pub required: bool,
@@ -149,7 +149,7 @@ pub struct Check {
     pub within: Option<Time>,
     /// Retries of a read that the SubDevice did not process.
     #[serde(default)]
-    pub retries: u8,
+    pub retries: u16,
     /// The SubDevice must process the read.
     #[serde(default)]
     pub required: bool,

@@ -1,0 +1,148 @@
+//! Commands about descriptions of networks and devices, as a user calls them: files in, files out, differences by name.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+/// Descriptions of an invented vendor.
+pub const ACME: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/tests/files");
+
+/// A folder of its own, removed on drop.
+pub struct Place(PathBuf);
+
+impl Place {
+    pub fn new(name: &str) -> Place {
+        let place = Place(std::env::temp_dir().join(format!("ringcat-files-{}-{name}", std::process::id())));
+        fs::create_dir_all(&place.0).expect("a temporary folder");
+        place
+    }
+
+    pub fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    pub fn write(&self, name: &str, text: &str) -> String {
+        fs::write(self.0.join(name), text).expect("it is ours");
+        self.path(name)
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What a command printed.
+pub struct Said {
+    pub code: Option<i32>,
+    pub out: String,
+    pub errors: String,
+}
+
+impl Said {
+    /// All that was said, for messages.
+    pub fn all(&self) -> String {
+        format!("{:?}\n{}\n{}", self.code, self.out, self.errors)
+    }
+
+    /// The last line, which is the verdict.
+    pub fn verdict(&self) -> &str {
+        self.errors.lines().chain(self.out.lines()).filter(|line| line.starts_with("result: ")).last().unwrap_or("")
+    }
+}
+
+/// Runs the program with these arguments.
+pub fn ringcat(arguments: &[&str]) -> Said {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ringcat"));
+    let output = command.args(arguments).stdin(Stdio::null()).output().expect("the program starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    Said { code: output.status.code(), out: text(&output.stdout), errors: text(&output.stderr) }
+}
+
+/// A coupler, terminals, a drive.
+fn segment(inputs: usize) -> String {
+    format!(
+        "[[device]]\ntype = \"coupler\"\n\n[[device]]\ntype = \"digital-input-8\"\ncount = {inputs}\n\n\
+         [[device]]\ntype = \"servo\"\n"
+    )
+}
+
+// covers: network-file
+#[test]
+fn a_network_file_is_made_of_a_scan_compared_and_never_replaced_by_chance() {
+    let place = Place::new("init");
+    let (bus, other) = (place.write("bus.toml", &segment(2)), place.write("other.toml", &segment(1)));
+    let out = place.path("machine.toml");
+    let made = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert_eq!(made.code, Some(0), "{}", made.all());
+    assert!(made.verdict().starts_with("result: ok: 4 SubDevices with "), "{}", made.all());
+    let text = place.read("machine.toml");
+    assert!(text.starts_with("ringcat_network = 1\n") && text.contains("name = \"digital-input-8 2\""), "{text}");
+    let again = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert!(again.code == Some(2) && again.verdict().contains("exists: name another file"), "{}", again.all());
+    assert_eq!(place.read("machine.toml"), text, "it is as it was");
+    let replaced = ringcat(&["init", "--sim", &bus, "--out", &out, "--overwrite", "--revisions", "equal"]);
+    assert!(replaced.code == Some(0) && place.read("machine.toml").contains("check_revision"), "{}", replaced.all());
+    let same = ringcat(&["compare", "--sim", &bus, "--network", &out]);
+    assert_eq!((same.code, same.verdict()), (Some(0), "result: ok: 4 SubDevices, as in the file"), "{}", same.all());
+    let differs = ringcat(&["compare", "--sim", &other, "--network", &out]);
+    assert_eq!(differs.code, Some(1), "{}", differs.all());
+    assert!(differs.out.contains("! missing       \"digital-input-8 2\" (position 2,"), "{}", differs.all());
+    assert_eq!(differs.verdict(), "result: FAILED: 1 difference from the file, 1 of them prevent OP");
+    let wrong = place.write("wrong.toml", &text.replacen("direction", "directoin", 1));
+    let refused = ringcat(&["compare", "--sim", &bus, "--network", &wrong]);
+    assert!(refused.code == Some(2) && refused.verdict().contains("wrong.toml:"), "{}", refused.all());
+}
+
+// covers: esi-read, ES-29
+#[test]
+fn a_folder_of_descriptions_is_listed_and_searched() {
+    let place = Place::new("esi");
+    let list = |more: &[&str]| ringcat(&[&["esi", "list", ACME, "--no-index"], more].concat());
+    let all = list(&[]);
+    assert!(all.code == Some(0) && all.out.contains("AD08") && all.out.contains("acme.xml:"), "{}", all.all());
+    assert!(all.verdict().starts_with("result: ok: ") && all.errors.contains("left out: "), "{}", all.all());
+    let found = list(&["--find", "modular"]);
+    assert!(found.out.contains("AM01") && !found.out.contains("AD08"), "{}", found.all());
+    let of_bus = ["--vendor", "0xc47", "--product", "0x1008", "--revision", "0x00150000"];
+    let older = list(&of_bus);
+    assert!(older.out.contains("0x00120000") && older.out.contains("(older)"), "{}", older.all());
+    let none = list(&["--vendor", "0xc47", "--product", "0x1008", "--revision", "0x00110000"]);
+    assert_eq!((none.code, none.verdict()), (Some(1), "result: FAILED: no description fits"));
+    let broken = place.write("broken.xml", "<EtherCATInfo>");
+    let refused = ringcat(&["esi", "list", &place.path(""), "--no-index"]);
+    assert!(refused.errors.contains("broken.xml:1: ") && refused.code == Some(1), "{broken}: {}", refused.all());
+}
+
+// covers: esi-use, ES-81, ES-102, ES-105
+#[test]
+fn images_are_built_compared_and_described_again() {
+    let place = Place::new("sii");
+    let acme = format!("{ACME}/acme.xml");
+    let image = place.path("ad08.bin");
+    let built = ringcat(&["sii", "build", &acme, "--type", "AD08", "--serial", "7", "--out", &image]);
+    assert_eq!(built.code, Some(0), "{}", built.all());
+    let same = ringcat(&["sii", "compare", &image, "--esi", &acme]);
+    assert_eq!(
+        (same.code, same.verdict()),
+        (Some(0), "result: ok: 1 image as described, 0 with differences, 0 not compared")
+    );
+    let mut bytes = fs::read(&image).expect("it was written");
+    bytes[0x90] ^= 0x20;
+    fs::write(&image, &bytes).expect("it is ours");
+    let differs = ringcat(&["sii", "compare", &image, "--esi", &acme]);
+    assert!(differs.code == Some(1) && differs.out.contains("string"), "{}", differs.all());
+    let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
+    assert!(skeleton.code == Some(0) && place.read("again.xml").contains("ProductCode"), "{}", skeleton.all());
+    let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
+    assert!(unknown.code == Some(2) && unknown.all().contains("there is no such device"), "{}", unknown.all());
+    let odd =
+        place.write("odd.xml", &fs::read_to_string(&acme).unwrap().replacen("<Su Frame", "<Su Foo=\"1\" Frame", 1));
+    let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--out", &image]);
+    assert!(noted.code == Some(0) && noted.errors.contains("odd.xml: line 31: Su@Foo is not known"), "{}", noted.all());
+}
