@@ -5,6 +5,7 @@
 //! elements and attributes, which are notices) and strict where a wrong guess would result in a wrong device: numbers
 //! beyond their range, two devices of one identity, data with half a byte.
 
+mod choices;
 mod element;
 mod error;
 pub mod index;
@@ -16,9 +17,12 @@ mod parse;
 mod references;
 mod rules;
 mod schema;
+mod select;
+mod selection;
 pub mod sii;
 mod values;
 
+pub use choices::{Choices, EntryChoice, MappingChoice, Parameter, PdoChoice, SamplesChoice};
 pub use error::{EsiError, EsiProblem, Notice};
 pub use limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_ELEMENTS, MAX_REFERENCES, MAX_TEXT_BYTES};
 pub use model::{
@@ -32,6 +36,8 @@ pub use model::{
 pub use modules::{PlacedModule, place_modules};
 pub use references::{NoReferences, References, read_with};
 pub use rules::{Choice, choose};
+pub use select::select;
+pub use selection::{SelectedCommand, SelectedMessage, SelectedSyncManager, Selection};
 pub use values::{Part, parts};
 
 use crate::xml;

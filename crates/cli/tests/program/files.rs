@@ -146,3 +146,38 @@ fn images_are_built_compared_and_described_again() {
     let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--out", &image]);
     assert!(noted.code == Some(0) && noted.errors.contains("odd.xml: line 31: Su@Foo is not known"), "{}", noted.all());
 }
+
+// covers: esi-declare
+#[test]
+fn a_device_is_shown_and_declared_with_choices_or_refused_by_file_line_and_device() {
+    let place = Place::new("declare");
+    let acme = format!("{ACME}/acme.xml");
+    let shown = ringcat(&["esi", "show", &acme, "--type", "AA02"]);
+    assert_eq!(shown.code, Some(0), "{}", shown.all());
+    for part in
+        ["TxPdo       0x1a00 SM 3   32 bits \"AI Standard Channel 1\", fixed, excludes 0x1a01", "mailbox     CoE, FoE"]
+    {
+        assert!(shown.out.contains(part), "{}", shown.all());
+    }
+    let drive = ringcat(&["esi", "show", &acme, "--type", "AM01"]);
+    assert!(drive.out.contains("slot        \"Axis 1\", 1 to 1: csp axis, status axis"), "{}", drive.all());
+    assert!(drive.out.contains("mode        \"DC\" 0x0300 SYNC0"), "{}", drive.all());
+    let out = place.path("machine.toml");
+    let declare = |more: &[&str]| ringcat(&[&["esi", "declare", &acme, "--out", &out], more].concat());
+    let analog = declare(&["--type", "AA02", "--with", "0x1A01", "--without", "0x1A00", "--set", "0x8000:3=2c01"]);
+    assert_eq!(analog.code, Some(0), "{}", analog.all());
+    assert!(analog.verdict().starts_with("result: ok: \"AA02\", 2 PDOs with 2 variables and 2 start-up commands"));
+    let again = declare(&["--type", "AD08"]);
+    assert!(again.code == Some(2) && again.verdict().contains("add --append or --overwrite"), "{}", again.all());
+    let second = declare(&["--type", "AM01", "--mode", "DC4", "--module", "csp axis", "--name", "Axis", "--append"]);
+    assert_eq!(second.code, Some(0), "{}", second.all());
+    let text = place.read("machine.toml");
+    for part in ["name = \"AA02\"", "name = \"Axis\"", "[clocks]", "sync0_cycle = \"250us\"", "index = 0x1a01"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let wrong = declare(&["--type", "AA02", "--without", "0x1A02", "--append"]);
+    assert_eq!(wrong.code, Some(2), "{}", wrong.all());
+    let reason = "device \"AA02\": PDO 0x1a02 \"AI Channel 2\": it is mandatory: it has to be assigned";
+    assert!(wrong.verdict().contains("acme.xml:1") && wrong.verdict().contains(reason), "{}", wrong.all());
+    assert_eq!(place.read("machine.toml"), text, "the file is as it was");
+}

@@ -57,6 +57,8 @@ fn what_cannot_be_done_is_an_object_too() {
         "compare --main no-such --network FILE.missing",
         "eni FILE.xml",
         "esi list FILE.missing",
+        "esi show FILE.missing",
+        "esi declare FILE.missing --out /tmp/never.toml",
         "sii build FILE.missing --out /tmp/never.bin",
         "sii compare FILE.missing --esi FILE.missing",
         "sii skeleton FILE.missing --out /tmp/never.xml",

@@ -12,6 +12,7 @@ mod profile;
 mod slots;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use roxmltree::{Document, Node};
 
@@ -30,6 +31,8 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Esi, EsiError> {
     let mut esi = root(element)?;
     schema::check(element);
     esi.file = name.to_owned();
+    let shared: Arc<str> = name.into();
+    esi.modules.iter_mut().for_each(|module| module.file = Arc::clone(&shared));
     esi.notices = file.into_notices().into_list();
     Ok(esi)
 }

@@ -228,6 +228,10 @@ fn subdevice(out: &mut Text, of: &SubDevice, implied: Option<u16>) {
         CheckRevision::None => "none",
         CheckRevision::Equal => "equal",
         CheckRevision::EqualOrGreater => "equal-or-greater",
+        CheckRevision::LowEqual => "low-equal",
+        CheckRevision::LowEqualHighEqualOrGreater => "low-equal-high-equal-or-greater",
+        CheckRevision::HighEqual => "high-equal",
+        CheckRevision::HighEqualLowEqualOrGreater => "high-equal-low-equal-or-greater",
     });
     out.some("serial", of.serial);
     out.some("check_identification", of.check_identification);

@@ -6,6 +6,7 @@ mod editions;
 mod images;
 mod reading;
 mod real_files;
+mod select;
 mod slots;
 
 /// A coupler, a terminal without mailbox, one with CoE and a dictionary, a modular drive.

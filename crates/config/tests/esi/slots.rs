@@ -21,7 +21,7 @@ fn indices_shift_with_the_slot_and_presets_fill_slots() {
     assert_eq!([0, 1, 2].map(|slot| in_slot(slot, 0x607A)), [0x607A, 0x687A, 0x707A].map(Some));
     assert_eq!(all[2].index(SlotIndex { index: 0xFF00, by_slot: true, by_group: false }), None);
     assert_eq!(all[2].index(SlotIndex { index: 0xFF00, by_slot: false, by_group: false }), Some(0xFF00));
-    let pdos = all[2].pdos(&esi, &all[2].module.rx_pdos).unwrap();
+    let pdos = all[2].pdos(&all[2].module.rx_pdos).unwrap();
     assert_eq!((pdos[0].index.index, pdos[0].entries[1].index.index), (0x1620, 0x707A));
     // The other set of vectors: 1 and 16.
     let other = crate::ACME.replacen(
@@ -34,7 +34,7 @@ fn indices_shift_with_the_slot_and_presets_fill_slots() {
     let index = |slot: usize, index| placed[slot].index(SlotIndex { index, by_slot: true, by_group: false });
     assert_eq!([0, 1, 2].map(|slot| index(slot, 0x1A00)), [0x1A00, 0x1A01, 0x1A02].map(Some));
     assert_eq!([0, 1, 2].map(|slot| index(slot, 0x6000)), [0x6000, 0x6010, 0x6020].map(Some));
-    assert_eq!(all[2].commands(&esi).unwrap()[0].index.index, 0x7060);
+    assert_eq!(all[2].commands().unwrap()[0].index.index, 0x7060);
     let skipped = place_modules(&esi, drive, &choices(&["csp axis", "-", "status axis"])).unwrap();
     assert_eq!(skipped.iter().map(|it| it.slot).collect::<Vec<_>>(), [0, 2]);
 }

@@ -1,5 +1,7 @@
 //! Slots of modular devices and their modules (MDP, protocol ES-64 to ES-71).
 
+use std::sync::Arc;
+
 use super::dictionary::Profile;
 use super::mailbox::{CoeCommand, Transition};
 use super::names::Names;
@@ -112,4 +114,6 @@ pub struct Module {
     pub op_mode: Option<String>,
     /// Vendor of the file.
     pub vendor_id: u32,
+    /// The file with the module.
+    pub file: Arc<str>,
 }

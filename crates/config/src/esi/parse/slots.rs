@@ -85,5 +85,6 @@ pub(super) fn module(element: Element<'_>, vendor_id: u32) -> Result<Module, Esi
         profiles: profiles(element)?,
         op_mode: element.child("DcOpModeName").map(|name| name.text().trim().to_owned()),
         vendor_id,
+        file: "".into(),
     })
 }
