@@ -5,6 +5,7 @@
 mod check;
 mod declare;
 mod error;
+mod esi_names;
 mod from_esi;
 mod from_scan;
 pub mod model;

@@ -32,7 +32,7 @@ pub struct ChoiceArguments {
     /// A start-up value in hexadecimal bytes: 0x8000:3=c800, at SO @SO behind it
     #[arg(long = "set", value_name = "OBJECT=BYTES", value_parser = parameter, help_heading = "Choices")]
     parameters: Vec<Parameter>,
-    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s
+    /// Cycle time, with its unit: 250us, 1ms; with --append that of the file
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Choices")]
     pub cycle: Duration,
     /// Language of names
@@ -45,7 +45,6 @@ impl ChoiceArguments {
     pub fn choices(&self) -> Choices {
         let mut choices = Choices::default();
         choices.mode.clone_from(&self.mode);
-        choices.cycle_ns = u32::try_from(self.cycle.as_nanos()).unwrap_or(u32::MAX);
         choices.modules = self.module.iter().cloned().map(Some).collect();
         choices.with.clone_from(&self.with);
         choices.without.clone_from(&self.without);
@@ -110,8 +109,7 @@ fn parameter(text: &str) -> Result<Parameter, String> {
         "SO" => Transition::So,
         "SP" => Transition::Sp,
         "OS" => Transition::Os,
-        "OP" => Transition::Op,
-        _ => return Err(format!("expected a transition IP, PS, SO, SP, OS or OP, got {at}")),
+        _ => return Err(format!("expected a transition IP, PS, SO, SP or OS, got {at}")),
     };
     let digits: Vec<char> = digits.chars().filter(|c| !c.is_whitespace()).collect();
     let byte = |pair: &[char]| {
@@ -137,7 +135,15 @@ mod tests {
         assert_eq!(mapping("0x1600=0x6040:0, 0:0:8"), Ok(MappingChoice::new(0x1600, entries)));
         assert_eq!(samples("0x1A00=10"), Ok(SamplesChoice::new(0x1A00, 10)));
         assert_eq!(parameter("0x8000:3=c8 00@SO"), Ok(Parameter::new(0x8000, 3, [0xC8, 0]).at(Transition::So)));
-        for wrong in ["0x8000:3", "0x8000:3=c", "0x8000:300=c8", "0x8000:3=c800@XY", "0x80000=00", "0x8000:3="] {
+        for wrong in [
+            "0x8000:3",
+            "0x8000:3=c",
+            "0x8000:300=c8",
+            "0x8000:3=c800@XY",
+            "0x8000:3=c800@OP",
+            "0x80000=00",
+            "0x8000:3=",
+        ] {
             assert!(parameter(wrong).is_err_and(|error| error.contains("expected")), "{wrong}");
         }
         assert!(pdo("0x1A01:x").is_err() && mapping("0x1600").is_err() && entry("0x6040:0:16:1").is_err());

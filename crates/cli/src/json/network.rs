@@ -10,6 +10,10 @@ pub struct Init {
     pub subdevices: usize,
     /// Variables of the process image
     pub variables: usize,
+    /// SubDevices that a description describes; null without descriptions
+    pub described: Option<usize>,
+    /// Names of PDOs and entries that come from descriptions
+    pub named: usize,
     /// Bytes of the file
     pub bytes: usize,
     /// Time of the scan, and of firmware versions where they are read, in microseconds

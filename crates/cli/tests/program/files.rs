@@ -94,9 +94,58 @@ fn a_network_file_is_made_of_a_scan_compared_and_never_replaced_by_chance() {
     assert_eq!(differs.code, Some(1), "{}", differs.all());
     assert!(differs.out.contains("! missing       \"digital-input-8 2\" (position 2,"), "{}", differs.all());
     assert_eq!(differs.verdict(), "result: FAILED: 1 difference from the file, 1 of them prevent OP");
+    let clocked = ringcat(&["init", "--sim", &bus, "--out", &out, "--overwrite", "--sync", "auto"]);
+    let with_signals = place.read("machine.toml");
+    for part in ["[clocks]", "[subdevice.sync]\nassign_activate = 0x0300\nsync0_cycle = \"1ms\""] {
+        assert!(clocked.code == Some(0) && with_signals.contains(part), "{}{with_signals}", clocked.all());
+    }
     let wrong = place.write("wrong.toml", &text.replacen("direction", "directoin", 1));
     let refused = ringcat(&["compare", "--sim", &bus, "--network", &wrong]);
     assert!(refused.code == Some(2) && refused.verdict().contains("wrong.toml:"), "{}", refused.all());
+}
+
+// covers: network-file, esi-use, ES-72, ES-73
+#[test]
+fn names_that_a_device_does_not_have_come_from_its_description() {
+    let place = Place::new("names");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    let bare = text
+        .replace("<Name>Status__Underrange</Name>", "<Name></Name>")
+        .replace("<Name>AI Channel 2</Name>", "<Name></Name>")
+        .replace("<Name>Value</Name><DataType>INT</DataType></Entry>", "<Name></Name></Entry>");
+    assert_ne!(bare, text);
+    place.write("bare.xml", &bare);
+    let terminals = "[[device]]\nesi = \"bare.xml\"\ntype = \"AA02\"\n\n[[device]]\ntype = \"digital-input-8\"\n";
+    let bus = place.write("bus.toml", terminals);
+    fs::create_dir(place.path("esi")).expect("it is ours");
+    let described = text.replacen("<Name>Status__Underrange</Name>", "<Name></Name>", 1);
+    place.write("esi/acme.xml", &described);
+    for folder in ["", "esi/"] {
+        let modules = format!("{folder}modules/acme-modules.xml");
+        fs::create_dir(place.path(&format!("{folder}modules"))).expect("it is ours");
+        fs::copy(format!("{ACME}/modules/acme-modules.xml"), place.path(&modules)).expect("it is ours");
+    }
+    let out = place.path("machine.toml");
+    let init = |more: &[&str]| ringcat(&[&["init", "--sim", &bus, "--out", &out, "--overwrite"], more].concat());
+    let without = init(&[]);
+    assert!(without.code == Some(0) && !place.read("machine.toml").contains("name = \"Value\""), "{}", without.all());
+    let with = init(&["--esi", &place.path("esi")]);
+    assert_eq!(with.code, Some(0), "{}", with.all());
+    assert!(with.out.contains("1 SubDevice described, 4 names from descriptions"), "{}", with.all());
+    assert!(with.errors.contains("position 1 \"digital-input-8\": no description of product"), "{}", with.all());
+    let made = place.read("machine.toml");
+    for part in [
+        "name = \"AI Standard Channel 1\"",
+        "name = \"AI Channel 2\"",
+        "{ index = 0x6000, sub = 1, bits = 1, name = \"Underrange\", type = \"BOOL\" }",
+        "{ index = 0x6010, sub = 17, bits = 16, name = \"Value\", type = \"INT\" }",
+    ] {
+        assert!(made.contains(part), "{part}: {made}");
+    }
+    let same = ringcat(&["compare", "--sim", &bus, "--network", &out]);
+    assert_eq!(same.code, Some(0), "names are no difference: {}", same.all());
+    let gone = init(&["--esi", &place.path("no-such")]);
+    assert!(gone.code == Some(2) && gone.verdict().contains("no-such"), "{}", gone.all());
 }
 
 // covers: esi-read, ES-29

@@ -8,8 +8,6 @@ use super::model::Transition;
 pub struct Choices {
     /// Operation mode of the clock by its name; `None`: that of its modules, else the first.
     pub mode: Option<String>,
-    /// Cycle of the MainDevice in nanoseconds, from which SYNC signals follow.
-    pub cycle_ns: u32,
     /// The module of each slot, as for [`place_modules`](super::place_modules).
     pub modules: Vec<Option<String>>,
     /// PDOs that are assigned besides those by default.
@@ -86,7 +84,6 @@ impl Default for Choices {
     fn default() -> Choices {
         Choices {
             mode: None,
-            cycle_ns: 1_000_000,
             modules: Vec::new(),
             with: Vec::new(),
             without: Vec::new(),

@@ -43,7 +43,7 @@ pub struct SelectedSyncManager<'a> {
 impl SelectedSyncManager<'_> {
     /// Bytes of its process data.
     pub fn bytes(&self) -> u32 {
-        self.pdos.iter().map(Pdo::bit_length).sum::<u32>().div_ceil(8)
+        self.pdos.iter().fold(0, |bits: u32, pdo| bits.saturating_add(pdo.bit_length())).div_ceil(8)
     }
 }
 

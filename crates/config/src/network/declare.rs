@@ -326,6 +326,18 @@ fn assignment(of: &SyncManager) -> PdoAssignment {
     PdoAssignment::new(of.number, direction(of), of.pdo.iter().map(mapping).collect())
 }
 
+impl From<SyncSignals> for model::Sync {
+    fn from(of: SyncSignals) -> model::Sync {
+        model::Sync {
+            assign_activate: of.assign_activate,
+            sync0_cycle: Shift(of.sync0_cycle_ns.into()),
+            sync0_shift: Shift(of.sync0_shift_ns.into()),
+            sync1_cycle: Shift(of.sync1_cycle_ns.into()),
+            sync1_shift: Shift(of.sync1_shift_ns.into()),
+        }
+    }
+}
+
 fn signals(of: &model::Sync) -> SyncSignals {
     let unsigned = |shift: Shift| u32::try_from(shift.0).unwrap_or(0);
     let signed = |shift: Shift| i32::try_from(shift.0).unwrap_or(0);

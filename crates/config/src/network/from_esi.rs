@@ -104,7 +104,7 @@ struct Notes {
 
 impl Notes {
     fn note(&mut self, text: String) {
-        match self.notices.iter_mut().find(|known| known.text == text) {
+        match self.notices.last_mut().filter(|known| known.text == text) {
             Some(known) => known.times += 1,
             None => self.notices.push(esi::Notice { line: self.line, text, times: 1 }),
         }
@@ -213,7 +213,7 @@ fn entry(of: &esi::PdoEntry, language: u32) -> Vec<Entry> {
     std::iter::once(whole).chain(gaps).collect()
 }
 
-fn printable(text: &str) -> String {
+pub(super) fn printable(text: &str) -> String {
     let text: String = text.chars().filter(|character| !character.is_control()).collect();
     text.trim().to_owned()
 }

@@ -246,6 +246,8 @@ fn oversampled_pdos_are_repeated_at_their_distance() {
     assert_eq!(assigned(&esi, ANALOG, &samples(3))[1].1, [0x1A00, 0x1A02, 0x1A12, 0x1A22]);
     assert!(refused(&esi, ANALOG, &samples(9)).contains("an oversampling factor of 9: expected 1 to 8"));
     assert!(refused(&acme(), ANALOG, &samples(2)).contains("it has no oversampling (OSFac)"));
+    let far = acme_of(&text.replacen("OSIndexInc=\"16\"", "OSIndexInc=\"4294967295\"", 1));
+    assert!(refused(&far, ANALOG, &samples(3)).contains("copy 1 has an index above 0xffff"));
     let analog = declared(&esi, ANALOG, &samples(3));
     assert_eq!(analog.sync_manager[1].pdo.len(), 4);
 }

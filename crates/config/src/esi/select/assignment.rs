@@ -15,6 +15,8 @@ const MAX_SAMPLES: u32 = 255;
 const UNLISTED: usize = 0x1_0000;
 /// Bytes of a SyncManager.
 const MAX_BYTES: u32 = 0xFFFF;
+/// Entries of a PDO with its copies, at most: more than bits in a SyncManager.
+const MAX_SAMPLED: u64 = 8 << 16;
 
 /// A PDO in a SyncManager: number of the candidate, number of the SyncManager, place in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,6 +50,7 @@ pub(super) fn sync_managers<'a>(work: &mut Work<'a>) -> Result<Vec<SelectedSyncM
         }
     }
     let device = work.device;
+    let factors = factors_of_mode(work);
     let mut selected = Vec::new();
     for (number, definition) in (0..=u8::MAX).zip(&device.sync_managers) {
         let outputs = definition.role == SyncManagerRole::Outputs;
@@ -62,7 +65,7 @@ pub(super) fn sync_managers<'a>(work: &mut Work<'a>) -> Result<Vec<SelectedSyncM
             if pdo.entries != candidate.pdo.entries {
                 mapped.push(pdo.index.index);
             }
-            pdos.extend(samples(work, candidate, pdo)?);
+            pdos.extend(samples(work, &factors, candidate, pdo)?);
         }
         let of = SelectedSyncManager { number, outputs, definition, pdos, mapped };
         let is_chosen = assigned != by_default || !work.choices.mappings.is_empty();
@@ -286,25 +289,32 @@ fn changeable(
     Ok(())
 }
 
+/// Oversampling factors that the operation mode lists.
+fn factors_of_mode(work: &Work<'_>) -> HashMap<u16, u32> {
+    let listed = work.mode.iter().flat_map(|mode| &mode.sync_managers).flat_map(|sm| &sm.pdos);
+    listed.filter_map(|(index, factor)| Some((*index, (*factor)?))).collect()
+}
+
 /// A PDO, and its copies by oversampling.
-fn samples(work: &Work<'_>, of: &Candidate, pdo: Pdo) -> Result<Vec<Pdo>, EsiError> {
+fn samples(work: &Work<'_>, factors: &HashMap<u16, u32>, of: &Candidate, pdo: Pdo) -> Result<Vec<Pdo>, EsiError> {
     let index = pdo.index.index;
     let chosen = work.choices.samples.iter().find(|it| it.index == index).map(|it| it.factor);
-    let of_mode = work.mode.iter().flat_map(|mode| &mode.sync_managers).flat_map(|sm| &sm.pdos);
-    let of_mode = of_mode.filter(|(listed, _)| *listed == index).find_map(|(_, factor)| *factor);
     let Some([default, least, most, distance]) = pdo.oversampling else {
         return match chosen.filter(|factor| *factor != 1) {
             Some(_) => Err(of.error(work, "it has no oversampling (OSFac)")),
             None => Ok(vec![pdo]),
         };
     };
-    let factor = chosen.or(of_mode).unwrap_or(default).max(1);
+    let factor = chosen.or(factors.get(&index).copied()).unwrap_or(default).max(1);
     if chosen.is_some() && !(least..=most.min(MAX_SAMPLES)).contains(&factor) {
         let reason = format!("an oversampling factor of {factor}: expected {least} to {}", most.min(MAX_SAMPLES));
         return Err(of.error(work, reason));
     }
+    if pdo.entries.len() as u64 * u64::from(factor.min(MAX_SAMPLES)) > MAX_SAMPLED {
+        return Err(of.error(work, format!("{} entries {factor} times, which no SyncManager has", pdo.entries.len())));
+    }
     let copy = |number: u32| {
-        let index = u32::from(index) + number * distance;
+        let index = u64::from(index) + u64::from(number) * u64::from(distance);
         let index =
             u16::try_from(index).map_err(|_| of.error(work, format!("copy {number} has an index above 0xffff")))?;
         Ok(Pdo { index: SlotIndex { index, ..pdo.index }, ..pdo.clone() })
@@ -316,7 +326,7 @@ fn samples(work: &Work<'_>, of: &Candidate, pdo: Pdo) -> Result<Vec<Pdo>, EsiErr
 fn size(work: &Work<'_>, sm: &SyncManager, of: &SelectedSyncManager<'_>, is_chosen: bool) -> Result<(), EsiError> {
     let bytes = of.bytes();
     let start = u32::from(sm.start.unwrap_or(0));
-    if bytes > MAX_BYTES || start + bytes > 0x1_0000 {
+    if bytes > MAX_BYTES || start + bytes > MAX_BYTES + 1 {
         let reason = format!("SyncManager {}: {bytes} bytes at {start:#06x}, which do not fit 64 KiB", of.number);
         return Err(work.error(sm.line, reason));
     }

@@ -6,6 +6,9 @@ use super::work::Work;
 use crate::esi::error::EsiError;
 use crate::esi::model::Pdo;
 
+/// Entries of the PDOs of all modules, at most: a module is in up to 255 slots.
+const MAX_ENTRIES: usize = 1 << 18;
+
 /// A PDO that can be assigned.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
@@ -47,9 +50,15 @@ pub(super) fn candidates(work: &Work<'_>) -> Result<Vec<Candidate>, EsiError> {
         }
     }
     let mut replaced = Vec::new();
+    let mut entries = 0;
     for placed in &work.modules {
         let module = placed.module;
         for (pdos, outputs) in [(&module.rx_pdos, true), (&module.tx_pdos, false)] {
+            entries += pdos.iter().map(|pdo| pdo.entries.len().max(1)).sum::<usize>();
+            if entries > MAX_ENTRIES {
+                let reason = format!("the modules bring more than {MAX_ENTRIES} entries");
+                return Err(work.error(device.line, reason));
+            }
             for pdo in placed.pdos(pdos)? {
                 let file = module.file.to_string();
                 let new = Candidate { pdo, outputs, file, slot: Some(placed.slot) };

@@ -1,5 +1,7 @@
 //! Start-up commands: modules, those of the description, parameters (protocol ES-55, ES-58, ES-59, ES-67, ES-70).
 
+use std::collections::HashSet;
+
 use super::work::Work;
 use crate::esi::choices::Parameter;
 use crate::esi::error::EsiError;
@@ -8,6 +10,8 @@ use crate::esi::selection::{SelectedCommand, SelectedMessage};
 
 /// The list of module idents (protocol ES-69).
 const MODULE_IDENTS: u16 = 0xF030;
+/// Start-up commands of all modules, at most.
+const MAX_COMMANDS: usize = 1 << 16;
 
 /// All commands: the list of modules, then those of the description, then the parameters.
 pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiError> {
@@ -16,12 +20,16 @@ pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiE
     let mailbox = device.mailbox.as_ref();
     let mut objects: Vec<CoeCommand> = Vec::new();
     for placed in &work.modules {
+        if objects.len() + placed.module.commands.len() > MAX_COMMANDS {
+            let reason = format!("the modules bring more than {MAX_COMMANDS} start-up commands");
+            return Err(work.error(device.line, reason));
+        }
         objects.extend(placed.commands()?);
     }
     let own = mailbox.and_then(|mailbox| mailbox.coe.as_ref()).map(|coe| &coe.commands[..]).unwrap_or_default();
+    let of_modules: HashSet<(u16, u8)> = objects.iter().map(|it| (it.index.index, it.sub_index)).collect();
     let is_replaced = |command: &CoeCommand| {
-        let same = |it: &CoeCommand| (it.index.index, it.sub_index) == (command.index.index, command.sub_index);
-        command.overwritten_by_module && objects.iter().any(same)
+        command.overwritten_by_module && of_modules.contains(&(command.index.index, command.sub_index))
     };
     let own: Vec<CoeCommand> = own.iter().filter(|command| !is_replaced(command)).cloned().collect();
     for command in own.iter().chain(&objects) {

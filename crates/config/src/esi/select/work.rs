@@ -23,7 +23,7 @@ impl Work<'_> {
 
     pub fn note(&mut self, line: u32, text: impl Into<String>) {
         let text = text.into();
-        match self.notices.iter_mut().find(|known| known.text == text) {
+        match self.notices.last_mut().filter(|known| known.text == text) {
             Some(known) => known.times += 1,
             None => self.notices.push(Notice { line, text, times: 1 }),
         }
