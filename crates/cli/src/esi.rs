@@ -1,5 +1,5 @@
-//! `ringcat esi`: device descriptions (ESI): what a folder describes, one device, a SubDevice of a network file from one
-//! and choices. No interface is needed.
+//! `ringcat esi`: device descriptions (ESI): what a folder describes, one device, a SubDevice of a network file from a
+//! description and choices. No interface is needed.
 
 mod choices;
 mod declare;

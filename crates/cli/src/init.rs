@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use ringcat::config::network::model::{CheckRevision, Sync as SyncTable};
 use ringcat::network::{NetworkFile, ScanOptions};
 
-use crate::bus::BusArguments;
+use crate::bus::{Bus, BusArguments};
 use crate::clock_options::sync::{Sync, choose, sync};
 use crate::clock_options::{SYNC_HELP, SYNC_LONG_HELP};
 use crate::failure::Failure;
@@ -113,28 +113,11 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     options.check_revision = arguments.revisions.into();
     options.check_serial = arguments.serials;
     let mut file = NetworkFile::from_scan(&bus.scan.subdevices, &bus.scan.topology, &options);
-    let signals = choose(&arguments.sync, &bus.scan.subdevices, arguments.cycle).map_err(Failure::new)?;
-    for (subdevice, signals) in file.subdevice.iter_mut().zip(signals) {
-        subdevice.sync = signals.map(SyncTable::from);
-    }
-    for (subdevice, firmware) in file.subdevice.iter_mut().zip(&bus.firmware) {
-        subdevice.firmware = firmware.clone().unwrap_or_default();
-    }
-    for (subdevice, info) in file.subdevice.iter().zip(&bus.scan.subdevices) {
-        if subdevice.sync_manager.is_empty() && !info.sync_managers.is_empty() && !info.pdos.is_empty() {
-            let (position, name) = (info.position, &subdevice.name);
-            warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
-        }
-    }
-    let named =
-        arguments.esi.as_deref().map(|folder| names::fill(&mut file, &bus.scan.subdevices, folder)).transpose()?;
+    let named = complete(arguments, &bus, &mut file)?;
     let text = file.to_text();
     // What is written must be what `run` reads.
     NetworkFile::read(&out.display().to_string(), text.as_bytes()).map_err(|error| Failure::new(error.to_string()))?;
-    let mut opening = OpenOptions::new();
-    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
-    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
+    write(arguments, &text)?;
     let us = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
     let (scan_us, file_us) = (us(scanned - begin), us(scanned.elapsed()));
     let digest = file.digest().to_string();
@@ -165,4 +148,31 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
         digest,
     });
     Ok(Report { verdict: Verdict::Held(held), data })
+}
+
+/// What a scan does not give: chosen signals, versions of the firmware, names from descriptions.
+fn complete(arguments: &InitArguments, bus: &Bus, file: &mut NetworkFile) -> Result<Option<names::Named>, Failure> {
+    let found = &bus.scan.subdevices;
+    let signals = choose(&arguments.sync, found, arguments.cycle).map_err(Failure::new)?;
+    for (subdevice, signals) in file.subdevice.iter_mut().zip(signals) {
+        subdevice.sync = signals.map(SyncTable::from);
+    }
+    for (subdevice, firmware) in file.subdevice.iter_mut().zip(&bus.firmware) {
+        subdevice.firmware = firmware.clone().unwrap_or_default();
+    }
+    for (subdevice, info) in file.subdevice.iter().zip(found) {
+        if subdevice.sync_manager.is_empty() && !info.sync_managers.is_empty() && !info.pdos.is_empty() {
+            let (position, name) = (info.position, &subdevice.name);
+            warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
+        }
+    }
+    arguments.esi.as_deref().map(|folder| names::fill(file, found, folder)).transpose()
+}
+
+fn write(arguments: &InitArguments, text: &str) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let mut opening = OpenOptions::new();
+    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
+    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
 }

@@ -1,5 +1,5 @@
-//! Names and types of PDOs and entries of a SubDevice from a description, where the file has none: the EEPROM of a device
-//! whose PDOs are in its dictionary only, or of a small one, has no texts (protocol ES-47, ES-72, ES-73).
+//! Names and types of PDOs and entries of a SubDevice from a description, where the file has none: the EEPROM of a
+//! device whose PDOs are in its dictionary only, or of a small one, has no texts (protocol ES-47, ES-72, ES-73).
 
 use super::from_esi::printable;
 use super::model::{Entry, SubDevice};

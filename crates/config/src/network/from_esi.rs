@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use super::check::check;
+use super::error::path_text;
 use super::model::{
     self, At, Buffer, CheckRevision, Clocks, Domain, Entry, Idn, Mailbox, NetworkFile, Pdo, Protocol, Sdo, Startup,
     SubDevice, Sync, SyncManager, Timeouts, Write,
@@ -36,19 +38,19 @@ impl SubDevice {
     /// `language`, an LcId.
     ///
     /// # Errors
-    /// SYNC signals that no controller can generate in this cycle.
+    /// SYNC signals that no controller can generate in this cycle; values that a network file cannot have.
     pub fn from_esi(selection: &Selection<'_>, cycle: Duration, language: u32) -> Result<FromEsi, EsiError> {
         let device = selection.device;
         let mut from = Notes { line: device.line, notices: selection.notices.clone() };
         let mut subdevice = SubDevice {
-            name: device.kind.trim().to_owned(),
+            name: name(device),
             vendor: Some(device.vendor_id),
             product: Some(device.product_code).filter(|_| device.check_product != esi::Check::None),
             revision: Some(device.revision),
             check_revision: check_revision(device.check_revision),
             serial: device.serial.filter(|_| device.check_serial == esi::Check::Equal),
-            order_code: device.kind.trim().to_owned(),
-            ports: device.physics.trim_end().to_owned(),
+            order_code: printable(&device.kind),
+            ports: ports(device),
             mailbox: mailbox(device),
             timeouts: timeouts(device),
             watchdog_divider: device.controller.reg_0400,
@@ -66,8 +68,34 @@ impl SubDevice {
         for command in &selection.commands {
             subdevice.startup.extend(startup(command, &mut from));
         }
+        valid(selection, &subdevice, cycle)?;
         Ok(FromEsi { subdevice, notices: from.notices })
     }
+}
+
+/// What a network file refuses is refused here with the place in the description.
+fn valid(selection: &Selection<'_>, subdevice: &SubDevice, cycle: Duration) -> Result<(), EsiError> {
+    let mut file = NetworkFile::empty("", cycle);
+    file.push(subdevice.clone());
+    check(&file).map_err(|fault| {
+        // The path begins with subdevice[0].
+        let key = path_text(fault.path.get(2..).unwrap_or_default());
+        let (device, reason) = (selection.device, format!("{key}: {}", fault.message));
+        EsiError::rule(&selection.esi.file, device.line, device.kind.trim(), reason)
+    })
+}
+
+/// The type, else the name of the device.
+fn name(device: &Device) -> String {
+    let texts = [printable(&device.kind), printable(device.name.english())];
+    texts.into_iter().find(|text| !text.is_empty()).unwrap_or_else(|| "SubDevice".to_owned())
+}
+
+/// Letters of the ports that a network file knows; others are no port of EtherCAT.
+fn ports(device: &Device) -> String {
+    let letter = |kind: char| if matches!(kind, 'Y' | 'K' | 'H') { kind } else { ' ' };
+    let letters: String = device.physics.chars().take(4).map(letter).collect();
+    letters.trim_end().to_owned()
 }
 
 impl NetworkFile {

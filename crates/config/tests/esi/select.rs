@@ -248,6 +248,11 @@ fn oversampled_pdos_are_repeated_at_their_distance() {
     assert!(refused(&acme(), ANALOG, &samples(2)).contains("it has no oversampling (OSFac)"));
     let far = acme_of(&text.replacen("OSIndexInc=\"16\"", "OSIndexInc=\"4294967295\"", 1));
     assert!(refused(&far, ANALOG, &samples(3)).contains("copy 1 has an index above 0xffff"));
+    let same = acme_of(&text.replacen("OSIndexInc=\"16\"", "OSIndexInc=\"0\"", 1));
+    let choices = samples(2);
+    let selection = select(&same, &same.devices[ANALOG], &choices).unwrap();
+    let twice = SubDevice::from_esi(&selection, CYCLE, 1033).unwrap_err().to_string();
+    assert!(twice.starts_with("acme.xml:") && twice.contains("0x1a02 is also the index of pdo[1]"), "{twice}");
     let analog = declared(&esi, ANALOG, &samples(3));
     assert_eq!(analog.sync_manager[1].pdo.len(), 4);
 }
