@@ -6,3 +6,4 @@ mod documented;
 mod exit_codes;
 mod files;
 mod json;
+mod pages;
