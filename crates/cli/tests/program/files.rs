@@ -52,7 +52,7 @@ impl Said {
 
     /// The last line, which is the verdict.
     pub fn verdict(&self) -> &str {
-        self.errors.lines().chain(self.out.lines()).filter(|line| line.starts_with("result: ")).last().unwrap_or("")
+        self.errors.lines().chain(self.out.lines()).rfind(|line| line.starts_with("result: ")).unwrap_or("")
     }
 }
 
