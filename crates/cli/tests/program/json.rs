@@ -74,7 +74,7 @@ fn good(page: &Page, command: &str, options: &str) -> Value {
     result
 }
 
-// covers: json, esi-read, esi-use
+// covers: json, esi-read, esi-use, esi-declare
 #[test]
 fn descriptions_and_images_are_printed_with_the_documented_keys() {
     let page = Page::read();
@@ -86,6 +86,14 @@ fn descriptions_and_images_are_printed_with_the_documented_keys() {
     assert_eq!(list["devices"][0]["type"], "A2", "{list}");
     assert_eq!(list["devices"][0]["choice"], "exact", "{list}");
     assert!(list["files"].as_u64() >= Some(4), "{list}");
+    let shown = good(&page, "esi show", &format!("{folder}/acme.xml --type AM01"));
+    let first = |key: &str| shown[key][0]["name"].as_str().map(str::to_owned);
+    assert_eq!((first("modes"), first("slots")), (Some("FreeRun".into()), Some("Axis 1".into())), "{shown}");
+    let out = directory.file("machine.toml");
+    let declared = good(&page, "esi declare", &format!("{folder}/acme.xml --type AM01 --mode DC4 --out {out}"));
+    assert_eq!((declared["mode"].as_str(), declared["name"].as_str()), (Some("DC4"), Some("AM01")), "{declared}");
+    let bare = good(&page, "esi declare", &format!("{folder}/acme.xml --type AK10 --out {out} --append"));
+    assert!(bare["mode"].is_null() && bare["pdos"] == 0, "{bare}");
     let built = good(&page, "sii build", &format!("{esi} --out {image}"));
     assert_eq!(built["bytes"], 512, "{built}");
     let compared = good(&page, "sii compare", &format!("{image} --esi {esi}"));
