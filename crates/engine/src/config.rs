@@ -50,15 +50,17 @@ pub use resolve::{DuplicateAlias, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;
 
 /// Expected identity; `None` matches any value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Expected {
     /// Vendor id.
     pub vendor_id: Option<u32>,
     /// Product code.
     pub product_code: Option<u32>,
-    /// Revision.
+    /// Revision; its bits in `revision_mask` are compared.
     pub revision: Option<u32>,
+    /// Bits of the revision that are compared; all by default.
+    pub revision_mask: u32,
     /// Lowest revision.
     pub minimum_revision: Option<u32>,
     /// Serial number.
@@ -67,16 +69,32 @@ pub struct Expected {
     pub identification: Option<u16>,
 }
 
+impl Default for Expected {
+    fn default() -> Expected {
+        Expected {
+            vendor_id: None,
+            product_code: None,
+            revision: None,
+            revision_mask: u32::MAX,
+            minimum_revision: None,
+            serial: None,
+            identification: None,
+        }
+    }
+}
+
 impl Expected {
     /// The first field that does not match.
     pub fn mismatch(&self, info: &SubDeviceInfo) -> Option<IdentityMismatch> {
         let got = &info.identity;
         let identification = u32::from(info.identification.unwrap_or(0));
+        let mask = self.revision_mask;
+        let revision = if mask == u32::MAX { IdentityField::Revision } else { IdentityField::RevisionBits };
         let minimum = self.minimum_revision.filter(|minimum| got.revision < *minimum);
         [
             (IdentityField::VendorId, self.vendor_id, got.vendor_id),
             (IdentityField::ProductCode, self.product_code, got.product_code),
-            (IdentityField::Revision, self.revision, got.revision),
+            (revision, self.revision.map(|revision| revision & mask), got.revision & mask),
             (IdentityField::MinimumRevision, minimum, got.revision),
             (IdentityField::Serial, self.serial, got.serial),
             (IdentityField::Identification, self.identification.map(u32::from), identification),

@@ -63,6 +63,14 @@ impl SubDeviceConfig {
         self
     }
 
+    /// Expects these bits of the revision, as descriptions compare its high or its low word.
+    #[must_use]
+    pub const fn expect_revision_bits(mut self, revision: u32, mask: u32) -> SubDeviceConfig {
+        self.expected.revision = Some(revision);
+        self.expected.revision_mask = mask;
+        self
+    }
+
     /// Expects an explicit device identification.
     #[must_use]
     pub fn expect_identification(mut self, value: u16) -> SubDeviceConfig {
