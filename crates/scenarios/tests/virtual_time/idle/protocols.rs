@@ -55,7 +55,7 @@ fn every_service_answers_by_ring_position_in_idle_operation() {
         assert!(main_device.subdevice(SPEAKER).sii_read().expect("EEPROM").len() > 128);
         for state in [AlState::SafeOp, AlState::Op, AlState::PreOp, AlState::Boot, AlState::PreOp] {
             main_device.subdevice(SPEAKER).request_state(state).expect("it follows");
-            assert_eq!(main_device.subdevice(SPEAKER).state().expect("it answers").0, AlStatus::new(state));
+            assert_eq!(main_device.subdevice(SPEAKER).state().expect("it answers").status, AlStatus::new(state));
         }
         assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<u32>(0x1018, 1).expect("SDO"), 0x0C47);
     }

@@ -95,14 +95,15 @@ fn any_owner_knows_the_pdos_of_the_one_before_and_reaches_op_with_its_own() {
 // covers: states
 #[test]
 fn known_dictionaries_are_not_read_again_by_the_next_owner() {
-    let former = idle(ring(descriptions(&["servo"; 12]), NetworkOptions::default()));
-    let before: Vec<u64> =
-        (0..12).map(|at| former.mailbox(Position(at)).expect("it has one").counters().written).collect();
+    let mut former = idle(ring(descriptions(&["servo"; 12]), NetworkOptions::default()));
+    let before: Vec<u64> = (0..12)
+        .map(|at| former.subdevice(Position(at)).mailbox_status().expect("it has one").counters.written)
+        .collect();
     assert!(before.iter().all(|written| *written >= 10), "they were read: {before:?}");
     let mut next = hand_over(former, Handover::Orderly);
     next.attend(LIMIT);
     for at in 0..12 {
-        assert_eq!(next.mailbox(Position(at)).expect("it has one").counters().written, 0);
+        assert_eq!(next.subdevice(Position(at)).mailbox_status().expect("it has one").counters.written, 0);
         assert_eq!(said(&next, at.into()), (vec![0x1600], 96));
     }
 }
