@@ -26,6 +26,7 @@ mod run_log;
 mod scan;
 mod sii;
 mod sim;
+#[cfg(feature = "standby")]
 mod standby;
 mod surroundings;
 mod table;
@@ -126,6 +127,7 @@ enum Command {
     /// Forwards the frames of the ACTIVE MainDevice, as the INACTIVE one of a ring
     ///
     /// The second MainDevice of MainDevice redundancy; it cannot take over yet.
+    #[cfg(feature = "standby")]
     Standby(standby::StandbyArguments),
     /// Puts a simulated segment on network interfaces
     ///
@@ -169,6 +171,7 @@ fn main() -> ExitCode {
         Command::Ring(arguments) => ring::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
+        #[cfg(feature = "standby")]
         Command::Standby(arguments) => standby::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
@@ -190,6 +193,7 @@ impl Command {
             Command::Ring(_) => "ring",
             Command::Clocks(_) => "clocks",
             Command::Capture(_) => "capture",
+            #[cfg(feature = "standby")]
             Command::Standby(_) => "standby",
             Command::Sim(_) => "sim",
             Command::Eni(_) => "eni",

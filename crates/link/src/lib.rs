@@ -52,7 +52,7 @@ pub use filter::ClassFilter;
 pub use frame_pipe::{FramePipe, wait_pipes};
 pub use listener::{Listener, Sender};
 pub use packet_socket::handed::{HandedSocket, revoke};
-pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
+pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket, SendingSide};
 pub use receive_mode::ReceiveMode;
 pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};
 pub use signals::{HeldSignals, Signal};

@@ -336,7 +336,7 @@ impl Master {
 
 /// Waits until no SubDevice changes its state any more: after the end of an application, or when they have just got
 /// power, they are on their way to PREOP, and what leads them there is not interrupted. OP does not depend on it
-/// (decision 0094); it stays because an application that asks for mailboxes first finds them in use.
+/// any more. It stays because an application that asks for mailboxes first finds them in use.
 fn wait_until_settled(supervisor: &SupervisorThread) {
     let settled = AlState::PreOp.code();
     let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());

@@ -143,15 +143,17 @@ impl Bench {
     }
 
     /// A second MainDevice in the ring, in a namespace of its own: `main1`, the far end of the segment, becomes its
-    /// redundant interface, and its main interface `second0` has a cable to `active1` of the first one.
+    /// redundant interface, and its main interface `second0` has a cable to `active1` of the first one. Both interfaces
+    /// of the second one are off until it forwards.
     pub fn add_second_main_device(&mut self) {
         self.give_away_main1();
         let other = self.other.as_ref().expect("it was just made");
         self.ip_main(&format!("link add active1 index 80 type veth peer name second0 index 90 netns {other}"));
         for (namespace, end) in [(&self.main, "active1"), (other, "second0")] {
             let _ = ip(&format!("-n {namespace} link set {end} addrgenmode none"));
-            ip(&format!("-n {namespace} link set {end} up")).expect("the interface is there");
         }
+        self.ip_main("link set active1 up");
+        self.set_link_elsewhere("main1", "down");
     }
 
     /// A computer in a separate network, with the MainDevice's host as its router: 10.1.0.2 behind 10.1.0.1.

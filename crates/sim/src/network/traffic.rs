@@ -138,6 +138,7 @@ impl Network {
         let counters = &mut self.statistics.links[link as usize];
         counters.frames_received += 1;
         counters.bytes_received += length;
+        self.expect_reaction(link.host());
     }
 
     /// Applies the faults of a leg to a frame that is due at its end.
