@@ -8,6 +8,8 @@
 
 #[cfg(feature = "standby")]
 mod forwarding;
+#[cfg(feature = "standby")]
+pub mod two_hosts;
 
 use std::time::{Duration, Instant as WallClock};
 

@@ -20,6 +20,7 @@ mod cabling;
 mod event;
 mod fast_path;
 mod faults;
+pub mod host_log;
 mod hosts;
 mod options;
 mod pool;
@@ -40,6 +41,7 @@ use crate::queue::EventQueue;
 use crate::segment::{Segment, SegmentError};
 use crate::time::SimTime;
 use event::Event;
+use host_log::HostLog;
 use pool::{FramePool, Slot};
 use route::Route;
 use statistics::Statistics;
@@ -86,6 +88,7 @@ pub struct Network {
     legs: Vec<Leg>,
     hosts: [HostInterface; HostLink::COUNT],
     machines: [Machine; Host::COUNT],
+    host_log: Option<HostLog>,
     frames: FramePool,
     scheduled: Vec<Option<Fault>>,
     random: Random,
@@ -123,6 +126,7 @@ impl Network {
             queue: EventQueue::with_capacity(devices.len() + options.transmit_queue),
             hosts: out.hosts.map(host),
             machines: [const { Machine::new() }; Host::COUNT],
+            host_log: None,
             legs: legs.collect(),
             cables: cables.into_iter().map(|spec| Cable { spec, cut: false, epoch: 0 }).collect(),
             nodes: devices.into_iter().zip(out.devices).map(|(device, out)| Node::new(device, out)).collect(),
@@ -179,14 +183,15 @@ impl Network {
     }
 
     /// Processes all events up to and including the time at which a frame has arrived at an interface of a host without
-    /// a program of its own that runs ([`Network::run_program`]), or `to` if none arrives; does nothing if a frame is
-    /// waiting already.
+    /// a program of its own that runs ([`Network::run_program`]), or at which a host begins or ceases to run, or `to` if
+    /// neither happens; does nothing if a frame is waiting already.
     pub fn advance_until_received(&mut self, to: SimTime) {
         self.until_received = true;
         self.limit = to;
         self.settle_all();
         let mut follows = None;
-        while !self.is_received() {
+        let hosts = self.host_changes();
+        while !self.is_received() && self.host_changes() == hosts {
             let due = match follows.take() {
                 Some((at, event)) => self.queue.push_pop(at, event, to),
                 None => self.queue.pop_until(to),
@@ -196,7 +201,7 @@ impl Network {
             follows = self.handle(event);
         }
         self.until_received = false;
-        let to = if self.is_received() { self.now } else { to };
+        let to = if self.is_received() || self.host_changes() != hosts { self.now } else { to };
         self.advance(to);
     }
 

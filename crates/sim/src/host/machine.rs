@@ -19,6 +19,9 @@ pub enum HostCondition {
 #[derive(Debug)]
 pub(crate) struct Machine {
     pub(crate) condition: HostCondition,
+    /// When the condition changed last, and how often it has.
+    pub(crate) since: SimTime,
+    pub(crate) changes: u32,
     pub(crate) program: Option<Running>,
 }
 
@@ -33,7 +36,15 @@ pub(crate) struct Running {
 
 impl Machine {
     pub(crate) const fn new() -> Machine {
-        Machine { condition: HostCondition::Runs, program: None }
+        Machine { condition: HostCondition::Runs, since: SimTime::ZERO, changes: 0, program: None }
+    }
+
+    /// The condition changes.
+    pub(crate) fn enter(&mut self, condition: HostCondition, now: SimTime) {
+        if self.condition != condition {
+            (self.condition, self.since) = (condition, now);
+            self.changes = self.changes.wrapping_add(1);
+        }
     }
 
     /// Whether it will react to frames that wait.

@@ -2,6 +2,7 @@
 
 use core::any::Any;
 
+use super::host_log::{HostFrame, HostLog};
 use super::{Event, Network};
 use crate::cable::{CableId, Host, HostLink};
 use crate::host::Received;
@@ -45,9 +46,24 @@ impl Network {
         }
     }
 
+    /// Logs the frames that leave and reach the interfaces of the hosts from now on.
+    pub fn log_hosts(&mut self) {
+        self.host_log.get_or_insert_default();
+    }
+
+    /// The logged frames since the last call.
+    pub fn take_host_log(&mut self) -> Vec<HostFrame> {
+        self.host_log.as_mut().map(HostLog::take).unwrap_or_default()
+    }
+
     /// What a host does.
     pub fn condition(&self, host: Host) -> HostCondition {
         self.machines[host as usize].condition
+    }
+
+    /// Since when it does that.
+    pub fn condition_since(&self, host: Host) -> SimTime {
+        self.machines[host as usize].since
     }
 
     /// Runs a program on a host: it takes all frames that the host receives from now on.
@@ -72,12 +88,13 @@ impl Network {
 
     /// The program of a host stops, or goes on.
     pub(super) fn stop_host(&mut self, host: Host, stop: bool) {
-        let condition = &mut self.machines[host as usize].condition;
-        *condition = match (*condition, stop) {
+        let machine = &mut self.machines[host as usize];
+        let condition = match (machine.condition, stop) {
             (HostCondition::Off, _) => HostCondition::Off,
             (_, true) => HostCondition::Stopped,
             (_, false) => HostCondition::Runs,
         };
+        machine.enter(condition, self.now);
         if let Some(running) = &mut self.machines[host as usize].program {
             running.reacts_at = None;
         }
@@ -86,7 +103,7 @@ impl Network {
 
     /// A host loses its power: its interfaces have no signal at once, and what it has received is lost.
     pub(super) fn power_host_off(&mut self, host: Host) {
-        self.machines[host as usize].condition = HostCondition::Off;
+        self.machines[host as usize].enter(HostCondition::Off, self.now);
         for link in host.links() {
             while let Some(received) = self.receive(link) {
                 self.give_back(received.bytes);
@@ -104,7 +121,7 @@ impl Network {
         if machine.condition != HostCondition::Off {
             return;
         }
-        machine.condition = HostCondition::Runs;
+        machine.enter(HostCondition::Runs, self.now);
         if let Some(running) = &mut machine.program {
             running.program.restart();
             running.reacts_at = None;
@@ -127,6 +144,11 @@ impl Network {
             let is_outside = machine.program.is_none() && machine.condition == HostCondition::Runs;
             is_outside && host.links().into_iter().any(waits)
         })
+    }
+
+    /// How often the conditions of the hosts have changed.
+    pub(super) fn host_changes(&self) -> [u32; 2] {
+        self.machines.each_ref().map(|machine| machine.changes)
     }
 
     /// Whether a program will react to frames that wait.
