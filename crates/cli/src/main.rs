@@ -129,6 +129,10 @@ enum Command {
     /// The second MainDevice of MainDevice redundancy; it cannot take over yet.
     #[cfg(feature = "standby")]
     Standby(standby::StandbyArguments),
+    /// Guards the interfaces of `ringcat standby`, which starts it
+    #[cfg(feature = "standby")]
+    #[command(hide = true)]
+    StandbyGuard(standby::guarding::GuardArguments),
     /// Puts a simulated segment on network interfaces
     ///
     /// Any EtherCAT MainDevice at their other end can work with it.
@@ -173,6 +177,8 @@ fn main() -> ExitCode {
         Command::Capture(arguments) => capture::run(&arguments),
         #[cfg(feature = "standby")]
         Command::Standby(arguments) => standby::run(&arguments),
+        #[cfg(feature = "standby")]
+        Command::StandbyGuard(arguments) => return standby::guarding::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
         Command::Esi(arguments) => esi::run(&arguments),
@@ -195,6 +201,8 @@ impl Command {
             Command::Capture(_) => "capture",
             #[cfg(feature = "standby")]
             Command::Standby(_) => "standby",
+            #[cfg(feature = "standby")]
+            Command::StandbyGuard(_) => "standby-guard",
             Command::Sim(_) => "sim",
             Command::Eni(_) => "eni",
             Command::Esi(arguments) => arguments.name(),

@@ -5,6 +5,8 @@
 //! Its interfaces are up only while it forwards (protocol MR-21): an interface that is up and does not forward takes
 //! the whole bus from the ACTIVE, one that is down leaves it a line.
 
+pub mod guarding;
+
 use std::time::Duration;
 
 use clap::Args;
@@ -23,8 +25,8 @@ use crate::thread::ThreadArguments;
 use crate::times::time;
 use crate::verdict::{Report, Verdict};
 
-/// Period of checks for the end.
-const LOOK: Duration = Duration::from_millis(200);
+use guarding::Guarded;
+
 /// No frame for this time: the ACTIVE MainDevice counts as silent.
 const SILENT: Duration = Duration::from_secs(1);
 /// An interface without a carrier this long after it was switched on is reported.
@@ -40,6 +42,8 @@ back if that one is down.
 Both interfaces are switched on when it forwards, and off at its end: then the
 ACTIVE has a line. Leave them off before: an interface that is up and does not
 forward takes the whole bus from the ACTIVE. Switching needs cap_net_admin.
+Another process guards that: it switches both off when this one is killed,
+hangs, or is stopped for longer than --guard.
 
 It never sends on its own, and cannot take over yet: see docs/standby.md, which
 begins with a note on patents.";
@@ -58,6 +62,15 @@ pub struct StandbyArguments {
     /// to earlier outputs; the ACTIVE has given them up.
     #[arg(long, value_name = "TIME", value_parser = time, default_value = "5ms", help_heading = "Run")]
     max_age: Duration,
+    /// Time after which both interfaces are switched off if this program hangs
+    ///
+    /// Another process does that, and at once when this program is killed. The ACTIVE then has a line instead of no
+    /// bus. A time below the pauses that this computer makes switches them off without need: this program then ends.
+    #[arg(long, value_name = "TIME", value_parser = guarding::limit, default_value = "20ms", help_heading = "Run")]
+    guard: Duration,
+    /// Without such a process
+    #[arg(long, conflicts_with = "guard", help_heading = "Run")]
+    no_guard: bool,
     /// How long, such as 10s or 5min; until Ctrl-C by default
     #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Run")]
     lasts: Option<Duration>,
@@ -78,30 +91,38 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     check_sockets(names.all(), arguments.force)?;
     let second = StoreAndForward::new(links.addresses()).map_err(|error| Failure::new(error.to_string()))?;
     let mut second = second.with_max_age(arguments.max_age);
+    let mut guarded = if arguments.no_guard {
+        Guarded::unguarded()
+    } else {
+        Guarded::start(arguments.guard, arguments.thread.priority, [&names.main, redundant])?
+    };
     let _awake = arguments.thread.apply();
     let mut links = LinksUp::new(links)?;
     say!("INACTIVE: forwarding between {} and {redundant}; Ctrl-C ends it", names.main);
     let until = arguments.lasts.map_or(Instant::NEVER, |lasts| links.0.now() + lasts);
     let mut active = Activity::default();
     let mut carriers_due = Some(links.0.now() + CARRIER_LIMIT);
-    while !end.is_asked() && links.0.now() < until && second.counters().same_identity == 0 {
-        links.0.wait(until.min(links.0.now() + LOOK));
+    while !end.is_asked() && links.0.now() < until && second.counters().same_identity == 0 && guarded.beat() {
+        links.0.wait(until.min(links.0.now() + guarded.look()));
         let taken = second.forward(&mut links.0);
         let now = links.0.now();
         active.observe(now, taken > 0);
+        guarded.check(now);
         if carriers_due.take_if(|at| now >= *at).is_some() {
             let down = Link::ALL.into_iter().filter(|link| links.0.carrier(*link) == Some(false));
             down.for_each(|link| warn(describe_down(names.of(link))));
         }
     }
+    guarded.end();
     links.down()?;
+    let unguarded = guarded.release();
     say!("{} and {redundant} are switched off: the ACTIVE has a line", names.main);
     let counters = second.counters();
     say!("{}", in_line(&counters));
     let forwarded = counters.on_main + counters.on_redundant;
     let none = (forwarded == 0).then(|| "no frame of another MainDevice came".to_owned());
     let verdict = Verdict::Held(format!("{forwarded} frames forwarded"));
-    let verdict = verdict.and(none).and(same_identity(&counters)).and(end.cut_short(arguments.lasts));
+    let verdict = verdict.and(none).and(same_identity(&counters)).and(unguarded).and(end.cut_short(arguments.lasts));
     Ok(Report { verdict, data: Data::Standby(Standby::from(&counters)) })
 }
 
@@ -184,6 +205,21 @@ mod tests {
     struct Line {
         #[command(flatten)]
         standby: StandbyArguments,
+    }
+
+    // covers: standby
+    #[test]
+    fn a_guard_has_a_limit_that_a_host_can_keep_or_is_left_out() {
+        let parse = |more: &[&str]| {
+            Line::try_parse_from(["standby", "--main", "a", "--redundant", "b"].iter().chain(more))
+                .map(|line| (line.standby.guard, line.standby.no_guard))
+        };
+        assert_eq!(parse(&[]).ok(), Some((Duration::from_millis(20), false)));
+        assert_eq!(parse(&["--guard", "1ms"]).ok(), Some((Duration::from_millis(1), false)));
+        assert_eq!(parse(&["--no-guard"]).map(|(_, none)| none).ok(), Some(true));
+        for wrong in [&["--guard", "999us"][..], &["--guard", "0ms"], &["--guard", "5ms", "--no-guard"]] {
+            assert!(parse(wrong).is_err(), "{wrong:?}");
+        }
     }
 
     // covers: standby

@@ -3,7 +3,7 @@
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`descriptors`]: sockets that another process has opened, passed over a Unix socket;
 //! * [`frame_pipe`]: frames over a pair of Unix sockets, to a simulated segment in another process;
-//! * [`process`]: the peer of a Unix socket, the end of a process;
+//! * [`process`]: the peer of a Unix socket, the end of a process; [`heartbeat`]: whether a process runs;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
@@ -26,6 +26,7 @@ pub mod descriptors;
 mod error;
 pub mod filter;
 pub mod frame_pipe;
+pub mod heartbeat;
 pub mod interface;
 mod kernel;
 pub mod listener;

@@ -5,6 +5,9 @@
 //! frame on at the other link, or back if that one is down, so that the ACTIVE has its ring. Frames of any MainDevice
 //! that leaves two bits of its source address to the standby are forwarded (protocol 9.7.1).
 
+#[cfg(feature = "packet")]
+pub mod guard;
+
 use std::error::Error;
 use std::fmt;
 use std::time::Duration;

@@ -17,6 +17,7 @@ use ringcat::simulated::two_hosts::{HostLinks, TwoHosts};
 use ringcat::standby::ForwardingCounters;
 use ringcat::{Instant, Link, RingState};
 use ringcat_sim::cable::{CableId, DeviceIndex, Host};
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::host::program::TurnAround;
 use ringcat_sim::network::Network;
@@ -25,11 +26,10 @@ use ringcat_wire::al::{AlState, AlStatus};
 use self::board::Board;
 pub use self::board::{Phase, Seen};
 use self::outputs::Outputs;
+pub use self::programs::CYCLE;
 use self::states::States;
 use self::traffic::Traffic;
 
-/// Cycle time of both MainDevices.
-pub const CYCLE: Duration = Duration::from_millis(1);
 /// Cycles until all SubDevices are in OP and process data is complete.
 const SETTLE_LIMIT: u32 = 5_000;
 
@@ -154,8 +154,14 @@ impl Pair {
 
     /// Whether all SubDevices are in OP, by their own registers.
     pub fn all_in_op(&self) -> bool {
+        self.not_in_op().is_empty()
+    }
+
+    /// The SubDevices that are not in OP, by their own registers.
+    pub fn not_in_op(&self) -> Vec<usize> {
         let op = AlStatus::new(AlState::Op);
-        self.hosts.with_network(|network| network.devices().all(|device| device.al_status() == op))
+        let left = |(number, device): (usize, &Device)| (device.al_status() != op).then_some(number);
+        self.hosts.with_network(|network| network.devices().enumerate().filter_map(left).collect())
     }
 
     /// Areas of outputs that were checked inside the SubDevices.

@@ -183,8 +183,8 @@ impl Network {
     }
 
     /// Processes all events up to and including the time at which a frame has arrived at an interface of a host without
-    /// a program of its own that runs ([`Network::run_program`]), or at which a host begins or ceases to run, or `to` if
-    /// neither happens; does nothing if a frame is waiting already.
+    /// a program of its own that runs ([`Network::run_program`]), or at which a host begins or ceases to run, or `to`
+    /// if neither happens; does nothing if a frame is waiting already.
     pub fn advance_until_received(&mut self, to: SimTime) {
         self.until_received = true;
         self.limit = to;

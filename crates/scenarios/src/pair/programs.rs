@@ -10,9 +10,10 @@ use ringcat::{
     SubDeviceId, automatic,
 };
 
-use super::CYCLE;
 use super::board::{Board, Phase};
 
+/// Cycle time of both MainDevices.
+pub const CYCLE: Duration = Duration::from_millis(1);
 /// An INACTIVE looks this often whether it is asked for anything, while no frames come.
 const LOOK: Duration = Duration::from_millis(1);
 /// Limit of an orderly stop.

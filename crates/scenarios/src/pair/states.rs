@@ -1,5 +1,5 @@
-//! States of the SubDevices: each stays in OP as long as its watchdog allows, unless an ACTIVE MainDevice starts or stops
-//! it.
+//! States of the SubDevices: each stays in OP as long as its watchdog allows, unless an ACTIVE MainDevice starts or
+//! stops it.
 
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;

@@ -10,6 +10,7 @@ use std::sync::mpsc::channel;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::running::Running;
 use crate::said::Said;
 use crate::states;
 
@@ -197,6 +198,13 @@ impl Bench {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
+    /// The interfaces of the third namespace that are switched on, a line each.
+    pub fn links_on_elsewhere(&self) -> String {
+        let other = self.other.as_ref().expect("there is one");
+        let output = Command::new("ip").args(["-n", other, "-o", "link", "show", "up"]).output().expect("ip starts");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
     /// Starts `ringcat` in the third namespace and reads its output.
     pub fn run_other_ringcat(&self, arguments: &[&str]) -> Running {
         Running::of(self.start_other_ringcat(arguments))
@@ -363,47 +371,6 @@ pub fn await_op(bench: &Bench, count: usize) {
     }
 }
 
-/// A program with output that is read while it runs; killed on drop.
-pub struct Running {
-    child: Child,
-    said: Said,
-    errors: Said,
-}
-
-impl Running {
-    fn of(mut child: Child) -> Running {
-        let said = Said::by(child.stdout.take().expect("it is piped"));
-        let errors = Said::by(child.stderr.take().expect("it is piped"));
-        Running { child, said, errors }
-    }
-
-    /// Its output so far.
-    pub fn said(&self) -> &Said {
-        &self.said
-    }
-
-    /// Sends SIGINT and waits for the end; returns standard output and standard error.
-    pub fn interrupt(self) -> (String, String) {
-        let process = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &process]).status().is_ok_and(|status| status.success()));
-        self.finish(END_LIMIT)
-    }
-
-    /// Waits for its end; returns standard output and standard error.
-    pub fn finish(mut self, limit: Duration) -> (String, String) {
-        wait(&mut self.child, limit);
-        (self.said.whole(), self.errors.whole())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It has usually ended.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 /// Waits for a program with a time limit; reads its output meanwhile.
 pub fn finish(child: Child) -> Output {
     let process = child.id().to_string();
@@ -415,17 +382,6 @@ pub fn finish(child: Child) -> Output {
             let _ = Command::new("kill").args(["-KILL", &process]).status();
             panic!("a program does not end within {} s", END_LIMIT.as_secs());
         }
-    }
-}
-
-fn wait(child: &mut Child, limit: Duration) {
-    let until = Instant::now() + limit;
-    while child.try_wait().expect("it is our child").is_none() {
-        if Instant::now() >= until {
-            let _ = child.kill();
-            panic!("a program does not end within {} s", limit.as_secs());
-        }
-        std::thread::sleep(Duration::from_millis(10));
     }
 }
 

@@ -53,8 +53,8 @@ fn a_ring_of_two_programs_runs_and_each_check_has_seen_it() {
         assert_eq!(incomplete_in(&mut pair, 200), 0, "{}", pair.log());
         assert_eq!(pair.ring(Host::First), RingState::Closed);
         let (outputs, passes) = (pair.checked_outputs(), pair.checked_passes());
-        // Five SubDevices have outputs; of both copies of a frame each passes the INACTIVE once.
-        assert!(outputs >= 200 * 5 && passes >= 200 * 2, "{outputs} outputs, {passes} passes");
+        // Six SubDevices have outputs; of both copies of a frame each passes the INACTIVE once.
+        assert!(outputs >= 200 * 6 && passes >= 200 * 2, "{outputs} outputs, {passes} passes");
         assert!(pair.take_oldest_outputs() <= CYCLE, "outputs arrive in their cycle");
         let counters = pair.forwarded(Host::Second);
         assert_eq!((counters.again, counters.too_old, counters.no_link), (0, 0, 0), "{counters:?}");
@@ -192,7 +192,42 @@ fn the_checks_find_a_subdevice_that_leaves_op_before_its_watchdog() {
     pair.run_cycles(1);
 }
 
-// covers: standby
+// covers: standby, MR-06, MR-08
+#[test]
+fn two_inactive_maindevices_send_nothing_and_neither_becomes_active() {
+    let mut pair = Pair::without_programs(12, ring_of_two(12, 8, Host::First));
+    Host::ALL.into_iter().for_each(|host| pair.start_standby(host));
+    // The checks of each cycle hold: neither sends a frame of its own.
+    pair.run_cycles(1_000);
+    assert_eq!(pair.checked_passes(), 0, "{}", pair.log());
+    let phases = Host::ALL.map(|host| pair.seen(host).phase);
+    assert_eq!(phases, [Phase::Inactive; 2]);
+}
+
+// covers: standby, MR-21
+#[test]
+fn a_dead_standby_and_a_cut_leave_the_active_the_subdevices_on_its_side() {
+    // Those with outputs behind the cut leave OP; the others have no watchdog.
+    for (near, behind) in [(Host::First, vec![4, 5, 6, 7]), (Host::Second, vec![1, 3])] {
+        let mut pair = Pair::new(13, ring_of_two(13, 8, near));
+        pair.hosts().guard(Host::Second, GUARD);
+        pair.kill(Host::Second);
+        pair.run_cycles(60);
+        assert!(pair.all_in_op(), "{near:?}\n{}", pair.log());
+        pair.cut(4);
+        pair.run_cycles(300);
+        assert_eq!(pair.not_in_op(), behind, "{near:?}\n{}", pair.log());
+        pair.heal(4);
+        pair.settle();
+        assert_eq!(pair.ring(Host::First), RingState::Open, "{near:?}\n{}", pair.log());
+        pair.hosts().dismiss_guard(Host::Second);
+        pair.start_standby(Host::Second);
+        assert!(incomplete_in(&mut pair, 100) <= 2, "{near:?}\n{}", pair.log());
+        assert!(pair.ring(Host::First) == RingState::Closed && pair.all_in_op(), "{near:?}\n{}", pair.log());
+    }
+}
+
+// covers: standby, MR-08
 #[test]
 fn an_active_that_is_killed_leaves_all_subdevices_to_their_watchdogs() {
     for near in Host::ALL {
