@@ -99,6 +99,8 @@ features() {
         echo "ringcat with \"$feature\""
         cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
     done
+    echo "the program without standby"
+    cargo clippy --package ringcat-cli --no-default-features --all-targets -- -D warnings
 }
 
 documentation() {

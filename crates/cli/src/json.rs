@@ -10,7 +10,7 @@ pub mod data;
 pub mod demo;
 pub mod eni;
 pub mod esi;
-#[cfg(test)]
+#[cfg(all(test, feature = "standby"))]
 mod keys;
 pub mod line;
 pub mod network;
@@ -19,5 +19,6 @@ pub mod run;
 pub mod scan;
 pub mod sii;
 pub mod sim;
+#[cfg(feature = "standby")]
 pub mod standby;
 pub mod values;

@@ -26,6 +26,7 @@ mod run_log;
 mod scan;
 mod sii;
 mod sim;
+#[cfg(feature = "standby")]
 mod standby;
 mod surroundings;
 mod table;
@@ -126,7 +127,12 @@ enum Command {
     /// Forwards the frames of the ACTIVE MainDevice, as the INACTIVE one of a ring
     ///
     /// The second MainDevice of MainDevice redundancy; it cannot take over yet.
+    #[cfg(feature = "standby")]
     Standby(standby::StandbyArguments),
+    /// Guards the interfaces of `ringcat standby`, which starts it
+    #[cfg(feature = "standby")]
+    #[command(hide = true)]
+    StandbyGuard(standby::guarding::GuardArguments),
     /// Puts a simulated segment on network interfaces
     ///
     /// Any EtherCAT MainDevice at their other end can work with it.
@@ -169,7 +175,10 @@ fn main() -> ExitCode {
         Command::Ring(arguments) => ring::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
+        #[cfg(feature = "standby")]
         Command::Standby(arguments) => standby::run(&arguments),
+        #[cfg(feature = "standby")]
+        Command::StandbyGuard(arguments) => return standby::guarding::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
         Command::Esi(arguments) => esi::run(&arguments),
@@ -190,7 +199,10 @@ impl Command {
             Command::Ring(_) => "ring",
             Command::Clocks(_) => "clocks",
             Command::Capture(_) => "capture",
+            #[cfg(feature = "standby")]
             Command::Standby(_) => "standby",
+            #[cfg(feature = "standby")]
+            Command::StandbyGuard(_) => "standby-guard",
             Command::Sim(_) => "sim",
             Command::Eni(_) => "eni",
             Command::Esi(arguments) => arguments.name(),

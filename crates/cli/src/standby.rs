@@ -1,6 +1,11 @@
 //! `ringcat standby`: the second MainDevice of a ring, INACTIVE.
 //!
 //! It forwards the frames of the ACTIVE MainDevice between its interfaces. There is no takeover yet.
+//!
+//! Its interfaces are up only while it forwards (protocol MR-21): an interface that is up and does not forward takes
+//! the whole bus from the ACTIVE, one that is down leaves it a line.
+
+pub mod guarding;
 
 use std::time::Duration;
 
@@ -20,10 +25,12 @@ use crate::thread::ThreadArguments;
 use crate::times::time;
 use crate::verdict::{Report, Verdict};
 
-/// Period of checks for the end.
-const LOOK: Duration = Duration::from_millis(200);
+use guarding::Guarded;
+
 /// No frame for this time: the ACTIVE MainDevice counts as silent.
 const SILENT: Duration = Duration::from_secs(1);
+/// An interface without a carrier this long after it was switched on is reported.
+const CARRIER_LIMIT: Duration = Duration::from_secs(5);
 
 /// What it is for, and what it is not.
 const ABOUT_STANDBY: &str = "\
@@ -31,6 +38,12 @@ The ring leads through both MainDevices: from the main link of the ACTIVE
 through the SubDevices into --redundant here, and from --main here to the
 redundant link of the ACTIVE. Each frame is sent on at the other interface, or
 back if that one is down.
+
+Both interfaces are switched on when it forwards, and off at its end: then the
+ACTIVE has a line. Leave them off before: an interface that is up and does not
+forward takes the whole bus from the ACTIVE. Switching needs cap_net_admin.
+Another process guards that: it switches both off when this one is killed,
+hangs, or is stopped for longer than --guard.
 
 It never sends on its own, and cannot take over yet: see docs/standby.md, which
 begins with a note on patents.";
@@ -43,6 +56,21 @@ pub struct StandbyArguments {
     links: LinkNames,
     #[command(flatten)]
     thread: ThreadArguments,
+    /// Age from which frames are not forwarded
+    ///
+    /// Frames wait where this computer is too busy, or where this program was stopped. They would bring SubDevices back
+    /// to earlier outputs; the ACTIVE has given them up.
+    #[arg(long, value_name = "TIME", value_parser = time, default_value = "5ms", help_heading = "Run")]
+    max_age: Duration,
+    /// Time after which both interfaces are switched off if this program hangs
+    ///
+    /// Another process does that, and at once when this program is killed. The ACTIVE then has a line instead of no
+    /// bus. A time below the pauses that this computer makes switches them off without need: this program then ends.
+    #[arg(long, value_name = "TIME", value_parser = guarding::limit, default_value = "20ms", help_heading = "Run")]
+    guard: Duration,
+    /// Without such a process
+    #[arg(long, conflicts_with = "guard", help_heading = "Run")]
+    no_guard: bool,
     /// How long, such as 10s or 5min; until Ctrl-C by default
     #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Run")]
     lasts: Option<Duration>,
@@ -59,35 +87,85 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let Some(redundant) = names.redundant.as_deref() else {
         return Err(Failure::new("an INACTIVE MainDevice forwards between two interfaces: add --redundant"));
     };
-    let mut links = PacketLinks::open(&names.main, Some(redundant), arguments.thread.mode())?;
+    let links = PacketLinks::open_forwarding(&names.main, redundant, arguments.thread.mode())?;
     check_sockets(names.all(), arguments.force)?;
-    let mut second = StoreAndForward::new(links.addresses()).map_err(|error| Failure::new(error.to_string()))?;
+    let second = StoreAndForward::new(links.addresses()).map_err(|error| Failure::new(error.to_string()))?;
+    let mut second = second.with_max_age(arguments.max_age);
+    let mut guarded = if arguments.no_guard {
+        Guarded::unguarded()
+    } else {
+        Guarded::start(arguments.guard, arguments.thread.priority, [&names.main, redundant])?
+    };
     let _awake = arguments.thread.apply();
-    for link in Link::ALL.into_iter().filter(|link| links.carrier(*link) == Some(false)) {
-        warn(describe_down(names.of(link)));
-    }
+    let mut links = LinksUp::new(links)?;
     say!("INACTIVE: forwarding between {} and {redundant}; Ctrl-C ends it", names.main);
-    let until = arguments.lasts.map_or(Instant::NEVER, |lasts| links.now() + lasts);
+    let until = arguments.lasts.map_or(Instant::NEVER, |lasts| links.0.now() + lasts);
     let mut active = Activity::default();
-    while !end.is_asked() && links.now() < until {
-        links.wait(until.min(links.now() + LOOK));
-        let taken = second.forward(&mut links);
-        active.observe(links.now(), taken > 0);
+    let mut carriers_due = Some(links.0.now() + CARRIER_LIMIT);
+    while !end.is_asked() && links.0.now() < until && second.counters().same_identity == 0 && guarded.beat() {
+        links.0.wait(until.min(links.0.now() + guarded.look()));
+        let taken = second.forward(&mut links.0);
+        let now = links.0.now();
+        active.observe(now, taken > 0);
+        guarded.check(now);
+        if carriers_due.take_if(|at| now >= *at).is_some() {
+            let down = Link::ALL.into_iter().filter(|link| links.0.carrier(*link) == Some(false));
+            down.for_each(|link| warn(describe_down(names.of(link))));
+        }
     }
+    guarded.end();
+    links.down()?;
+    let unguarded = guarded.release();
+    say!("{} and {redundant} are switched off: the ACTIVE has a line", names.main);
     let counters = second.counters();
-    say!("{}", in_words(&counters));
+    say!("{}", in_line(&counters));
     let forwarded = counters.on_main + counters.on_redundant;
     let none = (forwarded == 0).then(|| "no frame of another MainDevice came".to_owned());
-    let verdict = Verdict::Held(format!("{forwarded} frames forwarded")).and(none).and(end.cut_short(arguments.lasts));
+    let verdict = Verdict::Held(format!("{forwarded} frames forwarded"));
+    let verdict = verdict.and(none).and(same_identity(&counters)).and(unguarded).and(end.cut_short(arguments.lasts));
     Ok(Report { verdict, data: Data::Standby(Standby::from(&counters)) })
 }
 
+/// Why this MainDevice and the ACTIVE cannot be two of one ring.
+fn same_identity(counters: &ForwardingCounters) -> Option<String> {
+    let reason = "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can tell its \
+                  frames from those of the other: give that interface another address (ip link set IF address ...)";
+    (counters.same_identity > 0).then(|| reason.to_owned())
+}
+
+/// Links that are up as long as this lives, also if the program panics.
+struct LinksUp(PacketLinks);
+
+impl LinksUp {
+    fn new(mut links: PacketLinks) -> Result<LinksUp, Failure> {
+        if let Err(error) = links.switch(true) {
+            // One of them may be on already.
+            let _ = links.switch(false);
+            return Err(error.into());
+        }
+        Ok(LinksUp(links))
+    }
+
+    /// Takes them down.
+    fn down(mut self) -> Result<(), Failure> {
+        Ok(self.0.switch(false)?)
+    }
+}
+
+impl Drop for LinksUp {
+    fn drop(&mut self) {
+        // Where it is not permitted, it was not permitted to begin either.
+        let _ = self.0.switch(false);
+    }
+}
+
 /// The counters in a line.
-fn in_words(counters: &ForwardingCounters) -> String {
-    let ForwardingCounters { on_main, on_redundant, sent_back, again, own, not_ethercat, no_link, .. } = counters;
+fn in_line(counters: &ForwardingCounters) -> String {
+    let ForwardingCounters { on_main, on_redundant, sent_back, again, own, not_ethercat, too_old, no_link, .. } =
+        counters;
     format!(
         "forwarded {on_main} on MAIN, {on_redundant} on RED, of these {sent_back} back; not forwarded: {again} again, \
-         {own} own, {not_ethercat} not EtherCAT, {no_link} without a link"
+         {own} own, {not_ethercat} not EtherCAT, {too_old} too old, {no_link} without a link"
     )
 }
 
@@ -113,5 +191,41 @@ impl Activity {
         if has_come {
             self.last = Some(now);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use ringcat::standby::MAX_AGE;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        standby: StandbyArguments,
+    }
+
+    // covers: standby
+    #[test]
+    fn a_guard_has_a_limit_that_a_host_can_keep_or_is_left_out() {
+        let parse = |more: &[&str]| {
+            Line::try_parse_from(["standby", "--main", "a", "--redundant", "b"].iter().chain(more))
+                .map(|line| (line.standby.guard, line.standby.no_guard))
+        };
+        assert_eq!(parse(&[]).ok(), Some((Duration::from_millis(20), false)));
+        assert_eq!(parse(&["--guard", "1ms"]).ok(), Some((Duration::from_millis(1), false)));
+        assert_eq!(parse(&["--no-guard"]).map(|(_, none)| none).ok(), Some(true));
+        for wrong in [&["--guard", "999us"][..], &["--guard", "0ms"], &["--guard", "5ms", "--no-guard"]] {
+            assert!(parse(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    // covers: standby
+    #[test]
+    fn frames_are_forwarded_up_to_the_age_that_the_library_has_by_default() {
+        let line = Line::try_parse_from(["standby", "--main", "a", "--redundant", "b"]).expect("it is complete");
+        assert_eq!(line.standby.max_age, MAX_AGE);
     }
 }

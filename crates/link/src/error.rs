@@ -27,6 +27,11 @@ pub enum LinkError {
         /// The interface.
         name: String,
     },
+    /// This process may not switch interfaces on and off.
+    MayNotSwitch {
+        /// The interface to switch.
+        name: String,
+    },
     /// Another system call error.
     Os {
         /// The interface.
@@ -66,6 +71,11 @@ impl fmt::Display for LinkError {
             LinkError::NotEthernet { name } => {
                 write!(f, "{name} is not an Ethernet interface; take the one that the first SubDevice is plugged into")
             }
+            LinkError::MayNotSwitch { name } => write!(
+                f,
+                "not permitted to switch {name} on and off; run as root or permit it once with\n  {}",
+                permission::setcap_command()
+            ),
             LinkError::Os { name, what, errno } => {
                 write!(f, "{name}: {what}: {}; {}", io::Error::from_raw_os_error(*errno), advice(*errno))
             }
@@ -105,6 +115,12 @@ mod tests {
             let line = permission::setcap_command();
             assert!(text.contains("eth0") && text.ends_with(&line), "{text}");
         }
+    }
+
+    #[test]
+    fn a_missing_permission_to_switch_an_interface_is_told_with_the_setcap_line() {
+        let text = LinkError::MayNotSwitch { name: "eth0".to_owned() }.to_string();
+        assert!(text.starts_with("not permitted to switch eth0") && text.contains("cap_net_admin"), "{text}");
     }
 
     #[test]

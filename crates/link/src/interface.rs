@@ -11,6 +11,7 @@ use std::os::fd::AsRawFd;
 
 pub use use_warning::{UseWarning, exclusive_use};
 
+use crate::error::LinkError;
 use crate::kernel;
 
 /// A network interface.
@@ -45,10 +46,18 @@ pub fn carrier(name: &str) -> Option<bool> {
     kernel::link_up(socket.as_raw_fd(), name).ok()
 }
 
-/// Switches an interface on or off, as `ip link set NAME up` does. False if that is not permitted (CAP_NET_ADMIN) or
-/// there is no such interface. Waits for a lock of the kernel, with some drivers longer.
-pub fn switch(name: &str, up: bool) -> bool {
-    kernel::request_socket().is_ok_and(|socket| kernel::switch(socket.as_raw_fd(), name, up).is_ok())
+/// Switches an interface on or off, as `ip link set NAME up` does. Waits for a lock of the kernel, with some drivers
+/// longer.
+///
+/// # Errors
+/// It is not permitted (CAP_NET_ADMIN), or there is no such interface.
+pub fn switch(name: &str, up: bool) -> Result<(), LinkError> {
+    let switched = kernel::request_socket().and_then(|socket| kernel::switch(socket.as_raw_fd(), name, up));
+    switched.map_err(|errno| match errno {
+        libc::EPERM | libc::EACCES => LinkError::MayNotSwitch { name: name.to_owned() },
+        libc::ENODEV => LinkError::NoInterface { name: name.to_owned(), present: names() },
+        errno => LinkError::from_errno(name, "switching it on or off", errno),
+    })
 }
 
 /// Index of the other end of a veth pair, if it is in this namespace.
@@ -127,7 +136,7 @@ mod tests {
     fn a_missing_interface_has_no_carrier_state() {
         for name in ["", "no-such", "a-name-that-is-longer-than-the-kernel-allows", "with\0end"] {
             assert_eq!(carrier(name), None, "{name:?}");
-            assert!(!switch(name, false), "{name:?}");
+            assert!(matches!(switch(name, false), Err(LinkError::NoInterface { .. })), "{name:?}");
         }
     }
 }

@@ -3,7 +3,8 @@
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`descriptors`]: sockets that another process has opened, passed over a Unix socket;
 //! * [`frame_pipe`]: frames over a pair of Unix sockets, to a simulated segment in another process;
-//! * [`process`]: the peer of a Unix socket, the end of a process; [`private_file`]: files for this user only;
+//! * [`process`]: the peer of a Unix socket, the end of a process; [`heartbeat`]: whether a process runs;
+//! * [`private_file`]: files for this user only;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
@@ -27,6 +28,7 @@ pub mod descriptors;
 mod error;
 pub mod filter;
 pub mod frame_pipe;
+pub mod heartbeat;
 pub mod interface;
 mod kernel;
 pub mod listener;
@@ -56,7 +58,7 @@ pub use frame_pipe::{FramePipe, wait_pipes};
 pub use listener::{Listener, Sender};
 pub use packet_socket::binding::{PresentInterface, revoke};
 pub use packet_socket::handed::HandedSocket;
-pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
+pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket, SendingSide};
 pub use receive_mode::ReceiveMode;
 pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};
 pub use signals::{HeldSignals, Signal};

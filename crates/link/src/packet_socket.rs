@@ -5,8 +5,10 @@
 //! ([`ClassFilter`]). The socket receives only EtherType 0x88A4 and no frames sent by this host.
 
 pub mod binding;
+mod counters;
 pub mod handed;
 pub mod prepared;
+mod sending;
 
 use std::cell::Cell;
 use std::mem::{size_of, zeroed};
@@ -19,6 +21,9 @@ use crate::kernel::{self, Membership, Statistics};
 use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
 use crate::rx_ring::{RxRing, Seen, Taken};
+
+pub use counters::LinkCounters;
+pub use sending::SendingSide;
 
 /// The group address to which EtherCAT frames may be sent instead of broadcast.
 pub const GROUP_ADDRESS: [u8; 6] = [0x01, 0x01, 0x05, 0x01, 0x00, 0x00];
@@ -95,26 +100,6 @@ impl Default for PacketOptions {
     }
 }
 
-/// Counters of a socket.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct LinkCounters {
-    /// Frames that the kernel accepted for sending.
-    pub sent: u64,
-    /// Frames returned by [`PacketSocket::receive`].
-    pub received: u64,
-    /// Frames not sent because the interface was down or gone.
-    pub down: u64,
-    /// Frames not sent because the kernel's queue was full.
-    pub busy: u64,
-    /// Frames not sent for another reason, such as a length beyond the MTU.
-    pub refused: u64,
-    /// Frames received and lost because the ring was full.
-    pub overrun: u64,
-    /// Frames received that are longer than a slot of the ring.
-    pub truncated: u64,
-}
-
 /// Frames that a socket receives in addition to incoming EtherCAT frames.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Passing {
@@ -161,27 +146,13 @@ impl PacketSocket {
     /// next call tries again, so an interface that comes back is used at once.
     #[inline(always)]
     pub fn send(&mut self, frame: &[u8]) -> bool {
-        let result = kernel::send(self.fd(), frame);
-        if result.is_ok() {
-            self.counters.sent += 1;
-        }
-        result.is_ok() || self.send_again(frame, result)
+        self.sender().send(frame)
     }
 
-    #[cold]
-    fn send_again(&mut self, frame: &[u8], mut result: Result<(), i32>) -> bool {
-        if result == Err(libc::ENETDOWN) {
-            // The error may be pending since the interface went down, although the interface is up again.
-            kernel::clear_error(&self.fd);
-            result = kernel::send(self.fd(), frame);
-        }
-        match result {
-            Ok(()) => self.counters.sent += 1,
-            Err(libc::ENETDOWN | libc::ENXIO | libc::ENODEV) => self.counters.down += 1,
-            Err(libc::ENOBUFS | libc::EAGAIN | libc::ENOMEM) => self.counters.busy += 1,
-            Err(_) => self.counters.refused += 1,
-        }
-        result.is_ok()
+    /// The side that sends, to be used while a frame is held.
+    #[inline(always)]
+    pub fn sender(&mut self) -> SendingSide<'_> {
+        SendingSide::new(&self.fd, &mut self.counters)
     }
 
     /// Passes the oldest received frame to `take`; false if there is none. No system call.
@@ -189,6 +160,36 @@ impl PacketSocket {
     pub fn receive(&mut self, take: &mut dyn FnMut(&[u8])) -> bool {
         loop {
             match self.ring.take(take) {
+                Taken::Frame => {
+                    self.counters.received += 1;
+                    return true;
+                }
+                Taken::Nothing => return false,
+                Taken::Truncated => self.counters.truncated += 1,
+                Taken::Outgoing => {}
+            }
+        }
+    }
+
+    /// Passes the oldest received frame to `take` in its slot of the ring, where it may be changed, with the time of
+    /// its reception and the side that sends; false if there is none. The time is on the monotonic clock; one that is
+    /// not between `after_ns` and `before_ns` is determined again. No system call.
+    #[inline]
+    pub fn receive_in_place(
+        &mut self,
+        (after_ns, before_ns): (u64, u64),
+        take: &mut dyn FnMut(&mut [u8], u64, SendingSide<'_>),
+    ) -> bool {
+        loop {
+            let PacketSocket { ring, fd, counters, unix_offset_ns, .. } = self;
+            let taken = ring.take_in_place(|frame, stamp| {
+                let mut at = stamp.wrapping_sub(*unix_offset_ns);
+                if !(after_ns..=before_ns).contains(&at) || counters.received.is_multiple_of(OFFSET_FRAMES) {
+                    at = by_new_offset(stamp, unix_offset_ns);
+                }
+                take(frame, at, SendingSide::new(fd, counters));
+            });
+            match taken {
                 Taken::Frame => {
                     self.counters.received += 1;
                     return true;
@@ -210,13 +211,7 @@ impl PacketSocket {
         if (after_ns..=before_ns).contains(&at) && !self.counters.received.is_multiple_of(OFFSET_FRAMES) {
             return at;
         }
-        self.received_at_by_new_offset(stamp)
-    }
-
-    #[cold]
-    fn received_at_by_new_offset(&mut self, stamp: u64) -> u64 {
-        self.unix_offset_ns = monotonic::unix_offset_ns();
-        stamp.saturating_sub(self.unix_offset_ns).min(monotonic::now_ns())
+        by_new_offset(stamp, &mut self.unix_offset_ns)
     }
 
     /// Passes the oldest frame in either direction to `take`; false if there is none. No system call.
@@ -244,6 +239,13 @@ impl PacketSocket {
     pub fn fd(&self) -> RawFd {
         self.fd.as_raw_fd()
     }
+}
+
+/// A time of the Unix clock on the monotonic clock, after the offset of both is read again.
+#[cold]
+fn by_new_offset(stamp: u64, unix_offset_ns: &mut u64) -> u64 {
+    *unix_offset_ns = monotonic::unix_offset_ns();
+    stamp.saturating_sub(*unix_offset_ns).min(monotonic::now_ns())
 }
 
 impl AsFd for PacketSocket {

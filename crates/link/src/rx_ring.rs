@@ -120,10 +120,20 @@ impl RxRing {
         let mut stamp = self.stamp;
         let taken = self.take_slot(|status, slot| {
             stamp = [u32_at(slot, 16), u32_at(slot, 20)];
-            hand_out(status, slot, take)
+            hand_out(status, slot, |frame| take(frame))
         });
         self.stamp = stamp;
         taken
+    }
+
+    /// As [`RxRing::take`], with the frame to be changed, and with the time at which the kernel received it, in
+    /// nanoseconds since 1970.
+    #[inline]
+    pub fn take_in_place(&mut self, mut take: impl FnMut(&mut [u8], u64)) -> Taken {
+        self.take_slot(|status, slot| {
+            let stamp = stamp(slot);
+            hand_out(status, slot, |frame| take(frame, stamp))
+        })
     }
 
     /// When the kernel received the last frame returned, in nanoseconds since 1970.
@@ -231,7 +241,7 @@ fn show(status: u32, slot: &mut [u8], take: &mut dyn FnMut(Seen<'_>)) -> Taken {
 
 /// Returns the frame of a slot that this process owns, with its VLAN tag put back if the kernel removed it.
 #[inline(always)]
-fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken {
+fn hand_out(status: u32, slot: &mut [u8], take: impl FnOnce(&mut [u8])) -> Taken {
     if slot[PACKET_TYPE] == PACKET_OUTGOING {
         return Taken::Outgoing;
     }
@@ -241,7 +251,7 @@ fn hand_out(status: u32, slot: &mut [u8], take: &mut dyn FnMut(&[u8])) -> Taken 
     }
     let has_tag = status & TP_STATUS_VLAN_VALID != 0;
     let (start, tag) = if has_tag { put_tag_back(status, slot, start) } else { (start, 0) };
-    let Some(frame) = slot.get(start..start + length + tag) else { return Taken::Truncated };
+    let Some(frame) = slot.get_mut(start..start + length + tag) else { return Taken::Truncated };
     take(frame);
     Taken::Frame
 }
@@ -263,7 +273,7 @@ mod tests {
 
     fn handed(status: u32, mut slot: Vec<u8>) -> (Taken, Vec<u8>) {
         let mut frame = Vec::new();
-        let taken = hand_out(status, &mut slot, &mut |bytes| frame.extend_from_slice(bytes));
+        let taken = hand_out(status, &mut slot, |bytes| frame.extend_from_slice(bytes));
         (taken, frame)
     }
 

@@ -6,7 +6,7 @@ use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 #[cfg(feature = "eoe")]
 use ringcat_link::WakeUp;
-use ringcat_wire::frame::MacAddress;
+use ringcat_wire::frame::{MAX_FRAME_VLAN, MacAddress};
 
 /// What there is once for each link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,34 @@ impl<T> PerLink<T> {
     }
 }
 
+/// A frame that has arrived, while its place is held.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Arrived<'a> {
+    /// The link on which it came.
+    pub link: Link,
+    /// When it arrived at the interface, or when it was taken if these links do not know that.
+    pub at: Instant,
+    /// The frame, which may be changed.
+    pub frame: &'a mut [u8],
+}
+
+impl<'a> Arrived<'a> {
+    /// A frame that arrived on a link.
+    pub const fn new(link: Link, at: Instant, frame: &'a mut [u8]) -> Arrived<'a> {
+        Arrived { link, at, frame }
+    }
+}
+
+/// Links while a frame of them is held: they send it on.
+pub trait SendOn {
+    /// Whether a link has a carrier, as far as these links know.
+    fn is_up(&self, link: Link) -> bool;
+
+    /// Sends a frame, without FCS. False if it certainly does not leave.
+    fn send(&mut self, link: Link, frame: &[u8]) -> bool;
+}
+
 /// One or two network interfaces with a clock.
 ///
 /// Links belong to one thread, which calls these in turn. [`Links::send`] and [`Links::receive`] are called in the
@@ -41,6 +69,26 @@ pub trait Links {
 
     /// Passes the oldest frame that has arrived to `take`; false if there is none.
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool;
+
+    /// Passes the oldest frame that has arrived to `pass`, to be sent on; false if there is none. Where the links can,
+    /// it is passed in the place in which it arrived, and not copied. An arrival before `since` is determined again,
+    /// because the clock of arrivals may have been set.
+    fn receive_and_pass(&mut self, since: Instant, pass: &mut dyn FnMut(Arrived<'_>, &mut dyn SendOn)) -> bool {
+        let mut buffer = [0; MAX_FRAME_VLAN];
+        let mut received = None;
+        let any = self.receive(&mut |link, frame| {
+            received = buffer.get_mut(..frame.len()).map(|place| {
+                place.copy_from_slice(frame);
+                (link, frame.len())
+            });
+        });
+        if let Some((link, length)) = received {
+            let now = self.now();
+            let at = self.received_at(since, now).unwrap_or(now);
+            pass(Arrived { link, at, frame: &mut buffer[..length] }, &mut Sending(self));
+        }
+        any
+    }
 
     /// Whether a frame may have arrived that was not passed to `take`. Cheap.
     fn has_frame(&self) -> bool {
@@ -100,5 +148,19 @@ pub trait Links {
     fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
         let _ = (link, disconnect);
         false
+    }
+}
+
+/// Links whose sent frames count as sent.
+struct Sending<'a, L: ?Sized>(&'a mut L);
+
+impl<L: Links + ?Sized> SendOn for Sending<'_, L> {
+    fn is_up(&self, link: Link) -> bool {
+        self.0.carrier(link) != Some(false)
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) -> bool {
+        self.0.send(link, frame);
+        true
     }
 }

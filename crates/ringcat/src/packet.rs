@@ -11,13 +11,16 @@ use std::time::Duration;
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::interface;
-use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, UsualReturn, WakeUp, monotonic};
+use ringcat_link::{CarrierWatch, ClassFilter, PacketOptions, PacketSocket, SendingSide, UsualReturn};
+use ringcat_link::{WakeUp, monotonic};
 use ringcat_wire::frame::MacAddress;
 
 pub use ringcat_link::{HandedSocket, LinkCounters, LinkError, ReceiveMode};
 
-use crate::links::{Links, PerLink};
+use crate::links::{Arrived, Links, PerLink, SendOn};
 
+/// Interval of the check of the carriers of an INACTIVE MainDevice: it sends frames back where a link is down.
+pub const FORWARDING_CARRIER_PERIOD: Duration = Duration::from_millis(1);
 /// Slots of a receive ring for each class of frames in it, 2 KiB each: more than the frames of a class that may be on
 /// the wire at once ([`ringcat_engine::MAX_IN_FLIGHT`]).
 const RING_FRAMES: u32 = 128;
@@ -74,7 +77,18 @@ impl PacketLinks {
     /// # Errors
     /// An interface does not exist or is not Ethernet, or a permission is missing.
     pub fn open(main: &str, redundant: Option<&str>, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
-        PacketLinks::open_class(main, redundant, mode, ClassFilter::All)?.watch_carriers(main, redundant)
+        let links = PacketLinks::open_class(main, redundant, mode, ClassFilter::All)?;
+        links.watch_carriers(main, redundant, CarrierWatch::PERIOD)
+    }
+
+    /// As [`PacketLinks::open`], for an INACTIVE MainDevice, which detects the loss of a carrier within
+    /// [`FORWARDING_CARRIER_PERIOD`]. The interfaces may be down; [`PacketLinks::switch`] brings them up.
+    ///
+    /// # Errors
+    /// As [`PacketLinks::open`].
+    pub fn open_forwarding(main: &str, redundant: &str, mode: ReceiveMode) -> Result<PacketLinks, LinkError> {
+        let links = PacketLinks::open_class(main, Some(redundant), mode, ClassFilter::All)?;
+        links.watch_carriers(main, Some(redundant), FORWARDING_CARRIER_PERIOD)
     }
 
     /// Opens the interfaces twice: for the cyclic half, which waits for frames in this mode, and for the acyclic half,
@@ -90,7 +104,7 @@ impl PacketLinks {
         Ok((
             PacketLinks::open_class(main, redundant, cyclic, ClassFilter::Cyclic)?,
             PacketLinks::open_class(main, redundant, ReceiveMode::Blocking, ClassFilter::Acyclic)?
-                .watch_carriers(main, redundant)?
+                .watch_carriers(main, redundant, CarrierWatch::PERIOD)?
                 .with_wake_up()?,
         ))
     }
@@ -207,15 +221,32 @@ impl PacketLinks {
         };
     }
 
-    fn watch_carriers(mut self, main: &str, redundant: Option<&str>) -> Result<PacketLinks, LinkError> {
+    fn watch_carriers(
+        mut self,
+        main: &str,
+        redundant: Option<&str>,
+        period: Duration,
+    ) -> Result<PacketLinks, LinkError> {
         let interfaces: Vec<&str> = core::iter::once(main).chain(redundant).collect();
-        self.carriers = Some(CarrierWatch::start(&interfaces, CarrierWatch::PERIOD)?);
+        self.carriers = Some(CarrierWatch::start(&interfaces, period)?);
         Ok(self)
     }
 
     fn with_wake_up(mut self) -> Result<PacketLinks, LinkError> {
         self.wake_up = Some(WakeUp::new()?);
         Ok(self)
+    }
+
+    /// Switches all interfaces on, or off for good: also when these links are dropped they stay off. A controller in
+    /// a ring of two MainDevices has its links up only while it forwards or is ACTIVE (protocol MR-21). Not for the
+    /// cyclic path.
+    ///
+    /// # Errors
+    /// It is not permitted (CAP_NET_ADMIN). All interfaces were tried.
+    pub fn switch(&mut self, up: bool) -> Result<(), LinkError> {
+        self.disconnected = [false; 2];
+        let switched = self.names.iter().flatten().map(|name| interface::switch(name, up));
+        switched.fold(Ok(()), Result::and)
     }
 
     /// Counters of frames sent, received and lost by an interface; `None` if there is no such interface.
@@ -256,6 +287,23 @@ impl Links for PacketLinks {
         let Some(redundant) = &mut self.redundant else { return false };
         self.taken_from = Link::Redundant;
         redundant.receive(&mut |frame| take(Link::Redundant, frame))
+    }
+
+    /// In the slot of the ring of its socket.
+    fn receive_and_pass(&mut self, since: Instant, pass: &mut dyn FnMut(Arrived<'_>, &mut dyn SendOn)) -> bool {
+        let between = (since.0, monotonic::now_ns());
+        let PacketLinks { main, redundant, carriers, .. } = self;
+        let carriers = carriers.as_ref();
+        let from_main = main.receive_in_place(between, &mut |frame, at, main| {
+            let redundant = redundant.as_mut().map(PacketSocket::sender);
+            let arrived = Arrived::new(Link::Main, Instant(at), frame);
+            pass(arrived, &mut Sides { main, redundant, carriers });
+        });
+        let Some(redundant) = redundant.as_mut().filter(|_| !from_main) else { return from_main };
+        redundant.receive_in_place(between, &mut |frame, at, redundant| {
+            let arrived = Arrived::new(Link::Redundant, Instant(at), frame);
+            pass(arrived, &mut Sides { main: main.sender(), redundant: Some(redundant), carriers });
+        })
     }
 
     #[inline(always)]
@@ -338,11 +386,32 @@ impl Links for PacketLinks {
         let Some(name) = &self.names[link.index()] else { return false };
         let done = match &self.switch {
             Some(switch) => switch.switch(link, !disconnect),
-            None => interface::switch(name, !disconnect),
+            None => interface::switch(name, !disconnect).is_ok(),
         };
         if done {
             self.disconnected[link.index()] = disconnect;
         }
         done
+    }
+}
+
+/// The sending sides of both sockets, while a frame of one of them is held.
+struct Sides<'a> {
+    main: SendingSide<'a>,
+    redundant: Option<SendingSide<'a>>,
+    carriers: Option<&'a CarrierWatch>,
+}
+
+impl SendOn for Sides<'_> {
+    fn is_up(&self, link: Link) -> bool {
+        let has_link = link == Link::Main || self.redundant.is_some();
+        has_link && self.carriers.is_none_or(|watch| watch.carrier(link.index()).is_up())
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) -> bool {
+        match link {
+            Link::Main => self.main.send(frame),
+            Link::Redundant => self.redundant.as_mut().is_some_and(|side| side.send(frame)),
+        }
     }
 }

@@ -16,7 +16,7 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::frame::MacAddress;
 
 use crate::links::{Links, PerLink};
-use crate::simulated::host_link;
+use crate::simulated::{add_standby, host_link};
 use crate::simulated_addresses::{MAIN, REDUNDANT};
 use crate::window::Half;
 
@@ -56,8 +56,9 @@ pub struct SharedSegment {
 
 impl SharedSegment {
     /// Links into a network for the cyclic and for the acyclic half; two of each if a cable is connected to its
-    /// redundant host interface.
-    pub fn halves(network: Network) -> (SharedSegment, SharedSegment) {
+    /// redundant host interface. A second MainDevice is INACTIVE, as in [`SimulatedSegment`](crate::simulated).
+    pub fn halves(mut network: Network) -> (SharedSegment, SharedSegment) {
+        add_standby(&mut network);
         let ring = network.host_cable(HostLink::Redundant).is_some();
         let begin = WallClock::now();
         let inner = Arc::new(Mutex::new(Inner { network, arrived: Default::default() }));

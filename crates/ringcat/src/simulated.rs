@@ -3,14 +3,23 @@
 //! In virtual time waiting takes no real time. Paced, virtual time does not run ahead of the wall clock. A stall of the
 //! machine then stops host and segment alike, and no frame counts as lost.
 //!
-//! Where the network has links of a second MainDevice, that one is INACTIVE and forwards (feature `standby`).
+//! Where the network has links of a second MainDevice, that one is INACTIVE and forwards (feature `standby`; without it
+//! what the second MainDevice receives is lost).
+
+#[cfg(feature = "standby")]
+mod forwarding;
+#[cfg(feature = "standby")]
+pub mod two_hosts;
 
 use std::time::{Duration, Instant as WallClock};
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
-use ringcat_sim::cable::HostLink;
+use ringcat_sim::cable::{Host, HostLink};
 use ringcat_sim::host::Received;
+#[cfg(not(feature = "standby"))]
+use ringcat_sim::host::program::Deaf;
+use ringcat_sim::host::program::TurnAround;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::{Segment, SegmentError};
 use ringcat_sim::time::SimTime;
@@ -19,9 +28,9 @@ use ringcat_wire::frame::MacAddress;
 use crate::links::{Links, PerLink};
 use crate::simulated_addresses::{MAIN, REDUNDANT};
 #[cfg(feature = "standby")]
-use crate::simulated_addresses::{SECOND_MAIN, SECOND_REDUNDANT};
+use crate::standby::ForwardingCounters;
 #[cfg(feature = "standby")]
-use crate::standby::{ForwardingCounters, StoreAndForward};
+use forwarding::Forwarding;
 
 /// No sleep while virtual time is ahead of the wall clock by less than this.
 const SLEEP_THRESHOLD: Duration = Duration::from_micros(100);
@@ -34,48 +43,21 @@ pub struct SimulatedSegment {
     arrived: Option<(Link, Received)>,
     pace: Option<(WallClock, SimTime)>,
     stalled: Duration,
-    /// A second MainDevice, INACTIVE.
-    #[cfg(feature = "standby")]
-    second: Option<StoreAndForward>,
 }
 
 impl SimulatedSegment {
     /// Links into a network; two of them if a cable is connected to its redundant host interface.
-    pub fn new(network: Network) -> SimulatedSegment {
+    pub fn new(mut network: Network) -> SimulatedSegment {
         let ring = network.host_cable(HostLink::Redundant).is_some();
-        SimulatedSegment {
-            network,
-            ring,
-            arrived: None,
-            pace: None,
-            stalled: Duration::ZERO,
-            #[cfg(feature = "standby")]
-            second: second_main_device(),
-        }
+        add_standby(&mut network);
+        SimulatedSegment { network, ring, arrived: None, pace: None, stalled: Duration::ZERO }
     }
 
     /// Frames that the second MainDevice has forwarded, in a network where it has links.
     #[cfg(feature = "standby")]
     pub fn forwarded(&self) -> ForwardingCounters {
-        self.second.as_ref().map(StoreAndForward::counters).unwrap_or_default()
-    }
-
-    /// The second MainDevice forwards what it has received.
-    #[cfg(feature = "standby")]
-    fn forward(&mut self) {
-        if let Some(second) = &mut self.second {
-            second.forward(&mut SecondLinks(&mut self.network));
-        }
-    }
-
-    /// The second MainDevice is off: what it receives is lost.
-    #[cfg(not(feature = "standby"))]
-    fn forward(&mut self) {
-        for link in HostLink::SECOND {
-            while let Some(received) = self.network.receive(link) {
-                self.network.give_back(received.bytes);
-            }
-        }
+        let program = self.network.program::<Forwarding>(Host::Second);
+        program.map(Forwarding::counters).unwrap_or_default()
     }
 
     /// A segment from the text of a segment file; SII images are read from the working directory.
@@ -164,7 +146,6 @@ impl Links for SimulatedSegment {
         let until = SimTime(until.0);
         while !self.fetch() && self.network.now() < until {
             self.network.advance_until_received(until);
-            self.forward();
         }
         self.keep_pace();
     }
@@ -175,50 +156,14 @@ impl Links for SimulatedSegment {
     }
 }
 
-/// The second MainDevice, as INACTIVE.
-#[cfg(feature = "standby")]
-fn second_main_device() -> Option<StoreAndForward> {
-    StoreAndForward::new(PerLink::new(SECOND_MAIN, Some(SECOND_REDUNDANT))).ok()
-}
-
-/// The links of the second MainDevice.
-#[cfg(feature = "standby")]
-struct SecondLinks<'a>(&'a mut Network);
-
-#[cfg(feature = "standby")]
-const fn second_link(link: Link) -> HostLink {
-    match link {
-        Link::Main => HostLink::SecondMain,
-        Link::Redundant => HostLink::SecondRedundant,
+/// A second MainDevice, as INACTIVE, where the network has links of one.
+pub(crate) fn add_standby(network: &mut Network) {
+    let has_links = Host::Second.links().into_iter().any(|link| network.host_cable(link).is_some());
+    if has_links {
+        #[cfg(feature = "standby")]
+        let program = Box::new(Forwarding::new());
+        #[cfg(not(feature = "standby"))]
+        let program = Box::new(Deaf);
+        network.run_program(Host::Second, program, TurnAround::default());
     }
-}
-
-#[cfg(feature = "standby")]
-impl Links for SecondLinks<'_> {
-    fn now(&self) -> Instant {
-        Instant(self.0.now().0)
-    }
-
-    fn addresses(&self) -> PerLink<MacAddress> {
-        PerLink::new(SECOND_MAIN, Some(SECOND_REDUNDANT))
-    }
-
-    fn send(&mut self, link: Link, frame: &[u8]) {
-        self.0.send(second_link(link), frame);
-    }
-
-    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        let mut arrived = Link::ALL.into_iter().filter_map(|link| Some((link, self.0.receive(second_link(link))?)));
-        let Some((link, received)) = arrived.next() else { return false };
-        take(link, &received.bytes);
-        self.0.give_back(received.bytes);
-        true
-    }
-
-    fn carrier(&self, link: Link) -> Option<bool> {
-        Some(self.0.carrier(second_link(link)))
-    }
-
-    /// Time is that of the first MainDevice.
-    fn wait(&mut self, _until: Instant) {}
 }

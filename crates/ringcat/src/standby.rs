@@ -5,23 +5,30 @@
 //! frame on at the other link, or back if that one is down, so that the ACTIVE has its ring. Frames of any MainDevice
 //! that leaves two bits of its source address to the standby are forwarded (protocol 9.7.1).
 
+#[cfg(feature = "packet")]
+pub mod guard;
+
 use std::error::Error;
 use std::fmt;
+use std::time::Duration;
 
 use ringcat_engine::link::Link;
-pub use ringcat_engine::standby::{Forwarder, NotForwarded};
-use ringcat_wire::frame::{MAX_FRAME_VLAN, MacAddress};
+pub use ringcat_engine::standby::{Forwarder, NotForwarded, Onward};
+use ringcat_engine::time::Instant;
+use ringcat_wire::frame::MacAddress;
 
-use crate::links::{Links, PerLink};
+use crate::links::{Arrived, Links, PerLink, SendOn};
 
 /// Most frames that one call of [`StoreAndForward::forward`] takes.
 pub const MAX_AT_ONCE: usize = 256;
+/// Default age from which frames are not forwarded: an ACTIVE MainDevice has given them up.
+pub const MAX_AGE: Duration = Duration::from_millis(5);
 
 /// Forwards the frames of an ACTIVE MainDevice.
 #[derive(Debug)]
 pub struct StoreAndForward {
     forwarder: Forwarder,
-    buffer: Box<[u8; MAX_FRAME_VLAN]>,
+    max_age: Duration,
     counters: ForwardingCounters,
 }
 
@@ -35,12 +42,17 @@ pub struct ForwardingCounters {
     pub on_redundant: u64,
     /// Of these, sent back at the link on which they came, because the other one is down.
     pub sent_back: u64,
+    /// Of these, frames with the identity of this MainDevice, which it has not sent: another one has the same bytes 3
+    /// to 5 in its address, and it must not become ACTIVE (protocol SM-09).
+    pub same_identity: u64,
     /// Not sent: forwarded on that link before.
     pub again: u64,
     /// Not sent: own frames, from the time when this MainDevice was ACTIVE.
     pub own: u64,
-    /// Not sent: no EtherCAT frames with datagrams, or too long for Ethernet.
+    /// Not sent: no EtherCAT frames with datagrams.
     pub not_ethercat: u64,
+    /// Not sent: too old, because this MainDevice was stopped.
+    pub too_old: u64,
     /// Not sent: no link is up.
     pub no_link: u64,
 }
@@ -59,61 +71,78 @@ impl fmt::Display for NeedsTwoLinks {
 impl Error for NeedsTwoLinks {}
 
 impl StoreAndForward {
-    /// With the addresses of the own interfaces.
+    /// With the addresses of the own interfaces, of a MainDevice that has sent nothing. Frames older than [`MAX_AGE`]
+    /// are not forwarded.
     ///
     /// # Errors
     /// There is no redundant link.
     pub fn new(addresses: PerLink<MacAddress>) -> Result<StoreAndForward, NeedsTwoLinks> {
         let forwarder = Forwarder::new(addresses.main, addresses.redundant.ok_or(NeedsTwoLinks)?);
-        Ok(StoreAndForward {
-            forwarder,
-            buffer: Box::new([0; MAX_FRAME_VLAN]),
-            counters: ForwardingCounters::default(),
-        })
+        Ok(StoreAndForward { forwarder, max_age: MAX_AGE, counters: ForwardingCounters::default() })
+    }
+
+    /// This MainDevice was ACTIVE, and has sent its last frame at this time.
+    #[must_use]
+    pub fn after_sending(mut self, last_sent: Instant) -> StoreAndForward {
+        self.forwarder = self.forwarder.after_sending(last_sent);
+        self
+    }
+
+    /// Sets the age from which frames are not forwarded: those that came while this MainDevice was stopped would bring
+    /// SubDevices back to earlier outputs.
+    #[must_use]
+    pub fn with_max_age(mut self, max_age: Duration) -> StoreAndForward {
+        self.max_age = max_age;
+        self
     }
 
     /// Forwards the frames that have arrived, at most [`MAX_AT_ONCE`]; the number of frames taken. Neither allocates
     /// nor waits.
     pub fn forward(&mut self, links: &mut impl Links) -> usize {
-        let carriers = Link::ALL.map(|link| links.carrier(link) != Some(false));
-        let mut taken = 0;
-        while taken < MAX_AT_ONCE {
-            let mut received = None;
-            let buffer = &mut self.buffer;
-            let any = links.receive(&mut |link, frame| {
-                received = buffer.get_mut(..frame.len()).map(|place| {
-                    place.copy_from_slice(frame);
-                    (link, frame.len())
-                });
-            });
-            if !any {
-                break;
-            }
-            taken += 1;
-            match received {
-                Some((link, length)) => self.pass_on(links, link, length, carriers),
-                None => self.counters.not_ethercat += 1,
+        for taken in 0..MAX_AT_ONCE {
+            let now = links.now();
+            let since = Instant(now.0.saturating_sub(u64::try_from(self.max_age.as_nanos()).unwrap_or(u64::MAX)));
+            if !links.receive_and_pass(since, &mut |arrived, links| self.pass_on(arrived, links, since, now)) {
+                return taken;
             }
         }
-        taken
+        MAX_AT_ONCE
     }
 
-    /// Sends the frame in the buffer on.
-    fn pass_on(&mut self, links: &mut impl Links, received_on: Link, length: usize, carriers: [bool; 2]) {
-        let frame = &mut self.buffer[..length];
-        let counter = match self.forwarder.forward(frame, received_on, carriers) {
-            Ok(link) => {
-                links.send(link, frame);
-                self.counters.sent_back += u64::from(link == received_on);
+    /// Sends a frame on, unless it arrived before `since`.
+    fn pass_on(&mut self, arrived: Arrived<'_>, links: &mut dyn SendOn, since: Instant, now: Instant) {
+        let Arrived { link: received_on, at, frame } = arrived;
+        if at < since {
+            self.counters.too_old += 1;
+            return;
+        }
+        let carriers = Link::ALL.map(|link| links.is_up(link));
+        let forwarder = self.forwarder;
+        let passed = forwarder.forward(frame, received_on, carriers, now).and_then(|onward| {
+            if links.send(onward.link, frame) {
+                return Ok(onward);
+            }
+            let back = forwarder.turn_back(frame, received_on, onward)?;
+            if links.send(back.link, frame) { Ok(back) } else { Err(NotForwarded::NoLink) }
+        });
+        self.count(passed, received_on);
+    }
+
+    fn count(&mut self, passed: Result<Onward, NotForwarded>, received_on: Link) {
+        let counters = &mut self.counters;
+        let counter = match passed {
+            Ok(Onward { link, has_own_identity, .. }) => {
+                counters.sent_back += u64::from(link == received_on);
+                counters.same_identity += u64::from(has_own_identity);
                 match link {
-                    Link::Main => &mut self.counters.on_main,
-                    Link::Redundant => &mut self.counters.on_redundant,
+                    Link::Main => &mut counters.on_main,
+                    Link::Redundant => &mut counters.on_redundant,
                 }
             }
-            Err(NotForwarded::Own) => &mut self.counters.own,
-            Err(NotForwarded::Again) => &mut self.counters.again,
-            Err(NotForwarded::NoLink) => &mut self.counters.no_link,
-            Err(_) => &mut self.counters.not_ethercat,
+            Err(NotForwarded::Own) => &mut counters.own,
+            Err(NotForwarded::Again) => &mut counters.again,
+            Err(NotForwarded::NoLink) => &mut counters.no_link,
+            Err(_) => &mut counters.not_ethercat,
         };
         *counter += 1;
     }
@@ -121,5 +150,123 @@ impl StoreAndForward {
     /// What it has done since it began.
     pub fn counters(&self) -> ForwardingCounters {
         self.counters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OWN: PerLink<MacAddress> =
+        PerLink::new(MacAddress([0, 0, 0x5E, 0, 0x53, 0x11]), Some(MacAddress([0, 0, 0x5E, 0, 0x53, 0x12])));
+
+    /// Links with one frame after the other, whose interfaces fail to send.
+    struct Failing {
+        arriving: Vec<(Link, Instant, Vec<u8>)>,
+        sent: Vec<(Link, u8)>,
+        fails: [bool; 2],
+        now: Instant,
+    }
+
+    impl Failing {
+        fn new(fails: [bool; 2]) -> Failing {
+            Failing { arriving: Vec::new(), sent: Vec::new(), fails, now: Instant(1_000_000_000) }
+        }
+
+        /// A frame of the MainDevice of the trace arrives.
+        fn arrive(&mut self, link: Link, ago: Duration) {
+            let mut frame = vec![0; 60];
+            frame[6..12].copy_from_slice(&[0x08, 0x76, 0x0E, 0x01, 0xBD, 0x9A]);
+            frame[12..16].copy_from_slice(&[0x88, 0xA4, 0x0E, 0x10]);
+            self.arriving.push((link, Instant(self.now.0 - ago.as_nanos() as u64), frame));
+        }
+
+        fn forwarded(&mut self, max_age: Duration) -> ForwardingCounters {
+            let mut forwarder = StoreAndForward::new(OWN).expect("two links").with_max_age(max_age);
+            let count = self.arriving.len();
+            assert_eq!(forwarder.forward(self), count);
+            forwarder.counters()
+        }
+    }
+
+    impl Links for Failing {
+        fn now(&self) -> Instant {
+            self.now
+        }
+
+        fn addresses(&self) -> PerLink<MacAddress> {
+            OWN
+        }
+
+        fn send(&mut self, _link: Link, _frame: &[u8]) {
+            unreachable!("frames are sent on in place");
+        }
+
+        fn receive(&mut self, _take: &mut dyn FnMut(Link, &[u8])) -> bool {
+            unreachable!("frames are received in place");
+        }
+
+        fn receive_and_pass(&mut self, _since: Instant, pass: &mut dyn FnMut(Arrived<'_>, &mut dyn SendOn)) -> bool {
+            if self.arriving.is_empty() {
+                return false;
+            }
+            let (link, at, mut frame) = self.arriving.remove(0);
+            pass(Arrived::new(link, at, &mut frame), self);
+            true
+        }
+
+        fn wait(&mut self, _until: Instant) {}
+    }
+
+    impl SendOn for Failing {
+        fn is_up(&self, _link: Link) -> bool {
+            true
+        }
+
+        fn send(&mut self, link: Link, frame: &[u8]) -> bool {
+            let leaves = !self.fails[link.index()];
+            if leaves {
+                self.sent.push((link, frame[6]));
+            }
+            leaves
+        }
+    }
+
+    // covers: standby, 9.7.5
+    #[test]
+    fn a_frame_that_an_interface_does_not_send_goes_back_at_once() {
+        let cases = [
+            ([false, false], vec![(Link::Redundant, 0x88)], 0, 0),
+            ([false, true], vec![(Link::Main, 0x0C)], 1, 0),
+            ([true, false], vec![(Link::Redundant, 0x88)], 0, 0),
+            ([true, true], vec![], 0, 1),
+        ];
+        for (fails, expected, sent_back, no_link) in cases {
+            let mut links = Failing::new(fails);
+            links.arrive(Link::Main, Duration::ZERO);
+            let counters = links.forwarded(MAX_AGE);
+            assert_eq!(links.sent, expected, "{fails:?}");
+            assert_eq!((counters.sent_back, counters.no_link), (sent_back, no_link), "{fails:?}");
+        }
+    }
+
+    // covers: standby
+    #[test]
+    fn frames_older_than_the_limit_are_not_sent() {
+        let ms = Duration::from_millis;
+        let mut links = Failing::new([false; 2]);
+        [9, 3, 2, 1, 0].into_iter().for_each(|ago| links.arrive(Link::Main, ms(ago)));
+        let counters = links.forwarded(ms(2));
+        assert_eq!((counters.too_old, counters.on_redundant, links.sent.len()), (2, 3, 3));
+    }
+
+    // covers: standby, SM-09
+    #[test]
+    fn a_maindevice_with_the_same_identity_is_counted_and_forwarded() {
+        let mut links = Failing::new([false; 2]);
+        links.arrive(Link::Main, Duration::ZERO);
+        links.arriving[0].2[9..12].copy_from_slice(&[0, 0x53, 0x12]);
+        let counters = links.forwarded(MAX_AGE);
+        assert_eq!((counters.same_identity, counters.own, counters.on_redundant), (1, 0, 1));
     }
 }

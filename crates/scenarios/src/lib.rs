@@ -28,6 +28,7 @@ pub mod namespaces;
 pub mod odd_images;
 pub mod once;
 pub mod one_buffer;
+pub mod pair;
 pub mod parts;
 pub mod phases;
 pub mod pulses;

@@ -2,6 +2,7 @@
 //! has a limit, so that an engine that hangs fails its test instead of blocking it.
 
 use ringcat::simulated::SimulatedSegment;
+use ringcat::standby::ForwardingCounters;
 use ringcat::{Instant, Link, Links};
 use ringcat_engine::{Class, class_of};
 use ringcat_sim::network::{Network, NetworkOptions};
@@ -124,6 +125,11 @@ impl Tap {
     /// The segment, for fault injection.
     pub fn network_mut(&mut self) -> &mut Network {
         self.segment.network_mut()
+    }
+
+    /// Frames that the second MainDevice has forwarded, where the segment has one.
+    pub fn forwarded(&self) -> ForwardingCounters {
+        self.segment.forwarded()
     }
 
     /// The segment, which outlives the program on it.

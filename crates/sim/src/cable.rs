@@ -38,18 +38,36 @@ impl HostLink {
     pub const SECOND: [HostLink; 2] = [HostLink::SecondMain, HostLink::SecondRedundant];
     /// Number of all of them.
     pub(crate) const COUNT: usize = 4;
+
+    /// The MainDevice that it belongs to.
+    pub const fn host(self) -> Host {
+        match self {
+            HostLink::Main | HostLink::Redundant => Host::First,
+            HostLink::SecondMain | HostLink::SecondRedundant => Host::Second,
+        }
+    }
 }
 
 /// One of two MainDevices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Host {
     /// That with [`HostLink::Main`].
-    First,
+    First = 0,
     /// That with [`HostLink::SecondMain`].
-    Second,
+    Second = 1,
 }
 
 impl Host {
+    /// Both.
+    pub const ALL: [Host; 2] = [Host::First, Host::Second];
+    /// Their number.
+    pub(crate) const COUNT: usize = 2;
+
+    /// Its main link and its redundant link.
+    pub const fn links(self) -> [HostLink; 2] {
+        [self.main(), self.redundant()]
+    }
+
     /// Its main link.
     pub const fn main(self) -> HostLink {
         match self {

@@ -10,7 +10,7 @@ use ringcat_wire::al::{AlState, AlStatusCode};
 use crate::application::mailbox::faults::MailFault;
 pub use crate::controller::SpoiltWrite;
 
-use crate::cable::{CableId, DeviceIndex, Direction};
+use crate::cable::{CableId, DeviceIndex, Direction, Host};
 
 /// A fault, or its repair.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -149,6 +149,13 @@ pub enum Fault {
         /// Number of accesses.
         count: u32,
     },
+    /// The program of a host hangs or is stopped, or goes on: the interfaces of the host stay up, and keep what they
+    /// receive as far as their queues go.
+    StopHost(Host, bool),
+    /// A host loses its power: its interfaces have no signal.
+    PowerHostOff(Host),
+    /// A host gets power, and its program begins anew.
+    PowerHostOn(Host),
     /// A fault of a device's mail.
     Mail(DeviceIndex, MailFault),
 }

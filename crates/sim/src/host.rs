@@ -1,6 +1,9 @@
 //! The network interfaces of a MainDevice: they send at 100 Mbit/s, one frame after the other, and store received
 //! frames (protocol 1.3).
 
+pub(crate) mod machine;
+pub mod program;
+
 use core::time::Duration;
 use std::collections::VecDeque;
 

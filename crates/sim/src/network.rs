@@ -20,6 +20,8 @@ mod cabling;
 mod event;
 mod fast_path;
 mod faults;
+pub mod host_log;
+mod hosts;
 mod options;
 mod pool;
 mod random;
@@ -30,18 +32,21 @@ mod traffic;
 
 use core::time::Duration;
 
-use crate::cable::{CableId, CableSpec, DeviceIndex, Direction, Endpoint, HostLink, Leg, LegId};
+use crate::cable::{CableId, CableSpec, DeviceIndex, Direction, Endpoint, Host, HostLink, Leg, LegId};
 use crate::device::Device;
 use crate::fault::Fault;
-use crate::host::{HostInterface, Received};
+use crate::host::HostInterface;
+use crate::host::machine::Machine;
 use crate::queue::EventQueue;
 use crate::segment::{Segment, SegmentError};
 use crate::time::SimTime;
 use event::Event;
+use host_log::HostLog;
 use pool::{FramePool, Slot};
 use route::Route;
 use statistics::Statistics;
 
+pub use crate::host::machine::HostCondition;
 pub use options::{Beyond, DatagramLimit, NetworkOptions};
 pub(crate) use random::Random;
 
@@ -82,6 +87,8 @@ pub struct Network {
     cables: Vec<Cable>,
     legs: Vec<Leg>,
     hosts: [HostInterface; HostLink::COUNT],
+    machines: [Machine; Host::COUNT],
+    host_log: Option<HostLog>,
     frames: FramePool,
     scheduled: Vec<Option<Fault>>,
     random: Random,
@@ -118,6 +125,8 @@ impl Network {
             now: SimTime::ZERO,
             queue: EventQueue::with_capacity(devices.len() + options.transmit_queue),
             hosts: out.hosts.map(host),
+            machines: [const { Machine::new() }; Host::COUNT],
+            host_log: None,
             legs: legs.collect(),
             cables: cables.into_iter().map(|spec| Cable { spec, cut: false, epoch: 0 }).collect(),
             nodes: devices.into_iter().zip(out.devices).map(|(device, out)| Node::new(device, out)).collect(),
@@ -173,15 +182,16 @@ impl Network {
         self.now = self.now.max(to);
     }
 
-    /// Processes all events up to and including the time at which a frame has arrived at an interface, or `to` if none
-    /// arrives; does nothing if a frame is waiting already.
+    /// Processes all events up to and including the time at which a frame has arrived at an interface of a host without
+    /// a program of its own that runs ([`Network::run_program`]), or at which a host begins or ceases to run, or `to`
+    /// if neither happens; does nothing if a frame is waiting already.
     pub fn advance_until_received(&mut self, to: SimTime) {
-        let waits = |network: &Network| network.hosts.iter().any(|host| !host.received.is_empty());
         self.until_received = true;
         self.limit = to;
         self.settle_all();
         let mut follows = None;
-        while !waits(self) {
+        let hosts = self.host_changes();
+        while !self.is_received() && self.host_changes() == hosts {
             let due = match follows.take() {
                 Some((at, event)) => self.queue.push_pop(at, event, to),
                 None => self.queue.pop_until(to),
@@ -191,7 +201,7 @@ impl Network {
             follows = self.handle(event);
         }
         self.until_received = false;
-        let to = if waits(self) { self.now } else { to };
+        let to = if self.is_received() || self.host_changes() != hosts { self.now } else { to };
         self.advance(to);
     }
 
@@ -209,7 +219,7 @@ impl Network {
     fn pass_all_frames(&mut self, limit: SimTime) {
         self.limit = limit;
         let mut follows = None;
-        while self.frames.under_way() > 0 {
+        while self.frames.under_way() > 0 || self.is_program_due() {
             let due = match follows.take() {
                 Some((at, event)) => self.queue.push_pop(at, event, limit),
                 None => self.queue.pop_until(limit),
@@ -234,29 +244,9 @@ impl Network {
             Event::Detection { leg, epoch } => self.detect(leg, epoch),
             Event::Wake { device } => self.wake(device as usize),
             Event::Fault { number } => self.apply_scheduled(number as usize),
+            Event::Reaction { host } => self.react(host),
         }
         None
-    }
-
-    /// Sends a frame (without FCS) on an interface, padded to the minimum of Ethernet, after the frames queued there.
-    /// On an interface without carrier the frame is lost.
-    pub fn send(&mut self, link: HostLink, bytes: &[u8]) {
-        self.transmit(link, bytes);
-    }
-
-    /// The next frame received on an interface with a valid FCS.
-    pub fn receive(&mut self, link: HostLink) -> Option<Received> {
-        self.hosts[link as usize].received.pop_front()
-    }
-
-    /// Returns the buffer of a received frame, so that sending needs no new one.
-    pub fn give_back(&mut self, bytes: Vec<u8>) {
-        self.frames.give_back(bytes);
-    }
-
-    /// Whether the interface has detected a link.
-    pub fn carrier(&self, link: HostLink) -> bool {
-        self.hosts[link as usize].out.is_some_and(|out| self.legs[out.reverse().index()].detected)
     }
 
     /// A device.
@@ -301,11 +291,6 @@ impl Network {
         let is = |endpoint: Endpoint, wanted| matches!(endpoint, Endpoint::Device(device, _) if device == wanted);
         let joins = |spec: &CableSpec| is(spec.a, one) && is(spec.b, other) || is(spec.a, other) && is(spec.b, one);
         self.cables().position(joins).map(CableId)
-    }
-
-    /// The cable of an interface of the MainDevice.
-    pub fn host_cable(&self, link: HostLink) -> Option<CableId> {
-        self.cable_at(Endpoint::Host(link))
     }
 
     /// Counters since the beginning.

@@ -32,7 +32,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // frames
     ("ring", &["time", "link"]),
     ("board", &["order", "time", "link", "ring"]),
-    ("standby", &["link", "ring"]),
+    ("standby", &["time", "link", "ring"]),
     // knowledge of the bus
     ("info", &["direction"]),
     ("topology", &["order", "info", "link"]),

@@ -12,6 +12,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("crates/ffi/", "is called from C"),
     ("crates/scenarios/src/counting_allocator.rs", "a global allocator that counts allocations of the cyclic path"),
     ("crates/scenarios/src/shared_memory.rs", "maps memory that two processes share"),
+    ("crates/scenarios/src/bin/forward/bare.rs", "system calls alone: what the forwarder is compared with"),
     ("ci/no-std-proof/src/", "a program without std brings its own start and allocator"),
 ];
 

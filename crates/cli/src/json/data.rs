@@ -14,6 +14,7 @@ use super::run::Run;
 use super::scan::Scan;
 use super::sii::{SiiBuilt, SiiCompared, SiiSkeleton};
 use super::sim::Sim;
+#[cfg(feature = "standby")]
 use super::standby::Standby;
 
 /// The keys of one command.
@@ -29,6 +30,7 @@ pub enum Data {
     Clocks(Clocks),
     Capture(Capture),
     Sim(Sim),
+    #[cfg(feature = "standby")]
     Standby(Standby),
     Eni(Box<EniFile>),
     EsiList(EsiList),

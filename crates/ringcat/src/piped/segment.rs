@@ -13,7 +13,7 @@ use ringcat_sim::cable::HostLink;
 use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 
-use crate::simulated::host_link;
+use crate::simulated::{add_standby, host_link};
 
 /// Longest sleep: a change from outside is seen within it.
 const NAP_NS: u64 = 500_000;
@@ -104,7 +104,8 @@ fn place(link: Link, class: Class) -> usize {
 
 impl PipedSegment {
     /// A segment whose virtual time, which is at zero, goes on from now. Nothing is connected to its links.
-    pub fn new(network: Network) -> PipedSegment {
+    pub fn new(mut network: Network) -> PipedSegment {
+        add_standby(&mut network);
         let begin_ns = monotonic::now_ns();
         let (connected_ns, first_frame_ns, cyclic_frames) = (begin_ns, None, 0);
         PipedSegment { network, begin_ns, pipes: Vec::new(), connected_ns, first_frame_ns, cyclic_frames }

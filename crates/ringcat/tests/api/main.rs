@@ -12,6 +12,8 @@ mod process_data;
 mod protocols;
 mod readiness;
 mod services;
+#[cfg(feature = "standby")]
+mod standby;
 mod states;
 mod stop;
 mod subdevices;

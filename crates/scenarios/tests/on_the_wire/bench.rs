@@ -10,6 +10,7 @@ use std::sync::mpsc::channel;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::running::Running;
 use crate::said::Said;
 use crate::states;
 
@@ -143,15 +144,17 @@ impl Bench {
     }
 
     /// A second MainDevice in the ring, in a namespace of its own: `main1`, the far end of the segment, becomes its
-    /// redundant interface, and its main interface `second0` has a cable to `active1` of the first one.
+    /// redundant interface, and its main interface `second0` has a cable to `active1` of the first one. Both interfaces
+    /// of the second one are off until it forwards.
     pub fn add_second_main_device(&mut self) {
         self.give_away_main1();
         let other = self.other.as_ref().expect("it was just made");
         self.ip_main(&format!("link add active1 index 80 type veth peer name second0 index 90 netns {other}"));
         for (namespace, end) in [(&self.main, "active1"), (other, "second0")] {
             let _ = ip(&format!("-n {namespace} link set {end} addrgenmode none"));
-            ip(&format!("-n {namespace} link set {end} up")).expect("the interface is there");
         }
+        self.ip_main("link set active1 up");
+        self.set_link_elsewhere("main1", "down");
     }
 
     /// A computer in a separate network, with the MainDevice's host as its router: 10.1.0.2 behind 10.1.0.1.
@@ -192,6 +195,13 @@ impl Bench {
     /// The interfaces of the MainDevice's namespace, a line each.
     pub fn links_main(&self) -> String {
         let output = Command::new("ip").args(["-n", &self.main, "-o", "link"]).output().expect("ip starts");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// The interfaces of the third namespace that are switched on, a line each.
+    pub fn links_on_elsewhere(&self) -> String {
+        let other = self.other.as_ref().expect("there is one");
+        let output = Command::new("ip").args(["-n", other, "-o", "link", "show", "up"]).output().expect("ip starts");
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
@@ -361,47 +371,6 @@ pub fn await_op(bench: &Bench, count: usize) {
     }
 }
 
-/// A program with output that is read while it runs; killed on drop.
-pub struct Running {
-    child: Child,
-    said: Said,
-    errors: Said,
-}
-
-impl Running {
-    fn of(mut child: Child) -> Running {
-        let said = Said::by(child.stdout.take().expect("it is piped"));
-        let errors = Said::by(child.stderr.take().expect("it is piped"));
-        Running { child, said, errors }
-    }
-
-    /// Its output so far.
-    pub fn said(&self) -> &Said {
-        &self.said
-    }
-
-    /// Sends SIGINT and waits for the end; returns standard output and standard error.
-    pub fn interrupt(self) -> (String, String) {
-        let process = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &process]).status().is_ok_and(|status| status.success()));
-        self.finish(END_LIMIT)
-    }
-
-    /// Waits for its end; returns standard output and standard error.
-    pub fn finish(mut self, limit: Duration) -> (String, String) {
-        wait(&mut self.child, limit);
-        (self.said.whole(), self.errors.whole())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It has usually ended.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 /// Waits for a program with a time limit; reads its output meanwhile.
 pub fn finish(child: Child) -> Output {
     let process = child.id().to_string();
@@ -413,17 +382,6 @@ pub fn finish(child: Child) -> Output {
             let _ = Command::new("kill").args(["-KILL", &process]).status();
             panic!("a program does not end within {} s", END_LIMIT.as_secs());
         }
-    }
-}
-
-fn wait(child: &mut Child, limit: Duration) {
-    let until = Instant::now() + limit;
-    while child.try_wait().expect("it is our child").is_none() {
-        if Instant::now() >= until {
-            let _ = child.kill();
-            panic!("a program does not end within {} s", limit.as_secs());
-        }
-        std::thread::sleep(Duration::from_millis(10));
     }
 }
 

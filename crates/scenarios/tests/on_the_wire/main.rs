@@ -24,6 +24,7 @@ mod json;
 mod junctions;
 mod mail_captures;
 mod messages;
+mod running;
 mod said;
 
 use std::process::Output;

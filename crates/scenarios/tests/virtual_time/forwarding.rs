@@ -4,9 +4,10 @@
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Event, Link, Links, RingState};
+use ringcat::{Event, Instant, Link, Links, RingState};
 use ringcat_sim::cable::{CableId, Host, HostLink};
 use ringcat_sim::fault::Fault;
+use ringcat_sim::host::program::TurnAround;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::check::troubles;
@@ -44,6 +45,15 @@ fn broadcast(link: Link) -> [u8; 60] {
     frame[12..18].copy_from_slice(&[0x88, 0xA4, 0x0D, 0x10, 7, 0]);
     frame[22] = 1;
     frame
+}
+
+/// A frame that comes back, and when.
+fn back_at(segment: &mut SimulatedSegment, link: Link) -> Instant {
+    segment.send(link, &broadcast(link));
+    let until = segment.now() + CYCLE;
+    segment.wait(until);
+    assert!(segment.receive(&mut |_, _| ()), "it comes back");
+    segment.now()
 }
 
 /// A copy that came back: SubDevices that processed it, the link, byte 0 of its source address, whether it circulated.
@@ -114,7 +124,7 @@ fn each_cut_of_a_ring_of_two_returns_the_copies_of_the_table() {
     }
 }
 
-// covers: CR-14, CR-15, standby
+// covers: CR-15, standby
 #[test]
 fn the_active_has_its_ring_through_the_standby_whatever_cable_is_cut() {
     for (seed, near, count) in [(1, Host::First, 8), (2, Host::Second, 8), (3, Host::First, 1), (4, Host::Second, 2)] {
@@ -146,7 +156,7 @@ fn the_active_has_its_ring_through_the_standby_whatever_cable_is_cut() {
     }
 }
 
-// covers: MR-21, standby
+// covers: standby
 #[test]
 fn a_standby_whose_links_go_down_leaves_the_active_a_line() {
     for (seed, near) in [(1, Host::First), (2, Host::Second)] {
@@ -161,5 +171,76 @@ fn a_standby_whose_links_go_down_leaves_the_active_a_line() {
         world.run_cycles(200);
         assert_eq!(world.application().ring(), RingState::Closed, "{}", world.log());
         assert!(world.incomplete(mark) <= 2 && world.left_op(mark).is_empty(), "{}", world.log());
+    }
+}
+
+// covers: standby
+#[test]
+fn each_pass_of_a_standby_takes_its_turn_around_time() {
+    let time = |least: u64, most: u64, cut: Option<usize>| {
+        let mut network = ring_of_two(3, Host::First);
+        if let Some(cable) = cut {
+            network.apply(Fault::Cut(CableId(cable)));
+        }
+        network.advance_by(CYCLE);
+        let mut segment = SimulatedSegment::new(network);
+        let turn_around = TurnAround { least: Duration::from_micros(least), most: Duration::from_micros(most) };
+        segment.network_mut().set_turn_around(Host::Second, turn_around);
+        let begin = segment.now();
+        back_at(&mut segment, Link::Redundant) - begin
+    };
+    let us = Duration::from_micros;
+    let (once, twice) = (time(0, 0, None), time(0, 0, Some(2)));
+    assert_eq!((time(40, 40, None), time(40, 40, Some(2))), (once + us(40), twice + us(80)));
+    let random = time(5, 25, None) - once;
+    assert!(us(5) <= random && random <= us(25) && random == time(5, 25, None) - once, "{random:?}");
+    // The wire time of the shortest frame: its last bit has come before the standby sends its first one.
+    assert!(once > us(2 * 5), "{once:?}");
+}
+
+// covers: standby
+#[test]
+fn frames_that_waited_in_a_stopped_standby_are_not_sent_on() {
+    for (seed, near) in [(1, Host::First), (2, Host::Second)] {
+        for phase in [0, 100, 700] {
+            let mut world = World::in_op(seed, ring_of_two(8, near));
+            // Behind the cut only the standby reaches the SubDevices.
+            world.cut(CableId(4));
+            world.run_cycles(300);
+            let mark = world.mark();
+            world.fault_in(CYCLE * phase / 1000, Fault::StopHost(Host::Second, true));
+            world.run_cycles(20);
+            assert!(world.incomplete(mark) > 10, "the standby forwards nothing\n{}", world.log());
+            let before = world.application().links().forwarded();
+            let mark = world.mark();
+            world.fault_in(CYCLE * phase / 1000, Fault::StopHost(Host::Second, false));
+            world.run_cycles(20);
+            let after = world.application().links().forwarded();
+            let here = format!("seed {seed}, moment {phase}: {before:?}, {after:?}\n{}", world.log());
+            // Of 20 cycles with a frame on each link, those of the last five may still be of use.
+            assert!(after.too_old - before.too_old >= 20, "{here}");
+            assert!(world.incomplete(mark) <= 2, "{here}");
+        }
+    }
+}
+
+// covers: standby
+#[test]
+fn a_standby_that_loses_its_power_leaves_a_line_and_closes_the_ring_again() {
+    for (seed, near) in [(1, Host::First), (2, Host::Second)] {
+        for phase in [0, 60, 500] {
+            let mut world = World::in_op(seed, ring_of_two(8, near));
+            for (fault, expected) in [
+                (Fault::PowerHostOff(Host::Second), RingState::Open),
+                (Fault::PowerHostOn(Host::Second), RingState::Closed),
+            ] {
+                let mark = world.mark();
+                world.fault_in(CYCLE * phase / 1000, fault);
+                world.run_cycles(200);
+                let here = format!("seed {seed}, moment {phase}, {expected:?}\n{}", world.log());
+                assert_eq!(world.application().ring(), expected, "{here}");
+                assert!(world.incomplete(mark) <= 2 && world.left_op(mark).is_empty(), "{here}");
+            }
+        }
     }
 }

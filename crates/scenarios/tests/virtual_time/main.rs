@@ -68,6 +68,7 @@ mod odd_sii;
 mod opened_rings;
 mod own_datagrams;
 mod own_objects;
+mod pair;
 mod part_sequences;
 mod places;
 mod power_cycles;

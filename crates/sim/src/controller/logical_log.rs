@@ -9,15 +9,21 @@ use std::ops::Range;
 
 use ringcat_wire::command::Command;
 
+use crate::time::SimTime;
+
 /// Capacity.
 const KEPT: usize = 256;
-/// Offset of the second byte of the source address, in which a MainDevice stores the number of a frame (protocol
+/// Offset of the source address, in the second byte of which a MainDevice stores the number of a frame (protocol
 /// 9.7.1).
-const FRAME_ID_AT: usize = 7;
+const SOURCE_AT: usize = 6;
 
 /// A logical datagram that a SubDevice processed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogicalAccess {
+    /// When the first bit of its frame arrived.
+    pub at: SimTime,
+    /// The last three bytes of the frame's source address: the identity of its MainDevice (protocol 9.7.1).
+    pub identity: [u8; 3],
     /// Byte 1 of the frame's source address, and Idx of the datagram.
     pub frame: (u8, u8),
     /// LRD, LWR or LRW.
@@ -102,7 +108,8 @@ impl LogicalLog {
     }
 }
 
-/// Byte 1 of a frame's source address.
-pub(super) fn frame_id(frame: &[u8]) -> u8 {
-    frame.get(FRAME_ID_AT).copied().unwrap_or(0)
+/// The identity of a frame's MainDevice, and byte 1 of its source address.
+pub(super) fn marks(frame: &[u8]) -> ([u8; 3], u8) {
+    let source = frame.get(SOURCE_AT..).and_then(<[u8]>::first_chunk::<6>);
+    source.map_or(([0; 3], 0), |[_, id, _, a, b, c]| ([*a, *b, *c], *id))
 }

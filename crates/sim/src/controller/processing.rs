@@ -14,7 +14,7 @@ use ringcat_wire::register::map;
 use super::Controller;
 use super::event_bits::{EVENT_AL_STATUS, EVENT_DL_STATUS};
 use super::fmmu::{Direction, Piece};
-use super::logical_log::{LogicalAccess, frame_id};
+use super::logical_log::{LogicalAccess, marks};
 use super::memory::Side;
 use super::pass::Pass;
 use crate::frame::{DatagramPlace, Fcs, FrameKind, SimFrame, UDP_CHECKSUM, is_udp};
@@ -87,7 +87,7 @@ impl Controller {
     }
 
     fn datagram(&mut self, bytes: &mut [u8], place: DatagramPlace) {
-        let frame_id = self.logical_log.is_on().then(|| frame_id(bytes));
+        let marks = self.logical_log.is_on().then(|| marks(bytes));
         let Some(datagram) = bytes.get_mut(usize::from(place.header)..place.end()) else { return };
         let (header, rest) = datagram.split_at_mut(place.data() - usize::from(place.header));
         let (data, wkc) = rest.split_at_mut(usize::from(place.length));
@@ -105,8 +105,9 @@ impl Controller {
             Command::Lrd | Command::Lwr | Command::Lrw => {
                 let address = u32::from_le_bytes([header[2], header[3], header[4], header[5]]);
                 let added = self.logical(command, address, data);
-                if let Some(frame_id) = frame_id {
-                    self.log_access((frame_id, header[1]), command, address, added, data);
+                if let Some((identity, frame_id)) = marks {
+                    let frame = (frame_id, header[1]);
+                    self.log_access(identity, frame, command, (address, added), data);
                 }
                 added
             }
@@ -202,7 +203,14 @@ impl Controller {
         }
     }
 
-    fn log_access(&mut self, frame: (u8, u8), command: Command, address: u32, added: u16, data: &[u8]) {
+    fn log_access(
+        &mut self,
+        identity: [u8; 3],
+        frame: (u8, u8),
+        command: Command,
+        (address, added): (u32, u16),
+        data: &[u8],
+    ) {
         let moved = self.logical_log.take_moved();
         if added == 0 {
             return;
@@ -211,7 +219,8 @@ impl Controller {
             Command::Lwr => (false, true),
             _ => (added & 1 != 0, added & 2 != 0),
         };
-        self.logical_log.note(LogicalAccess { frame, command, address, read, written, data: data.to_vec(), moved });
+        let (at, data) = (self.pass.start, data.to_vec());
+        self.logical_log.note(LogicalAccess { at, identity, frame, command, address, read, written, data, moved });
     }
 
     fn log_moved(&mut self, piece: Piece, first: u64, write: bool) {

@@ -1,7 +1,7 @@
 //! Events of a segment's queue.
 
 use super::pool::Slot;
-use crate::cable::{HostLink, LegId};
+use crate::cable::{Host, HostLink, LegId};
 
 /// A due event.
 #[derive(Clone, Copy, Debug)]
@@ -16,4 +16,6 @@ pub(super) enum Event {
     Wake { device: u32 },
     /// A scheduled fault.
     Fault { number: u32 },
+    /// The program of a host reacts to frames that wait.
+    Reaction { host: Host },
 }

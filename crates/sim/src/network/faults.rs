@@ -49,6 +49,9 @@ impl Network {
             Fault::OneWay { cable, direction, blocked } => {
                 self.set_faults(cable, Some(direction), |faults| faults.blocked = blocked);
             }
+            Fault::StopHost(host, stop) => self.stop_host(host, stop),
+            Fault::PowerHostOff(host) => self.power_host_off(host),
+            Fault::PowerHostOn(host) => self.power_host_on(host),
             Fault::PowerOff(device) => self.power_off(device),
             Fault::PowerOn(device) => self.power_on(device),
             Fault::Hang(device, hanging) => {
@@ -121,6 +124,7 @@ impl Network {
             | Fault::OneWay { cable, .. } => {
                 assert!(cable.0 < self.cables.len(), "no cable {} among {}", cable.0, self.cables.len());
             }
+            Fault::StopHost(..) | Fault::PowerHostOff(_) | Fault::PowerHostOn(_) => {}
             Fault::PowerOff(device)
             | Fault::PowerOn(device)
             | Fault::Hang(device, _)

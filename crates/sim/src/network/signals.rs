@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::{Event, Network, Node};
-use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, HostLink, LegId};
+use crate::cable::{CableId, DeviceIndex, Direction, Endpoint, LegId};
 use crate::device::Device;
 use crate::frame::Port;
 use crate::queue::Lane;
@@ -210,23 +210,15 @@ impl Network {
         self.settle(device.0);
     }
 
-    /// Takes an interface of the MainDevice down, or brings it up: while it is down, the cable has no signal.
-    pub fn disconnect(&mut self, link: HostLink, disconnect: bool) {
-        self.hosts[link as usize].disconnected = disconnect;
-        if let Some(cable) = self.host_cable(link) {
-            self.refresh_signal(cable);
-        }
-    }
-
     fn has_power(&self, endpoint: Endpoint) -> bool {
         match endpoint {
             Endpoint::Device(device, _) => self.nodes[device.0].device.controller.is_powered(),
-            Endpoint::Host(link) => !self.hosts[link as usize].disconnected,
+            Endpoint::Host(link) => self.is_host_link_up(link),
         }
     }
 
     /// Updates whether a cable carries a signal; after a change, its ends detect it later.
-    fn refresh_signal(&mut self, id: CableId) {
+    pub(super) fn refresh_signal(&mut self, id: CableId) {
         self.refresh_signal_unevenly(id, |_| Duration::ZERO);
     }
 

@@ -46,6 +46,9 @@ impl Network {
         let Some(last_bit) = self.hosts[link as usize].transmit(self.now, self.frames.frame(slot)) else {
             return self.lose(slot, LossCause::TransmitQueueFull);
         };
+        if let Some(log) = &mut self.host_log {
+            log.note(self.now, link, true, bytes);
+        }
         let counters = &mut self.statistics.links[link as usize];
         counters.frames_sent += 1;
         counters.bytes_sent += bytes.len() as u64;
@@ -131,6 +134,9 @@ impl Network {
         }
         let bytes = self.frames.remove_bytes(slot);
         let length = bytes.len() as u64;
+        if let Some(log) = &mut self.host_log {
+            log.note(self.now, link, false, &bytes);
+        }
         if let Err(refused) = self.hosts[link as usize].deliver(Received { at: self.now, bytes }) {
             self.frames.give_back(refused.bytes);
             return self.statistics.lose(LossCause::ReceiveQueueFull);
@@ -138,6 +144,7 @@ impl Network {
         let counters = &mut self.statistics.links[link as usize];
         counters.frames_received += 1;
         counters.bytes_received += length;
+        self.expect_reaction(link.host());
     }
 
     /// Applies the faults of a leg to a frame that is due at its end.

@@ -1,0 +1,250 @@
+//! Two MainDevices on one simulated segment in virtual time, each with its program: one is ACTIVE, the other one
+//! forwards. Checks from inside the SubDevices and on the interfaces run in every cycle, whatever happens to either.
+//!
+//! A failing test prints the seed and the log.
+
+mod board;
+mod outputs;
+mod programs;
+mod states;
+mod traffic;
+
+use std::fmt::Display;
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat::simulated::two_hosts::{HostLinks, TwoHosts};
+use ringcat::standby::ForwardingCounters;
+use ringcat::{Instant, Link, RingState};
+use ringcat_sim::cable::{CableId, DeviceIndex, Host};
+use ringcat_sim::device::Device;
+use ringcat_sim::fault::Fault;
+use ringcat_sim::host::program::TurnAround;
+use ringcat_sim::network::Network;
+use ringcat_wire::al::{AlState, AlStatus};
+
+use self::board::Board;
+pub use self::board::{Phase, Seen};
+use self::outputs::Outputs;
+pub use self::programs::CYCLE;
+use self::states::States;
+use self::traffic::Traffic;
+
+/// Cycles until all SubDevices are in OP and process data is complete.
+const SETTLE_LIMIT: u32 = 5_000;
+
+/// Two MainDevices and their segment.
+#[derive(Debug)]
+pub struct Pair {
+    seed: u64,
+    hosts: TwoHosts,
+    boards: [Arc<Board>; 2],
+    outputs: Outputs,
+    states: States,
+    traffic: Traffic,
+    log: Vec<(Instant, String)>,
+}
+
+impl Pair {
+    /// The network of a ring of two; the first MainDevice is ACTIVE, the second one forwards.
+    ///
+    /// # Panics
+    /// The SubDevices do not reach OP.
+    pub fn new(seed: u64, network: Network) -> Pair {
+        let mut pair = Pair::without_programs(seed, network);
+        pair.start_standby(Host::Second);
+        pair.start_active(Host::First);
+        pair.settle();
+        pair
+    }
+
+    /// As [`Pair::new`], with nothing started.
+    pub fn without_programs(seed: u64, mut network: Network) -> Pair {
+        let count = network.devices().len();
+        (0..count).map(DeviceIndex).for_each(|device| network.device_mut(device).controller.log_logical());
+        network.log_hosts();
+        let (outputs, states) = (Outputs::new(&network, CYCLE), States::new(&network));
+        let hosts = TwoHosts::new(network);
+        let boards = [Arc::default(), Arc::default()];
+        Pair { seed, hosts, boards, outputs, states, traffic: Traffic::new(CYCLE), log: Vec::new() }
+    }
+
+    /// Starts the program of an ACTIVE MainDevice on a host: it scans, activates, and runs cycles.
+    pub fn start_active(&mut self, host: Host) {
+        self.start(host, Phase::Starting, programs::active);
+    }
+
+    /// Starts the program of an INACTIVE MainDevice on a host: it forwards.
+    pub fn start_standby(&mut self, host: Host) {
+        self.start(host, Phase::Inactive, programs::standby);
+    }
+
+    /// As [`Pair::start_standby`], of one that forwards frames of any age, as it must not.
+    pub fn start_standby_without_limit(&mut self, host: Host) {
+        self.start(host, Phase::Inactive, programs::standby_without_limit);
+    }
+
+    fn start(&mut self, host: Host, phase: Phase, program: fn(HostLinks, &Board)) {
+        self.say(format!("{host:?} starts: {phase:?}"));
+        let board = Arc::new(Board::new(phase));
+        self.boards[host as usize] = board.clone();
+        let started = self.hosts.start(host, move |links| program(links, &board));
+        started.unwrap_or_else(|error| panic!("a program cannot be started: {error}"));
+    }
+
+    /// Asks the ACTIVE program of a host to stop in order: SubDevices go to INIT, links go down.
+    pub fn stop(&mut self, host: Host) {
+        self.say(format!("{host:?} is to stop"));
+        self.boards[host as usize].ask_to_stop();
+    }
+
+    /// Runs until all SubDevices are in OP and a cycle of the ACTIVE is complete.
+    ///
+    /// # Panics
+    /// When this takes more than 5 s.
+    pub fn settle(&mut self) {
+        for _ in 0..SETTLE_LIMIT {
+            self.cycle();
+            let is_complete = Host::ALL.iter().any(|host| self.seen(*host).is_last_complete);
+            if is_complete && self.all_in_op() {
+                return;
+            }
+        }
+        panic!("not settled within {SETTLE_LIMIT} cycles");
+    }
+
+    /// Lets a cycle pass, and checks what happened in it.
+    pub fn cycle(&mut self) {
+        self.hosts.run_for(CYCLE);
+        let phases = Host::ALL.map(|host| self.seen(host).phase);
+        let Pair { hosts, outputs, states, traffic, .. } = self;
+        let now = hosts.now();
+        let steps = hosts.with_network(|network| {
+            traffic.check(network.take_host_log(), phases);
+            outputs.check(network);
+            states.check(network, outputs, phases)
+        });
+        self.log.extend(steps.into_iter().map(|step| (now, step)));
+    }
+
+    /// Lets cycles pass.
+    pub fn run_cycles(&mut self, cycles: u32) {
+        (0..cycles).for_each(|_| self.cycle());
+    }
+
+    /// What the program of a host has seen.
+    pub fn seen(&self, host: Host) -> Seen {
+        self.boards[host as usize].seen()
+    }
+
+    /// Cycles of the ACTIVE on a host whose process data was not complete, since its start.
+    pub fn incomplete(&self, host: Host) -> u64 {
+        self.seen(host).incomplete
+    }
+
+    /// The ring as the ACTIVE on a host sees it.
+    pub fn ring(&self, host: Host) -> RingState {
+        self.seen(host).ring
+    }
+
+    /// Frames that the INACTIVE on a host has forwarded since its start.
+    pub fn forwarded(&self, host: Host) -> ForwardingCounters {
+        self.seen(host).forwarded
+    }
+
+    /// Whether all SubDevices are in OP, by their own registers.
+    pub fn all_in_op(&self) -> bool {
+        self.not_in_op().is_empty()
+    }
+
+    /// The SubDevices that are not in OP, by their own registers.
+    pub fn not_in_op(&self) -> Vec<usize> {
+        let op = AlStatus::new(AlState::Op);
+        let left = |(number, device): (usize, &Device)| (device.al_status() != op).then_some(number);
+        self.hosts.with_network(|network| network.devices().enumerate().filter_map(left).collect())
+    }
+
+    /// Areas of outputs that were checked inside the SubDevices.
+    pub fn checked_outputs(&self) -> u64 {
+        self.outputs.checked()
+    }
+
+    /// Passes of frames over the interfaces of INACTIVE MainDevices that were checked.
+    pub fn checked_passes(&self) -> u64 {
+        self.traffic.passes()
+    }
+
+    /// Oldest outputs that a SubDevice took since the last call.
+    pub fn take_oldest_outputs(&mut self) -> Duration {
+        self.outputs.take_oldest()
+    }
+
+    /// Outputs that are older than this number of cycles when a SubDevice takes them fail the test.
+    pub fn allow_age(&mut self, cycles: u32) {
+        self.outputs.allow_age(cycles);
+    }
+
+    /// The hosts.
+    pub fn hosts(&mut self) -> &mut TwoHosts {
+        &mut self.hosts
+    }
+
+    /// Kills the program of a host. Its interfaces stay up.
+    pub fn kill(&mut self, host: Host) {
+        self.say(format!("{host:?} is killed"));
+        self.hosts.kill(host);
+    }
+
+    /// A fault, after a time.
+    pub fn fault_in(&mut self, delay: Duration, fault: Fault) {
+        self.say(format!("in {} us: {fault:?}", delay.as_micros()));
+        self.hosts.apply_in(delay, fault);
+    }
+
+    /// A fault, now.
+    pub fn fault(&mut self, fault: Fault) {
+        self.say(format!("{fault:?}"));
+        self.hosts.apply(fault);
+    }
+
+    /// Cuts a cable.
+    pub fn cut(&mut self, cable: usize) {
+        self.fault(Fault::Cut(CableId(cable)));
+    }
+
+    /// Repairs a cable.
+    pub fn heal(&mut self, cable: usize) {
+        self.fault(Fault::Heal(CableId(cable)));
+    }
+
+    /// Whether a link of a host has a carrier.
+    pub fn carrier(&self, host: Host, link: Link) -> bool {
+        self.hosts.with_network(|network| network.carrier(host.links()[link.index()]))
+    }
+
+    /// Sets the turn-around time of both hosts.
+    pub fn set_turn_around(&mut self, turn_around: TurnAround) {
+        Host::ALL.into_iter().for_each(|host| self.hosts.set_turn_around(host, turn_around));
+    }
+
+    /// Puts a line into the log.
+    pub fn say(&mut self, what: impl Display) {
+        self.log.push((self.hosts.now(), format!("> {what}")));
+    }
+
+    /// The log as text.
+    pub fn log(&self) -> String {
+        let line = |(at, what): &(Instant, String)| format!("{:>12.3} us  {what}\n", at.0 as f64 / 1e3);
+        let lines: String = self.log.iter().map(line).collect();
+        let sides = Host::ALL.map(|host| format!("{host:?}: {:?}\n", self.seen(host)));
+        lines + &sides.concat()
+    }
+}
+
+impl Drop for Pair {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("seed {}, at {} ns; what happened:\n{}", self.seed, self.hosts.now().0, self.log());
+        }
+    }
+}
