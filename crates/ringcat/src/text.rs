@@ -7,6 +7,8 @@ mod messages;
 mod names;
 mod ring;
 mod scan;
+#[cfg(feature = "standby")]
+mod standby;
 mod subdevices;
 
 use ringcat_engine::domain::DomainState;
@@ -37,6 +39,8 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| clocks::describe(event, names, *occupants))
         .or_else(|| messages::of_command(event, names, *occupants))
         .or_else(|| of_process_data(event));
+    #[cfg(feature = "standby")]
+    let line = line.or_else(|| standby::describe(event));
     // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))
 }

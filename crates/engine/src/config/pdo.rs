@@ -17,7 +17,7 @@ pub struct PdoEntry {
 }
 
 /// A PDO and its mapping.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct PdoMapping {
     /// Index of the PDO mapping object.
@@ -27,7 +27,7 @@ pub struct PdoMapping {
 }
 
 /// The PDOs of one SyncManager.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct PdoAssignment {
     /// The SyncManager.

@@ -27,6 +27,8 @@ use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
+#[cfg(feature = "standby")]
+use crate::board::live::Life;
 use crate::declared::Move;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -159,6 +161,20 @@ pub enum Observation<'a> {
     Attached,
     /// The application ends. The result of the scan stays.
     Deactivated,
+    /// This MainDevice controls the bus from now on, with process data of another one.
+    #[cfg(feature = "standby")]
+    TookOver {
+        /// The members as the other MainDevice has seen them.
+        lives: &'a [Life],
+        /// They keep their configuration; otherwise they get it again from INIT on.
+        is_hot: bool,
+    },
+    /// Another MainDevice controls the bus from now on: procedures have ended.
+    #[cfg(feature = "standby")]
+    Yielded,
+    /// Another MainDevice controls the bus, and may have posted other states of the members.
+    #[cfg(feature = "standby")]
+    Mirrored,
 
     /// The configuration of all present members may begin.
     Started,

@@ -12,6 +12,8 @@ mod neighbours;
 mod observe;
 mod ports;
 mod recabling;
+#[cfg(feature = "standby")]
+mod roles;
 mod silence;
 mod stages;
 mod unassigned;

@@ -49,6 +49,12 @@ impl Segment {
             Activated(declared) => self.activate(*declared, effects),
             Attached => self.begin_procedures(effects),
             Deactivated => self.deactivate(),
+            #[cfg(feature = "standby")]
+            TookOver { lives, is_hot } => self.take_bus(lives, is_hot, effects),
+            #[cfg(feature = "standby")]
+            Yielded => self.yield_bus(),
+            #[cfg(feature = "standby")]
+            Mirrored => self.mirror(),
             SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
             Started => self.start_all(effects),
             OfMember { index, attempt, finding } => self.observe_finding((index, attempt), finding, now, effects),
