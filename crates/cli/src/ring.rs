@@ -7,7 +7,7 @@ use clap::Args;
 use ringcat::Services;
 use ringcat::text::Names;
 use ringcat::wire::address::{Position, StationAddress};
-use ringcat::{Cable, CableErrors, Link, LinkCounts, MainDevice, Occupant, RingInspection, RingState};
+use ringcat::{Cable, CableErrors, CableReport, Link, LinkCounts, MainDevice, Occupant, RingInspection, RingState};
 
 use crate::access::{Access, AccessArguments};
 use crate::ending::EndRequest;
@@ -82,9 +82,9 @@ fn inspect(
     if let Some(lasts) = lasts {
         std::thread::sleep(lasts);
         let before = std::mem::replace(&mut inspection, read()?);
-        for ((cable, errors), (same, earlier)) in inspection.cables.iter_mut().zip(&before.cables) {
-            if cable == same {
-                *errors = gained(*earlier, *errors);
+        for (now, earlier) in inspection.cables.iter_mut().zip(&before.cables) {
+            if now.cable == earlier.cable {
+                now.errors = gained(earlier.errors, now.errors);
             }
         }
     }
@@ -152,7 +152,7 @@ fn lines(inspection: &RingInspection, two_links: bool) -> Vec<String> {
         lines.push(format!("line break  {}", names.cable(place, ends(inspection, place))));
     }
     lines.push(String::from("damaged frames, lost links of each cable:"));
-    for (cable, errors) in &inspection.cables {
+    for CableReport { cable, errors, .. } in &inspection.cables {
         let mark = if inspection.place == Some(*cable) { "  <- line break" } else { "" };
         lines.push(format!(
             "{:>6} {:>6}  {}{mark}",
@@ -173,11 +173,11 @@ fn json(inspection: &RingInspection, two_links: bool) -> ring::Ring {
         })
     };
     let cable = |cable: Cable| ring::Cable { near: end(cable.near), far: end(cable.far) };
-    let errors = |(it, errors): &(Cable, CableErrors)| ring::CableErrors {
-        near: end(it.near),
-        far: end(it.far),
-        damaged_frames: errors.invalid_frames,
-        lost_links: errors.lost_links,
+    let errors = |it: &CableReport| ring::CableErrors {
+        near: end(it.cable.near),
+        far: end(it.cable.far),
+        damaged_frames: it.errors.invalid_frames,
+        lost_links: it.errors.lost_links,
     };
     ring::Ring {
         ring: two_links.then(|| inspection.state.into()),
@@ -276,13 +276,13 @@ mod tests {
         for cable in 0..=3 {
             let inspection = look(Some(cable), None);
             assert_eq!((inspection.state, counts(&inspection)), (RingState::Open, (cable as u16, 3 - cable as u16)));
-            assert_eq!(inspection.place, Some(inspection.cables[cable].0), "cable {cable}");
+            assert_eq!(inspection.place, Some(inspection.cables[cable].cable), "cable {cable}");
             assert!(lines(&inspection, true).iter().any(|line| line.ends_with("<- line break")));
             assert_eq!(json(&inspection, true).ring, Some(crate::json::values::Ring::Open));
         }
         for cable in 0..=3 {
             let inspection = look(None, Some(cable));
-            let counted: Vec<u64> = inspection.cables.iter().map(|(_, errors)| errors.invalid_frames).collect();
+            let counted: Vec<u64> = inspection.cables.iter().map(|it| it.errors.invalid_frames).collect();
             let at_the_host = cable == 0 || cable == 3;
             // No port counts what is damaged on the way to the host.
             let expected = if at_the_host { 1..=2 } else { 2..=4 };

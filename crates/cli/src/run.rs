@@ -22,8 +22,9 @@ use ringcat::AlState;
 use ringcat::event_log::EventLog;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    Application, CyclicThread, Declaration, Event, Instant, JobProbe, JunctionConnection, JunctionMode, LastOutputs,
-    Links, Options, ProcessData, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread, SyncSignals, automatic,
+    Application, CyclicThread, Declaration, Ended, Event, Instant, JobProbe, JunctionConnection, JunctionMode,
+    LastOutputs, Links, Options, ProcessData, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread,
+    SyncSignals, automatic,
 };
 
 use crate::access::{Access, WireLinks};
@@ -260,7 +261,7 @@ fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut
     json.variables = run.watched.json();
     json.jobs = jobs.json();
     match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
-        Ok((supervisor, mut tee)) => {
+        Ok(Ended { supervisor, links: mut tee, .. }) => {
             json.interfaces = final_account(&mut tee, &supervisor, links);
             json.acyclic = supervisor.counters().into();
             json.stopped = true;

@@ -67,7 +67,7 @@ pub use procedures::request_states::{NotFollowed, NotFollowedReason, StateScope,
 pub use procedures::scan::{FIRST_STATION, Scan, ScanError};
 pub use procedures::services::ServiceError;
 pub use procedures::services::eeprom_owner::{EepromAssignment, EepromOwner, EepromOwnership};
-pub use procedures::services::forced_state::Acknowledge;
+pub use procedures::services::forced_state::{Acknowledge, AlRegisters};
 pub use procedures::services::port_report::{Neighbour, PortRegisters, PortReport, SubDevicePorts};
 pub use procedures::services::ports::BlockedPort;
 pub use procedures::services::registers::Urgency;

@@ -45,8 +45,8 @@ mod tests;
 
 pub use conversation::{Conversation, Limits, MailboxSizes};
 pub use counters::MailCounters;
-pub use emergencies::EmergencyRing;
 pub(crate) use emergencies::EmergencyRings;
+pub use emergencies::{EmergencyRing, ReceivedEmergency};
 pub use error::MailboxError;
 pub(crate) use handover::InUse;
 pub use lane::Lane;

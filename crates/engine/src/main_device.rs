@@ -110,7 +110,7 @@ use crate::procedures::stop::{StopError, all_known, stop};
 use crate::procedures::undeclared::UndeclaredMailboxes;
 use crate::queue::Consumer;
 use crate::ring::Identity;
-use crate::ring_status::{Cable, CableErrors, LinkStatus, Redundancy, RingStatus};
+use crate::ring_status::{CableReport, LinkStatus, Redundancy, RingStatus};
 use crate::role::RoleControl;
 use crate::segment::member::Phase;
 use crate::segment::{Choices, Observation, Segment, counts};
@@ -456,8 +456,9 @@ impl MainDevice {
     }
 
     /// Every cable of the scan with the error counts of the ports at its ends since activation, read once a second.
-    pub fn cable_errors(&self) -> Vec<(Cable, CableErrors)> {
-        self.segment.view().cabling().cables.clone()
+    pub fn cable_errors(&self) -> Vec<CableReport> {
+        let view = self.segment.view();
+        view.cabling().cables.iter().map(|(cable, errors)| CableReport::new(*cable, *errors)).collect()
     }
 
     fn first_ring_status(&self) -> RingStatus {

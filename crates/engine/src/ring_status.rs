@@ -11,7 +11,7 @@ use core::fmt;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlState;
 
-pub use cables::{CableErrors, cables, port_errors};
+pub use cables::{CableErrors, CableReport, cables, port_errors};
 
 use crate::declared::SubDeviceId;
 use crate::link::Link;

@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 use crate::arguments::OPTIONS;
 use crate::commands::ALL;
-use crate::options_help::{Told, common, of};
+use crate::options_help::{OptionHelp, common, of};
 use crate::shape::Command;
 
 /// Words with which options of a command are written.
-fn words(options: &[Told]) -> String {
-    let words: Vec<String> = options.iter().map(|told| format!("--{} -{}", told.name, told.letter)).collect();
+fn words(options: &[OptionHelp]) -> String {
+    let words: Vec<String> = options.iter().map(|option| format!("--{} -{}", option.name, option.letter)).collect();
     words.join(" ")
 }
 
@@ -19,7 +19,7 @@ fn literals(command: &Command) -> impl Iterator<Item = &'static str> {
     words.filter(|word| word.chars().all(|it| it.is_ascii_lowercase()))
 }
 
-fn all_options(command: &Command) -> Vec<Told> {
+fn all_options(command: &Command) -> Vec<OptionHelp> {
     of(command).into_iter().chain(common()).collect()
 }
 
@@ -66,8 +66,8 @@ fn quoted(text: &str) -> String {
     text.replace('\'', "").replace(['[', ']', ':'], " ").replace('\\', " ")
 }
 
-fn zsh_option(told: &Told) -> String {
-    let Told { name, letter, value, text } = told;
+fn zsh_option(option: &OptionHelp) -> String {
+    let OptionHelp { name, letter, value, text } = option;
     let text = quoted(text);
     let value = if value.is_empty() { String::new() } else { format!(":{value}:_default") };
     format!("'(-{letter} --{name})'{{-{letter},--{name}}}'[{text}]{value}'")
@@ -82,15 +82,15 @@ pub fn zsh() -> String {
         let _ = writeln!(text, "    '{}:{}'", command.name, quoted(command.summary));
     }
     text += "  )\n  local context state state_descr line\n  typeset -A opt_args\n  _arguments -C \\\n";
-    for told in common() {
-        let _ = writeln!(text, "    {} \\", zsh_option(&told));
+    for option in common() {
+        let _ = writeln!(text, "    {} \\", zsh_option(&option));
     }
     text += "    '1:command:->command' '*::argument:->argument'\n";
     text += "  case $state in\n    command) _describe command commands ;;\n    argument)\n      case $words[1] in\n";
     for command in ALL {
         let _ = write!(text, "        {}) _arguments", command.name);
-        for told in all_options(command) {
-            let _ = write!(text, " \\\n          {}", zsh_option(&told));
+        for option in all_options(command) {
+            let _ = write!(text, " \\\n          {}", zsh_option(&option));
         }
         let literals: Vec<&str> = literals(command).collect();
         let rest = if literals.is_empty() { "_default".to_owned() } else { format!("({})", literals.join(" ")) };
@@ -99,8 +99,8 @@ pub fn zsh() -> String {
     text + "      esac ;;\n  esac\n}\n_ethercat \"$@\"\n"
 }
 
-fn fish_option(told: &Told, condition: &str) -> String {
-    let Told { name, letter, value, text } = told;
+fn fish_option(option: &OptionHelp, condition: &str) -> String {
+    let OptionHelp { name, letter, value, text } = option;
     let value = if value.is_empty() { "" } else { " -r" };
     format!("complete -c ethercat{condition} -l {name} -s {letter}{value} -d '{}'\n", quoted(text))
 }
@@ -108,12 +108,12 @@ fn fish_option(told: &Told, condition: &str) -> String {
 /// For fish: `/usr/share/fish/vendor_completions.d/ethercat.fish`.
 pub fn fish() -> String {
     let mut text = "# Completion of ethercat for fish.\n".to_owned();
-    common().iter().for_each(|told| text += &fish_option(told, ""));
+    common().iter().for_each(|option| text += &fish_option(option, ""));
     for command in ALL {
         let (name, summary) = (command.name, quoted(command.summary));
         let _ = writeln!(text, "complete -c ethercat -f -n __fish_use_subcommand -a {name} -d '{summary}'");
         let condition = format!(" -n '__fish_seen_subcommand_from {name}'");
-        of(command).iter().for_each(|told| text += &fish_option(told, &condition));
+        of(command).iter().for_each(|option| text += &fish_option(option, &condition));
         for word in literals(command) {
             let _ = writeln!(text, "complete -c ethercat{condition} -a {word}");
         }

@@ -13,7 +13,7 @@ pub enum Failure {
     Usage(String),
     /// A text as it is.
     Message(String),
-    /// The output was closed: nothing more is said.
+    /// The output was closed: no further message is written.
     Closed,
     /// The daemon gave no answer, or refuses.
     Asked(ClientError),

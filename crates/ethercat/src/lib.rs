@@ -32,15 +32,17 @@ pub mod shape;
 
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 
 use arguments::Arguments;
 use commands::Found;
 use failure::Failure;
 use session::Session;
 
-/// Runs the tool with these arguments, the name of the program left out. False is exit code 1.
-pub fn run(arguments: &[OsString], output: &mut dyn Write, errors: &mut dyn Write) -> bool {
-    match try_run(arguments, output, errors) {
+/// Runs the tool with these arguments, the name of the program left out, and the daemon at `socket`. False is exit
+/// code 1.
+pub fn run(arguments: &[OsString], socket: &Path, output: &mut dyn Write, errors: &mut dyn Write) -> bool {
+    match try_run(arguments, socket, output, errors) {
         Ok(()) => true,
         Err(failure) => {
             // Where the standard error is closed nothing can be said.
@@ -50,7 +52,7 @@ pub fn run(arguments: &[OsString], output: &mut dyn Write, errors: &mut dyn Writ
     }
 }
 
-fn try_run(words: &[OsString], output: &mut dyn Write, errors: &mut dyn Write) -> Result<(), Failure> {
+fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &mut dyn Write) -> Result<(), Failure> {
     let wrong = |text: String| Failure::Message(format!("ethercat: {text}\n\n{}", help::usage()));
     let arguments = Arguments::parse(words).map_err(wrong)?;
     let Some(name) = arguments.words.first() else {
@@ -73,6 +75,6 @@ fn try_run(words: &[OsString], output: &mut dyn Write, errors: &mut dyn Write) -
         output.write_all(help::of(command).as_bytes())?;
         return Ok(());
     }
-    let mut session = Session::new(command.name, arguments, output, errors);
+    let mut session = Session::new(command.name, arguments, socket, output, errors);
     (command.run)(&mut session).map_err(|failure| failure.with_help(|| help::of(command)))
 }

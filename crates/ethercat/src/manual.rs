@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::commands::ALL;
 use crate::help::NUMBERS;
-use crate::options_help::{Told, common, of};
+use crate::options_help::{OptionHelp, common, of};
 use crate::shape::Command;
 
 /// A text as roff takes it: no line begins a request, and a minus sign can be copied.
@@ -22,12 +22,12 @@ fn head(name: &str, summary: &str) -> String {
     format!(".TH \"{title}\" 8 \"\" \"RingCAT {version}\"\n.SH NAME\n{} \\- {summary}\n", roff(name))
 }
 
-fn options(title: &str, options: &[Told]) -> String {
+fn options(title: &str, options: &[OptionHelp]) -> String {
     if options.is_empty() {
         return String::new();
     }
     let mut text = format!(".SH {title}\n");
-    for Told { name, letter, value, text: about } in options {
+    for OptionHelp { name, letter, value, text: about } in options {
         let value = if value.is_empty() { String::new() } else { format!(" \\fI{}\\fR", roff(value)) };
         // A string takes everything; so below.
         let _ = write!(text, ".TP\n\\fB\\-{letter}\\fR, \\fB\\-\\-{}\\fR{value}\n{}\n", roff(name), roff(about));

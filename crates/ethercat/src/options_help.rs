@@ -1,4 +1,4 @@
-//! Options as the help tells them, for completion and manual pages.
+//! Options as the help describes them, for completion and manual pages.
 
 use crate::help::COMMON;
 use crate::shape::Command;
@@ -6,7 +6,7 @@ use crate::shape::Command;
 /// An option in the help.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Told {
+pub struct OptionHelp {
     /// Its name, without minus signs.
     pub name: &'static str,
     /// Its letter.
@@ -18,18 +18,18 @@ pub struct Told {
 }
 
 /// The options that all commands have.
-pub fn common() -> Vec<Told> {
-    told(COMMON)
+pub fn common() -> Vec<OptionHelp> {
+    options(COMMON)
 }
 
 /// A command's own options.
-pub fn of(command: &Command) -> Vec<Told> {
-    told(command.options)
+pub fn of(command: &Command) -> Vec<OptionHelp> {
+    options(command.options)
 }
 
 /// A line with an option begins with two blanks and two minus signs; the lines behind it go on with its text.
-fn told(text: &'static str) -> Vec<Told> {
-    let mut all: Vec<Told> = Vec::new();
+fn options(text: &'static str) -> Vec<OptionHelp> {
+    let mut all: Vec<OptionHelp> = Vec::new();
     for line in text.lines() {
         let line = line.trim();
         let Some(option) = line.strip_prefix("--") else {
@@ -45,7 +45,7 @@ fn told(text: &'static str) -> Vec<Told> {
             Some(value) => value.split_once('>').unwrap_or((value, "")),
             None => ("", rest),
         };
-        all.push(Told { name, letter: letter.trim_start_matches('-'), value, text: rest.trim().to_owned() });
+        all.push(OptionHelp { name, letter: letter.trim_start_matches('-'), value, text: rest.trim().to_owned() });
     }
     all
 }
@@ -65,15 +65,15 @@ mod tests {
     #[test]
     fn options_in_the_help_are_those_of_the_parser() {
         let all = || ALL.into_iter().flat_map(of).chain(common());
-        for told in all() {
-            let wanted = (told.name, told.letter, !told.value.is_empty());
+        for option in all() {
+            let wanted = (option.name, option.letter, !option.value.is_empty());
             let is_known = |(letter, name, has_value): &(char, &str, bool)| {
-                wanted == (*name, letter.to_string().as_str(), *has_value) && told.text.len() > 5
+                wanted == (*name, letter.to_string().as_str(), *has_value) && option.text.len() > 5
             };
-            assert!(OPTIONS.iter().any(is_known), "{told:?}");
+            assert!(OPTIONS.iter().any(is_known), "{option:?}");
         }
         for (_, name, _) in OPTIONS {
-            assert!(all().any(|told| told.name == name), "--{name} is not in the help");
+            assert!(all().any(|option| option.name == name), "--{name} is not in the help");
         }
     }
 

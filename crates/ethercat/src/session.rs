@@ -2,7 +2,7 @@
 
 use std::fmt::Arguments as Formatted;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, Ask, MasterState};
@@ -23,20 +23,28 @@ pub struct Session<'a> {
     pub name: &'static str,
     /// Its arguments.
     pub arguments: Arguments,
+    socket: &'a Path,
     client: Option<Client>,
     output: &'a mut dyn Write,
     errors: &'a mut dyn Write,
 }
 
+/// The socket of the daemon: that of the environment, or the one that services have.
+pub fn socket() -> PathBuf {
+    let named = std::env::var_os(SOCKET).filter(|path| !path.is_empty());
+    named.map_or_else(|| PathBuf::from(DEFAULT_SOCKET), PathBuf::from)
+}
+
 impl<'a> Session<'a> {
-    /// A command with these arguments. The daemon is called when it is needed.
+    /// A command with these arguments. The daemon at `socket` is called when it is needed.
     pub fn new(
         name: &'static str,
         arguments: Arguments,
+        socket: &'a Path,
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        Session { name, arguments, client: None, output, errors }
+        Session { name, arguments, socket, client: None, output, errors }
     }
 
     /// The arguments behind the command.
@@ -75,9 +83,7 @@ impl<'a> Session<'a> {
 
     fn client(&mut self) -> Result<&mut Client, ClientError> {
         if self.client.is_none() {
-            let socket = std::env::var_os(SOCKET).filter(|path| !path.is_empty());
-            let socket = socket.map_or_else(|| PathBuf::from(DEFAULT_SOCKET), PathBuf::from);
-            self.client = Some(Client::connect(&socket, "ethercat")?);
+            self.client = Some(Client::connect(self.socket, "ethercat")?);
         }
         self.client.as_mut().ok_or(ClientError::Refused(Refusal::Unexpected { expected: "a daemon".to_owned() }))
     }

@@ -296,7 +296,7 @@ impl Master {
             Ok(application) => application,
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
-                let (supervisor, links) = refused.main_device;
+                let ringcat::Ended { supervisor, links, .. } = refused.main_device;
                 let unused = (0..domains).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
                 locked(&self.memory).extend(unused);
                 bus.give_links_back(links);
@@ -349,14 +349,14 @@ impl Master {
             words.set_memory(std::ptr::null_mut());
             locked(&self.memory).extend(application.exchange_mut().give_memory_back(DomainId(number)));
         }
-        let (_, links) = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
-            Ok(parts) => parts,
+        let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+            Ok(ended) => ended,
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
                 refused.main_device
             }
         };
-        bus.give_links_back(links);
+        bus.give_links_back(ended.links);
         *draft = Draft::default();
         draft.set_found(bus.found()?);
         self.application_time.store(0, Ordering::Relaxed);

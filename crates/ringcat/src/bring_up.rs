@@ -10,7 +10,7 @@ use crate::application::Application;
 use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::{MainDevice, Refused};
-use crate::supervisor_thread::{Activated, SupervisorThread};
+use crate::supervisor_thread::{Activated, Ended, SupervisorThread};
 
 impl<L: Links> MainDevice<L> {
     /// Scans, and activates what `declare` returns: the shortest way to OP, because only what operation needs is read
@@ -56,7 +56,7 @@ impl SupervisorThread {
         let begun = self.with(Engine::start_scan_for_operation).and_then(|begun| Ok(begun?));
         match begun.and_then(|()| self.finish_scan(|| ())) {
             Ok(scan) => self.activate(declare(&scan), links),
-            Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
+            Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),
         }
     }
 }

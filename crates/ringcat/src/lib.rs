@@ -145,11 +145,10 @@ pub use probe::{CycleJob, CycleProbe, FramesIn, JobProbe, JobTime, JobTimes};
 pub use process_data::ProcessData;
 pub use services::{Background, Services};
 pub use stop::Deactivated;
-pub use subdevice::{SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
-pub use supervisor_thread::SupervisorThread;
+pub use subdevice::{ListLengths, MailboxStatus, SubDevice, SubDeviceError, SubDeviceFailure, SubDeviceName};
+pub use supervisor_thread::{Ended, SupervisorThread};
 pub use value::{Number, ObjectValue};
 
-pub use ringcat_engine::Acknowledge;
 pub use ringcat_engine::BlockedPort;
 pub use ringcat_engine::PortOf;
 pub use ringcat_engine::ReadPdos;
@@ -175,15 +174,18 @@ pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
 pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;
-pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute};
+pub use ringcat_engine::mail::aoe::{AoeDeviceInfo, AoeError, AoeRoute, AoeStates};
 pub use ringcat_engine::mail::coe::history::{History, HistoryMessage};
 pub use ringcat_engine::mail::coe::information::{Entry as ObjectEntry, InformationError, Object};
+pub use ringcat_engine::mail::coe::pdo_mail::PdoMailError;
 pub use ringcat_engine::mail::coe::{SdoAddress, SdoError, SdoFailure};
 pub use ringcat_engine::mail::foe::{FoeError, FoeFailure, FoeOptions, FoeProgress};
 pub use ringcat_engine::mail::soe::command::CommandState;
 pub use ringcat_engine::mail::soe::{SoeAddress, SoeError, SoeFailure};
 pub use ringcat_engine::mail::voe::Voe;
-pub use ringcat_engine::mail::{EmergencyRing, Limits, Mailbox, MailboxError, Unclaimed, Unsolicited};
+pub use ringcat_engine::mail::{
+    EmergencyRing, Limits, Mailbox, MailboxError, ReceivedEmergency, Unclaimed, Unsolicited,
+};
 pub use ringcat_engine::main_device::snapshot::{
     Activity, AcyclicSnapshot, CableSnapshot, ClockSnapshot, GroupSnapshot, LinkSnapshot, Progress, RingSnapshot,
     Snapshot, SubDeviceSnapshot,
@@ -200,9 +202,10 @@ pub use ringcat_engine::request::{
     VoeHeader,
 };
 pub use ringcat_engine::ring_status::{
-    Cable, CableErrors, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
+    Cable, CableErrors, CableReport, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,
 };
 pub use ringcat_engine::time::Instant;
+pub use ringcat_engine::{Acknowledge, AlRegisters};
 pub use ringcat_engine::{AcyclicCounters, BusError, Reply};
 pub use ringcat_engine::{AreaPlan, MappedEntry, MappedPdo, PlanError, SubDevicePlan, plan};
 pub use ringcat_engine::{Classified, Identity};
@@ -219,6 +222,7 @@ pub use ringcat_engine::{PortErrors, Statistics};
 pub use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 pub use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 pub use ringcat_wire::mailbox::coe::{DataType, ListType, ObjectCode};
+pub use ringcat_wire::mailbox::eoe::AddressFilter;
 pub use ringcat_wire::mailbox::soe::Idn;
 pub use ringcat_wire::register::LoopControl;
 pub use ringcat_wire::source_address::MacCodec;
@@ -233,7 +237,7 @@ pub use ringcat_engine::exchange::Exchange;
 pub use ringcat_engine::info::{ControllerInfo, InfoWarning, MailboxSyncManagers, PdoInfo};
 pub use ringcat_engine::layout::LayoutError;
 pub use ringcat_engine::mail::eoe::{EoeError, EoeFailure, EthernetCounters, EthernetRate, EthernetStatus};
-pub use ringcat_engine::mail::stream::Overflow;
+pub use ringcat_engine::mail::stream::{Overflow, Sink, Source};
 pub use ringcat_engine::mail::{Conversation, Lane, MailCounters, MailboxSizes};
 pub use ringcat_engine::main_device::MainDevice as Engine;
 pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice, PlacedEntry};

@@ -10,14 +10,12 @@ use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::{SiiExtent, SubDeviceInfo};
 use ringcat_engine::knowledge::{Handover, Knowledge};
 use ringcat_engine::link::Link;
-use ringcat_engine::mail::Mailbox;
 use ringcat_engine::main_device::{
     ActivateError, Declaration, MainDevice as Engine, Options as Engineering, Pending, Retries,
 };
 use ringcat_engine::time::Instant;
 use ringcat_engine::{AcyclicCounters, ReadPdos, RingInspection, Scan, inspect_ring};
 use ringcat_engine::{JunctionConnection, JunctionMode};
-use ringcat_wire::address::Position;
 use ringcat_wire::source_address::MacCodec;
 
 use crate::acyclic::{Inline, carry_out_link_order, log_messages};
@@ -351,11 +349,6 @@ impl<L: Links> MainDevice<L> {
         if let Some(wake) = self.engine.next_deadline() {
             self.links.wait(wake);
         }
-    }
-
-    /// The mailbox of a scanned SubDevice, for the functions of [`ringcat_engine::mail`]; see [`MainDevice::run`].
-    pub fn mailbox(&self, position: Position) -> Option<Mailbox> {
-        self.engine.mailbox(position)
     }
 
     /// Runs an async function of the engine to its end.

@@ -10,7 +10,7 @@ use crate::application::{Application, LastOutputs};
 use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::{MainDevice, Refused};
-use crate::supervisor_thread::SupervisorThread;
+use crate::supervisor_thread::{Ended, SupervisorThread};
 
 /// Whether last cycles may be sent: in role INACTIVE the segment belongs to another MainDevice.
 fn is_allowed(engine: &Engine, function: Function) -> bool {
@@ -67,16 +67,11 @@ impl<L: Links> Application<L, SupervisorThread> {
     ///
     /// # Errors
     /// SubDevices do not reach the state in time, or the bus fails.
-    pub fn stop(
-        mut self,
-        outputs: LastOutputs,
-        state: AlState,
-        limit: Duration,
-    ) -> Result<(SupervisorThread, L), Error> {
+    pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<Ended<L>, Error> {
         let is_allowed = self.acyclic.with(|engine| is_allowed(engine, Function::Stop))?;
         self.end_cycles(outputs, is_allowed);
         self.acyclic.stop(state, limit)?;
-        Ok((self.acyclic, self.links))
+        Ok(Ended { supervisor: self.acyclic, links: self.links })
     }
 
     /// Ends the application, as in one thread. The returned thread keeps the scan, and may activate another declaration
@@ -90,7 +85,7 @@ impl<L: Links> Application<L, SupervisorThread> {
             self.end_cycles(outputs, is_allowed);
             self.acyclic.deactivate(limit)
         });
-        let main_device = (self.acyclic, self.links);
+        let main_device = Ended { supervisor: self.acyclic, links: self.links };
         match ended {
             Ok(()) => Ok(main_device),
             Err(error) => Err(Box::new(Refused { error, main_device })),
@@ -98,5 +93,5 @@ impl<L: Links> Application<L, SupervisorThread> {
     }
 }
 
-/// The handle and the links of a deactivated application; the same if it was not complete.
-pub type Deactivated<L> = Result<(SupervisorThread, L), Box<Refused<(SupervisorThread, L)>>>;
+/// What a deactivated application leaves; the same if the deactivation was not complete.
+pub type Deactivated<L> = Result<Ended<L>, Box<Refused<Ended<L>>>>;

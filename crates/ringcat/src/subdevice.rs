@@ -13,14 +13,17 @@
 //! so create it for each use: `application.subdevice(drive).sdo_read::<u32>(0x6064, 0)`.
 
 mod bus;
+mod emergencies;
 mod error;
+mod ethernet;
 mod files;
+mod mail;
 mod name;
 mod objects;
+mod pdos;
 mod protocols;
 mod resolve;
 mod start;
-mod unsolicited;
 
 use std::future::Future;
 use std::time::Duration;
@@ -30,7 +33,9 @@ use ringcat_engine::main_device::{Address, MainDevice as Engine, SubDeviceId};
 use ringcat_wire::address::Position;
 
 pub use error::{SubDeviceError, SubDeviceFailure};
+pub use mail::MailboxStatus;
 pub use name::SubDeviceName;
+pub use objects::ListLengths;
 use start::{start, start_with_mailbox};
 
 use crate::acyclic::Inline;

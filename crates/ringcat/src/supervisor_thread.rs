@@ -260,7 +260,7 @@ impl SupervisorThread {
     pub fn activate<C: Links>(self, declaration: Declaration, links: C) -> Activated<C> {
         match self.load(declaration) {
             Ok(()) => self.apply(links),
-            Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
+            Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),
         }
     }
 
@@ -306,7 +306,7 @@ impl SupervisorThread {
                 published.observes(&application.cyclic.observed);
                 Ok(application)
             }
-            Err(error) => Err(Box::new(Refused { error, main_device: (self, links) })),
+            Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),
         }
     }
 
@@ -467,5 +467,15 @@ impl AcyclicHalf for SupervisorThread {
     }
 }
 
+/// What is left of an application of two threads that has ended or was refused: another one may be activated with both.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Ended<L> {
+    /// The thread of the acyclic half.
+    pub supervisor: SupervisorThread,
+    /// The links of the cycles.
+    pub links: L,
+}
+
 /// A running application, or the handle and the links for another attempt.
-pub type Activated<C> = Result<Application<C, SupervisorThread>, Box<Refused<(SupervisorThread, C)>>>;
+pub type Activated<C> = Result<Application<C, SupervisorThread>, Box<Refused<Ended<C>>>>;

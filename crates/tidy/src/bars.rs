@@ -50,13 +50,13 @@ const BEFORE: Before = Before { engine_lines: "42982, 37632", public_items: "153
 
 impl Counted {
     /// Counts a tree.
-    pub fn of(tree: &Tree) -> Counted {
+    pub fn of(tree: &Tree) -> Result<Counted, Finding> {
         let (without, all) = (lines(tree, "engine", false), lines(tree, "engine", true));
-        Counted {
+        Ok(Counted {
             engine_lines: format!("{all}, {without}"),
-            public_items: handed_on::items(tree).len(),
+            public_items: handed_on::items(tree)?.len(),
             examples: examples(tree),
-        }
+        })
     }
 }
 
@@ -111,7 +111,7 @@ pub fn rows(tree: &Tree, packet: &str) -> Result<Vec<Row>, Finding> {
     let long = limits::long_functions(tree)?.into_keys().map(|name| (name, 1)).collect();
     let files = limits::long_files(tree).into_keys().map(|name| (name, 1)).collect();
     let (registry, _) = dependencies::crates_in(packet);
-    let Counted { engine_lines, public_items, examples } = Counted::of(tree);
+    let Counted { engine_lines, public_items, examples } = Counted::of(tree)?;
     Ok(vec![
         none("files in circles of a crate", "28 of 184 files", circles::sizes(tree)?),
         at_most(

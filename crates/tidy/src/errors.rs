@@ -14,8 +14,8 @@ use crate::tree::Tree;
 const ENDS: [&str; 8] = ["Error", "Failure", "Refused", "Panicked", "NotReady", "NotLocked", "NoDomain", "DoesNotFit"];
 
 /// Error types without the trait.
-pub fn without_trait(tree: &Tree) -> Vec<Finding> {
-    in_items(&handed_on::items(tree))
+pub fn without_trait(tree: &Tree) -> Result<Vec<Finding>, Finding> {
+    Ok(in_items(&handed_on::items(tree)?))
 }
 
 fn in_items(items: &[String]) -> Vec<Finding> {
@@ -55,7 +55,7 @@ mod tests {
             "b::c: pub struct Three<T>: pub failure: RequestFailure",
             "d: pub struct Refused<M>",
             "d: impl<M> StdError for Refused<M>",
-            "lib: pub use e::{FourError}",
+            "lib: pub use e::FourError",
         ];
         let found = in_items(&items.map(str::to_owned));
         assert_eq!(found, [Finding::new(LIST, 0, "OneError does not implement Error")]);

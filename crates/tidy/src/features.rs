@@ -4,7 +4,7 @@
 //! Input: a tree. Output: findings. A row of the former is `| [capability](feature-tests.md#id) | state | limits |`; a
 //! test covers it by its id on a `// covers:` line. [`crate::evidence`] lists the tests of each row.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Finding;
 use crate::covers;
@@ -16,6 +16,8 @@ pub(crate) const PAGE: &str = "docs/capabilities.md";
 const SHORT: &str = "docs/FEATURES.md";
 /// Values of the second column; the last one needs no test.
 const STATES: [&str; 3] = ["works", "partly", "not yet"];
+/// Section of what does not exist yet.
+const NOT_YET: &str = "not-yet";
 /// Maximum number of rows.
 const MAX_ROWS: usize = 120;
 /// Maximum number of words of the short form outside of links: two minutes at 240 words a minute.
@@ -68,8 +70,10 @@ fn row(cells: &[&str], line: usize) -> Result<Row, Finding> {
     Ok(Row { id, capability, state, limits, line })
 }
 
-/// Findings about the short form: it is too long, a row has an unknown state or leads to no section, a section of the
-/// page is missing in it.
+/// Findings about the short form: it is too long, a row leads to no section, a section of the page is missing in it, or
+/// the state of a row is not that of the capabilities it stands for.
+///
+/// These are in a comment in the row: `<!-- ring-cut ring-flap -->`. The row works if all of them work.
 pub fn short_form(tree: &Tree) -> Vec<Finding> {
     let (Some(short), Some(page)) = (tree.file(SHORT), tree.file(PAGE)) else {
         return vec![Finding::new(SHORT, 0, "is missing, or the page behind it")];
@@ -77,28 +81,65 @@ pub fn short_form(tree: &Tree) -> Vec<Finding> {
     let sections: BTreeSet<String> =
         page.text.lines().filter_map(|line| line.strip_prefix("## ")).map(anchor).collect();
     let (mut findings, mut named, mut words) = (Vec::new(), BTreeSet::new(), 0);
+    let capabilities = capabilities(&page.text);
+    let mut shown: BTreeSet<&str> = BTreeSet::new();
     for (number, line) in short.text.lines().enumerate() {
+        let (line, ids) = without_comment(line);
         let (link, rest) = match line.split_once("](capabilities.md#") {
             Some((before, after)) => (after.split_once(')'), before),
-            None => (None, line),
+            None => (None, line.as_str()),
         };
         let row = link.map(|(section, cells)| (section, cells.split('|').map(str::trim).collect::<Vec<_>>()));
         words += words_of(rest) + link.map_or(0, |(_, cells)| words_of(cells));
         let Some((section, cells)) = row else { continue };
+        let mut found = |text: String| findings.push(Finding::new(SHORT, number + 1, text));
         if !sections.contains(section) {
-            findings.push(Finding::new(SHORT, number + 1, format!("{PAGE} has no section #{section}")));
+            found(format!("{PAGE} has no section #{section}"));
         }
-        if !cells.get(1).is_some_and(|state| STATES.contains(state)) {
-            findings.push(Finding::new(SHORT, number + 1, format!("state is one of {STATES:?}")));
+        let mut state = if section == NOT_YET { STATES[2] } else { STATES[0] };
+        for id in ids {
+            match capabilities.get_key_value(id) {
+                Some((id, (of, row))) if of == section => {
+                    shown.insert(id);
+                    state = if row == STATES[0] { state } else { STATES[1] };
+                }
+                _ => found(format!("#{section} of {PAGE} has no row `{id}`")),
+            }
+        }
+        if cells.get(1) != Some(&state) {
+            found(format!("the state is `{state}`, as {PAGE} has it"));
         }
         named.insert(section.to_owned());
     }
+    let hidden = capabilities.keys().filter(|id| !shown.contains(id.as_str()));
+    findings.extend(hidden.map(|id| Finding::new(SHORT, 0, format!("no row stands for `{id}`"))));
     let missing = sections.difference(&named);
     findings.extend(missing.map(|section| Finding::new(SHORT, 0, format!("no row leads to #{section}"))));
     if words > MAX_SHORT_WORDS {
         findings.push(Finding::new(SHORT, 0, format!("{words} words, more than {MAX_SHORT_WORDS}")));
     }
     findings
+}
+
+/// Id of each capability that has one, with the anchor of its section and its state.
+fn capabilities(page: &str) -> BTreeMap<String, (String, String)> {
+    let mut found = BTreeMap::new();
+    for part in page.split("\n## ").skip(1) {
+        let section = anchor(part.lines().next().unwrap_or_default());
+        for row in rows(part).into_iter().flatten().filter(|row| !row.id.is_empty()) {
+            found.insert(row.id, (section.clone(), row.state));
+        }
+    }
+    found
+}
+
+/// A line without the comment in it, and the words of that.
+fn without_comment(line: &str) -> (String, Vec<&str>) {
+    let comment = line.split_once("<!--").and_then(|(before, rest)| Some((before, rest.split_once("-->")?)));
+    match comment {
+        Some((before, (ids, after))) => (format!("{before}{after}"), ids.split_whitespace().collect()),
+        None => (line.to_owned(), Vec::new()),
+    }
 }
 
 /// Words of a text, without signs that stand alone.
@@ -206,19 +247,30 @@ mod tests {
     }
 
     #[test]
-    fn the_short_form_leads_to_each_section_with_few_words() {
-        let page = "# Capabilities\n\n## Clocks (all)\n\n## Not yet\n";
+    fn the_short_form_leads_to_each_section_with_few_words_and_its_states() {
+        let head = "| capability | state | limits |\n|---|---|---|\n";
+        let row = |id: &str, state: &str| format!("| [It](feature-tests.md#{id}) | {state} | |\n");
+        let clocks = format!("{head}{}{}", row("lock", "works"), row("ring", "partly"));
+        let page = format!("# Capabilities\n\n## Clocks (all)\n\n{clocks}\n## Not yet\n");
         let short = |text: &str| {
-            short_form(&Tree { files: vec![File::new(PAGE, page), File::new(SHORT, text)] })
+            short_form(&Tree { files: vec![File::new(PAGE, &page), File::new(SHORT, text)] })
                 .iter()
                 .map(ToString::to_string)
                 .collect::<Vec<_>>()
         };
-        let good =
-            "| [Clocks](capabilities.md#clocks-all) | works | |\n| [It](capabilities.md#not-yet) | not yet | |\n";
+        let good = "| [A](capabilities.md#clocks-all) | works | <!-- lock --> |\n\
+                    | [B](capabilities.md#clocks-all) | partly | <!-- lock ring --> |\n\
+                    | [C](capabilities.md#not-yet) | not yet | |\n";
         assert_eq!(short(good), [""; 0]);
-        let wrong = good.replace("#not-yet", "#other").replace("works", "worked");
-        assert_eq!(short(&wrong).len(), 3, "{:?}", short(&wrong));
-        assert_eq!(short(&format!("{good}{}", "word ".repeat(480))).len(), 1);
+        let wrong = [
+            ("no such section, and none leads to the other one", good.replace("#not-yet", "#other"), 3),
+            ("another state", good.replace("partly", "works"), 1),
+            ("a capability without a row", good.replace("lock ring", "lock").replace("partly", "works"), 1),
+            ("an unknown capability", good.replace("lock ring", "lock ring other"), 1),
+            ("too many words", format!("{good}{}", "word ".repeat(480)), 1),
+        ];
+        for (what, text, count) in wrong {
+            assert_eq!(short(&text).len(), count, "{what}: {:?}", short(&text));
+        }
     }
 }

@@ -6,28 +6,30 @@
 
 use std::collections::BTreeSet;
 
+use crate::Finding;
 use crate::interface::{Item, SOURCES, items_of, own_items};
 use crate::tree::Tree;
 
 /// Lower crates by the name under which the sources of `ringcat` use them.
-const CRATES: [&str; 6] = ["engine", "wire", "link", "config", "gateway", "sim"];
+const CRATES: [&str; 7] = ["engine", "wire", "link", "config", "control", "gateway", "sim"];
 
 /// The whole list: the items of the library, then those of lower crates.
-pub fn items(tree: &Tree) -> Vec<String> {
-    own_items(tree).into_iter().chain(members(tree)).collect()
+pub fn items(tree: &Tree) -> Result<Vec<String>, Finding> {
+    Ok(own_items(tree)?.into_iter().chain(members(tree)?).collect())
 }
 
 /// Lines for what is re-exported, sorted by crate and name.
-fn members(tree: &Tree) -> Vec<String> {
-    CRATES.iter().flat_map(|name| of_crate(tree, name)).collect()
+fn members(tree: &Tree) -> Result<Vec<String>, Finding> {
+    let of_crates: Result<Vec<_>, _> = CRATES.iter().map(|name| of_crate(tree, name)).collect();
+    Ok(of_crates?.concat())
 }
 
-fn of_crate(tree: &Tree, name: &str) -> Vec<String> {
+fn of_crate(tree: &Tree, name: &str) -> Result<Vec<String>, Finding> {
     let names = re_exported(tree, name);
-    let items = items_of(tree, &format!("crates/{name}/src/"));
+    let items = items_of(tree, &format!("crates/{name}/src/"))?;
     let line = |item: &Item| format!("ringcat_{name}::{}: {}", item.module, item.text);
     if is_re_exported_whole(tree, name) {
-        return items.iter().map(line).collect();
+        return Ok(items.iter().map(line).collect());
     }
     let root = tree.file(&format!("crates/{name}/src/lib.rs")).map_or("", |root| &root.text);
     let is_module = |wanted: &&String| root.lines().any(|line| line == format!("pub mod {wanted};"));
@@ -39,7 +41,7 @@ fn of_crate(tree: &Tree, name: &str) -> Vec<String> {
             found.push(format!("ringcat_{name}::{wanted}: {}", item.text));
         }
     }
-    found
+    Ok(found)
 }
 
 /// Whether the sources of the library have `pub use ringcat_<name> as ...`.
@@ -113,7 +115,7 @@ mod tests {
             "ringcat_link::near: pub fn near()",
             "ringcat_wire::al::code: pub fn code()",
         ];
-        let mut found = members(&tree);
+        let mut found = members(&tree).expect("parses");
         found.sort_by_key(|line| expected.iter().position(|other| other == line));
         assert_eq!(found, expected);
     }

@@ -7,6 +7,7 @@
 //! * [`crates`]: allowed arrows between crates;
 //! * [`dependencies`]: crates that an application gets with the library; examples and the program use only the library;
 //! * [`interface`], [`handed_on`]: the list of public items of the library is kept in the repository;
+//! * [`mailboxes`]: the library can do all that the engine's mailboxes can do;
 //! * [`errors`], [`sources`]: public error types of the library implement `Error` and return the errors in them;
 //! * [`non_exhaustive`]: public types may grow without a break of the interface, or are closed for a reason;
 //! * [`modules`]: allowed arrows between the modules of the engine;
@@ -18,7 +19,7 @@
 //! * [`deny`]: licences, versions and sources of crates match `deny.toml`;
 //! * [`evidence`]: the lists of tests in `docs/` are current;
 //! * [`explorers`]: the list of random scenarios in `ci/explorers.toml` is complete;
-//! * [`paths`]: the paths in `docs/ARCHITECTURE.md` exist;
+//! * [`paths`], [`links`]: the paths in `docs/ARCHITECTURE.md` exist, and what pages link to;
 //! * [`toolchain`]: the same minimum Rust version everywhere;
 //! * [`circles`]: the files of a crate name each other without circles, over [`names`] and [`arrows`];
 //! * [`limits`]: lines of functions and files, columns of lines, names of tests;
@@ -49,6 +50,8 @@ pub mod handed_on;
 pub mod interface;
 pub mod known;
 pub mod limits;
+pub mod links;
+pub mod mailboxes;
 pub mod modules;
 pub mod names;
 pub mod non_exhaustive;

@@ -2,6 +2,7 @@
 //!
 //! Input: a tree. Output: [`Counts`] of items beyond a limit.
 
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 
@@ -36,7 +37,31 @@ fn functions(tree: &Tree) -> Result<Vec<(String, usize)>, Finding> {
         lengths.visit_file(&syntax);
         all.extend(lengths.0.into_iter().map(|(name, lines)| (format!("{}: {name}", file.path), lines)));
     }
+    for file in tree.files.iter().filter(|file| file.path.ends_with(".c")) {
+        all.extend(
+            functions_of_c(&file.text).into_iter().map(|(name, lines)| (format!("{}: {name}", file.path), lines)),
+        );
+    }
     Ok(all)
+}
+
+/// Functions of C with their lines, from the line of the name to the closing brace. Both braces of a body are at the
+/// beginning of a line.
+fn functions_of_c(text: &str) -> Vec<(String, usize)> {
+    let (mut found, mut head): (_, Option<(String, usize)>) = (Vec::new(), None);
+    for (at, line) in text.lines().enumerate() {
+        let name = line.split('(').next().and_then(|before| before.rsplit([' ', '*']).next()).unwrap_or_default();
+        let is_head = line.starts_with(char::is_alphabetic) && line.contains('(') && !line.ends_with(';');
+        match (line, &head) {
+            ("}", Some((name, from))) => {
+                found.push((name.clone(), at + 1 - from));
+                head = None;
+            }
+            _ if is_head => head = Some((name.to_owned(), at)),
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Name and lines of each function.
@@ -46,6 +71,30 @@ impl Lengths {
     fn add(&mut self, signature: &syn::Signature, block: &syn::Block) {
         let lines = block.span().end().line + 1 - signature.fn_token.span.start().line;
         self.0.push((signature.ident.to_string(), lines));
+    }
+
+    /// Functions between the brackets of a macro: `fn`, a name, and a body before the next semicolon.
+    fn add_tokens(&mut self, tokens: TokenStream) {
+        let mut begun: Option<(String, usize)> = None;
+        let mut tokens = tokens.into_iter().peekable();
+        while let Some(token) = tokens.next() {
+            match token {
+                TokenTree::Ident(word) if word == "fn" => {
+                    let name = tokens.peek().map(ToString::to_string);
+                    begun = name.map(|name| (name, word.span().start().line));
+                }
+                TokenTree::Punct(sign) if sign.as_char() == ';' => begun = None,
+                TokenTree::Group(group) => {
+                    if group.delimiter() == Delimiter::Brace
+                        && let Some((name, from)) = begun.take()
+                    {
+                        self.0.push((name, group.span_close().end().line + 1 - from));
+                    }
+                    self.add_tokens(group.stream());
+                }
+                _ => {}
+            }
+        }
     }
 }
 
@@ -65,6 +114,10 @@ impl<'ast> Visit<'ast> for Lengths {
             self.add(&item.sig, block);
         }
         visit::visit_trait_item_fn(self, item);
+    }
+
+    fn visit_macro(&mut self, item: &'ast syn::Macro) {
+        self.add_tokens(item.tokens.clone());
     }
 }
 
@@ -139,6 +192,20 @@ mod tests {
         assert_eq!(long, expected.map(|(name, lines)| (name.to_owned(), lines)).into());
         let longest = longest_function(&tree("a.rs", &text)).expect("parses");
         assert_eq!(longest, Some(("a.rs: a".to_owned(), 62)));
+    }
+
+    #[test]
+    fn functions_in_macros_and_in_c_are_measured() {
+        let body = "\n    f();".repeat(60);
+        let text =
+            format!("proptest! {{\n    #[test]\n    fn a(b in c()) {{{body}\n    }}\n\n    fn d() {{\n    }}\n}}\n");
+        let long = long_functions(&tree("a.rs", &text)).expect("parses");
+        assert_eq!(long, [("a.rs: a".to_owned(), 62)].into());
+        let head = "static int long_one(void)\n{";
+        let text =
+            format!("int declared(void);\nint (*pointer)(void) = 0;\n\n{head}{body}\n}}\nint main(void)\n{{\n}}\n");
+        let all = functions(&tree("a.c", &text)).expect("parses");
+        assert_eq!(all, [("a.c: long_one".to_owned(), 63), ("a.c: main".to_owned(), 3)]);
     }
 
     #[test]

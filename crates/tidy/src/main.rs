@@ -71,7 +71,7 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
 fn counted(directory: &Path) -> Result<(), Finding> {
     let name = directory.display().to_string();
     let tree = Tree::read(directory).map_err(|error| Finding::new(&name, 0, error.to_string()))?;
-    print!("{}", bars::Counted::of(&tree));
+    print!("{}", bars::Counted::of(&tree)?);
     Ok(())
 }
 

@@ -5,7 +5,8 @@ use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
     Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources, toolchain, words,
+    interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources,
+    toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -150,6 +151,13 @@ fn paths_in_the_architecture_page_exist() {
     none(paths::leading_nowhere(&tree()));
 }
 
+// covers: tree
+#[test]
+fn relative_links_of_pages_lead_to_files_and_headings() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    none(links::broken(&tree(), |path| root.join(path).exists()));
+}
+
 #[test]
 fn one_minimum_rust_version_is_named_everywhere() {
     none(toolchain::disagreements(&tree()));
@@ -179,8 +187,14 @@ fn the_page_of_bars_that_are_measured_elsewhere_has_its_section() {
 
 // covers: api
 #[test]
+fn the_handle_of_a_subdevice_can_do_all_that_its_mailbox_can_do() {
+    none(mailboxes::without_method(&tree()).unwrap_or_else(|finding| vec![finding]));
+}
+
+// covers: api
+#[test]
 fn public_error_types_implement_error() {
-    none(errors::without_trait(&tree()));
+    none(errors::without_trait(&tree()).unwrap_or_else(|finding| vec![finding]));
 }
 
 // covers: api
@@ -229,7 +243,7 @@ fn external_crates_match_deny_toml() {
 fn the_list_of_public_items_is_up_to_date() {
     let tree = tree();
     let place = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(interface::LIST);
-    let items = handed_on::items(&tree);
+    let items = handed_on::items(&tree).unwrap_or_else(|finding| panic!("{finding}"));
     println!("{} public items of the library", items.len());
     if std::env::var_os("RINGCAT_WRITE_PUBLIC_ITEMS").is_some() {
         std::fs::write(&place, items.join("\n") + "\n").expect("the list can be written");

@@ -1,7 +1,10 @@
 //! `--json` of the commands that need no network interface, and of every command that cannot do what was asked. Those
 //! that need one are in `crates/scenarios/tests/on_the_wire`.
 
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
 
 use crate::documented::Page;
 
@@ -38,6 +41,92 @@ fn a_file_is_printed_with_the_documented_keys() {
         assert_eq!((result["result"]["exit_code"].as_i64(), output.status.code()), (Some(0), Some(0)), "{file}");
         assert!(result["subdevices"].as_array().is_some_and(|subdevices| subdevices.len() >= 4), "{file}");
     }
+}
+
+/// A directory of its own, removed at the end.
+struct Directory(PathBuf);
+
+impl Directory {
+    fn new(name: &str) -> Directory {
+        let path = std::env::temp_dir().join(format!("ringcat-json-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("the temporary directory is writable");
+        Directory(path)
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let removed = std::fs::remove_dir_all(&self.0);
+        assert!(removed.is_ok() || std::thread::panicking());
+    }
+}
+
+/// A command that ends well, its result held against the page.
+fn good(page: &Page, command: &str, options: &str) -> Value {
+    let output = ringcat(&format!("--json {command} {options}"));
+    let (printed, errors) = (text(&output.stdout), text(&output.stderr));
+    let result = page.check(command, &printed);
+    assert_eq!((result["result"]["outcome"].as_str(), output.status.code()), (Some("ok"), Some(0)), "{errors}");
+    result
+}
+
+// covers: json, esi-read, esi-use
+#[test]
+fn descriptions_and_images_are_printed_with_the_documented_keys() {
+    let page = Page::read();
+    let directory = Directory::new("esi");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/tests/files");
+    let esi = format!("{folder}/outputs.xml");
+    let image = directory.file("image.bin");
+    let list = good(&page, "esi list", &format!("{folder} --vendor 0x1ff --product 0x10002 --revision 3"));
+    assert_eq!(list["devices"][0]["type"], "A2", "{list}");
+    assert_eq!(list["devices"][0]["choice"], "exact", "{list}");
+    assert!(list["files"].as_u64() >= Some(4), "{list}");
+    let built = good(&page, "sii build", &format!("{esi} --out {image}"));
+    assert_eq!(built["bytes"], 512, "{built}");
+    let compared = good(&page, "sii compare", &format!("{image} --esi {esi}"));
+    assert_eq!(compared["images"][0]["outcome"], "identical", "{compared}");
+    let skeleton = good(&page, "sii skeleton", &format!("{image} --out {}", directory.file("skeleton.xml")));
+    assert!(skeleton["bytes"].as_u64() > Some(200), "{skeleton}");
+}
+
+// covers: json, network-file
+#[test]
+fn a_network_file_and_its_differences_are_printed_with_the_documented_keys() {
+    let page = Page::read();
+    let directory = Directory::new("network");
+    let (segment, other) = (directory.file("segment.toml"), directory.file("other.toml"));
+    let file = directory.file("network.toml");
+    let devices = |kinds: [&str; 2]| kinds.map(|kind| format!("[[device]]\ntype = \"{kind}\"\n")).concat();
+    std::fs::write(&segment, devices(["coupler", "digital-output-8"])).expect("it is writable");
+    std::fs::write(&other, devices(["coupler", "servo"])).expect("it is writable");
+    let init = good(&page, "init", &format!("--sim {segment} --out {file}"));
+    assert_eq!((init["subdevices"].as_u64(), init["digest"].as_str().map(str::len)), (Some(2), Some(64)), "{init}");
+    let same = good(&page, "compare", &format!("--sim {segment} --network {file}"));
+    assert_eq!(same["differences"].as_array().map(Vec::len), Some(0), "{same}");
+    let output = ringcat(&format!("--json compare --sim {other} --network {file}"));
+    let different = page.check("compare", &text(&output.stdout));
+    assert_eq!((different["result"]["outcome"].as_str(), output.status.code()), (Some("failed"), Some(1)));
+    assert!(different["differences"].as_array().is_some_and(|them| !them.is_empty()), "{different}");
+}
+
+/// Each heading of a command has to be named in a test that holds its output against the table.
+// covers: json
+#[test]
+fn the_output_of_each_command_on_the_page_is_checked_by_a_test() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../");
+    let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("the file is there");
+    let tests = read("cli/tests/program/json.rs") + &read("scenarios/tests/on_the_wire/json.rs");
+    let page = read("../docs/json.md");
+    let heading = |line: &str| Some(line.strip_prefix("### `")?.strip_suffix('`')?.to_owned());
+    let commands: Vec<String> = page.lines().filter_map(heading).collect();
+    assert!(commands.len() >= 17, "{commands:?}");
+    let unchecked: Vec<&String> = commands.iter().filter(|name| !tests.contains(&format!("\"{name}\""))).collect();
+    assert!(unchecked.is_empty(), "{unchecked:?}");
 }
 
 // covers: json, verdict

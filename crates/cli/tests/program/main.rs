@@ -5,3 +5,4 @@ mod demo;
 mod documented;
 mod exit_codes;
 mod json;
+mod pages;

@@ -85,6 +85,23 @@ pub struct AoeDeviceInfo {
     pub name: String,
 }
 
+/// States of ADS and of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AoeStates {
+    /// State of ADS: 5 is run, 6 stop.
+    pub ads: u16,
+    /// State of the device, in its own numbers.
+    pub device: u16,
+}
+
+impl AoeStates {
+    /// These states.
+    pub const fn new(ads: u16, device: u16) -> AoeStates {
+        AoeStates { ads, device }
+    }
+}
+
 /// Reads at most `length` bytes.
 pub async fn read(
     mailbox: &Mailbox,
@@ -120,9 +137,9 @@ pub async fn read_write(
 }
 
 /// The states of ADS and of the device.
-pub async fn read_state(mailbox: &Mailbox, route: AoeRoute, limits: Limits) -> Result<(u16, u16), AoeError> {
+pub async fn read_state(mailbox: &Mailbox, route: AoeRoute, limits: Limits) -> Result<AoeStates, AoeError> {
     let states = |response: AdsResponse<'_>| match response {
-        AdsResponse::State { ads_state, device_state, .. } => Some((ads_state, device_state)),
+        AdsResponse::State { ads_state, device_state, .. } => Some(AoeStates::new(ads_state, device_state)),
         AdsResponse::DeviceInfo { .. } | AdsResponse::Data { .. } | AdsResponse::Done { .. } => None,
     };
     request(mailbox, route, &AdsRequest::ReadState, limits, states).await
@@ -132,11 +149,11 @@ pub async fn read_state(mailbox: &Mailbox, route: AoeRoute, limits: Limits) -> R
 pub async fn write_control(
     mailbox: &Mailbox,
     route: AoeRoute,
-    (ads_state, device_state): (u16, u16),
+    states: AoeStates,
     data: &[u8],
     limits: Limits,
 ) -> Result<(), AoeError> {
-    let control = AdsRequest::WriteControl { ads_state, device_state, data };
+    let control = AdsRequest::WriteControl { ads_state: states.ads, device_state: states.device, data };
     request(mailbox, route, &control, limits, |_| Some(())).await
 }
 

@@ -26,6 +26,16 @@ struct Slots {
     overruns: AtomicU64,
 }
 
+/// An emergency as it was read from the SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ReceivedEmergency {
+    /// Host time at which it was read.
+    pub at: Instant,
+    /// The emergency.
+    pub emergency: Emergency,
+}
+
 /// The last emergencies of one SubDevice. Copies are handles to the same ring, for any thread.
 #[derive(Clone, Debug)]
 pub struct EmergencyRing {
@@ -63,7 +73,7 @@ impl EmergencyRing {
     }
 
     /// Takes the oldest emergency, with the time at which it was read from the SubDevice.
-    pub fn pop(&self) -> Option<(Instant, Emergency)> {
+    pub fn pop(&self) -> Option<ReceivedEmergency> {
         let shared = &*self.shared;
         let mut read = shared.read.load(Ordering::Acquire);
         while read < shared.written.load(Ordering::Acquire) {
@@ -71,7 +81,10 @@ impl EmergencyRing {
             let (at, content) = (at.load(Ordering::Relaxed), content.load(Ordering::Relaxed));
             // The router writes this slot again only after `read` has changed: then the exchange fails.
             match shared.read.compare_exchange_weak(read, read + 1, Ordering::AcqRel, Ordering::Acquire) {
-                Ok(_) => return Some((Instant(at), Emergency::decode(&content.to_le_bytes()))),
+                Ok(_) => {
+                    let emergency = Emergency::decode(&content.to_le_bytes());
+                    return Some(ReceivedEmergency { at: Instant(at), emergency });
+                }
                 Err(now) => read = now,
             }
         }
@@ -156,7 +169,8 @@ mod tests {
             (0..5).for_each(|number| ring.push(Instant(u64::from(number)), &emergency(number)));
             assert_eq!((ring.len(), ring.overruns()), (size, 5 - size as u64));
             for number in 0..size as u16 {
-                assert_eq!(ring.pop(), Some((Instant(u64::from(number)), emergency(number))));
+                let expected = ReceivedEmergency { at: Instant(u64::from(number)), emergency: emergency(number) };
+                assert_eq!(ring.pop(), Some(expected));
             }
             assert_eq!(ring.pop(), None);
             ring.push(Instant(9), &emergency(9));
@@ -178,8 +192,8 @@ mod tests {
                     let mut taken = Vec::new();
                     loop {
                         match ring.pop() {
-                            Some((_, Emergency { error_code: u16::MAX, .. })) => return taken,
-                            Some((at, kept)) => {
+                            Some(last) if last.emergency.error_code == u16::MAX => return taken,
+                            Some(ReceivedEmergency { at, emergency: kept }) => {
                                 assert_eq!((at, kept), (Instant(kept.error_code.into()), emergency(kept.error_code)));
                                 taken.push(kept.error_code);
                             }

@@ -4,12 +4,11 @@ use alloc::rc::Rc;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
-use ringcat_wire::mailbox::coe::Emergency;
 use ringcat_wire::sii::MailboxLayout;
 
 use super::conversation::Conversation;
 use super::counters::MailCounters;
-use super::emergencies::EmergencyRing;
+use super::emergencies::{EmergencyRing, ReceivedEmergency};
 use super::error::MailboxError;
 use super::lane::{Lane, LaneState};
 use super::shared::{Session, SharedMailbox};
@@ -17,7 +16,6 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::declared::Address;
 use crate::role::Function;
 use crate::supervisor::Bus;
-use crate::time::Instant;
 
 /// The handle to a SubDevice's mailbox and its router; copies are handles to the same mailbox. It stays valid while the
 /// SubDevice is absent: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
@@ -132,7 +130,7 @@ impl Mailbox {
     }
 
     /// Takes the oldest kept emergency, with the time at which it was read. Each emergency is also an event.
-    pub fn pop_emergency(&self) -> Option<(Instant, Emergency)> {
+    pub fn pop_emergency(&self) -> Option<ReceivedEmergency> {
         self.emergencies().pop()
     }
 

@@ -247,7 +247,7 @@ impl MainDevice {
             },
             cables: cables
                 .into_iter()
-                .map(|(cable, errors)| cable_snapshot(cable, [errors.invalid_frames, errors.lost_links]))
+                .map(|it| cable_snapshot(it.cable, [it.errors.invalid_frames, it.errors.lost_links]))
                 .collect(),
             clocks: self.clock_snapshots(),
             clocks_locked: self.clocks_locked(),

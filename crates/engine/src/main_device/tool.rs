@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::al::AlState;
 use ringcat_wire::frame::{ETHERNET_HEADER_LEN, ETHERTYPE, ETHERTYPE_VLAN, MAX_FRAME};
 
 use super::MainDevice;
@@ -10,7 +10,7 @@ use super::pending::Pending;
 use crate::declared::Address;
 use crate::procedures::services::ServiceError;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
-use crate::procedures::services::forced_state::{Acknowledge, force};
+use crate::procedures::services::forced_state::{Acknowledge, AlRegisters, force};
 use crate::procedures::services::port_report::{self, SubDevicePorts};
 use crate::role::Function;
 use crate::segment::{Addressed, UndeclaredObservation};
@@ -45,7 +45,7 @@ impl MainDevice {
         subdevice: impl Into<Address>,
         state: AlState,
         acknowledge: Acknowledge,
-    ) -> Pending<Result<(AlStatus, AlStatusCode), ServiceError>> {
+    ) -> Pending<Result<AlRegisters, ServiceError>> {
         let subdevice = subdevice.into();
         if let (Ok(()), Ok(Addressed::Undeclared(key))) = (self.permit(Function::ForcedState), self.find(subdevice)) {
             self.segment.observe_undeclared(UndeclaredObservation::Forced(key));

@@ -10,7 +10,7 @@ use ringcat_wire::register::{DlStatus, ErrorCounters, Information, map};
 use super::scan::{ScanError, explain};
 use crate::link::LinkSet;
 use crate::ring::RingState;
-use crate::ring_status::{Cable, CableErrors, LinkCounts, cables, port_errors};
+use crate::ring_status::{Cable, CableReport, LinkCounts, cables, port_errors};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{NodeStatus, PortOf, Topology, ends_of_earlier_break};
 
@@ -32,7 +32,7 @@ pub struct RingInspection {
     pub counters: Vec<ErrorCounters>,
     /// Every cable with the error counts of the ports at its ends since the counters were cleared. The counters
     /// saturate at 255.
-    pub cables: Vec<(Cable, CableErrors)>,
+    pub cables: Vec<CableReport>,
     /// The place of the break, if the ring is open.
     pub place: Option<Cable>,
 }
@@ -74,7 +74,8 @@ pub async fn inspect_ring(bus: Bus) -> Result<RingInspection, ScanError> {
         end.unwrap_or_default()
     };
     let cables = cables(&topology, bus.links());
-    let cables = cables.into_iter().map(|cable| (cable, errors(cable.near).plus(errors(cable.far)))).collect();
+    let report = |cable: Cable| CableReport { cable, errors: errors(cable.near).plus(errors(cable.far)) };
+    let cables = cables.into_iter().map(report).collect();
     Ok(RingInspection { state, counts, stations, states, topology, counters, cables, place })
 }
 

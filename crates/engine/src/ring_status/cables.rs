@@ -23,6 +23,23 @@ pub struct CableErrors {
     pub lost_links: u64,
 }
 
+/// A cable, and the errors counted at its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CableReport {
+    /// The cable.
+    pub cable: Cable,
+    /// Errors at both ends together.
+    pub errors: CableErrors,
+}
+
+impl CableReport {
+    /// A cable with its errors.
+    pub const fn new(cable: Cable, errors: CableErrors) -> CableReport {
+        CableReport { cable, errors }
+    }
+}
+
 impl CableErrors {
     /// All counters zero.
     pub const fn is_none(&self) -> bool {

@@ -4,13 +4,17 @@ use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 use std::time::{Duration, Instant};
 
-use crate::bench::{directory, tool_with};
+use crate::bench::{Bench, LONG, directory, tool_with};
+use crate::golden_bus::{WITH_SOE, segment};
+use crate::several::ring;
 use ethercat::commands::ALL;
 
-/// Runs of the tool as a library. There is no daemon at the default socket of a machine that runs tests.
+/// Runs of the tool as a library, with a socket in a directory of its own: a daemon of this machine is left alone.
 const RUNS: u64 = 20_000;
 /// Runs of the program.
 const PROGRAM_RUNS: u64 = 60;
+/// Runs of the program with a daemon that has two masters.
+const DAEMON_RUNS: u64 = 300;
 
 /// Numbers from a seed (SplitMix64).
 struct Numbers(u64);
@@ -97,7 +101,7 @@ fn no_arguments_make_the_tool_panic_or_last() {
     for run in 0..RUNS {
         let words = words(&mut numbers);
         let (mut output, mut errors) = (Vec::new(), Vec::new());
-        let is_good = ethercat::run(&words, &mut output, &mut errors);
+        let is_good = ethercat::run(&words, &nowhere.join("nothing"), &mut output, &mut errors);
         // Where no daemon is, only versions and help are right, and each failure says why.
         assert!(if is_good { !output.is_empty() } else { !errors.is_empty() }, "run {run}: {words:?}");
     }
@@ -109,4 +113,28 @@ fn no_arguments_make_the_tool_panic_or_last() {
     }
     assert!(begin.elapsed() < Duration::from_secs(120));
     std::fs::remove_dir(nowhere).expect("it is empty");
+}
+
+// covers: daemon
+#[test]
+fn no_arguments_beside_a_bus_make_the_tool_panic_or_last() {
+    let samples = directory();
+    let bench = Bench::start(vec![segment(&samples, WITH_SOE), ring(3, true)]);
+    let mut numbers = Numbers(2);
+    let mut good = 0;
+    for run in 0..DAEMON_RUNS {
+        let words: Vec<OsString> =
+            words(&mut numbers).into_iter().filter(|word| !word.as_encoded_bytes().contains(&0)).collect();
+        let begin = Instant::now();
+        let done = tool_with(&bench.socket, &words);
+        assert!(matches!(done.code, Some(0 | 1)) && !done.err.contains("panicked"), "run {run}: {words:?} {done:?}");
+        assert!(done.code == Some(0) || !done.err.is_empty(), "run {run}: {words:?} {done:?}");
+        assert!(begin.elapsed() < LONG, "run {run}: {words:?} {done:?}");
+        good += u32::from(done.code == Some(0));
+    }
+    // A fair part reaches the bus, and the daemon serves both masters as before.
+    assert!(good > 30, "{good} of {DAEMON_RUNS}");
+    let listed = bench.good(&["slaves"]);
+    assert_eq!(listed.lines().filter(|line| !line.starts_with("Master")).count(), 4 + 3, "{listed}");
+    std::fs::remove_dir_all(samples).expect("it is there");
 }

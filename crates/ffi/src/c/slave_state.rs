@@ -32,7 +32,7 @@ fn state_of(slave: &SlaveObject) -> Outcome<SlaveConfigState> {
     let position = master.look(|draft| draft.info(slave.index).map(|info| info.position))?;
     let Some(Position(position)) = position else { return Ok(pack(false, false, 0)) };
     let read = master.bus()?.supervisor().subdevice(Position(position)).state();
-    let al_state = read.ok().and_then(|(status, _)| status.al_state());
+    let al_state = read.ok().and_then(|it| it.status.al_state());
     Ok(pack(al_state.is_some(), false, al_state.map_or(0, |state| state.code())))
 }
 
@@ -54,9 +54,9 @@ unsafe extern "C" fn ecrt_slave_config_emerg_pop(sc: *mut ec_slave_config_t, tar
         if target.is_null() {
             return Err(Code::FAULT);
         }
-        let (_, emergency) = slave.emergencies(|ring| ring.pop())?.ok_or(Code::NOT_FOUND)?;
+        let received = slave.emergencies(|ring| ring.pop())?.ok_or(Code::NOT_FOUND)?;
         // SAFETY: eight bytes of C (ecrt.h).
-        unsafe { put(target.cast::<[u8; EMERGENCY_BYTES]>(), emergency.encode()) }
+        unsafe { put(target.cast::<[u8; EMERGENCY_BYTES]>(), received.emergency.encode()) }
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(sc, pop) }

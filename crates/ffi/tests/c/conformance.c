@@ -262,11 +262,33 @@ static void bad_arguments(ec_master_t *master)
     POINTER(ecrt_request_master, (0));
 }
 
+/* From the activation to the end of the application. */
+static void while_active(struct handles *h)
+{
+    uint32_t time;
+    int rounds;
+
+    CODE(ecrt_master_activate, (h->master));
+    phase = "active";
+    CODE(ecrt_master_activate, (h->master));
+    /* The reference clock is read once the clocks are set up. */
+    for (rounds = 0; rounds < 300 && ecrt_master_reference_clock_time(h->master, &time); rounds++)
+        cycles(h, 100);
+    of_domain(h);
+    of_master(h->master);
+    of_slave(h);
+    of_requests(h);
+    starts(h);
+    cycles(h, 1500);
+    writes(h);
+    cycles(h, 1500);
+    direct_read(h);
+    CODE(ecrt_master_deactivate, (h->master));
+}
+
 int main(void)
 {
     struct handles h = {NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    uint32_t time;
-    int rounds;
 
     phase = "any";
     CODE(ecrt_version_magic, ());
@@ -297,22 +319,7 @@ int main(void)
         || ecrt_slave_config_reg_pdo_entry(h.sc, 0x6040, 0, h.domain, NULL) < 0)
         return 1;
     phase = "requested";
-    CODE(ecrt_master_activate, (h.master));
-    phase = "active";
-    CODE(ecrt_master_activate, (h.master));
-    /* The reference clock is read once the clocks are set up. */
-    for (rounds = 0; rounds < 300 && ecrt_master_reference_clock_time(h.master, &time); rounds++)
-        cycles(&h, 100);
-    of_domain(&h);
-    of_master(h.master);
-    of_slave(&h);
-    of_requests(&h);
-    starts(&h);
-    cycles(&h, 1500);
-    writes(&h);
-    cycles(&h, 1500);
-    direct_read(&h);
-    CODE(ecrt_master_deactivate, (h.master));
+    while_active(&h);
     phase = "deactivated";
     of_master(h.master);
     of_slave(&h);

@@ -100,11 +100,9 @@ static int blocking_transfers(void)
 #define AWAIT(state, handle) \
     do { int rounds = 3000; while (state(handle) == EC_REQUEST_BUSY && rounds--) cycle(); } while (0)
 
-static int requests(ec_sdo_request_t *sdo, ec_reg_request_t *reg, ec_soe_request_t *soe, ec_voe_handler_t *voe)
+static int objects(ec_sdo_request_t *sdo)
 {
     uint8_t *data = ecrt_sdo_request_data(sdo);
-    uint32_t vendor;
-    uint16_t type;
 
     CHECK(ecrt_sdo_request_state(sdo) == EC_REQUEST_UNUSED && ecrt_sdo_request_data_size(sdo) == 4);
     CHECK(ecrt_sdo_request_timeout(sdo, 500) == 0 && ecrt_sdo_request_read(sdo) == 0);
@@ -123,7 +121,11 @@ static int requests(ec_sdo_request_t *sdo, ec_reg_request_t *reg, ec_soe_request
     CHECK(ecrt_sdo_request_index(sdo, 0x1018, 9) == 0 && ecrt_sdo_request_read(sdo) == 0);
     AWAIT(ecrt_sdo_request_state, sdo);
     CHECK(ecrt_sdo_request_state(sdo) == EC_REQUEST_ERROR);
+    return 0;
+}
 
+static int registers(ec_reg_request_t *reg)
+{
     /* AL status. */
     CHECK(ecrt_reg_request_read(reg, 0x0130, 2) == 0);
     AWAIT(ecrt_reg_request_state, reg);
@@ -138,7 +140,15 @@ static int requests(ec_sdo_request_t *sdo, ec_reg_request_t *reg, ec_soe_request
     AWAIT(ecrt_reg_request_state, reg);
     CHECK(ecrt_reg_request_state(reg) == EC_REQUEST_SUCCESS);
     CHECK(EC_READ_U16(ecrt_reg_request_data(reg)) == 0x0102);
+    return 0;
+}
 
+static int requests(ec_sdo_request_t *sdo, ec_reg_request_t *reg, ec_soe_request_t *soe, ec_voe_handler_t *voe)
+{
+    uint32_t vendor;
+    uint16_t type;
+
+    CHECK(objects(sdo) == 0 && registers(reg) == 0);
     CHECK(ecrt_soe_request_timeout(soe, 500) == 0 && ecrt_soe_request_read(soe) == 0);
     AWAIT(ecrt_soe_request_state, soe);
     CHECK(ecrt_soe_request_state(soe) == EC_REQUEST_SUCCESS && ecrt_soe_request_data_size(soe) == 2);

@@ -57,7 +57,7 @@ impl OwnedBus {
     pub fn activate(&mut self, declaration: Declaration) -> Result<Application<DaemonLinks, SupervisorThread>, Error> {
         let links = self.take_links().ok_or(Error::Gone)?;
         self.supervisor().clone().activate(declaration, links).map_err(|refused| {
-            let (_, links) = refused.main_device;
+            let links = refused.main_device.links;
             self.give_links_back(links);
             refused.error
         })

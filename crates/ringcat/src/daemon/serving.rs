@@ -45,7 +45,7 @@ pub fn answer(supervisor: &SupervisorThread, ask: Ask, bytes: Vec<u8>) -> Result
         Ask::Events { from } => events(supervisor, from).map(|events| (events, Vec::new())),
         Ask::AlStatus { position } => subdevice(position)
             .state()
-            .map(|(status, code)| (Answer::AlStatus { status: status.bits(), code: code.0 }, Vec::new())),
+            .map(|it| (Answer::AlStatus { status: it.status.bits(), code: it.code.0 }, Vec::new())),
         Ask::SdoUpload { position, index, sub_index } => match sub_index {
             Some(sub_index) => subdevice(position).sdo_read::<Vec<u8>>(index, sub_index),
             None => subdevice(position).sdo_read_complete(index),

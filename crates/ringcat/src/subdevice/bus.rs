@@ -1,11 +1,11 @@
 //! Services without a mailbox: states, registers, ports, the EEPROM, error counters.
 
-use ringcat_engine::Acknowledge;
 use ringcat_engine::BlockedPort;
 use ringcat_engine::SiiWritten;
 use ringcat_engine::Statistics;
 use ringcat_engine::Urgency;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::{Acknowledge, AlRegisters};
 use ringcat_engine::{EepromAssignment, EepromOwnership};
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
@@ -31,13 +31,14 @@ impl<S: Services> SubDevice<S> {
 
     /// Reads its AL status and AL status code (registers 0x0130 and 0x0134) now. After a refused state, or a change of
     /// state by itself, the error flag is set and the code gives the reason.
-    pub fn state(self) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
+    pub fn state(self) -> S::Outcome<AlRegisters, SubDeviceError> {
         self.ask(move |engine, subdevice| {
             let read = engine.start_register_read(subdevice, map::AL_STATUS, STATUS_BYTES);
             async move {
                 let bytes = read.ended().await?;
                 let word = |at: usize| [bytes.get(at), bytes.get(at + 1)].map(|byte| byte.copied().unwrap_or(0));
-                Ok::<_, SubDeviceFailure>((AlStatus::decode(&word(0)), AlStatusCode::decode(&word(4))))
+                let registers = AlRegisters::new(AlStatus::decode(&word(0)), AlStatusCode::decode(&word(4)));
+                Ok::<_, SubDeviceFailure>(registers)
             }
         })
     }
@@ -92,11 +93,7 @@ impl<S: Services> SubDevice<S> {
     /// # Danger
     /// Outputs may switch, and the SubDevice may reach OP with a configuration that nothing has checked: for tests and
     /// maintenance of a machine that is secured.
-    pub fn force_state(
-        self,
-        state: AlState,
-        acknowledge: Acknowledge,
-    ) -> S::Outcome<(AlStatus, AlStatusCode), SubDeviceError> {
+    pub fn force_state(self, state: AlState, acknowledge: Acknowledge) -> S::Outcome<AlRegisters, SubDeviceError> {
         let subdevice = self.address;
         self.ask(move |engine, _| engine.start_forced_state(subdevice, state, acknowledge).ended())
     }

@@ -10,6 +10,8 @@ use ringcat_engine::mail::MailboxError;
 use ringcat_engine::mail::aoe::AoeError;
 use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::mail::coe::information::InformationError;
+use ringcat_engine::mail::coe::pdo_mail::PdoMailError;
+use ringcat_engine::mail::eoe::EoeError;
 use ringcat_engine::mail::foe::FoeError;
 use ringcat_engine::mail::soe::SoeError;
 
@@ -71,7 +73,11 @@ pub enum SubDeviceFailure {
     Soe(SoeError),
     /// An ADS request failed.
     Aoe(AoeError),
-    /// A message of a vendor failed.
+    /// A PDO by mailbox failed.
+    Pdo(PdoMailError),
+    /// IP parameters or an address filter were not read or set.
+    Eoe(EoeError),
+    /// A message of a vendor, or one that the application has composed, failed.
     Mailbox(MailboxError),
     /// A state was not reached.
     State(ConfigureError),
@@ -111,6 +117,8 @@ impl fmt::Display for SubDeviceFailure {
             SubDeviceFailure::Foe(error) => error.fmt(f),
             SubDeviceFailure::Soe(error) => error.fmt(f),
             SubDeviceFailure::Aoe(error) => error.fmt(f),
+            SubDeviceFailure::Pdo(error) => error.fmt(f),
+            SubDeviceFailure::Eoe(error) => error.fmt(f),
             SubDeviceFailure::Mailbox(error) => error.fmt(f),
             SubDeviceFailure::State(error) => error.fmt(f),
             SubDeviceFailure::Service(error) => error.fmt(f),
@@ -132,6 +140,8 @@ impl StdError for SubDeviceFailure {
             SubDeviceFailure::Foe(error) => Some(error),
             SubDeviceFailure::Soe(error) => Some(error),
             SubDeviceFailure::Aoe(error) => Some(error),
+            SubDeviceFailure::Pdo(error) => Some(error),
+            SubDeviceFailure::Eoe(error) => Some(error),
             SubDeviceFailure::Mailbox(error) => Some(error),
             SubDeviceFailure::State(error) => Some(error),
             SubDeviceFailure::Service(error) => Some(error),
@@ -156,6 +166,8 @@ failures! {
     Foe(FoeError),
     Soe(SoeError),
     Aoe(AoeError),
+    Pdo(PdoMailError),
+    Eoe(EoeError),
     Mailbox(MailboxError),
     State(ConfigureError),
     Service(ServiceError),

@@ -2,7 +2,7 @@
 
 use ringcat_engine::mail::Limits;
 use ringcat_engine::mail::foe::{self, FoeOptions, FoeProgress};
-use ringcat_engine::mail::stream::{Bounded, Bytes};
+use ringcat_engine::mail::stream::{Bounded, Bytes, Sink, Source};
 
 use super::{SubDevice, SubDeviceError};
 use crate::services::Services;
@@ -28,6 +28,37 @@ impl<S: Services> SubDevice<S> {
             foe::read(&mailbox, &file, options, &mut sink, progress).await?;
             Ok::<_, foe::FoeError>(sink.into_bytes())
         })
+    }
+
+    /// Reads a file of any size into `sink`, packet by packet, and returns the sink. It is called in the thread of the
+    /// acyclic half.
+    pub fn foe_read_into<K: Sink + Send + 'static>(
+        self,
+        file: impl Into<String>,
+        mut sink: K,
+        options: FoeOptions,
+        progress: impl FnMut(FoeProgress) + Send + 'static,
+    ) -> S::Outcome<K, SubDeviceError> {
+        let file = file.into();
+        self.ask_mailbox(move |mailbox| async move {
+            foe::read(&mailbox, &file, options, &mut sink, progress).await?;
+            Ok::<_, foe::FoeError>(sink)
+        })
+    }
+
+    /// Writes a file of any size from `source`, packet by packet; the result is its size in bytes. It is called in the
+    /// thread of the acyclic half.
+    pub fn foe_write_from(
+        self,
+        file: impl Into<String>,
+        mut source: impl Source + Send + 'static,
+        options: FoeOptions,
+        progress: impl FnMut(FoeProgress) + Send + 'static,
+    ) -> S::Outcome<u64, SubDeviceError> {
+        let file = file.into();
+        self.ask_mailbox(
+            move |mailbox| async move { foe::write(&mailbox, &file, options, &mut source, progress).await },
+        )
     }
 
     /// Writes a file; the result is its size in bytes.

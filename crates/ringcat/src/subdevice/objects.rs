@@ -3,11 +3,24 @@
 use ringcat_engine::mail::coe::history::{self, History};
 use ringcat_engine::mail::coe::information::{self, Entry as ObjectEntry, Object};
 use ringcat_engine::mail::coe::{self, SdoAddress};
+use ringcat_engine::mail::stream::{Sink, Source};
 use ringcat_wire::mailbox::coe::{ListType, ValueInfo};
 
 use super::{SubDevice, SubDeviceError, SubDeviceFailure};
 use crate::services::Services;
 use crate::value::ObjectValue;
+
+/// Numbers of objects in the lists of a SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ListLengths([u16; ListType::LISTS.len()]);
+
+impl ListLengths {
+    /// Number of objects in a list; `None` for a list that has no length.
+    pub fn of(&self, list: ListType) -> Option<u16> {
+        let at = ListType::LISTS.iter().position(|other| *other == list)?;
+        Some(self.0[at])
+    }
+}
 
 impl<S: Services> SubDevice<S> {
     /// Reads one entry of an object: a number of exactly its size, bytes, or text.
@@ -50,6 +63,31 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { coe::write(&mailbox, object, &data, limits).await })
     }
 
+    /// Reads an object of any size into `sink`, piece by piece, and returns the sink. It is called in the thread of the
+    /// acyclic half.
+    pub fn sdo_read_into<K: Sink + Send + 'static>(
+        self,
+        object: SdoAddress,
+        mut sink: K,
+    ) -> S::Outcome<K, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move {
+            coe::upload(&mailbox, object, limits, &mut sink).await?;
+            Ok::<_, coe::SdoError>(sink)
+        })
+    }
+
+    /// Writes an object of any size from `source`, piece by piece. It is called in the thread of the acyclic half, and
+    /// has to know its length.
+    pub fn sdo_write_from(
+        self,
+        object: SdoAddress,
+        mut source: impl Source + Send + 'static,
+    ) -> S::Outcome<(), SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { coe::download(&mailbox, object, limits, &mut source).await })
+    }
+
     /// Indices of all objects that the SubDevice has (SDO information).
     pub fn sdo_info(self) -> S::Outcome<Vec<u16>, SubDeviceError> {
         self.sdo_list(ListType::All)
@@ -59,6 +97,12 @@ impl<S: Services> SubDevice<S> {
     pub fn sdo_list(self, list: ListType) -> S::Outcome<Vec<u16>, SubDeviceError> {
         let limits = self.limits.of_message();
         self.ask_mailbox(move |mailbox| async move { information::list(&mailbox, list, limits).await })
+    }
+
+    /// Numbers of objects in the SubDevice's lists.
+    pub fn sdo_list_lengths(self) -> S::Outcome<ListLengths, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { information::lengths(&mailbox, limits).await.map(ListLengths) })
     }
 
     /// Reads the description of an object (SDO information): name, kind, largest subindex.

@@ -1,6 +1,6 @@
 //! SoE, AoE and VoE: IDNs of drives, ADS requests, messages of vendors.
 
-use ringcat_engine::mail::aoe::{self, AoeDeviceInfo, AoeRoute};
+use ringcat_engine::mail::aoe::{self, AoeDeviceInfo, AoeRoute, AoeStates};
 use ringcat_engine::mail::soe::command::{self, CommandState};
 use ringcat_engine::mail::soe::{self, SoeAddress};
 use ringcat_engine::mail::voe::{self, Voe};
@@ -43,6 +43,12 @@ impl<S: Services> SubDevice<S> {
         )
     }
 
+    /// Writes an element of an IDN other than its value, such as a limit that is not protected.
+    pub fn soe_write_elements(self, address: SoeAddress, data: Vec<u8>) -> S::Outcome<(), SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { soe::write(&mailbox, address, &data, limits).await })
+    }
+
     /// Starts the procedure command of an IDN.
     pub fn soe_command(self, drive: u8, idn: Idn) -> S::Outcome<(), SubDeviceError> {
         let limits = self.limits.of_message();
@@ -81,6 +87,33 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(
             move |mailbox| async move { aoe::write(&mailbox, route, (group, offset), &data, limits).await },
         )
+    }
+
+    /// Writes by ADS, then reads `length` bytes at most, in one request.
+    pub fn aoe_read_write(
+        self,
+        route: AoeRoute,
+        group: u32,
+        offset: u32,
+        data: Vec<u8>,
+        length: u32,
+    ) -> S::Outcome<Vec<u8>, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move {
+            aoe::read_write(&mailbox, route, (group, offset), length, &data, limits).await
+        })
+    }
+
+    /// The states of ADS and of an ADS device.
+    pub fn aoe_states(self, route: AoeRoute) -> S::Outcome<AoeStates, SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { aoe::read_state(&mailbox, route, limits).await })
+    }
+
+    /// Requests states of ADS and of an ADS device, with data in the device's own form.
+    pub fn aoe_set_states(self, route: AoeRoute, states: AoeStates, data: Vec<u8>) -> S::Outcome<(), SubDeviceError> {
+        let limits = self.limits.of_message();
+        self.ask_mailbox(move |mailbox| async move { aoe::write_control(&mailbox, route, states, &data, limits).await })
     }
 
     /// Name and version of an ADS device.

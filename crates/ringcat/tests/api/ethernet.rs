@@ -126,7 +126,7 @@ fn each_eoe_subdevice_has_an_interface_by_position_or_alias_until_the_stop() -> 
     assert_eq!(events[0], EthernetEvent::Made { name: "eoe3s1".to_owned(), subdevice: SubDeviceId(1).into() });
     assert!(events.iter().any(|events| events.to_string() == "eoe3a1000: frames can pass"), "{events:?}");
     cycles.supervisor().all_settled();
-    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
     wait("the interfaces go", || cables.iter().all(|cable| Arc::strong_count(cable) == 1));
     drop(supervisor);
     Ok(())
@@ -171,7 +171,7 @@ fn interfaces_of_idle_operation_stay_while_an_application_begins() -> Result<(),
         interfaces.get(at).is_some_and(|interface| interface.subdevice.subdevice == SubDeviceId(at + 1).into())
     };
     wait("they lead to declared SubDevices", || declared(0) && declared(1));
-    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
     drop(supervisor);
     Ok(())
 }

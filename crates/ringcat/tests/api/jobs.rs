@@ -140,7 +140,7 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
     let endless = supervisor.start_job(|_| std::future::pending::<()>());
     let mut open = supervisor.start_job(|_| std::future::pending::<()>());
     assert!(open.wait_for(Duration::from_millis(20)).is_none(), "it goes on");
-    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
     assert!(matches!(endless.wait(), Err(Error::Gone)));
     assert!(matches!(block_on(open), Err(Error::Gone)));
     // Beside a thread that goes on, a result that is not wanted any more is no obstacle.

@@ -6,6 +6,7 @@ mod ethernet;
 mod gateway;
 mod jobs;
 mod junctions;
+mod mailbox;
 mod names;
 mod process_data;
 mod protocols;

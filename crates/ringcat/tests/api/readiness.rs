@@ -11,7 +11,7 @@ use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{
-    ActivateError, AlState, Declaration, Error, Event, LastOutputs, MainDevice, Options, Reason, Refused,
+    ActivateError, AlState, Declaration, Ended, Error, Event, LastOutputs, MainDevice, Options, Reason, Refused,
     SubDeviceConfig, SubDeviceId, SupervisorThread,
 };
 
@@ -69,7 +69,7 @@ fn another_thread_waits_for_op_with_a_limit() -> Result<(), Box<dyn StdError>> {
     let error = cycles.supervisor().wait_until_op(SHORT).expect_err("the drive cannot be configured");
     let text = error.to_string();
     assert!(text.contains("SubDevice 1") && !text.contains("SubDevice 0"), "{text}");
-    let (supervisor, cyclic) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let Ended { supervisor, links: cyclic, .. } = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     supervisor.scan()?;
     let mut good = declaration();
     good.subdevices[1].startup.clear();

@@ -78,7 +78,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let error = speaker.sdo_read::<u32>(0x7777, 0).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000"), "{error}");
     assert_eq!(file_there_and_back(&handle)?, vec![7; 3000]);
-    let (supervisor, _) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
     let gone = supervisor.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7).expect_err("nothing is active");
     assert!(gone.to_string().contains("no declaration is active"), "{gone}");
     Ok(())

@@ -99,8 +99,8 @@ fn objects_files_idns_and_registers_before_activation_by_position() -> Result<()
     main_device.subdevice(Position(0)).register_write(USER_RAM, 0xBEEFu16)?;
     assert_eq!(main_device.subdevice(Position(0)).register_read::<u16>(USER_RAM)?, 0xBEEF);
     assert_eq!(main_device.subdevice(Position(0)).port(0)?, LoopControl::Auto);
-    let (status, _) = main_device.subdevice(SPEAKER).state()?;
-    assert_eq!(status.al_state(), Some(AlState::PreOp), "its mailbox was used");
+    let registers = main_device.subdevice(SPEAKER).state()?;
+    assert_eq!(registers.status.al_state(), Some(AlState::PreOp), "its mailbox was used");
     Ok(())
 }
 
@@ -185,7 +185,7 @@ fn any_thread_uses_a_subdevice_while_cycles_run() -> Result<(), Box<dyn StdError
     assert_eq!(values, [0x0C47, 0x0002_0192]);
     let drive = cycles.supervisor().subdevice(drive);
     drive.request_state(AlState::PreOp)?;
-    assert_eq!(drive.state()?.0.al_state(), Some(AlState::PreOp));
+    assert_eq!(drive.state()?.status.al_state(), Some(AlState::PreOp));
     drive.request_state(AlState::Op)?;
     cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     Ok(())

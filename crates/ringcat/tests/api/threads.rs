@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
-    CycleJob, Direction, DomainId, Error, FramesIn, JobProbe, LastOutputs, Link, Links, MainDeviceRole, NoSnapshot,
-    Options, Position, SubDeviceId, SupervisorThread, automatic,
+    CycleJob, Direction, DomainId, Ended, Error, FramesIn, JobProbe, LastOutputs, Link, Links, MainDeviceRole,
+    NoSnapshot, Options, Position, SubDeviceId, SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -66,7 +66,7 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     assert!(cycles.cyclic_status().pace().cycles > 0 && cycles.cyclic_status().counters().sent > 0);
     assert!(cycles.cyclic_status().round_trips().count() > 0);
 
-    let (supervisor, links) = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
+    let Ended { supervisor, links, .. } = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?;
     plant.with_network(|network| {
         assert!(network.devices().all(|device| device.al_status() == AlStatus::new(AlState::Init)));
         assert!(outputs(network).iter().flatten().all(|byte| *byte == 0));
@@ -202,7 +202,7 @@ fn a_refused_declaration_leaves_both_parts_for_another_try() -> Result<(), Error
     wrong.domains[0].members[0].subdevice = SubDeviceId(99);
     let refused = supervisor.activate(wrong, cyclic).expect_err("there is no SubDevice 99");
     assert!(refused.error.to_string().starts_with("activation: "), "{}", refused.error);
-    let (supervisor, cyclic) = refused.main_device;
+    let Ended { supervisor, links: cyclic, .. } = refused.main_device;
     assert!(supervisor.activate(good, cyclic).is_ok());
     Ok(())
 }
@@ -355,7 +355,7 @@ fn two_threads_deactivate_and_activate_another_declaration() -> Result<(), Error
         let op = AlStatus::new(AlState::Op);
         let in_op = plant.with_network(|network| network.devices().filter(|it| it.al_status() == op).count());
         assert_eq!(in_op, round + 1);
-        (supervisor, cyclic) = cycles.end()?.deactivate(LastOutputs::Zero, LIMIT)?;
+        Ended { supervisor, links: cyclic, .. } = cycles.end()?.deactivate(LastOutputs::Zero, LIMIT)?;
         assert!(all_in_preop());
         assert!(supervisor.subdevice(Position(2)).sdo_read::<u32>(0x1018, 1)? > 0);
     }

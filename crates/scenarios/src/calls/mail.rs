@@ -88,7 +88,7 @@ impl Ecrt {
     /// # Errors
     /// [`Errno::NoEnt`]: empty.
     pub fn emerg_pop(ring: &EmergencyRing) -> Result<u16, Errno> {
-        ring.pop().map(|(_, emergency)| emergency.error_code).ok_or(Errno::NoEnt)
+        ring.pop().map(|received| received.emergency.error_code).ok_or(Errno::NoEnt)
     }
 
     /// The emergencies of the SubDevice at a position.

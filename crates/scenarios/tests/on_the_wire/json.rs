@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::process::{Child, Command, Output};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -111,6 +112,29 @@ fn the_simulator_and_onlookers_print_the_documented_keys() {
     interrupt(&echo);
     let echo = result(&page, "bench echo", &finish(echo));
     assert!(echo["frames_answered"].as_u64() >= Some(400), "{echo}");
+}
+
+// covers: json, standby
+#[test]
+fn a_standby_prints_the_documented_keys() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    bench.add_second_main_device();
+    bench.simulate(&RING_OF_6.segment(), true);
+    let arguments = ["standby", "--main", "second0", "--redundant", "main1", "--json"];
+    let standby = bench.start_other_ringcat(&arguments);
+    // The ACTIVE sees all SubDevices on its main link only if the INACTIVE forwards.
+    let until = Instant::now() + Duration::from_secs(5);
+    loop {
+        let scan = bench.ringcat(&["scan", "--main", "main0", "--redundant", "active1", "--json"]);
+        let scan: Value = serde_json::from_str(said(&scan).0.lines().last().expect("a line")).expect("JSON");
+        if scan["main_subdevices"] == RING_OF_6.count() {
+            break;
+        }
+        assert!(Instant::now() < until, "{scan}");
+    }
+    interrupt(&standby);
+    let standby = result(&Page::read(), "standby", &finish(standby));
+    assert!(standby["forwarded_on_redundant_frames"].as_u64() > Some(10), "{standby}");
 }
 
 // covers: json

@@ -100,9 +100,9 @@ fn a_segment_is_scanned_without_a_call_and_all_are_in_preop_with_mailboxes() {
         assert_eq!(main_device.subdevices().len(), MIXED.len());
         assert_eq!(Services::phase(&mut main_device), MainDevicePhase::Idle);
         for servo in [0, 3] {
-            assert!(main_device.mailbox(Position(servo)).expect("it has one").is_open());
+            assert!(main_device.engine().mailbox(Position(servo)).expect("it has one").is_open());
             let servo = main_device.subdevice(Position(servo));
-            assert_eq!(servo.state().expect("it answers").0, PREOP);
+            assert_eq!(servo.state().expect("it answers").status, PREOP);
             let servo = main_device.subdevice(Position(3));
             assert!(servo.sdo_read::<u32>(0x1018, 1).expect("it answers") > 0);
         }
@@ -351,7 +351,7 @@ fn a_subdevice_that_comes_while_others_are_in_op_is_brought_to_preop() {
             cycles(&mut application, 1_500);
             assert_eq!(application.links().network().device(DeviceIndex(5)).al_status(), PREOP);
             let read = ringcat::SubDevice::new(&mut application, Position(5)).state();
-            assert_eq!(application.cycle_until(read, LIMIT, |_| ()).expect("it answers").0, PREOP);
+            assert_eq!(application.cycle_until(read, LIMIT, |_| ()).expect("it answers").status, PREOP);
             application.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(5)));
             cycles(&mut application, 1_500);
         }

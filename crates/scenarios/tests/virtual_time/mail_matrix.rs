@@ -126,7 +126,7 @@ fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
                 Trouble::Mail(MailFault::RepeatAnswers { .. }) => assert!(after.duplicates > before.duplicates),
                 Trouble::Mail(MailFault::EmergencyBefore { .. }) => {
                     let kept = std::iter::from_fn(|| mailbox.pop_emergency());
-                    assert!(kept.filter(|(_, emergency)| emergency.error_code == 0x8130).count() > 0, "{kind:?}");
+                    assert!(kept.filter(|received| received.emergency.error_code == 0x8130).count() > 0, "{kind:?}");
                 }
                 Trouble::Mail(_) => {}
             }

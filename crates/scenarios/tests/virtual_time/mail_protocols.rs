@@ -289,7 +289,7 @@ fn emergencies_are_events_and_kept_with_the_mailbox() {
     });
     let told: Vec<u16> = told.collect();
     assert_eq!(told, (1..=10).collect::<Vec<_>>());
-    let kept: Vec<_> = std::iter::from_fn(|| mailbox.pop_emergency()).map(|(_, kept)| kept).collect();
+    let kept: Vec<_> = std::iter::from_fn(|| mailbox.pop_emergency()).map(|received| received.emergency).collect();
     assert_eq!(kept, (1..=10).map(emergency).collect::<Vec<_>>());
     assert_eq!(mailbox.emergencies().overruns(), 0);
 }

@@ -104,7 +104,7 @@ fn firmware_is_written_in_boot_and_the_new_version_is_reported() {
     assert_eq!(version(&mut main_device), b"1.0");
     main_device.subdevice(Position(1)).request_state(AlState::Boot).expect("it has a boot loader");
     let image = firmware::image("2.7", &[0x5A; 20_000]);
-    let mailbox = main_device.mailbox(Position(1)).expect("it was visited");
+    let mailbox = main_device.engine().mailbox(Position(1)).expect("it was visited");
     let written = main_device.run(async move {
         foe::write(&mailbox, "firmware.bin", FoeOptions::default(), &mut Bytes::new(&image), |_| ()).await
     });

@@ -196,7 +196,7 @@ fn the_application_chooses_how_many_emergencies_of_a_subdevice_are_kept() {
     let mut world = world(4);
     let mark = world.mark();
     let codes = |ring: &ringcat::EmergencyRing| -> Vec<u16> {
-        std::iter::from_fn(|| ring.pop()).map(|(_, emergency)| emergency.error_code).collect()
+        std::iter::from_fn(|| ring.pop()).map(|received| received.emergency.error_code).collect()
     };
     let before = world.application_mut().subdevice(SubDeviceId(ALL)).emergencies();
     send_emergency(&mut world, ALL, 1);
@@ -234,7 +234,7 @@ fn emergencies_are_kept_by_position_and_wait_in_an_undeclared_subdevice() {
     };
     post(&mut main_device, 1);
     main_device.subdevice(position).sdo_read::<u32>(0x1000, 0).expect("a device type");
-    assert_eq!(by_position.pop().map(|(_, kept)| kept), Some(emergency(1)));
+    assert_eq!(by_position.pop().map(|received| received.emergency), Some(emergency(1)));
     // Declared without it: its mailbox is closed, so it cannot send.
     declaration.subdevices.truncate(ALL);
     declaration.domains.iter_mut().for_each(|domain| domain.members.retain(|member| member.subdevice.0 < ALL));

@@ -108,7 +108,7 @@ fn a_former_pdo_assignment_is_restored_after_a_loss_of_power() {
     let mut main_device = MainDevice::request(links, &options);
     main_device.scan().expect("a scan");
     main_device.subdevice(Position(ODD as u16)).request_state(AlState::PreOp).expect("it goes there");
-    let mailbox = main_device.mailbox(Position(ODD as u16)).expect("it was visited");
+    let mailbox = main_device.engine().mailbox(Position(ODD as u16)).expect("it was visited");
     // The compact PDOs, without status.
     let compact: Vec<PdoMapping> = (0..4).map(|channel| PdoMapping::from_sii(0x1A01 + 2 * channel)).collect();
     let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
@@ -184,7 +184,11 @@ fn mailboxes_on_other_sync_managers_work_as_in_the_sii() {
         let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
         assert!(world.network_mut().device_mut(DeviceIndex(ODD)).application.emergency(&emergency));
         world.run_cycles(50);
-        assert_eq!(mailbox.pop_emergency().map(|(_, kept)| kept), Some(emergency), "shows mail: {shows_mail}");
+        assert_eq!(
+            mailbox.pop_emergency().map(|received| received.emergency),
+            Some(emergency),
+            "shows mail: {shows_mail}"
+        );
         world.power_off(DeviceIndex(ODD));
         world.run_cycles(20);
         world.power_on(DeviceIndex(ODD));

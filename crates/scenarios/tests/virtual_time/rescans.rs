@@ -145,9 +145,9 @@ fn a_rescan_of_a_changing_ring_ends_in_time_with_right_places() {
 /// Cables with damaged frames: positions of the ends and counts.
 fn damaged(world: &World) -> Vec<(Option<usize>, Option<usize>, u64)> {
     let counted = world.application().engine().cable_errors();
-    let damaged = counted.iter().filter(|(_, errors)| errors.invalid_frames > 0);
+    let damaged = counted.iter().filter(|it| it.errors.invalid_frames > 0);
     let node = |end: Option<PortOf>| end.map(|end| usize::from(end.position().0));
-    damaged.map(|(cable, errors)| (node(cable.near), node(cable.far), errors.invalid_frames)).collect()
+    damaged.map(|it| (node(it.cable.near), node(it.cable.far), it.errors.invalid_frames)).collect()
 }
 
 fn place(world: &World) -> Option<(Option<usize>, Option<usize>)> {

@@ -107,7 +107,7 @@ fn a_rescan_in_idle_disturbs_no_subdevice_and_no_transfer() {
     for network in networks() {
         let (mut main_device, frames) = idle(network);
         let (before, infos) = (stations(&mut main_device), main_device.subdevices());
-        let mailbox = main_device.mailbox(TALKER).expect("it has one");
+        let mailbox = main_device.engine().mailbox(TALKER).expect("it has one");
         let written = mailbox.counters().written;
         frames.take();
         for round in 0..3 {

@@ -333,15 +333,15 @@ fn bursts_of_corrupt_frames_are_no_break_and_are_reported_by_cable() {
         assert!(errors.invalid_frames >= 3 && errors.lost_links == 0);
     }
     let counted = world.application().engine().cable_errors();
-    let at: Vec<u64> = counted.iter().map(|(_, errors)| errors.invalid_frames).collect();
+    let at: Vec<u64> = counted.iter().map(|it| it.errors.invalid_frames).collect();
     assert!(at[2] > 50 && at.iter().sum::<u64>() == at[2], "only that cable: {at:?}");
     // The same on a stub after a break elsewhere.
     world.cut(CableId(1));
     world.run_cycles(50);
-    let before = world.application().engine().cable_errors()[3].1.invalid_frames;
+    let before = world.application().engine().cable_errors()[3].errors.invalid_frames;
     world.corrupt(CableId(3), 20);
     world.run_cycles(2_200);
     let after = world.application().engine().cable_errors();
-    assert!(after[3].1.invalid_frames >= before + 20, "{after:?}");
-    assert_eq!(after[1].1.lost_links, 2, "both ends of the broken cable lost their link");
+    assert!(after[3].errors.invalid_frames >= before + 20, "{after:?}");
+    assert_eq!(after[1].errors.lost_links, 2, "both ends of the broken cable lost their link");
 }

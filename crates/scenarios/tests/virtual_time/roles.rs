@@ -342,7 +342,7 @@ fn role_inactive_sends_nothing_for_a_call_and_all_work_again_when_it_is_active()
         let sent = frames.take().into_iter().filter(|passed| passed.is_sent).count();
         assert_eq!(sent, 0, "{function:?}");
         Services::set_role(&mut main_device, MainDeviceRole::Active);
-        let states = main_device.subdevice(DRIVE).state().expect("it answers").0;
+        let states = main_device.subdevice(DRIVE).state().expect("it answers").status;
         assert_eq!(states, AlStatus::new(AlState::PreOp), "{function:?} has changed nothing");
         main_device.subdevice(DRIVE).sdo_read::<u32>(0x1018, 1).expect("it answers");
         main_device.attend(LIMIT);

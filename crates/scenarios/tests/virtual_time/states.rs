@@ -184,7 +184,7 @@ fn firmware_update_uses_the_boot_sync_managers_of_the_sii() {
         let emergency = Emergency { error_code: 0x8130, error_register: 1, data: [0; 5] };
         assert!(world.network_mut().device_mut(DeviceIndex(DRIVE)).application.emergency(&emergency));
         world.run_cycles(50);
-        assert_eq!(mailbox.pop_emergency().map(|(_, kept)| kept), Some(emergency), "own: {own}");
+        assert_eq!(mailbox.pop_emergency().map(|received| received.emergency), Some(emergency), "own: {own}");
     }
 }
 

@@ -116,8 +116,8 @@ fn a_forced_state_is_left_until_another_state_is_requested() {
             // OP without the states between is refused, and the error stays until it is acknowledged.
             let refused = force(&mut main_device, at, AlState::Op, Acknowledge::No);
             assert_eq!((refused.error, refused.al_state()), (true, Some(AlState::Init)), "{refused:?}");
-            let (shown, code) = main_device.subdevice(Position(at)).state().expect("it answers");
-            assert_eq!((shown, code), (refused, AlStatusCode(0x0011)));
+            let shown = main_device.subdevice(Position(at)).state().expect("it answers");
+            assert_eq!((shown.status, shown.code), (refused, AlStatusCode(0x0011)));
             assert_eq!(force(&mut main_device, at, AlState::PreOp, Acknowledge::No), refused, "at {at}");
             assert_eq!(force(&mut main_device, at, AlState::Init, Acknowledge::Yes), init);
             let others = (0..KINDS.len()).filter(|other| *other != usize::from(at));

@@ -145,6 +145,18 @@ struct Flight {
     complete: bool,
 }
 
+impl Flight {
+    /// Notes a copy that was received.
+    fn take(&mut self, bytes: &[u8]) {
+        self.taken += 1;
+        self.complete = match self.way {
+            Way::Closed | Way::Cut(0 | 3) => self.complete || bytes[LRD_WKC_AT] == 3,
+            Way::Cut(_) => self.taken == 2,
+            Way::Without(_) => false,
+        };
+    }
+}
+
 /// A copy on the wire: the number of its flight, the link of its arrival, the number of SubDevices that processed it.
 struct Copy {
     flight: usize,
@@ -169,18 +181,10 @@ proptest! {
                 }
                 let Copy { flight, link, bytes } = copies.swap_remove(pick % copies.len());
                 if ring.receive(link, &bytes) == Received::Taken {
-                    let number = flight;
-                    let flight = &mut flights[number];
-                    flight.taken += 1;
-                    flight.complete = match flight.way {
-                        Way::Closed => flight.complete || bytes[LRD_WKC_AT] == 3,
-                        Way::Cut(0 | 3) => flight.complete || bytes[LRD_WKC_AT] == 3,
-                        Way::Cut(_) => flight.taken == 2,
-                        Way::Without(_) => false,
-                    };
+                    flights[flight].take(&bytes);
                     for (subdevice, newest) in newest.iter_mut().enumerate() {
                         if bytes[PRESENCE_AT + subdevice] != 0 {
-                            *newest = (*newest).max(Some(number));
+                            *newest = (*newest).max(Some(flight));
                         }
                     }
                 }

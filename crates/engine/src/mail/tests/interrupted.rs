@@ -38,7 +38,7 @@ impl Bench {
     }
 
     fn codes(&self) -> Vec<u16> {
-        core::iter::from_fn(|| self.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code).collect()
+        core::iter::from_fn(|| self.mailbox.pop_emergency()).map(|received| received.emergency.error_code).collect()
     }
 }
 

@@ -17,7 +17,7 @@ use super::{Bench, Fate, LIMITS};
 use crate::config::{PdoEntry, PdoMapping};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::LinkSet;
-use crate::mail::aoe::{AoeError, AoeRoute};
+use crate::mail::aoe::{AoeError, AoeRoute, AoeStates};
 use crate::mail::coe::{SdoAddress, SdoFailure, information, pdo, read, write};
 use crate::mail::foe::{FoeFailure, FoeOptions, FoeProgress};
 use crate::mail::soe::{SoeAddress, SoeFailure};
@@ -151,7 +151,7 @@ fn an_emergency_between_request_and_response_is_kept_and_is_an_event() {
         bench.run(async move { read(&mailbox, SdoAddress::new(0x2000, 1), LIMITS, 4).await }),
         Ok(vec![1, 2, 3])
     );
-    assert_eq!(bench.mailbox.pop_emergency().map(|(_, emergency)| emergency), Some(emergency));
+    assert_eq!(bench.mailbox.pop_emergency().map(|received| received.emergency), Some(emergency));
     assert_eq!(bench.mailbox.pop_emergency(), None);
     let subdevice = Address::Declared(SubDeviceId(0));
     let expected = crate::event::Event::Emergency { subdevice, emergency };
@@ -268,8 +268,8 @@ fn ads_requests_are_answered_by_their_invoke_id() {
         aoe::write(&mailbox, route, (0xF302, 7), b"value", LIMITS).await.unwrap();
         assert_eq!(aoe::read(&mailbox, route, (0xF302, 7), 5, LIMITS).await.unwrap(), b"value");
         assert_eq!(aoe::read_write(&mailbox, route, (1, 2), 4, b"echo", LIMITS).await.unwrap(), b"echo");
-        assert_eq!(aoe::read_state(&mailbox, route, LIMITS).await, Ok((5, 8)));
-        aoe::write_control(&mailbox, route, (5, 0), &[], LIMITS).await.unwrap();
+        assert_eq!(aoe::read_state(&mailbox, route, LIMITS).await, Ok(AoeStates::new(5, 8)));
+        aoe::write_control(&mailbox, route, AoeStates::new(5, 0), &[], LIMITS).await.unwrap();
         let info = aoe::read_device_info(&mailbox, route, LIMITS).await.unwrap();
         assert_eq!((info.major, info.minor, info.build, info.name.as_str()), (3, 1, 77, "device"));
         let error = aoe::read(&mailbox, route, (1, 1), 5, LIMITS).await.unwrap_err();

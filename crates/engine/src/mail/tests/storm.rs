@@ -146,14 +146,16 @@ fn storm(seed: u64, links: LinkSet, percent: u64, drops: bool) {
             });
         }
         bench.step(|| fate(&mut random, percent, links));
-        emergencies
-            .extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+        emergencies.extend(
+            core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|received| received.emergency.error_code),
+        );
     }
     for _ in 0..10 {
         bench.mailbox.mail_available();
         bench.pass(Duration::from_millis(100));
-        emergencies
-            .extend(core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|(_, emergency)| emergency.error_code));
+        emergencies.extend(
+            core::iter::from_fn(|| bench.mailbox.pop_emergency()).map(|received| received.emergency.error_code),
+        );
     }
     emergencies.sort_unstable();
     let counters = bench.mailbox.counters();

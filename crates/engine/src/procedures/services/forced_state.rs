@@ -19,6 +19,23 @@ pub enum Acknowledge {
     Yes,
 }
 
+/// What a SubDevice shows in AL_STATUS and AL_STATUS_CODE.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AlRegisters {
+    /// Its state, and whether it shows an error.
+    pub status: AlStatus,
+    /// The reason of the error; of the last one where none is shown.
+    pub code: AlStatusCode,
+}
+
+impl AlRegisters {
+    /// These values.
+    pub const fn new(status: AlStatus, code: AlStatusCode) -> AlRegisters {
+        AlRegisters { status, code }
+    }
+}
+
 /// Writes AL control once, before all datagrams that wait, and reads what the SubDevice shows at once. A SubDevice may
 /// need longer for the change.
 pub(crate) async fn force(
@@ -26,11 +43,12 @@ pub(crate) async fn force(
     station: StationAddress,
     state: AlState,
     acknowledge: Acknowledge,
-) -> Result<(AlStatus, AlStatusCode), ServiceError> {
+) -> Result<AlRegisters, ServiceError> {
     let control = match acknowledge {
         Acknowledge::No => AlControl::new(state),
         Acknowledge::Yes => AlControl::with_acknowledge(state),
     };
     bus.fpwr_first(station, map::AL_CONTROL, &control.encode()).await?;
-    Ok(read_status(bus, station).await?)
+    let (status, code) = read_status(bus, station).await?;
+    Ok(AlRegisters { status, code })
 }

@@ -106,7 +106,7 @@ fn an_address_that_another_program_has_written_is_noticed_within_a_second() {
             assert_eq!(main_device.subdevices().len(), 4);
             events(&mut main_device);
             let servo = main_device.subdevice(Position(0));
-            assert_eq!(servo.state().expect("it answers").0.al_state(), Some(AlState::PreOp));
+            assert_eq!(servo.state().expect("it answers").status.al_state(), Some(AlState::PreOp));
         }
     }
 }

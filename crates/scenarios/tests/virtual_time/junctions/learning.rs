@@ -80,7 +80,7 @@ fn four_nested_rings_are_learned_closed_and_with_any_one_broken() {
 #[test]
 fn a_local_cable_broken_at_the_scan_is_listed_after_its_repair() {
     let cables = |world: &World| -> Vec<Cable> {
-        world.application().engine().cable_errors().into_iter().map(|(cable, _)| cable).collect()
+        world.application().engine().cable_errors().into_iter().map(|it| it.cable).collect()
     };
     let whole = cables(&in_op(60, one_ring(), (JunctionMode::Strict, &[STRICT])));
     for broken in [2, 3, 4] {

@@ -117,7 +117,7 @@ fn a_crash_in_boot_and_during_a_file_leaves_the_mailbox_usable() {
         let boot = former.engine_mut().start_state_request(Position(1), AlState::Boot);
         former.attend(Duration::from_micros(after_us / 2));
         drop(boot);
-        let mailbox = former.mailbox(Position(1)).expect("it has one");
+        let mailbox = former.engine().mailbox(Position(1)).expect("it has one");
         mailbox.bus().clone().spawn(async move {
             let mut source = ringcat_engine::mail::stream::Bytes::new(&[0x5A; 20_000]);
             let options = ringcat_engine::mail::foe::FoeOptions::default();

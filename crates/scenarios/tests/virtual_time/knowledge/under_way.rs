@@ -43,7 +43,7 @@ fn write_file(mailbox: Mailbox, name: &'static str) {
 }
 
 fn mailbox(main_device: &MainDevice<Tap>) -> Mailbox {
-    main_device.mailbox(DRIVE).expect("it has one")
+    main_device.engine().mailbox(DRIVE).expect("it has one")
 }
 
 /// Protocols whose conversations were cut, as reported.

@@ -1,9 +1,8 @@
-//! Mail that a SubDevice sends without a request: emergencies, vendor messages, notifications.
+//! Emergencies of a SubDevice.
 
-use ringcat_engine::mail::voe::{self, Voe};
-use ringcat_engine::mail::{EmergencyRing, Unclaimed, Unsolicited};
+use ringcat_engine::mail::EmergencyRing;
 
-use super::{SubDevice, SubDeviceError};
+use super::SubDevice;
 use crate::services::Services;
 
 impl<S: Services> SubDevice<S> {
@@ -16,8 +15,8 @@ impl<S: Services> SubDevice<S> {
     /// /// Prints the emergencies of a drive, of which the last 200 are kept.
     /// fn watch(supervisor: &SupervisorThread, drive: SubDeviceId) -> Result<(), Error> {
     ///     let emergencies = supervisor.subdevice(drive).create_emergency_ring(200)?;
-    ///     while let Some((at, emergency)) = emergencies.pop() {
-    ///         println!("{} ns: {:#06x}", at.0, emergency.error_code);
+    ///     while let Some(received) = emergencies.pop() {
+    ///         println!("{} ns: {:#06x}", received.at.0, received.emergency.error_code);
     ///     }
     ///     println!("{} more were not kept", emergencies.overruns());
     ///     Ok(())
@@ -33,20 +32,5 @@ impl<S: Services> SubDevice<S> {
     pub fn create_emergency_ring(self, size: usize) -> S::Immediate<EmergencyRing> {
         let address = self.address;
         self.services.immediately(move |engine| engine.create_emergency_ring(address, size))
-    }
-
-    /// Waits for a vendor message that the SubDevice sends without a request, or takes the oldest kept one. The time
-    /// limit is that of an answer, see [`SubDevice::limits`].
-    pub fn voe_receive(self) -> S::Outcome<Voe, SubDeviceError> {
-        let limit = self.limits.answer;
-        self.ask_mailbox(move |mailbox| async move { voe::receive(&mailbox, limit).await })
-    }
-
-    /// Takes the oldest kept mail of a kind that no request waited for: notifications of drives and ADS, vendor
-    /// messages, late answers, mail of unknown types. `None` if there is none. The SubDevice's mailbox keeps 32 of each
-    /// kind.
-    pub fn take_unsolicited(self, kind: Unsolicited) -> S::Immediate<Option<Unclaimed>> {
-        let address = self.address;
-        self.services.immediately(move |engine| engine.mailbox(address)?.pop_unsolicited(kind))
     }
 }
