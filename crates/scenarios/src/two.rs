@@ -9,9 +9,9 @@ mod controller;
 
 use std::time::Duration;
 
+use ringcat::standby::StandbyEvent;
+use ringcat::standby::StandbyOptions;
 use ringcat::{Event, Instant, MainDeviceRole, TimedEvent};
-use ringcat_engine::event::StandbyEvent;
-use ringcat_engine::main_device::StandbyOptions;
 use ringcat_sim::cable::{Host, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::Network;

@@ -1,12 +1,12 @@
 //! One MainDevice of two: its engine, its application, and its way to forward.
 
-use ringcat::{Declaration, Directory, DomainId, Engine, Instant, Link, MainDeviceRole, Scan, SubDeviceId, TimedEvent};
-use ringcat_engine::exchange::Exchange;
-use ringcat_engine::info::Direction;
-use ringcat_engine::main_device::{Active, Options, StandbyOptions};
-use ringcat_engine::role::{Partner, RoleControl, RoleRequest};
-use ringcat_engine::standby::Forwarder;
-use ringcat_engine::{Class, class_of};
+use ringcat::standby::{
+    Active, Class, EngineOptions, Forwarder, Partner, RoleControl, RoleRequest, StandbyOptions, class_of,
+};
+use ringcat::{
+    Declaration, Direction, Directory, DomainId, Engine, Exchange, Instant, Link, MainDeviceRole, Scan, SubDeviceId,
+    TimedEvent,
+};
 use ringcat_sim::cable::{Host, HostLink};
 use ringcat_sim::network::Network;
 use ringcat_wire::command::Command;
@@ -15,6 +15,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::CYCLE;
+use crate::counting_allocator::counts;
 
 /// The declaration of the application, from what is known of the segment.
 pub type Declare = fn(&Scan) -> Declaration;
@@ -64,6 +65,8 @@ pub struct Controller {
     pub written: BTreeSet<(u8, u16)>,
     /// Frames that it has sent as INACTIVE: there must be none.
     pub sent_inactive: u64,
+    /// Allocations and deallocations in its cyclic half, in programs that count them.
+    pub allocations: u64,
     /// Events since the last mark.
     pub events: Vec<TimedEvent>,
 }
@@ -83,7 +86,7 @@ fn addresses(host: Host) -> [MacAddress; 2] {
 impl Controller {
     pub(super) fn new(host: Host, settings: Settings, now: Instant) -> Controller {
         let [main, redundant] = addresses(host);
-        let mut options = Options::new(main, Some(redundant));
+        let mut options = EngineOptions::new(main, Some(redundant));
         options.standby = Some(settings.standby);
         let engine = Engine::new(options, now);
         Controller {
@@ -102,6 +105,7 @@ impl Controller {
             first_data_at: None,
             written: BTreeSet::new(),
             sent_inactive: 0,
+            allocations: 0,
             events: Vec::new(),
         }
     }
@@ -209,7 +213,9 @@ impl Controller {
     fn take(&mut self, link: Link, bytes: &[u8], now: Instant) {
         match &mut self.running {
             Some(running) if class_of(bytes) != Some(Class::Acyclic) => {
+                let before = calls();
                 running.exchange.receive(link, bytes, now);
+                self.allocations += calls() - before;
             }
             _ => {
                 self.engine.receive(link, bytes, now);
@@ -218,14 +224,18 @@ impl Controller {
     }
 
     fn pass_on(&mut self, network: &mut Network, link: Link, bytes: &mut [u8], now: Instant, carriers: [bool; 2]) {
+        let before = calls();
         match &mut self.running {
             Some(running) => running.exchange.fill(link, bytes, now),
             None => self.engine.fill(link, bytes, now),
         }
+        self.allocations += calls() - before;
         if let Ok(onward) = self.forwarder.forward(bytes, link, carriers) {
             network.send(self.links()[onward.index()], bytes);
             if let Some(running) = &mut self.running {
+                let before = calls();
                 running.exchange.take_forwarded(bytes);
+                self.allocations += calls() - before;
             }
         }
     }
@@ -285,7 +295,9 @@ impl Controller {
     fn cycle(&mut self, network: &mut Network, now: Instant) {
         let links = self.links();
         let Some(Running { exchange, domains, outputs }) = &mut self.running else { return };
+        let before = calls();
         let changed = exchange.begin_role(now);
+        self.allocations += calls() - before;
         if changed == Some(MainDeviceRole::Active) {
             self.next_cycle = exchange.grid_of_other(now).unwrap_or(now + CYCLE);
             (self.changed_at, self.first_frame_at, self.first_data_at) = (Some(now), None, None);
@@ -310,19 +322,29 @@ impl Controller {
             }
             self.cycles += 1;
         }
+        let (before, mut of_network) = (calls(), 0);
         all.for_each(|domain| {
             exchange.queue(domain, now);
         });
         let (is_inactive, mut sent) = (exchange.role() == MainDeviceRole::Inactive, 0);
         exchange.send(now, &mut |link, bytes| {
             sent += 1;
+            let before = calls();
             network.send(links[link.index()], bytes);
+            of_network += calls() - before;
         });
+        self.allocations += calls() - before - of_network;
         if sent > 0 && self.changed_at.is_some() {
             self.first_frame_at.get_or_insert(now);
         }
         self.sent_inactive += if is_inactive { sent } else { 0 };
     }
+}
+
+/// Allocations and deallocations of this thread so far.
+fn calls() -> u64 {
+    let counts = counts();
+    counts.allocations + counts.deallocations
 }
 
 /// Notes the registers that a frame writes.

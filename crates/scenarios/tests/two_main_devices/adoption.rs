@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use ringcat::standby::RoleRequest;
+use ringcat::standby::StandbyEvent;
 use ringcat::{Event, Limits, MainDeviceRole, SdoAddress, SubDeviceId};
-use ringcat_engine::event::StandbyEvent;
 use ringcat_engine::mail::coe;
-use ringcat_engine::role::RoleRequest;
 use ringcat_sim::cable::{DeviceIndex, Host};
 use ringcat_sim::fault::Fault;
 use ringcat_wire::al::{AlState, AlStatus};
@@ -56,7 +56,7 @@ fn first_sdos(two: &mut Two, subdevices: &[usize]) -> Duration {
     last.since(two.controllers[1].changed_at.expect("it has changed"))
 }
 
-// covers: MR-16, MR-18, 6.3, standby
+// covers: MR-16, MR-18, 6.3, takeover
 #[test]
 fn a_takeover_writes_no_register_that_a_configuration_writes() {
     let mut two = taken_over(8);
@@ -69,7 +69,7 @@ fn a_takeover_writes_no_register_that_a_configuration_writes() {
     assert!(!written.is_empty(), "mailboxes are written");
 }
 
-// covers: MR-16, MR-17, REQ042, 9.9, standby
+// covers: MR-16, MR-17, REQ042, 9.9, takeover
 #[test]
 fn after_a_takeover_of_33_subdevices_the_first_sdo_is_answered_within_20_ms() {
     let mut two = taken_over(33);
@@ -84,7 +84,7 @@ fn after_a_takeover_of_33_subdevices_the_first_sdo_is_answered_within_20_ms() {
     assert_eq!(two.controllers[1].engine.subdevices().len(), 33);
 }
 
-// covers: MR-17, REQ042, standby
+// covers: MR-17, REQ042, takeover
 #[test]
 fn transfers_of_an_active_that_yields_are_cancelled_there_and_can_be_repeated_at_the_other_one() {
     let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
@@ -113,7 +113,7 @@ fn transfers_of_an_active_that_yields_are_cancelled_there_and_can_be_repeated_at
     }
 }
 
-// covers: MR-18, standby
+// covers: MR-18, takeover
 #[test]
 fn a_warm_takeover_configures_all_subdevices_from_init_on_and_says_so() {
     let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby().with_goes_through_init(true));
@@ -130,7 +130,7 @@ fn a_warm_takeover_configures_all_subdevices_from_init_on_and_says_so() {
     assert!(init, "AL control was written");
 }
 
-// covers: MR-23, MR-16, standby
+// covers: MR-23, MR-16, takeover
 #[test]
 fn a_subdevice_that_left_before_a_takeover_is_missing_and_one_that_leaves_with_it_is_lost() {
     for before in [true, false] {
@@ -162,7 +162,7 @@ fn a_subdevice_that_left_before_a_takeover_is_missing_and_one_that_leaves_with_i
     }
 }
 
-// covers: MR-26, REQ025, REQ026, standby
+// covers: MR-26, REQ025, REQ026, takeover
 #[test]
 fn a_maindevice_that_returns_is_inactive_and_follows_again() {
     let mut two = taken_over(8);

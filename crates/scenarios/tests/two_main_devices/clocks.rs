@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use ringcat::{ClockConfig, Declaration, Scan, SyncSignals};
-use ringcat_engine::role::RoleRequest;
+use ringcat::standby::RoleRequest;
+use ringcat::{Declaration, Scan, SyncSignals};
 use ringcat_sim::cable::{DeviceIndex, Host};
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
@@ -25,7 +25,9 @@ fn free_running(scan: &Scan) -> Declaration {
 }
 
 fn steered(scan: &Scan) -> Declaration {
-    with_clocks(scan, ClockConfig { bus_shift: true, ..config() })
+    let mut clocks = config();
+    clocks.bus_shift = true;
+    with_clocks(scan, clocks)
 }
 
 fn with_signals(scan: &Scan) -> Declaration {
@@ -71,7 +73,7 @@ fn offset(two: &Two) -> u64 {
     two.network.device(DeviceIndex(0)).controller.system_time(now).wrapping_sub(now.0)
 }
 
-// covers: X23, 7.2, 7.5, dc-ring, standby
+// covers: X23, 7.2, 7.5, dc-ring, takeover
 #[test]
 fn clocks_of_33_subdevices_keep_together_through_a_takeover() {
     let declarations: [(&str, fn(&Scan) -> Declaration); 3] =
@@ -99,7 +101,7 @@ fn clocks_of_33_subdevices_keep_together_through_a_takeover() {
     }
 }
 
-// covers: X23, 7.2, 7.5, dc-ring, standby
+// covers: X23, 7.2, 7.5, dc-ring, takeover
 #[test]
 fn clocks_of_33_subdevices_keep_together_through_switchovers() {
     for near in [Host::First, Host::Second] {

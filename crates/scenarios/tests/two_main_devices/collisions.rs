@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use ringcat::Event;
+use ringcat::standby::RoleRequest;
+use ringcat::standby::StandbyEvent;
 use ringcat::{Instant, MainDeviceRole};
-use ringcat_engine::event::{Event, StandbyEvent};
-use ringcat_engine::role::RoleRequest;
 use ringcat_sim::cable::{CableId, Host};
 use ringcat_sim::fault::Fault;
 use scenarios::two::{CYCLE, Two};
@@ -19,7 +20,7 @@ fn collided_at(two: &Two, controller: usize) -> Option<Instant> {
     two.controllers[controller].events.iter().find(|timed| is_collision(&timed.event)).map(|timed| timed.at)
 }
 
-// covers: MR-09, MR-10, REQ016, REQ017, 9.9, standby
+// covers: MR-09, MR-10, REQ016, REQ017, 9.9, takeover
 #[test]
 fn a_second_active_is_reported_by_both_within_a_cycle() {
     for phase in [0, 130, 480, 910] {
@@ -48,7 +49,7 @@ fn a_second_active_is_reported_by_both_within_a_cycle() {
     }
 }
 
-// covers: MR-24, MR-10, REQ048, standby
+// covers: MR-24, MR-10, REQ048, takeover
 #[test]
 fn two_networks_that_are_joined_collide_on_both_sides_within_a_cycle() {
     let mut two = Two::in_op(ring_of_two(COUNT, Host::First), declare, standby());
@@ -79,7 +80,7 @@ fn two_networks_that_are_joined_collide_on_both_sides_within_a_cycle() {
     }
 }
 
-// covers: MR-27, MR-06, REQ035, standby
+// covers: MR-27, MR-06, REQ035, takeover
 #[test]
 fn the_manuals_switchover_costs_the_time_out_of_the_other_one_and_no_subdevice_leaves_op() {
     let mut two = Two::in_op(ring_of_two(COUNT, Host::First), declare, standby());

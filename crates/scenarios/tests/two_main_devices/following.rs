@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use ringcat::standby::StandbyEvent;
+use ringcat::standby::{Partner, RoleRequest};
+use ringcat::{ActivateError, Denial};
 use ringcat::{Function, MainDeviceRole, SubDeviceId};
-use ringcat_engine::event::StandbyEvent;
-use ringcat_engine::main_device::{ActivateError, Denial};
-use ringcat_engine::role::{Partner, RoleRequest};
 use ringcat_sim::cable::Host;
 use ringcat_wire::al::AlState;
 use scenarios::two::{CYCLE, Settings, Two};
@@ -18,7 +18,7 @@ fn followed() -> Two {
     two
 }
 
-// covers: MR-20, MR-12, 9.11, standby
+// covers: MR-20, MR-12, 9.11, takeover
 #[test]
 fn an_inactive_that_follows_refuses_what_needs_the_bus_and_answers_the_rest() {
     let mut two = followed();
@@ -41,7 +41,7 @@ fn an_inactive_that_follows_refuses_what_needs_the_bus_and_answers_the_rest() {
     assert!(two.left_op.is_empty());
 }
 
-// covers: FR-08, FR-06, MR-13, REQ030, standby
+// covers: FR-08, FR-06, MR-13, REQ030, takeover
 #[test]
 fn the_images_of_the_inactive_are_those_of_whole_cycles_of_the_active() {
     let mut two = followed();
@@ -59,7 +59,7 @@ fn the_images_of_the_inactive_are_those_of_whole_cycles_of_the_active() {
     assert!(equal >= 199, "{equal} of 200");
 }
 
-// covers: MR-12, MR-13, REQ031, REQ032, standby
+// covers: MR-12, MR-13, REQ031, REQ032, takeover
 #[test]
 fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
     let mut two = followed();
@@ -73,7 +73,7 @@ fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
     assert_eq!(ours.links.map(|link| link.answering), theirs.links.map(|link| link.answering));
 }
 
-// covers: REQ010, MR-15, standby
+// covers: REQ010, MR-15, takeover
 #[test]
 fn an_inactive_with_another_declaration_is_not_ready_and_both_name_what_differs() {
     fn other(scan: &ringcat::Scan) -> ringcat::Declaration {
@@ -104,7 +104,7 @@ fn an_inactive_with_another_declaration_is_not_ready_and_both_name_what_differs(
     assert!(two.standby_events(0).iter().any(refused));
 }
 
-// covers: MR-08, 9.10, standby
+// covers: MR-08, 9.10, takeover
 #[test]
 fn without_an_active_an_inactive_waits_for_ever_and_its_application_decides() {
     let mut two = Two::new(ring_of_two(4, Host::First), declare, standby());

@@ -10,14 +10,18 @@ mod taking_over;
 
 use std::time::Duration;
 
+use ringcat::standby::MasterSizes;
+use ringcat::standby::StandbyOptions;
 use ringcat::{Declaration, Scan, automatic};
-use ringcat_engine::layout::MasterSizes;
-use ringcat_engine::main_device::StandbyOptions;
 use ringcat_sim::cable::Host;
 use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::counting_allocator::CountingAllocator;
 use scenarios::segments::{descriptions, devices};
 use scenarios::two::CYCLE;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const KINDS: [&str; 8] = [
     "coupler",

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat_engine::role::RoleRequest;
+use ringcat::standby::RoleRequest;
 use ringcat_sim::cable::{CableId, Host};
 use ringcat_sim::fault::Fault;
 use scenarios::two::{CYCLE, Two};
@@ -25,7 +25,7 @@ fn with_active(active: usize) -> Two {
     two
 }
 
-// covers: 9.7.5, 9.8, MR-05, FR-11, standby
+// covers: 9.7.5, 9.8, MR-05, FR-11, takeover
 #[test]
 fn with_any_cable_cut_either_active_has_its_ring_and_its_partner_follows() {
     for active in [0, 1] {
@@ -48,7 +48,7 @@ fn with_any_cable_cut_either_active_has_its_ring_and_its_partner_follows() {
     }
 }
 
-// covers: 9.7.5, MR-07, standby
+// covers: 9.7.5, MR-07, takeover
 #[test]
 fn a_role_is_handed_over_with_any_cable_cut() {
     for active in [0, 1] {
@@ -67,7 +67,7 @@ fn a_role_is_handed_over_with_any_cable_cut() {
     }
 }
 
-// covers: 9.7.5, MR-24, standby
+// covers: 9.7.5, MR-24, takeover
 #[test]
 fn a_dead_active_and_a_cut_cable_leave_the_subdevices_that_are_in_reach() {
     // The line begins at the first MainDevice. Without the one that dies the other one reaches a line from its own end.

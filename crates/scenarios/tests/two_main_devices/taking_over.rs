@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use ringcat::MainDeviceRole;
-use ringcat_engine::event::StandbyEvent;
-use ringcat_engine::role::RoleRequest;
+use ringcat::standby::RoleRequest;
+use ringcat::standby::StandbyEvent;
 use ringcat_sim::cable::Host;
 use scenarios::two::{CYCLE, Two};
 
 use super::{declare, ring_of_two, standby};
 
-// covers: MR-01, MR-12, MR-13, FR-08, REQ031, REQ032, standby
+// covers: MR-01, MR-12, MR-13, FR-08, REQ031, REQ032, takeover
 #[test]
 fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
     for near in [Host::First, Host::Second] {
@@ -25,7 +25,7 @@ fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
     }
 }
 
-// covers: MR-07, MR-16, MR-18, REQ005, REQ025, standby
+// covers: MR-07, MR-16, MR-18, REQ005, REQ025, takeover
 #[test]
 fn a_takeover_leaves_all_subdevices_in_op_and_no_output_goes_back() {
     for near in [Host::First, Host::Second] {
@@ -52,7 +52,7 @@ fn a_takeover_leaves_all_subdevices_in_op_and_no_output_goes_back() {
     }
 }
 
-// covers: MR-07, REQ015, standby
+// covers: MR-07, REQ015, takeover
 #[test]
 fn a_role_is_handed_over_and_back_without_a_lost_cycle() {
     for near in [Host::First, Host::Second] {
@@ -71,4 +71,24 @@ fn a_role_is_handed_over_and_back_without_a_lost_cycle() {
             assert_eq!(two.controllers[giver].sent_inactive, 0);
         }
     }
+}
+
+// covers: no-allocation, takeover
+#[test]
+fn cycles_of_both_and_changes_of_the_role_do_not_allocate() {
+    let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
+    two.controllers.iter_mut().for_each(|it| it.allocations = 0);
+    two.run(Duration::from_millis(300));
+    two.controllers[0].request(RoleRequest::HandOver);
+    two.run(Duration::from_millis(100));
+    assert_eq!(two.active(), Some(1), "{}", two.log());
+    two.kill(1);
+    two.run(3 * CYCLE);
+    two.controllers[0].request(RoleRequest::Active);
+    two.run(Duration::from_millis(300));
+    assert_eq!(two.active(), Some(0), "{}", two.log());
+    assert_eq!(two.controllers.each_ref().map(|it| it.allocations), [0, 0]);
+    let before = scenarios::counting_allocator::counts().allocations;
+    drop(std::hint::black_box(vec![1_u8; 100]));
+    assert!(scenarios::counting_allocator::counts().allocations > before, "they are counted");
 }
