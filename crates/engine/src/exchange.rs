@@ -32,6 +32,7 @@ mod outcome;
 mod place;
 mod presence;
 mod proved;
+mod ready;
 mod send_service;
 mod service;
 mod shares;
@@ -57,7 +58,7 @@ pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
 #[cfg(feature = "standby")]
-pub use standby::StandbySetup;
+pub use standby::state::StandbySetup;
 
 use crate::board::Board;
 use crate::domain::{DomainId, DomainState, DomainStatus};
@@ -75,10 +76,13 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use leaving::{Leaving, send_twice};
-use missed::{Missed, give_up, give_up_overdue, note_missing};
+use missed::{Missed, give_up_overdue};
 use service::Service;
 use shares::Shares;
+#[cfg(not(feature = "standby"))]
 use standby::Standby;
+#[cfg(feature = "standby")]
+use standby::state::Standby;
 
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
@@ -397,33 +401,6 @@ impl Exchange {
             }
         }
         self.domains[id.0].load(set.start, &mut self.frames[set], self.cycle);
-        true
-    }
-
-    /// Makes frames of a domain ready to be loaded. False while some are still expected.
-    fn make_ready(&mut self, id: DomainId, set: Range<usize>, now: Instant) -> bool {
-        let frames = &mut self.frames[set.clone()];
-        if frames.iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
-            self.tally.disturbed().skipped += 1;
-            self.domains[id.0].count_skip();
-            self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
-            return false;
-        }
-        for frame in frames.iter_mut().filter(|frame| frame.is_open()) {
-            if frame.is_waiting() {
-                give_up(frame, &mut self.missed, self.tally.disturbed());
-                self.board.post_lost(self.tally.counters.lost);
-            }
-            if frame.is_delivered() {
-                self.tally.disturbed().copies_lost += 1;
-            }
-            note_missing(frame, &self.board);
-            self.evidence.close(frame, &self.board, &mut self.events);
-        }
-        let changes = self.board.taking_part_changes();
-        if !frames.iter().all(|frame| frame.is_ready(changes)) {
-            self.follow_board(set, changes);
-        }
         true
     }
 

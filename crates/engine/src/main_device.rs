@@ -37,6 +37,8 @@ mod messages;
 mod options;
 mod pending;
 mod prepare;
+#[cfg(feature = "standby")]
+mod redundancy;
 mod register_error;
 mod registered;
 mod registered_area;
@@ -49,6 +51,8 @@ mod services;
 pub mod snapshot;
 #[cfg(feature = "standby")]
 mod standby;
+#[cfg(feature = "standby")]
+mod standby_options;
 mod state_of_all;
 mod states;
 mod steps;
@@ -84,7 +88,7 @@ pub use register_error::RegisterError;
 pub use registered_area::{EntryPlace, RegisteredArea};
 pub use sent_once::SentOnce;
 #[cfg(feature = "standby")]
-pub use standby::StandbyOptions;
+pub use standby_options::StandbyOptions;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
@@ -262,16 +266,6 @@ impl MainDevice {
         *self.stopped.borrow_mut() = None;
     }
 
-    /// Another supervisor, without procedures.
-    fn renew_supervisor(&mut self, events: EventLog, now: Instant) {
-        let (are_reported, sequence) = (self.supervisor.bus().are_commands_reported(), self.supervisor.sequence());
-        self.supervisor = supervisor(self.identity, &self.options, now);
-        self.supervisor.attach_role(self.roles.clone());
-        self.supervisor.set_command_reports(are_reported);
-        self.supervisor.go_on_from(sequence);
-        self.supervisor.set_events(events);
-    }
-
     /// Starts procedures that the model requests without an application.
     fn start_reconciler(&mut self) {
         let (bus, companions) = (self.supervisor.bus(), self.companions());
@@ -444,6 +438,10 @@ impl MainDevice {
             Some(segment) => segment.view().ring_status(),
             None => RingStatus { state: self.ring(), ..self.first_ring_status() },
         };
+        if self.role() == MainDeviceRole::Inactive {
+            // What the ACTIVE has sent last.
+            status.state = self.ring();
+        }
         let seen = self.segment.board.supervision().map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
         let positions = status.place.map_or([None; 2], |cable| cable.positions());

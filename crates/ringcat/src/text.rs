@@ -16,17 +16,11 @@ use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_wire::frame::MacAddress;
 
 pub use messages::message;
-pub use names::Names;
+pub use names::{Names, address};
 
 /// The source address of a frame, if it is long enough to have one.
 pub fn address_of_sender(frame: &[u8]) -> Option<MacAddress> {
     frame.get(6..12)?.try_into().ok().map(MacAddress)
-}
-
-/// A MAC address in the usual notation: `02:00:00:00:00:01`.
-pub fn address(mac: MacAddress) -> String {
-    let bytes = mac.0.map(|byte| format!("{byte:02x}"));
-    bytes.join(":")
 }
 
 /// An event in one line.

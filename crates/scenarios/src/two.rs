@@ -18,10 +18,7 @@ use ringcat_sim::network::Network;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 
-pub use self::controller::{Controller, Declare, Settings};
-
-/// Period of the cycles.
-pub const CYCLE: Duration = Duration::from_millis(1);
+pub use self::controller::{CYCLE, Controller, Declare, Settings};
 
 /// Both, and the network.
 pub struct Two {

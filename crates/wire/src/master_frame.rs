@@ -1,9 +1,9 @@
 //! Cyclic master frames: what the two MainDevices of a ring tell each other in each cycle (protocol 9.8).
 //!
 //! A master frame holds NOP datagrams at ADP 0 and ADO 0x4155 only, so that SubDevices pass it unchanged. Each datagram
-//! is a fragment of one area ([`Area`]): a head ([`FragmentHead`]), then bytes of the area. One direction per area makes
-//! the weight of its working counter unambiguous: the INACTIVE adds 2 where it has taken bytes of the ACTIVE, 1 where
-//! it has put in bytes for the ACTIVE.
+//! is a fragment of one area ([`Area`]): a head ([`FragmentHead`]), then bytes of the area. One direction per area
+//! makes the weight of its working counter unambiguous: the INACTIVE adds 2 where it has taken bytes of the ACTIVE, 1
+//! where it has put in bytes for the ACTIVE.
 //!
 //! [`fragments_mut`] walks over the fragments of a received frame. The contents of the areas that have a fixed form are
 //! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application.
@@ -145,10 +145,9 @@ impl fmt::Display for MasterFrameError {
                 write!(f, "{what} too short: expected at least {expected} bytes, got {got}")
             }
             MasterFrameError::Magic(got) => write!(f, "a master frame of another stack: it begins with {got:02x?}"),
-            MasterFrameError::Version { least, got } => write!(
-                f,
-                "master frames of version {got}, readable from version {least} on: this MainDevice has version {VERSION}"
-            ),
+            MasterFrameError::Version { least, got } => {
+                write!(f, "master frames of version {got}, readable from version {least} on: here is version {VERSION}")
+            }
         }
     }
 }

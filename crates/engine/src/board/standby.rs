@@ -56,7 +56,8 @@ impl StandbyWords {
         self.is_hot.store(is_hot, Ordering::Release);
     }
 
-    /// Whether the last takeover went on with process data of the other MainDevice: SubDevices keep their configuration.
+    /// Whether the last takeover went on with process data of the other MainDevice: SubDevices keep their
+    /// configuration.
     pub fn is_hot(&self) -> bool {
         self.is_hot.load(Ordering::Acquire)
     }

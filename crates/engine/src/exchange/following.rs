@@ -124,7 +124,7 @@ impl Following {
         (self.sender, self.newest, self.ended) = (None, None, [None; 2]);
         (self.begun_at, self.unusable) = (Instant::NEVER, None);
         self.cycles.iter_mut().for_each(Cycle::forget);
-        self.knowledge = HeardKnowledge::default();
+        self.knowledge.forget();
     }
 
     /// The role was another one: nothing of the ACTIVE is known.

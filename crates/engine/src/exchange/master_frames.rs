@@ -191,18 +191,23 @@ impl MasterFrames {
         let Sources { board, domains, counters, ring, .. } = sources;
         let seen = board.responding();
         let bits = |link: Link| board.live.carrier(link).map_or(0, |has| 1 + u8::from(has));
-        let mut diagnosis = Diagnosis::default();
-        diagnosis.ring = match ring {
+        let CyclicCounters { sent, lost, incomplete, skipped, foreign, .. } = **counters;
+        let ring = match ring {
             RingState::Unknown => 0,
             RingState::Closed => 1,
             RingState::Open => 2,
         };
-        diagnosis.carriers = bits(Link::Main) | bits(Link::Redundant) << 2;
-        diagnosis.al_states = seen.al_status;
-        diagnosis.answering = [seen.main.0, seen.redundant.0];
-        let CyclicCounters { sent, lost, incomplete, skipped, foreign, .. } = **counters;
-        (diagnosis.sent, diagnosis.lost, diagnosis.incomplete) = (sent, lost, incomplete);
-        (diagnosis.skipped, diagnosis.foreign) = (skipped, foreign);
+        let diagnosis = Diagnosis {
+            ring,
+            carriers: bits(Link::Main) | bits(Link::Redundant) << 2,
+            al_states: seen.al_status,
+            answering: [seen.main.0, seen.redundant.0],
+            sent,
+            lost,
+            incomplete,
+            skipped,
+            foreign,
+        };
         diagnosis.encode(&mut self.diagnosis);
         let records = self.diagnosis[Diagnosis::LEN..].chunks_exact_mut(DomainRecord::LEN);
         for (domain, record) in domains.iter().zip(records) {

@@ -6,7 +6,7 @@ use crate::ring::{FrameCopy, Sequence};
 
 /// Nothing.
 #[derive(Debug, Default)]
-pub(super) struct Standby;
+pub(super) struct Standby {}
 
 impl Standby {
     pub const fn is_inactive(&self) -> bool {

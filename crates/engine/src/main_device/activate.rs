@@ -62,10 +62,7 @@ impl MainDevice {
         let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
         report_oddities(&self.segment, &subdevices, &layout);
         let count = subdevices.member_count();
-        let optional = subdevices.members().map(|member| member.config.optional).collect();
-        let addresses = subdevices.members().map(|member| member.station).collect();
-        let board = Board::new(count).with_optional(optional).with_stations(addresses);
-        let board = Arc::new(board.with_commands(layout.datagrams()));
+        let board = Arc::new(board_of(&subdevices, &layout));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = self.exchange(&layout, board.clone(), producer);
         let repeats = repeats::rules(&repeats);
@@ -73,10 +70,7 @@ impl MainDevice {
         #[cfg(feature = "standby")]
         self.set_up_standby(&mut exchange, (&loaded.declaration, &layout, session), &subdevices)
             .map_err(ActivateError::Layout)?;
-        if let Some(config) = &clock_config {
-            let ClockConfig { epoch, bus_shift, sync_window_ns, .. } = *config;
-            exchange.set_up_clocks(ClockSetup { epoch, bus_shift, sync_window_ns });
-        }
+        set_up_clocks(&mut exchange, clock_config.as_ref());
         let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
         let closings = loaded.closings(&topology, &subdevices, &stations);
         let cables = cables(&topology, self.options.links());
@@ -170,4 +164,20 @@ fn clocks_of(config: Option<ClockConfig>, scan: &Found, topology: &Topology, sub
         Some((index, &*subdevices.member(index)?.member.config))
     };
     Clocks::new(config, &scan.subdevices, topology, member)
+}
+
+/// The board of an application.
+fn board_of(subdevices: &SubDevices, layout: &Layout) -> Board {
+    let optional = subdevices.members().map(|member| member.config.optional).collect();
+    let addresses = subdevices.members().map(|member| member.station).collect();
+    let board = Board::new(subdevices.member_count()).with_optional(optional).with_stations(addresses);
+    board.with_commands(layout.datagrams())
+}
+
+/// Sets up the clocks in the cyclic frames, if there are any.
+fn set_up_clocks(exchange: &mut Exchange, config: Option<&ClockConfig>) {
+    if let Some(config) = config {
+        let ClockConfig { epoch, bus_shift, sync_window_ns, .. } = *config;
+        exchange.set_up_clocks(ClockSetup { epoch, bus_shift, sync_window_ns });
+    }
 }

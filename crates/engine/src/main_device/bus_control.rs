@@ -9,7 +9,8 @@ use alloc::vec::Vec;
 
 use ringcat_wire::al::AlState;
 
-use super::MainDevice;
+use super::{MainDevice, supervisor};
+use crate::event::EventLog;
 use crate::knowledge::{Handover, KnownMailbox};
 use crate::mail::InUse;
 use crate::procedures::scan::ScanError;
@@ -59,6 +60,16 @@ impl MainDevice {
             }
         }
         self.role_followed = self.roles.changes();
+    }
+
+    /// Another supervisor, without procedures.
+    pub(super) fn renew_supervisor(&mut self, events: EventLog, now: Instant) {
+        let (are_reported, sequence) = (self.supervisor.bus().are_commands_reported(), self.supervisor.sequence());
+        self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.attach_role(self.roles.clone());
+        self.supervisor.set_command_reports(are_reported);
+        self.supervisor.go_on_from(sequence);
+        self.supervisor.set_events(events);
     }
 
     /// Ends all procedures.

@@ -21,8 +21,8 @@ use crate::segment::{Found, Observation, Scan};
 impl MainDevice {
     /// Prepares an application that follows the ACTIVE, in role INACTIVE: its process data has the places that it has
     /// there. `knowledge` and `session` are those of the ACTIVE ([`MainDevice::heard_knowledge`],
-    /// [`MainDevice::heard_configuration`]). No frame is sent; when the role becomes ACTIVE, the exchange goes on with the
-    /// next cycle, and the SubDevices stay as they are.
+    /// [`MainDevice::heard_configuration`]). No frame is sent; when the role becomes ACTIVE, the exchange goes on with
+    /// the next cycle, and the SubDevices stay as they are.
     ///
     /// # Errors
     /// This MainDevice is ACTIVE, has an application, or the declaration does not fit what is known of the segment.

@@ -1,8 +1,8 @@
-//! The configuration of an application as digests with names, to be compared with that of the other MainDevice of a ring
-//! (protocol MR-15, REQ010).
+//! The configuration of an application as digests with names, to be compared with that of the other MainDevice of a
+//! ring (protocol MR-15, REQ010).
 //!
-//! In: the declaration, whatever file it comes from, and the options. Out: a digest of all of it, and one for each item:
-//! parameters, clocks, domains, and the parts of each SubDevice's declaration.
+//! In: the declaration, whatever file it comes from, and the options. Out: a digest of all of it, and one for each
+//! item: parameters, clocks, domains, and the parts of each SubDevice's declaration.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -14,7 +14,7 @@ use core::time::Duration;
 use super::declaration::{Declaration, DomainConfig, DomainMember};
 use super::options::Options;
 use super::registered_area::RegisteredArea;
-use super::standby::{StandbyOptions, unknown_item};
+use super::standby_options::StandbyOptions;
 use crate::config::{ConfigPart, Digest};
 use crate::direction::Direction;
 
@@ -110,6 +110,11 @@ fn domains(domains: &[DomainConfig]) -> u32 {
         }
     }
     digest.short()
+}
+
+/// A name of an item of the configuration that is not known.
+fn unknown_item(number: u16) -> String {
+    format!("item {number}")
 }
 
 #[cfg(test)]

@@ -25,8 +25,8 @@ pub struct Heard {
 }
 
 impl MainDevice {
-    /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as INACTIVE
-    /// with the options of MainDevice redundancy. Any bytes are allowed. With an application it is
+    /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as
+    /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application it is
     /// [`Exchange::fill`](crate::exchange::Exchange::fill).
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         if self.role() != MainDeviceRole::Inactive || self.active().is_some() {

@@ -14,7 +14,7 @@ use crate::role::MainDeviceRole;
 use crate::segment::Retries;
 
 #[cfg(feature = "standby")]
-use super::standby::StandbyOptions;
+use super::standby_options::StandbyOptions;
 
 /// Configuration of a MainDevice that is needed before the first frame.
 #[derive(Clone, Debug)]

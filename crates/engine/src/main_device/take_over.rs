@@ -15,9 +15,9 @@ use crate::mail::InUse;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::shared_segment::Beside;
 use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
-use crate::segment::Observation;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::setup::Setup;
+use crate::segment::{Observation, StandbyObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -59,8 +59,8 @@ impl MainDevice {
     }
 
     /// The exchange goes on with the process data of the other MainDevice. The SubDevices stay as they are: none goes
-    /// through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is compared with the
-    /// segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
+    /// through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is compared with
+    /// the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
     fn take_over(&mut self) {
         let events = self.supervisor.take_events();
         // The mirror of the other MainDevice ends.
@@ -69,7 +69,8 @@ impl MainDevice {
         self.learn_clocks();
         self.adopt_mailboxes(&lives);
         let is_hot = self.standby.as_ref().is_some_and(|standby| standby.words.is_hot());
-        self.segment.observe(Observation::TookOver { lives: &lives, is_hot });
+        let took_over = StandbyObservation::TookOver { lives: &lives, is_hot };
+        self.segment.observe(Observation::Standby(took_over));
         let segment = self.segment.clone();
         self.start_reconcile(segment);
     }
@@ -83,7 +84,7 @@ impl MainDevice {
         self.ports.clear();
         self.gateway_queue = None;
         self.renew(events);
-        self.segment.observe(Observation::Yielded);
+        self.segment.observe(Observation::Standby(StandbyObservation::Yielded));
         self.begin_mirror();
     }
 

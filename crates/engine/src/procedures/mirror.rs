@@ -1,10 +1,11 @@
-//! The model of a MainDevice that follows another one: states that the other one has sent, and requests that are refused.
+//! The model of a MainDevice that follows another one: states that the other one has sent, and requests that are
+//! refused.
 
 use core::time::Duration;
 
 use super::serve_requests::Requests;
 use super::shared_segment::SharedSegment;
-use crate::segment::Observation;
+use crate::segment::{Observation, StandbyObservation};
 use crate::supervisor::Bus;
 
 /// Interval of the look at the states.
@@ -14,7 +15,7 @@ const EACH: Duration = Duration::from_millis(10);
 /// role changes.
 pub(crate) async fn mirror(bus: Bus, segment: SharedSegment, requests: Requests) {
     loop {
-        segment.observe(Observation::Mirrored);
+        segment.observe(Observation::Standby(StandbyObservation::Mirrored));
         requests.end();
         bus.sleep(EACH).await;
     }

@@ -226,8 +226,8 @@ pub(crate) fn is_forwarded(bytes: &[u8]) -> bool {
     bytes.get(SOURCE_AT).is_some_and(|marks| marks & (FORWARDED_ON_MAIN | FORWARDED_ON_REDUNDANT) != 0)
 }
 
-/// The sender of a frame of another MainDevice, and the sequence number of the frame, if that one writes source addresses
-/// and Idx as this library does by default. `None` if there is no first datagram.
+/// The sender of a frame of another MainDevice, and the sequence number of the frame, if that one writes source
+/// addresses and Idx as this library does by default. `None` if there is no first datagram.
 #[cfg(feature = "standby")]
 pub(crate) fn foreign_frame(bytes: &[u8]) -> Option<([u8; 3], Sequence)> {
     let head = bytes.first_chunk::<{ FIRST_INDEX_AT + 1 }>()?;

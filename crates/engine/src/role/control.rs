@@ -1,7 +1,7 @@
 //! The role of a MainDevice, and requests for another one, for all threads (protocol 9.6).
 //!
-//! A request takes effect at the next cycle: the half that runs the cycles takes it, and sets the role. The last request
-//! before a cycle counts.
+//! A request takes effect at the next cycle: the half that runs the cycles takes it, and sets the role. The last
+//! request before a cycle counts.
 
 use alloc::sync::Arc;
 use core::fmt;

@@ -37,10 +37,10 @@ impl fmt::Display for Partner {
             Partner::Absent => f.write_str("absent"),
             Partner::Forwards => f.write_str("forwards, and does not follow"),
             Partner::Alive { is_consistent: false, .. } => f.write_str("follows, and does not take all areas"),
-            Partner::Alive { stage, not_ready, .. } if not_ready.is_ready() => match stage {
-                Stage::Accepts => f.write_str("takes over"),
-                _ => f.write_str("ready"),
-            },
+            Partner::Alive { stage, not_ready, .. } if not_ready.is_ready() => {
+                f.write_str(if *stage == Stage::Accepts { "takes over" } else { "ready" })?;
+                if *not_ready == NotReady::NOTHING { Ok(()) } else { write!(f, ", but {not_ready}") }
+            }
             Partner::Alive { not_ready, .. } => write!(f, "not ready: {not_ready}"),
         }
     }

@@ -37,6 +37,23 @@ use crate::ring_status::CableErrors;
 use crate::time::Instant;
 use crate::topology::NodeStatus;
 
+/// An observation of MainDevice redundancy.
+#[cfg(feature = "standby")]
+#[derive(Debug)]
+pub enum StandbyObservation<'a> {
+    /// This MainDevice controls the bus from now on, with process data of another one.
+    TookOver {
+        /// The members as the other MainDevice has seen them.
+        lives: &'a [Life],
+        /// They keep their configuration; otherwise they get it again from INIT on.
+        is_hot: bool,
+    },
+    /// Another MainDevice controls the bus from now on: procedures have ended.
+    Yielded,
+    /// Another MainDevice controls the bus, and may have posted other states of the members.
+    Mirrored,
+}
+
 /// How a SubDevice takes part in process data from now on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProcessDataStep {
@@ -161,20 +178,9 @@ pub enum Observation<'a> {
     Attached,
     /// The application ends. The result of the scan stays.
     Deactivated,
-    /// This MainDevice controls the bus from now on, with process data of another one.
+    /// What another MainDevice of the ring does, or has done.
     #[cfg(feature = "standby")]
-    TookOver {
-        /// The members as the other MainDevice has seen them.
-        lives: &'a [Life],
-        /// They keep their configuration; otherwise they get it again from INIT on.
-        is_hot: bool,
-    },
-    /// Another MainDevice controls the bus from now on: procedures have ended.
-    #[cfg(feature = "standby")]
-    Yielded,
-    /// Another MainDevice controls the bus, and may have posted other states of the members.
-    #[cfg(feature = "standby")]
-    Mirrored,
+    Standby(StandbyObservation<'a>),
 
     /// The configuration of all present members may begin.
     Started,

@@ -3,7 +3,7 @@
 use ringcat_engine::event::{Event, StandbyEvent};
 use ringcat_engine::role::MainDeviceRole;
 
-use super::address;
+use super::names::address;
 
 pub(super) fn describe(event: &Event) -> Option<String> {
     let Event::Standby(event) = event else { return None };

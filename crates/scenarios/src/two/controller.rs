@@ -13,9 +13,12 @@ use ringcat_wire::command::Command;
 use ringcat_wire::frame::{Frame, MacAddress};
 use std::collections::BTreeSet;
 use std::fmt;
+use std::time::Duration;
 
-use super::CYCLE;
 use crate::counting_allocator::counts;
+
+/// Period of the cycles.
+pub const CYCLE: Duration = Duration::from_millis(1);
 
 /// The declaration of the application, from what is known of the segment.
 pub type Declare = fn(&Scan) -> Declaration;

@@ -20,7 +20,7 @@ fn collided_at(two: &Two, controller: usize) -> Option<Instant> {
     two.controllers[controller].events.iter().find(|timed| is_collision(&timed.event)).map(|timed| timed.at)
 }
 
-// covers: MR-09, MR-10, REQ016, REQ017, 9.9, takeover
+// covers: MR-09, MR-10, REQ016, REQ017, 9.9, standby
 #[test]
 fn a_second_active_is_reported_by_both_within_a_cycle() {
     for phase in [0, 130, 480, 910] {
@@ -49,7 +49,7 @@ fn a_second_active_is_reported_by_both_within_a_cycle() {
     }
 }
 
-// covers: MR-24, MR-10, REQ048, takeover
+// covers: MR-24, MR-10, REQ048, standby
 #[test]
 fn two_networks_that_are_joined_collide_on_both_sides_within_a_cycle() {
     let mut two = Two::in_op(ring_of_two(COUNT, Host::First), declare, standby());
@@ -80,9 +80,9 @@ fn two_networks_that_are_joined_collide_on_both_sides_within_a_cycle() {
     }
 }
 
-// covers: MR-27, MR-06, REQ035, takeover
+// covers: MR-27, MR-06, REQ035, standby
 #[test]
-fn the_manuals_switchover_costs_the_time_out_of_the_other_one_and_no_subdevice_leaves_op() {
+fn the_manuals_switchover_costs_a_time_out_and_no_subdevice_leaves_op() {
     let mut two = Two::in_op(ring_of_two(COUNT, Host::First), declare, standby());
     two.run(Duration::from_millis(100));
     two.mark();

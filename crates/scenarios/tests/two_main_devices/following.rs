@@ -18,7 +18,7 @@ fn followed() -> Two {
     two
 }
 
-// covers: MR-20, MR-12, 9.11, takeover
+// covers: MR-20, MR-12, 9.11, standby
 #[test]
 fn an_inactive_that_follows_refuses_what_needs_the_bus_and_answers_the_rest() {
     let mut two = followed();
@@ -28,9 +28,8 @@ fn an_inactive_that_follows_refuses_what_needs_the_bus_and_answers_the_rest() {
         let has_other_reason = matches!(function, Function::Follow);
         assert_eq!(is_refused, function.needs_the_bus() || has_other_reason, "{function:?}");
     }
-    assert!(
-        matches!(inactive.start_scan(), Err(ActivateError::NotPermitted(denied)) if denied.denial == Denial::NeedsTheBus)
-    );
+    let scan = inactive.start_scan();
+    assert!(matches!(scan, Err(ActivateError::NotPermitted(denied)) if denied.denial == Denial::NeedsTheBus));
     let state = inactive.start_state_request(SubDeviceId(1), AlState::PreOp);
     assert!(inactive.mailbox(SubDeviceId(3)).is_some_and(|mailbox| !mailbox.is_open()));
     two.run(Duration::from_millis(10));
@@ -41,7 +40,7 @@ fn an_inactive_that_follows_refuses_what_needs_the_bus_and_answers_the_rest() {
     assert!(two.left_op.is_empty());
 }
 
-// covers: FR-08, FR-06, MR-13, REQ030, takeover
+// covers: FR-08, FR-06, MR-13, REQ030, standby
 #[test]
 fn the_images_of_the_inactive_are_those_of_whole_cycles_of_the_active() {
     let mut two = followed();
@@ -59,7 +58,7 @@ fn the_images_of_the_inactive_are_those_of_whole_cycles_of_the_active() {
     assert!(equal >= 199, "{equal} of 200");
 }
 
-// covers: MR-12, MR-13, REQ031, REQ032, takeover
+// covers: MR-12, MR-13, REQ031, REQ032, standby
 #[test]
 fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
     let mut two = followed();
@@ -73,7 +72,7 @@ fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
     assert_eq!(ours.links.map(|link| link.answering), theirs.links.map(|link| link.answering));
 }
 
-// covers: REQ010, MR-15, takeover
+// covers: REQ010, MR-15, standby
 #[test]
 fn an_inactive_with_another_declaration_is_not_ready_and_both_name_what_differs() {
     fn other(scan: &ringcat::Scan) -> ringcat::Declaration {
@@ -104,7 +103,7 @@ fn an_inactive_with_another_declaration_is_not_ready_and_both_name_what_differs(
     assert!(two.standby_events(0).iter().any(refused));
 }
 
-// covers: MR-08, 9.10, takeover
+// covers: MR-08, 9.10, standby
 #[test]
 fn without_an_active_an_inactive_waits_for_ever_and_its_application_decides() {
     let mut two = Two::new(ring_of_two(4, Host::First), declare, standby());

@@ -10,7 +10,7 @@ use scenarios::two::{CYCLE, Two};
 
 use super::{declare, ring_of_two, standby};
 
-// covers: MR-01, MR-12, MR-13, FR-08, REQ031, REQ032, takeover
+// covers: MR-01, MR-12, MR-13, FR-08, REQ031, REQ032, standby
 #[test]
 fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
     for near in [Host::First, Host::Second] {
@@ -25,7 +25,7 @@ fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
     }
 }
 
-// covers: MR-07, MR-16, MR-18, REQ005, REQ025, takeover
+// covers: MR-07, MR-16, MR-18, REQ005, REQ025, standby
 #[test]
 fn a_takeover_leaves_all_subdevices_in_op_and_no_output_goes_back() {
     for near in [Host::First, Host::Second] {
@@ -52,7 +52,7 @@ fn a_takeover_leaves_all_subdevices_in_op_and_no_output_goes_back() {
     }
 }
 
-// covers: MR-07, REQ015, takeover
+// covers: MR-07, REQ015, standby
 #[test]
 fn a_role_is_handed_over_and_back_without_a_lost_cycle() {
     for near in [Host::First, Host::Second] {
@@ -73,7 +73,7 @@ fn a_role_is_handed_over_and_back_without_a_lost_cycle() {
     }
 }
 
-// covers: no-allocation, takeover
+// covers: no-allocation, standby
 #[test]
 fn cycles_of_both_and_changes_of_the_role_do_not_allocate() {
     let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());

@@ -64,7 +64,7 @@ impl NotReady {
     pub const LAYOUT: NotReady = NotReady(0x08);
     /// It is to stay INACTIVE.
     pub const HELD: NotReady = NotReady(0x10);
-    /// One of its links is down.
+    /// One of its links is down. This alone does not prevent a takeover: the ring is open there, as for the ACTIVE.
     pub const LINK: NotReady = NotReady(0x20);
     /// The application has a reason of its own.
     pub const APPLICATION: NotReady = NotReady(0x40);
@@ -91,9 +91,9 @@ impl NotReady {
         self.0 & other.0 == other.0
     }
 
-    /// Whether nothing prevents it.
+    /// Whether nothing prevents it. A link that is down does not ([`NotReady::LINK`]), an unknown bit does.
     pub const fn is_ready(self) -> bool {
-        self.0 == 0
+        self.0 & !NotReady::LINK.0 == 0
     }
 
     /// The reasons in words.
@@ -104,7 +104,7 @@ impl NotReady {
 
 impl fmt::Display for NotReady {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_ready() {
+        if *self == NotReady::NOTHING {
             return f.write_str("ready");
         }
         for (number, name) in self.reasons().enumerate() {

@@ -169,10 +169,7 @@ fn a_reader_takes_the_next_version_and_refuses_what_it_cannot_read() {
     next[5] = VERSION + 1;
     let error = Header::decode(&next).unwrap_err();
     assert_eq!(error, MasterFrameError::Version { least: VERSION + 1, got: VERSION + 1 });
-    assert_eq!(
-        error.to_string(),
-        "master frames of version 2, readable from version 2 on: this MainDevice has version 1"
-    );
+    assert_eq!(error.to_string(), "master frames of version 2, readable from version 2 on: here is version 1");
     next[0] = b'X';
     assert_eq!(Header::decode(&next), Err(MasterFrameError::Magic(*b"XCmr")));
     assert!(Answer::decode(&next).is_err());

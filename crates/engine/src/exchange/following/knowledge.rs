@@ -29,6 +29,12 @@ impl Default for HeardKnowledge {
 }
 
 impl HeardKnowledge {
+    /// Nothing is on its way. In the cyclic path: the room stays.
+    pub fn forget(&mut self) {
+        (self.version, self.left) = (None, 0);
+        self.arrived.fill(0);
+    }
+
     /// The pieces of this cycle are of the knowledge that its header names.
     pub fn expect(&mut self, header: &Header) {
         let length = header.knowledge_len as usize;

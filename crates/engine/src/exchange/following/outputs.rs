@@ -1,7 +1,8 @@
-//! Outputs that the INACTIVE takes from the frames of the ACTIVE: controllers do not alter written data (protocol FR-05).
+//! Outputs that the INACTIVE takes from the frames of the ACTIVE: controllers do not alter written data (protocol
+//! FR-05).
 //!
-//! Two states of them: the latest ones, datagram by datagram, which a takeover goes on with, so that no output goes back
-//! to an older value; and those of a cycle that was received as a whole, which the application sees.
+//! Two states of them: the latest ones, datagram by datagram, which a takeover goes on with, so that no output goes
+//! back to an older value; and those of a cycle that was received as a whole, which the application sees.
 
 use alloc::boxed::Box;
 use alloc::vec;

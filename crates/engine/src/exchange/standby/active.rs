@@ -3,8 +3,9 @@
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{Phase, Stage};
 
-use super::partner::Difference;
-use super::{Exchange, State};
+use super::Exchange;
+use super::partner::{Difference, Items};
+use super::state::State;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::Received;
 use crate::exchange::flight::Step;
@@ -141,7 +142,7 @@ impl State {
 
 /// Compares the configuration of the other MainDevice with the own one.
 pub(super) fn compare(
-    items: &mut super::Items,
+    items: &mut Items,
     (identity, item): (u64, ringcat_wire::master_frame::Item),
     events: &mut Producer,
 ) {

@@ -2,7 +2,8 @@
 
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord, NotReady, SubDeviceRecord, is_master_frame};
 
-use super::{Exchange, State};
+use super::Exchange;
+use super::state::State;
 use crate::board::Supervision;
 use crate::board::live::{Life, Presence};
 use crate::board::{Board, RingWord};

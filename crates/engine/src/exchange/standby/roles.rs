@@ -2,7 +2,8 @@
 
 use ringcat_wire::master_frame::{Answer, Phase};
 
-use super::{Exchange, State};
+use super::Exchange;
+use super::state::State;
 use crate::domain::DomainStatus;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::domain::Domain;

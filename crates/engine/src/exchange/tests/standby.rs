@@ -19,7 +19,7 @@ use crate::layout::MasterSizes;
 use crate::link::Link;
 use crate::role::Partner;
 
-// covers: FR-03, FR-05, FR-06, FR-07, FR-08, FR-16, takeover
+// covers: FR-03, FR-05, FR-06, FR-07, FR-08, FR-16, standby
 #[test]
 fn the_inactive_has_outputs_of_the_cycle_and_inputs_of_the_cycle_before() {
     let mut duo = Duo::new(MasterSizes::default());
@@ -38,7 +38,7 @@ fn the_inactive_has_outputs_of_the_cycle_and_inputs_of_the_cycle_before() {
     assert_eq!(kinds, [false, false, true, true], "process data first, then master frames, each on both links");
 }
 
-// covers: FR-04, FR-12, FR-15, REQ027, takeover
+// covers: FR-04, FR-12, FR-15, REQ027, standby
 #[test]
 fn process_data_of_both_maindevices_arrives_at_the_other_one() {
     let sizes = MasterSizes { to_inactive: 4, to_active: 3, ..MasterSizes::default() };
@@ -54,7 +54,7 @@ fn process_data_of_both_maindevices_arrives_at_the_other_one() {
     assert!(none.first.exchange.to_partner_mut().is_empty() && none.first.exchange.from_partner().is_empty());
 }
 
-// covers: FR-10, FR-11, takeover
+// covers: FR-10, FR-11, standby
 #[test]
 fn working_counters_of_master_frames_are_those_of_one_pass_in_both_copies() {
     let mut duo = Duo::new(MasterSizes { to_active: 3, ..MasterSizes::default() });
@@ -71,7 +71,7 @@ fn working_counters_of_master_frames_are_those_of_one_pass_in_both_copies() {
     assert!(duo.first.exchange.partner().is_ready(), "{:?}", duo.first.exchange.partner());
 }
 
-// covers: 9.8, takeover
+// covers: 9.8, standby
 #[test]
 fn both_copies_of_a_cycle_carry_the_same_answer_and_data() {
     let mut duo = Duo::new(MasterSizes { to_active: 3, ..MasterSizes::default() });
@@ -89,7 +89,7 @@ fn both_copies_of_a_cycle_carry_the_same_answer_and_data() {
     }
 }
 
-// covers: 9.8, FR-06, takeover
+// covers: 9.8, FR-06, standby
 #[test]
 fn a_cycle_that_did_not_arrive_as_a_whole_changes_nothing_at_the_inactive() {
     let sizes = MasterSizes { to_inactive: 2000, ..MasterSizes::default() };
@@ -110,7 +110,7 @@ fn a_cycle_that_did_not_arrive_as_a_whole_changes_nothing_at_the_inactive() {
     assert!(duo.second.exchange.from_partner().iter().all(|byte| *byte == 7));
 }
 
-// covers: 9.8, takeover
+// covers: 9.8, standby
 #[test]
 fn one_copy_of_each_frame_is_enough_whatever_copy_it_is() {
     let sizes = MasterSizes { to_inactive: 2000, to_active: 2000, ..MasterSizes::default() };
@@ -131,7 +131,7 @@ fn one_copy_of_each_frame_is_enough_whatever_copy_it_is() {
     }
 }
 
-// covers: FR-13, takeover
+// covers: FR-13, standby
 #[test]
 fn without_the_area_of_inputs_the_inactive_has_outputs_alone() {
     let mut duo = Duo::new(MasterSizes { inputs: false, ..MasterSizes::default() });
@@ -141,7 +141,7 @@ fn without_the_area_of_inputs_the_inactive_has_outputs_alone() {
     assert_eq!(duo.second.exchange.freshness(DOMAIN, SubDeviceId(0)), Freshness::Never);
 }
 
-// covers: MR-13, MR-14, MR-19, REQ043, REQ045, takeover
+// covers: MR-13, MR-14, MR-19, REQ043, REQ045, standby
 #[test]
 fn states_and_diagnosis_of_the_active_are_those_of_the_inactive() {
     let mut duo = Duo::new(MasterSizes::default());
@@ -164,7 +164,7 @@ fn states_and_diagnosis_of_the_active_are_those_of_the_inactive() {
     assert_eq!(diagnosis.len(), 57);
 }
 
-// covers: FR-11, MR-07, takeover
+// covers: FR-11, MR-07, standby
 #[test]
 fn the_active_tells_a_bare_forwarder_from_one_that_follows_and_notices_both_ends() {
     let mut duo = Duo::new(MasterSizes::default());
@@ -198,7 +198,7 @@ fn the_active_tells_a_bare_forwarder_from_one_that_follows_and_notices_both_ends
     assert_eq!(kinds, [1, 3, 2, 0], "{partners:?}");
 }
 
-// covers: REQ010, MR-15, takeover
+// covers: REQ010, MR-15, standby
 #[test]
 fn different_configurations_are_reported_on_both_sides_and_prevent_a_takeover() {
     let mut duo = Duo::with_items(MasterSizes::default(), (7, &[1, 2, 3]), (8, &[1, 2, 9]));
@@ -212,7 +212,7 @@ fn different_configurations_are_reported_on_both_sides_and_prevent_a_takeover() 
     assert!(matches!(partner, Partner::Alive { not_ready, .. } if not_ready.has(NotReady::IDENTITY)), "{partner:?}");
 }
 
-// covers: 9.8, takeover
+// covers: 9.8, standby
 #[test]
 fn knowledge_arrives_piece_by_piece_and_a_newer_one_replaces_it() {
     let mut duo = Duo::new(MasterSizes { knowledge: 100, ..MasterSizes::default() });

@@ -1,7 +1,7 @@
 //! Clocks that another MainDevice has set up: they are read and not written, and go on without a jump (protocol 7.2).
 //!
-//! What was measured is known from that MainDevice. Offset, delay and filters of each clock and the time of the reference
-//! are read; where a delay differs from the known one the segment is measured again, as after a change.
+//! What was measured is known from that MainDevice. Offset, delay and filters of each clock and the time of the
+//! reference are read; where a delay differs from the known one the segment is measured again, as after a change.
 
 use alloc::format;
 use alloc::string::{String, ToString};

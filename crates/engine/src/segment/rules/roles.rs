@@ -6,12 +6,22 @@ use crate::board::live::{Life, Presence};
 use crate::segment::effect::{Check, Effects, Watch};
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
+use crate::segment::observation::StandbyObservation;
 use crate::segment::start::Start;
 
 impl Segment {
+    /// Observes what another MainDevice of the ring does.
+    pub(super) fn observe_standby(&mut self, seen: StandbyObservation<'_>, effects: &mut Effects) {
+        match seen {
+            StandbyObservation::TookOver { lives, is_hot } => self.take_bus(lives, is_hot, effects),
+            StandbyObservation::Yielded => self.yield_bus(),
+            StandbyObservation::Mirrored => self.mirror(),
+        }
+    }
+
     /// This MainDevice controls the bus: members that the other one had in their target states stay as they are, the
     /// others are configured. The first round of reads compares all of them with what was known.
-    pub(in crate::segment) fn take_bus(&mut self, lives: &[Life], is_hot: bool, effects: &mut Effects) {
+    fn take_bus(&mut self, lives: &[Life], is_hot: bool, effects: &mut Effects) {
         if let Some(scanned) = self.stage.scanned_mut() {
             scanned.registers = Start::Doubtful;
         }
@@ -59,7 +69,7 @@ impl Segment {
     }
 
     /// Another MainDevice controls the bus: attempts have ended, and what was altered for a moment is its matter now.
-    pub(in crate::segment) fn yield_bus(&mut self) {
+    fn yield_bus(&mut self) {
         self.slot = self.slot.emptied();
         self.altered.clear();
         self.port_controls.clear();
@@ -69,7 +79,7 @@ impl Segment {
     }
 
     /// Shows the states of the members that the other MainDevice has seen. Nothing is reported: it reports them.
-    pub(in crate::segment) fn mirror(&mut self) {
+    fn mirror(&mut self) {
         for (index, member) in self.subdevices.members_mut().enumerate() {
             let Some(life) = self.board.live.life(index) else { return };
             let state = AlStatus::decode(&[life.al_status, 0]).al_state();

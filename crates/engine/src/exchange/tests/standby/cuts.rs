@@ -21,7 +21,7 @@ fn pass(second: &mut Device, duo_now: crate::time::Instant, frame: &mut [u8], wa
     }
 }
 
-// covers: 9.7.5, 9.8, FR-10, FR-11, CF-05, takeover
+// covers: 9.7.5, 9.8, FR-10, FR-11, CF-05, standby
 #[test]
 fn in_each_row_of_a_cut_one_copy_counts_as_expected_and_none_more() {
     use Link::{Main, Redundant};

@@ -21,7 +21,7 @@ fn count(duo: &mut Duo, from: u8, cycles: u8) {
     }
 }
 
-// covers: MR-07, REQ015, takeover
+// covers: MR-07, REQ015, standby
 #[test]
 fn a_role_that_is_handed_over_costs_no_cycle_and_no_output_goes_back() {
     let mut duo = Duo::new(MasterSizes::default());
@@ -48,7 +48,7 @@ fn a_role_that_is_handed_over_costs_no_cycle_and_no_output_goes_back() {
     }
 }
 
-// covers: MR-07, takeover
+// covers: MR-07, standby
 #[test]
 fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
     let mut duo = Duo::new(MasterSizes::default());
@@ -69,9 +69,9 @@ fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
     assert!(duo.first.is_active() && duo.first.standby_events().iter().any(refused));
 }
 
-// covers: FR-09, 9.8, takeover
+// covers: FR-09, 9.8, standby
 #[test]
-fn a_cycle_of_the_inactive_begins_with_the_last_frame_on_both_links_or_half_a_period_later() {
+fn an_inactive_begins_a_cycle_with_the_last_frame_or_half_a_period_later() {
     let mut duo = Duo::new(MasterSizes::default());
     duo.cycle();
     let begins_at = |duo: &Duo| duo.second.exchange.inactive_begins_at().expect("it is INACTIVE");
@@ -97,7 +97,7 @@ fn a_cycle_of_the_inactive_begins_with_the_last_frame_on_both_links_or_half_a_pe
     assert_eq!(begins_at(&duo), Instant(0), "nothing comes on a dead link");
 }
 
-// covers: 9.9, takeover
+// covers: 9.9, standby
 #[test]
 fn the_grid_of_the_former_active_goes_on() {
     let mut duo = Duo::new(MasterSizes::default());

@@ -13,7 +13,7 @@ fn duo() -> Duo {
     Duo::new(MasterSizes { to_inactive: 2, to_active: 2, ..MasterSizes::default() })
 }
 
-// covers: MR-02, MR-03, MR-04, MR-07, REQ003, REQ014, takeover
+// covers: MR-02, MR-03, MR-04, MR-07, REQ003, REQ014, standby
 #[test]
 fn a_requested_role_takes_effect_at_the_next_cycle_and_is_reported_once() {
     let mut duo = duo();
@@ -34,7 +34,7 @@ fn a_requested_role_takes_effect_at_the_next_cycle_and_is_reported_once() {
     assert!(duo.second.standby_events().is_empty(), "the present role is no change");
 }
 
-// covers: MR-05, MR-06, CF-04, takeover
+// covers: MR-05, MR-06, CF-04, standby
 #[test]
 fn the_inactive_sends_nothing_and_two_of_them_send_nothing() {
     let mut duo = duo();
@@ -52,9 +52,9 @@ fn the_inactive_sends_nothing_and_two_of_them_send_nothing() {
     }
 }
 
-// covers: MR-07, MR-16, REQ046, takeover
+// covers: MR-07, MR-16, REQ046, standby
 #[test]
-fn a_takeover_goes_on_with_the_latest_outputs_and_the_merged_inputs_in_its_first_cycle() {
+fn the_first_cycle_of_a_takeover_has_the_latest_outputs_and_merged_inputs() {
     let mut duo = duo();
     for number in 0..4_u8 {
         duo.first.exchange.image_mut(DOMAIN)[..3].fill(number);
@@ -82,7 +82,7 @@ fn a_takeover_goes_on_with_the_latest_outputs_and_the_merged_inputs_in_its_first
     assert!(duo.second.exchange.partner().is_ready(), "{:?}", duo.second.exchange.partner());
 }
 
-// covers: MR-07, 9.9, takeover
+// covers: MR-07, 9.9, standby
 #[test]
 fn outputs_of_a_cycle_that_was_cut_off_never_go_back_to_those_before() {
     let mut duo = duo();
@@ -99,7 +99,7 @@ fn outputs_of_a_cycle_that_was_cut_off_never_go_back_to_those_before() {
     assert_eq!(duo.second.exchange.image(DOMAIN)[..3], [2; 3], "the SubDevices have these");
 }
 
-// covers: MR-10, REQ017, takeover
+// covers: MR-10, REQ017, standby
 #[test]
 fn a_frame_of_another_maindevice_is_a_collision_in_the_cycle_in_which_it_comes() {
     let mut duo = duo();
@@ -120,7 +120,7 @@ fn a_frame_of_another_maindevice_is_a_collision_in_the_cycle_in_which_it_comes()
     assert!(duo.first.is_active(), "what follows is the matter of the application");
 }
 
-// covers: MR-25, 9.16, takeover
+// covers: MR-25, 9.16, standby
 #[test]
 fn an_active_without_links_becomes_inactive() {
     let mut duo = duo();
@@ -135,7 +135,7 @@ fn an_active_without_links_becomes_inactive() {
     assert_eq!(duo.first.standby_events(), [lost]);
 }
 
-// covers: MR-08, 9.10, takeover
+// covers: MR-08, 9.10, standby
 #[test]
 fn an_inactive_never_takes_over_by_itself() {
     let mut duo = duo();
