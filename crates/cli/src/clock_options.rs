@@ -2,7 +2,7 @@
 //!
 //! Input: options and the result of a scan. Output: a declaration, or an error with what is allowed.
 
-mod sync;
+pub mod sync;
 
 use clap::Args;
 use ringcat::{
@@ -17,8 +17,8 @@ use crate::times::{shift, us};
 use sync::{Sync, choose, sync};
 
 /// How `--sync` is explained.
-const SYNC_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us";
-const SYNC_LONG_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us\n\n\
+pub const SYNC_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us";
+pub const SYNC_LONG_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] as in 3:1ms+250us\n\n\
     auto takes the operation modes of the EEPROMs. SYNC0 and SYNC1 are a cycle with or without a shift: 3:1ms, \
     3:1ms+250us, 3:500us:1ms-100us. POSITION may be all, SYNC0 may be auto. The option may be given several times; one \
     with a position goes before one for all.";

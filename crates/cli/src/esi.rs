@@ -1,4 +1,10 @@
-//! `ringcat esi`: what a folder of device descriptions (ESI) describes. No interface is needed.
+//! `ringcat esi`: device descriptions (ESI): what a folder describes, one device, a SubDevice of a network file from a
+//! description and choices. No interface is needed.
+
+mod choices;
+mod declare;
+pub mod device;
+mod show;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -29,6 +35,12 @@ enum EsiCommand {
     /// With --vendor, --product and --revision: the description that counts for this device on the bus, which is that
     /// of its revision or the next older one of the same variant.
     List(ListArguments),
+    /// Shows a device of a description, and what can be chosen for it
+    Show(device::DeviceArguments),
+    /// Writes a network file with a device of a description and choices
+    ///
+    /// The choices are checked against the rules of the description.
+    Declare(Box<declare::DeclareArguments>),
 }
 
 #[derive(Args, Debug)]
@@ -70,14 +82,18 @@ impl EsiArguments {
     pub const fn name(&self) -> &'static str {
         match self.command {
             EsiCommand::List(_) => "esi list",
+            EsiCommand::Show(_) => "esi show",
+            EsiCommand::Declare(_) => "esi declare",
         }
     }
 }
 
-/// Runs the command.
+/// Runs one of the commands.
 pub fn run(arguments: &EsiArguments) -> Result<Report, Failure> {
     match &arguments.command {
         EsiCommand::List(arguments) => list(arguments),
+        EsiCommand::Show(arguments) => show::run(arguments),
+        EsiCommand::Declare(arguments) => declare::run(arguments),
     }
 }
 

@@ -1,15 +1,19 @@
 //! `ringcat init`: a network file from a scan.
 
+mod names;
+
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use ringcat::config::network::model::CheckRevision;
+use ringcat::config::network::model::{CheckRevision, Sync as SyncTable};
 use ringcat::network::{NetworkFile, ScanOptions};
 
-use crate::bus::BusArguments;
+use crate::bus::{Bus, BusArguments};
+use crate::clock_options::sync::{Sync, choose, sync};
+use crate::clock_options::{SYNC_HELP, SYNC_LONG_HELP};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::Init;
@@ -40,6 +44,15 @@ pub struct InitArguments {
     /// Use the distributed clocks
     #[arg(long, help_heading = "Network")]
     clocks: bool,
+    #[arg(
+        long,
+        value_name = "SIGNALS",
+        value_parser = sync,
+        help = SYNC_HELP,
+        long_help = SYNC_LONG_HELP,
+        help_heading = "Network"
+    )]
+    sync: Vec<Sync>,
     /// Find SubDevices with an alias of their own by it, not by position
     #[arg(long, help_heading = "Network")]
     by_alias: bool,
@@ -52,6 +65,9 @@ pub struct InitArguments {
     /// Read the versions of the firmware too, for `ringcat compare`
     #[arg(long, help_heading = "Network")]
     firmware: bool,
+    /// Folder of descriptions (ESI) for names that the devices do not have
+    #[arg(long, value_name = "DIR", help_heading = "Network")]
+    esi: Option<PathBuf>,
     /// File to write
     #[arg(long, value_name = "FILE.toml", help_heading = "Output")]
     out: PathBuf,
@@ -87,33 +103,32 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     if !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
         return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
     }
+    let begin = Instant::now();
     let bus = arguments.bus.scan(|_| arguments.firmware)?;
+    let scanned = Instant::now();
     let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
     options.ring = bus.ring;
-    options.clocks = arguments.clocks;
+    options.clocks = arguments.clocks || !arguments.sync.is_empty();
     options.by_alias = arguments.by_alias;
     options.check_revision = arguments.revisions.into();
     options.check_serial = arguments.serials;
     let mut file = NetworkFile::from_scan(&bus.scan.subdevices, &bus.scan.topology, &options);
-    for (subdevice, firmware) in file.subdevice.iter_mut().zip(&bus.firmware) {
-        subdevice.firmware = firmware.clone().unwrap_or_default();
-    }
-    for (subdevice, info) in file.subdevice.iter().zip(&bus.scan.subdevices) {
-        if subdevice.sync_manager.is_empty() && !info.sync_managers.is_empty() && !info.pdos.is_empty() {
-            let (position, name) = (info.position, &subdevice.name);
-            warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
-        }
-    }
+    let named = complete(arguments, &bus, &mut file)?;
     let text = file.to_text();
     // What is written must be what `run` reads.
     NetworkFile::read(&out.display().to_string(), text.as_bytes()).map_err(|error| Failure::new(error.to_string()))?;
-    let mut opening = OpenOptions::new();
-    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
-    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
+    write(arguments, &text)?;
+    let us = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+    let (scan_us, file_us) = (us(scanned - begin), us(scanned.elapsed()));
     let digest = file.digest().to_string();
     let variables = file.configuration().image.variables.len();
     let subdevices = file.subdevice.len();
+    say!("scan {:.1} ms, file {:.1} ms", scan_us as f64 / 1e3, file_us as f64 / 1e3);
+    if let Some(named) = named {
+        let (described, names) =
+            (counted(named.described, "SubDevice", "SubDevices"), counted(named.names, "name", "names"));
+        say!("{described} described, {names} from descriptions");
+    }
     say!("digest {digest}");
     let held = format!(
         "{} with {} at {} in {}",
@@ -122,6 +137,42 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
         in_words(arguments.cycle),
         out.display()
     );
-    let data = Data::Init(Init { subdevices, variables, bytes: text.len(), digest });
+    let data = Data::Init(Init {
+        subdevices,
+        variables,
+        described: named.map(|named| named.described),
+        named: named.map_or(0, |named| named.names),
+        bytes: text.len(),
+        scan_us,
+        file_us,
+        digest,
+    });
     Ok(Report { verdict: Verdict::Held(held), data })
+}
+
+/// What a scan does not give: chosen signals, versions of the firmware, names from descriptions.
+fn complete(arguments: &InitArguments, bus: &Bus, file: &mut NetworkFile) -> Result<Option<names::Named>, Failure> {
+    let found = &bus.scan.subdevices;
+    let signals = choose(&arguments.sync, found, arguments.cycle).map_err(Failure::new)?;
+    for (subdevice, signals) in file.subdevice.iter_mut().zip(signals) {
+        subdevice.sync = signals.map(SyncTable::from);
+    }
+    for (subdevice, firmware) in file.subdevice.iter_mut().zip(&bus.firmware) {
+        subdevice.firmware = firmware.clone().unwrap_or_default();
+    }
+    for (subdevice, info) in file.subdevice.iter().zip(found) {
+        if subdevice.sync_manager.is_empty() && !info.sync_managers.is_empty() && !info.pdos.is_empty() {
+            let (position, name) = (info.position, &subdevice.name);
+            warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
+        }
+    }
+    arguments.esi.as_deref().map(|folder| names::fill(file, found, folder)).transpose()
+}
+
+fn write(arguments: &InitArguments, text: &str) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let mut opening = OpenOptions::new();
+    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
+    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
 }

@@ -135,7 +135,7 @@ enum Command {
     ///
     /// An ENI is a network that TwinCAT, EC-Engineer or another tool has configured. No interface is needed.
     Eni(eni_summary::EniArguments),
-    /// Device descriptions (ESI): what a folder describes
+    /// Device descriptions (ESI): a folder, a device, a SubDevice from one
     ///
     /// Descriptions are files of vendors, see docs/esi.md. No interface is needed.
     Esi(esi::EsiArguments),

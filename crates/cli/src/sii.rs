@@ -5,11 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
+use ringcat::config::esi::Esi;
 use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, build, most_alike, skeleton};
-use ringcat::config::esi::{Device, Esi};
 use ringcat::esi::load;
 use ringcat::wire::sii::Sii;
 
+use crate::esi::device::{DeviceArguments, read};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::sii::{ComparedImage, Difference, SiiBuilt, SiiCompared, SiiSkeleton};
@@ -51,14 +52,8 @@ enum Profile {
 
 #[derive(Args, Debug)]
 struct BuildArguments {
-    /// The description (ESI)
-    esi: PathBuf,
-    /// Type of the device in it
-    #[arg(long = "type", value_name = "TYPE", help_heading = "Device")]
-    kind: Option<String>,
-    /// Revision of the device; the highest without
-    #[arg(long, value_name = "REVISION", value_parser = number_of_32_bits, help_heading = "Device")]
-    revision: Option<u32>,
+    #[command(flatten)]
+    device: DeviceArguments,
     /// Order of strings, padding and omissions of a tool
     #[arg(long, value_enum, default_value = "twincat", help_heading = "Image")]
     profile: Profile,
@@ -120,8 +115,8 @@ pub fn run(arguments: &SiiArguments) -> Result<Report, Failure> {
 
 fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     let failed = |text: String| Failure::new(text);
-    let esi = load(&arguments.esi).map_err(|error| failed(error.to_string()))?;
-    let device = chosen(&esi, arguments)?;
+    let esi = read(&arguments.device.esi)?;
+    let device = arguments.device.choose(&esi)?;
     let profile = match arguments.profile {
         Profile::Twincat => SiiProfile::TwinCat,
         Profile::Siitool => SiiProfile::Siitool,
@@ -145,29 +140,10 @@ fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     Ok(Report { verdict: Verdict::Held(held), data: Data::SiiBuilt(data) })
 }
 
-/// The device of the command line.
-fn chosen<'a>(esi: &'a Esi, arguments: &BuildArguments) -> Result<&'a Device, Failure> {
-    let wanted = |device: &&Device| {
-        arguments.kind.as_ref().is_none_or(|kind| device.kind.trim() == kind.trim())
-            && arguments.revision.is_none_or(|revision| device.revision == revision)
-    };
-    let found: Vec<&Device> = esi.devices.iter().filter(wanted).collect();
-    let is_one_type = found.iter().all(|device| device.kind.trim() == found[0].kind.trim());
-    match found.iter().max_by_key(|device| device.revision) {
-        Some(device) if is_one_type => Ok(device),
-        _ => {
-            let kinds: Vec<String> =
-                esi.devices.iter().map(|it| format!("{} {:#010x}", it.kind.trim(), it.revision)).collect();
-            let what = if found.is_empty() { "there is no such device" } else { "give --type" };
-            Err(Failure::new(format!("{}: {what}\nIt has {}", esi.file, kinds.join(", "))))
-        }
-    }
-}
-
 /// The descriptions of a file or a folder; a file that is refused is named and left out.
 fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
     if !path.is_dir() {
-        return Ok(vec![load(path).map_err(|error| Failure::new(error.to_string()))?]);
+        return Ok(vec![read(path)?]);
     }
     let entries = fs::read_dir(path);
     let entries = entries.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;

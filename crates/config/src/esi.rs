@@ -5,6 +5,7 @@
 //! elements and attributes, which are notices) and strict where a wrong guess would result in a wrong device: numbers
 //! beyond their range, two devices of one identity, data with half a byte.
 
+mod choices;
 mod element;
 mod error;
 pub mod index;
@@ -15,22 +16,28 @@ mod number;
 mod parse;
 mod references;
 mod rules;
+mod schema;
+mod select;
+mod selection;
 pub mod sii;
 mod values;
 
+pub use choices::{Choices, EntryChoice, MappingChoice, Parameter, PdoChoice, SamplesChoice};
 pub use error::{EsiError, EsiProblem, Notice};
 pub use limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_ELEMENTS, MAX_REFERENCES, MAX_TEXT_BYTES};
 pub use model::{
-    Access, AllowedModule, ArrayBounds, Check, ClockSettings, CoeCommand, CoeSettings, Controller, DataType, Device,
-    Dictionary, Eeprom, EepromCategory, EepromContent, EoeSettings, Esi, Flags, Fmmu, FmmuRole, Group, Info, Mailbox,
-    Module, ModuleClass, Names, Object, ObjectInfo, OpMode, OpModeSyncManager, OtherIdentity, Pdo, PdoEntry, PortKind,
-    PortSettings, Profile, RawCommand, Reference, RevisionCheck, ScaledTime, Slot, SlotDistances, SlotGroupData,
-    SlotIndex, Slots, SoeCommand, StateTimes, SubDeviceOf, SubItem, SubItemInfo, SyncManager, SyncManagerRole,
-    SyncUnit, Transition, Vendor,
+    Access, AllowedModule, AoeSettings, ArrayBounds, Check, ClockSettings, CoeCommand, CoeSettings, Controller,
+    DataType, Device, Dictionary, Eeprom, EepromCategory, EepromContent, EoeSettings, Esi, Flags, Fmmu, FmmuRole,
+    Group, Info, Mailbox, Module, ModuleClass, Names, Object, ObjectInfo, OpMode, OpModeSyncManager, OtherIdentity,
+    Pdo, PdoEntry, PortKind, PortSettings, Profile, RawCommand, Reference, RevisionCheck, ScaledTime, Slot,
+    SlotDistances, SlotGroupData, SlotIndex, Slots, SoeCommand, StateTimes, SubDeviceOf, SubItem, SubItemInfo,
+    SyncManager, SyncManagerRole, SyncUnit, Transition, Vendor,
 };
 pub use modules::{PlacedModule, place_modules};
 pub use references::{NoReferences, References, read_with};
 pub use rules::{Choice, choose};
+pub use select::select;
+pub use selection::{SelectedCommand, SelectedMessage, SelectedSyncManager, Selection};
 pub use values::{Part, parts};
 
 use crate::xml;

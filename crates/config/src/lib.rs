@@ -12,6 +12,7 @@ mod configuration;
 pub mod eni;
 pub mod esi;
 mod follow;
+mod ip;
 #[cfg(feature = "network")]
 pub mod network;
 mod xml;

@@ -5,6 +5,8 @@
 mod check;
 mod declare;
 mod error;
+mod esi_names;
+mod from_esi;
 mod from_scan;
 pub mod model;
 mod read;
@@ -15,6 +17,7 @@ mod values;
 mod write;
 
 pub use error::NetworkError;
+pub use from_esi::FromEsi;
 pub use from_scan::ScanOptions;
 pub use model::NetworkFile;
 pub use read::MAX_NETWORK_BYTES;

@@ -30,6 +30,13 @@ pub enum ClientError {
         /// The error of the system.
         cause: io::Error,
     },
+    /// A daemon may be there, but this user may not connect to its socket.
+    NotPermitted {
+        /// The socket.
+        socket: PathBuf,
+        /// The error of the system.
+        cause: io::Error,
+    },
     /// The connection failed.
     Connection(ReceiveError),
     /// The daemon refuses.
@@ -42,6 +49,11 @@ impl fmt::Display for ClientError {
             ClientError::NoDaemon { socket, cause } => {
                 write!(f, "no daemon answers at {}: {cause}; does ringcatd run?", socket.display())
             }
+            ClientError::NotPermitted { socket, cause } => write!(
+                f,
+                "this user may not connect to {}: {cause}; --mode and --group of ringcatd decide which users may",
+                socket.display()
+            ),
             ClientError::Connection(error) => write!(f, "connection to ringcatd: {error}"),
             ClientError::Refused(refusal) => write!(f, "ringcatd: {refusal}"),
         }
@@ -51,7 +63,7 @@ impl fmt::Display for ClientError {
 impl std::error::Error for ClientError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         Some(match self {
-            ClientError::NoDaemon { cause, .. } => cause,
+            ClientError::NoDaemon { cause, .. } | ClientError::NotPermitted { cause, .. } => cause,
             ClientError::Connection(error) => error,
             ClientError::Refused(refusal) => refusal,
         })
@@ -90,7 +102,10 @@ impl Client {
     /// # Errors
     /// No daemon is there, it has another version, or it refuses.
     pub fn connect(socket: &Path, program: &str) -> Result<Client, ClientError> {
-        let no_daemon = |cause| ClientError::NoDaemon { socket: socket.to_owned(), cause };
+        let no_daemon = |cause: io::Error| match cause.kind() {
+            io::ErrorKind::PermissionDenied => ClientError::NotPermitted { socket: socket.to_owned(), cause },
+            _ => ClientError::NoDaemon { socket: socket.to_owned(), cause },
+        };
         let connection = Connection::new(UnixStream::connect(socket).map_err(no_daemon)?)?;
         let hello: Message = Content::Hello { program: program.to_owned() }.into();
         // A daemon that refuses closes the connection, and has said why before.

@@ -230,6 +230,23 @@ impl Connection {
     pub fn receive_part(&self, arriving: &mut Arriving) -> Result<Option<Message>, ReceiveError> {
         arriving.read_part(|bytes| (&self.stream).read(bytes))
     }
+
+    /// The same with descriptors, which are appended to `all`: those of a message come with its beginning. For messages
+    /// of a daemon, as [`Connection::receive_with_descriptors`].
+    ///
+    /// # Errors
+    /// As [`Connection::receive_part`].
+    pub fn receive_part_with_descriptors(
+        &self,
+        arriving: &mut Arriving,
+        all: &mut Vec<OwnedFd>,
+    ) -> Result<Option<Message>, ReceiveError> {
+        arriving.read_part(|bytes| {
+            let (read, descriptors) = descriptors::receive(&self.stream, bytes)?;
+            all.extend(descriptors);
+            Ok(read)
+        })
+    }
 }
 
 impl AsFd for Connection {
@@ -258,12 +275,12 @@ mod tests {
         let sent = long.clone();
         let sender = std::thread::spawn(move || {
             near.send_with(&sent, &[0, 1]).expect("it is read");
-            near.send(&Content::Take { master: 1 }.into()).expect("it is read");
+            near.send(&Content::Take { master: 1, ethernet: true }.into()).expect("it is read");
         });
         let (first, descriptors) = far.receive_with_descriptors(Limits::OWNER, None).expect("it is sent");
         assert!(first == long && descriptors.len() == 2);
         let (second, descriptors) = far.receive_with_descriptors(Limits::OWNER, None).expect("it is sent");
-        assert_eq!((second, descriptors.len()), (Content::Take { master: 1 }.into(), 0));
+        assert_eq!((second, descriptors.len()), (Content::Take { master: 1, ethernet: true }.into(), 0));
         sender.join().expect("no panic");
         assert!(matches!(far.receive(Limits::OWNER, None), Err(ReceiveError::Ended)));
     }
@@ -274,7 +291,8 @@ mod tests {
         let (near, far) = pair();
         let limit = Some(Duration::from_millis(20));
         assert!(matches!(far.receive(Limits::CLIENT, limit), Err(ReceiveError::TimedOut)));
-        (&near.stream).write_all(b"RCTL\x03\x00\x00\x00\x10\x00\x00\x00").expect("there is room");
+        let whole = wire::encode(&Content::Take { master: 1, ethernet: true }.into()).expect("it is short");
+        (&near.stream).write_all(&whole[..12]).expect("there is room");
         let begin = Instant::now();
         assert!(matches!(far.receive(Limits::CLIENT, limit), Err(ReceiveError::TimedOut)));
         assert!((WHOLE..2 * WHOLE).contains(&begin.elapsed()));
@@ -286,7 +304,8 @@ mod tests {
     fn descriptors_that_are_not_expected_are_never_in_this_process() {
         let (near, far) = pair();
         let (held, other_end) = UnixStream::pair().expect("a pair");
-        near.send_with(&Content::Take { master: 1 }.into(), &[held.as_raw_fd(); descriptors::MOST]).expect("room");
+        near.send_with(&Content::Take { master: 1, ethernet: true }.into(), &[held.as_raw_fd(); descriptors::MOST])
+            .expect("room");
         drop(held);
         // Only the messages have duplicates now. The connection is open, so they end when the message is received.
         far.receive(Limits::CLIENT, None).expect("it is sent");
@@ -306,9 +325,12 @@ mod tests {
         assert_eq!(failed.kind(), io::ErrorKind::TimedOut);
         assert!(begin.elapsed() < LEAVES);
         let near = near.patient();
-        let sender = std::thread::spawn(move || near.send(&Content::Take { master: 1 }.into()));
+        let sender = std::thread::spawn(move || near.send(&Content::Take { master: 1, ethernet: true }.into()));
         assert_eq!(far.receive(Limits::OWNER, None).expect("it is whole"), long);
-        assert_eq!(far.receive(Limits::OWNER, None).expect("it is sent"), Content::Take { master: 1 }.into());
+        assert_eq!(
+            far.receive(Limits::OWNER, None).expect("it is sent"),
+            Content::Take { master: 1, ethernet: true }.into()
+        );
         sender.join().expect("no panic").expect("it is read");
     }
 
@@ -335,7 +357,7 @@ mod tests {
     #[test]
     fn parts_of_messages_are_taken_without_waiting_for_the_rest() {
         let (near, far) = pair();
-        let message = Message { content: Content::Take { master: 9 }, bytes: vec![1, 2, 3] };
+        let message = Message { content: Content::Take { master: 9, ethernet: true }, bytes: vec![1, 2, 3] };
         let bytes = wire::encode(&message).expect("it is short");
         let mut arriving = Arriving::new(Limits::CLIENT);
         for _ in 0..2 {

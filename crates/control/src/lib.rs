@@ -7,7 +7,7 @@
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;
 //! * [`arriving`]: a message of which a part has arrived;
-//! * [`client`]: questions to a daemon.
+//! * [`client`]: questions to a daemon; [`socket`]: where it listens.
 //!
 //! A client says [`Content::Hello`], then asks. An application that drives a master says [`Content::Take`] and gets the
 //! descriptors of its links with what is known of the segment; from then on the daemon asks on this connection. The
@@ -22,6 +22,7 @@ pub mod message;
 mod owner;
 mod receive_error;
 pub mod refusal;
+pub mod socket;
 pub mod tool;
 pub mod wire;
 
@@ -29,10 +30,8 @@ pub use arriving::Arriving;
 pub use client::Client;
 pub use connection::{Connection, ReceiveError};
 pub use message::{
-    Answer, Ask, Content, EventLine, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Right,
+    Answer, Ask, Content, EventLine, HandedBus, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Right,
 };
 pub use refusal::{Refusal, ServiceFault};
+pub use socket::DEFAULT_SOCKET;
 pub use wire::{Limits, VERSION, WireError};
-
-/// Where a daemon listens unless an option says otherwise.
-pub const DEFAULT_SOCKET: &str = "/run/ringcat/control";

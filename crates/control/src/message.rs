@@ -17,6 +17,9 @@ pub use crate::tool::{ToolAnswer, ToolAsk};
 const USUAL: Duration = Duration::from_secs(30);
 /// Longest time for answers that wait for flash memory of a SubDevice.
 const LONG: Duration = Duration::from_secs(600);
+/// Network interfaces of EoE of a master: their descriptors fit into a message.
+pub const MOST_INTERFACES: usize = 48;
+const _: () = assert!(MOST_INTERFACES + 5 <= ringcat_link::descriptors::MOST);
 
 /// A message.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,17 +65,45 @@ pub enum Content {
     Take {
         /// Number of the master.
         master: u32,
+        /// It moves frames between network interfaces of EoE and mailboxes.
+        ethernet: bool,
     },
-    /// The client drives it. Descriptors come with the message, those of the links and a lock, which the client keeps
-    /// for as long as it drives the master; its bytes are what is known of the segment, empty if nothing is known.
-    Taken(HandedLinks),
+    /// The client drives it. Descriptors come with the message, in the order of [`HandedBus`]; its bytes are what is
+    /// known of the segment, empty if nothing is known.
+    Taken(HandedBus),
+    /// An owner needs a network interface for a SubDevice with EoE.
+    MakeInterface {
+        /// Its name.
+        name: String,
+        /// Its address.
+        mac: [u8; 6],
+    },
+    /// The answer, with the descriptor of the interface.
+    Interface {
+        /// Its name.
+        name: String,
+        /// Why there is none.
+        fault: Option<String>,
+    },
+    /// An owner orders a link down, so that its partner detects that, or up again.
+    SwitchLink {
+        /// The redundant link.
+        is_redundant: bool,
+        /// Up.
+        up: bool,
+    },
     /// An owner tells what it knows after a scan, in the bytes.
     Knowledge,
     /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
     /// nothing.
     Release,
-    /// The daemon drives the master again.
+    /// The daemon drives the master again, after a release.
     Released,
+    /// The daemon drives the master again, without a release: what the client sends reaches no SubDevice.
+    TakenBack {
+        /// Why, as in the log of the daemon.
+        cause: String,
+    },
     /// The connection ends, and why.
     Refused(Refusal),
 }
@@ -291,6 +322,21 @@ pub struct EventLine {
     pub text: String,
 }
 
+/// A master that is handed over. Descriptors follow in this order: those of the links, a lock, network interfaces.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HandedBus {
+    /// Its links.
+    pub links: HandedLinks,
+    /// A lock comes with them, which the client keeps for as long as it drives the master.
+    pub has_lock: bool,
+    /// Network interfaces of EoE.
+    pub interfaces: Vec<String>,
+    /// The daemon can switch links ([`Content::SwitchLink`]).
+    pub can_switch: bool,
+    /// Level of messages: 0 to 2, above as 2 ([`ToolAsk::SetDebugLevel`]). It outlasts hand-overs.
+    pub debug_level: u32,
+}
+
 /// The links of a master that is handed over. Descriptors follow in this order: cyclic half main, redundant; acyclic
 /// half main, redundant.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -313,6 +359,9 @@ pub enum HandedLink {
         name: String,
         /// Slots of each ring.
         slots: u32,
+        /// The address that stands for it while it is absent: the daemon binds the sockets when it comes. `None`: it is
+        /// there.
+        absent_mac: Option<[u8; 6]>,
     },
 }
 

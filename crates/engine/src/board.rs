@@ -267,6 +267,21 @@ impl Board {
         self.live.is_silent(self.supervision_count.load(Ordering::Acquire))
     }
 
+    /// Posts the carriers of the links.
+    pub(crate) fn post_carriers(&self, carriers: [Option<bool>; 2]) {
+        self.live.post_carriers(carriers);
+    }
+
+    /// Takes over what another board shows of the segment as a whole.
+    pub(crate) fn go_on_from(&self, before: &Board) {
+        if !before.is_silent()
+            && let Some((_, seen)) = before.supervision()
+        {
+            self.post_supervision(seen.pack());
+        }
+        self.post_carriers(Link::ALL.map(|link| before.live.carrier(link)));
+    }
+
     /// A supervision frame did not come back.
     #[cold]
     pub(crate) fn post_silence(&self) {

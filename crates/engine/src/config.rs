@@ -7,12 +7,14 @@ mod address;
 mod builder;
 mod clocks;
 mod declared;
+mod dictionary;
 #[cfg(feature = "standby")]
 mod digest;
 mod groups;
 mod ip;
 mod matching;
 mod pdo;
+mod refused_pdos;
 mod register;
 mod repetition;
 mod resolution;
@@ -38,7 +40,9 @@ pub use digest::{ConfigPart, Digest};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
+pub(crate) use pdo::{ASSIGNMENT_BASE, is_of_pdos};
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
+pub use refused_pdos::RefusedPdos;
 pub use register::{RegisterAccess, RegisterCommand};
 pub use repetition::Repetition;
 pub use startup::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
@@ -50,15 +54,17 @@ pub use resolve::{DuplicateAlias, duplicate_aliases, resolve};
 pub use sync_modes::ModeError;
 
 /// Expected identity; `None` matches any value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Expected {
     /// Vendor id.
     pub vendor_id: Option<u32>,
     /// Product code.
     pub product_code: Option<u32>,
-    /// Revision.
+    /// Revision; its bits in `revision_mask` are compared.
     pub revision: Option<u32>,
+    /// Bits of the revision that are compared; all by default.
+    pub revision_mask: u32,
     /// Lowest revision.
     pub minimum_revision: Option<u32>,
     /// Serial number.
@@ -67,16 +73,32 @@ pub struct Expected {
     pub identification: Option<u16>,
 }
 
+impl Default for Expected {
+    fn default() -> Expected {
+        Expected {
+            vendor_id: None,
+            product_code: None,
+            revision: None,
+            revision_mask: u32::MAX,
+            minimum_revision: None,
+            serial: None,
+            identification: None,
+        }
+    }
+}
+
 impl Expected {
     /// The first field that does not match.
     pub fn mismatch(&self, info: &SubDeviceInfo) -> Option<IdentityMismatch> {
         let got = &info.identity;
         let identification = u32::from(info.identification.unwrap_or(0));
+        let mask = self.revision_mask;
+        let revision = if mask == u32::MAX { IdentityField::Revision } else { IdentityField::RevisionBits };
         let minimum = self.minimum_revision.filter(|minimum| got.revision < *minimum);
         [
             (IdentityField::VendorId, self.vendor_id, got.vendor_id),
             (IdentityField::ProductCode, self.product_code, got.product_code),
-            (IdentityField::Revision, self.revision, got.revision),
+            (revision, self.revision.map(|revision| revision & mask), got.revision & mask),
             (IdentityField::MinimumRevision, minimum, got.revision),
             (IdentityField::Serial, self.serial, got.serial),
             (IdentityField::Identification, self.identification.map(u32::from), identification),
@@ -143,6 +165,8 @@ pub struct SubDeviceConfig {
     pub sync_managers: Vec<SyncManagerOverride>,
     /// PDOs by SyncManager; SyncManagers without an assignment, or all if this is `None`, have the PDOs of the SII.
     pub pdos: Option<Vec<PdoAssignment>>,
+    /// What follows if it refuses their assignment or mapping.
+    pub refused_pdos: RefusedPdos,
     /// All its SyncManagers from a configuration file; `None` takes them from the SII. If they are given,
     /// `sync_managers` and `pdos` are ignored, PDO assignment and mapping are not written, and the mailboxes of the
     /// file replace those of the SII.
@@ -185,6 +209,7 @@ impl Default for SubDeviceConfig {
             group: None,
             sync_managers: Vec::new(),
             pdos: None,
+            refused_pdos: RefusedPdos::default(),
             declared: None,
             declared_bootstrap: None,
             watchdog_divider: None,

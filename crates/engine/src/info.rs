@@ -9,6 +9,8 @@ mod collect;
 mod extend;
 mod extent;
 mod identity_field;
+mod pdo_source;
+mod pdos;
 mod subdevice;
 mod warning;
 
@@ -20,6 +22,7 @@ pub use crate::direction::Direction;
 pub(crate) use collect::is_possible;
 pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
+pub use pdo_source::PdoSource;
 pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};
 

@@ -28,7 +28,7 @@ pub use error::KnowledgeError;
 /// First bytes.
 const MAGIC: [u8; 8] = *b"RingCAT\0";
 /// Version of the form of the bytes. Bytes of other versions are refused: the reader scans.
-const VERSION: u16 = 2;
+const VERSION: u16 = 3;
 /// Bytes of magic, version, length and checksum.
 const HEADER: usize = 8 + 2 + 4 + 8;
 /// Bytes of a SubDevice, as a first estimate.
@@ -314,7 +314,7 @@ fn open(bytes: &[u8]) -> Result<Input<'_>, KnowledgeError> {
         return wrong(0, "knowledge of a segment");
     }
     if u16::take(&mut input)? != VERSION {
-        return wrong(8, "version 2");
+        return wrong(8, "version 3");
     }
     if usize::take(&mut input)? != bytes.len().saturating_sub(HEADER) {
         return wrong(10, "the number of bytes behind the header");

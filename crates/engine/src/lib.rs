@@ -54,14 +54,14 @@ pub use clocks::{DelayRange, Follower, phase_error};
 pub use declared::Move;
 pub use junction::{ClosingEvidence, HEAD_PORT, JunctionConnection, JunctionError, JunctionMode, START_PORT};
 pub use plan::{
-    AreaPlan, MappedEntry, MappedPdo, PlanError, PlanFault, PlanProblem, PlanWarning, SmPlan, SubDevicePlan, plan,
+    AreaPlan, MappedEntry, MappedPdo, PdoPlan, PlanError, PlanFault, PlanProblem, PlanWarning, SmPlan, SubDevicePlan,
+    plan,
 };
 pub use procedures::al_state::StateError;
 pub use procedures::clocks::NotLocked;
 pub use procedures::configure::{
     ConfigureError, RegisterCommandError, RegisterFailure, SetupError, StartupError, WrongValue,
 };
-pub use procedures::dictionary::ReadPdos;
 pub use procedures::inspect_ring::{RingInspection, inspect_ring};
 pub use procedures::request_states::{NotFollowed, NotFollowedReason, StateScope, StatesError};
 pub use procedures::scan::{FIRST_STATION, Scan, ScanError};
@@ -79,5 +79,6 @@ pub use procedures::unassigned::rescan::{Found, Identified, Rescan};
 pub use queue::{Consumer, queue};
 pub use ring::identity::{Class, Classified, class_of};
 pub use ring::{FrameLimit, Identity, MAX_IN_FLIGHT, MIN_DATAGRAMS_PER_FRAME, RingState};
+pub use segment::ReadPdos;
 pub use supervisor::{AcyclicCounters, Bus, BusError, Reply, Supervisor, UnderWay};
 pub use topology::{Closing, PortOf, Topology};

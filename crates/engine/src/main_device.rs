@@ -246,6 +246,7 @@ impl MainDevice {
     /// ports that were changed for a moment by the first steps of what follows ([`restore`]).
     fn end_application(&mut self, now: Instant) {
         self.counted = self.counters();
+        self.segment.observe_written_pdos();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
         self.renew_supervisor(events, now);
@@ -274,8 +275,7 @@ impl MainDevice {
 
     /// What the procedures of the model need beside it.
     fn companions(&self) -> Companions {
-        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
-        Companions { options, requests: self.requests.clone() }
+        Companions { options: self.own_scan_options(), requests: self.requests.clone() }
     }
 
     /// The result of [`MainDevice::start_stop`], once it has ended.
@@ -481,6 +481,7 @@ fn choices(options: &Options) -> Choices {
         idle_operation: options.idle_operation,
         supervision: options.supervision,
         retries: options.retries,
+        pdos: options.pdos_in_preop(),
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

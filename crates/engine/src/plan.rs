@@ -9,6 +9,7 @@ mod areas;
 mod check;
 mod declared;
 mod error;
+mod pdos;
 mod sdos;
 mod subdevice;
 
@@ -22,6 +23,8 @@ use crate::config::SubDeviceConfig;
 use crate::info::{Direction, MailboxSyncManagers, SubDeviceInfo};
 
 pub use error::{PlanError, PlanFault, PlanProblem, PlanWarning};
+pub(crate) use sdos::HeldPdos;
+pub use sdos::PdoPlan;
 pub use subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan, SubDevicePlan};
 
 use areas::sync_manager;
@@ -57,7 +60,7 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
     let of_sii = || info.bootstrap.map_or(Vec::new(), |layout| mailbox_pair(info, &layout, info.boot_sync_managers()));
     let bootstrap = config.declared_bootstrap.as_ref().map_or_else(of_sii, |pair| declared::managers(pair).collect());
     let mut warnings = Vec::new();
-    let (mailbox, process_data, assign_sdos) = match &config.declared {
+    let (mailbox, process_data, pdos) = match &config.declared {
         Some(declared) => {
             let (mailbox, process_data) = declared::areas(declared, info)?;
             (mailbox, process_data, Vec::new())
@@ -67,8 +70,8 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
             let mailbox = layout.map(|layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
             let mailbox = mailbox.unwrap_or_default();
             let process_data = areas::areas(config, info, &mailbox)?;
-            let assign_sdos = sdos::assign_sdos(config, info, &process_data, &mut warnings)?;
-            (mailbox, process_data, assign_sdos)
+            let pdos = pdos::pdo_plans(config, info, &process_data, &mut warnings);
+            (mailbox, process_data, pdos)
         }
     };
     check::check(info, &mailbox, &process_data)?;
@@ -83,7 +86,7 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
         mailbox,
         bootstrap,
         process_data,
-        assign_sdos,
+        pdos,
         lrw_supported: info.lrw_supported(),
         watchdog: watchdog(config),
         warnings,

@@ -3,6 +3,7 @@
 //! They access the bus and the time only through [`crate::supervisor::Bus`].
 
 pub mod al_state;
+mod assign_pdos;
 mod attempt_results;
 mod cabling;
 pub mod clocks;
@@ -10,7 +11,7 @@ pub(crate) mod command_watch;
 pub(crate) mod complete_siis;
 pub mod configure;
 pub(crate) mod deactivate;
-pub mod dictionary;
+pub(crate) mod dictionary;
 pub(crate) mod error_statistics;
 pub(crate) mod error_watch;
 mod frame_limit;
@@ -26,6 +27,7 @@ pub(crate) mod mirror;
 pub(crate) mod own_objects;
 mod presence;
 mod read_again;
+mod read_state;
 pub(crate) mod reconcile;
 pub mod recover;
 pub(crate) mod request_state;

@@ -41,7 +41,7 @@ fn as_it_is(text: &str) -> String {
 }
 
 const END: &str = ".SH EXIT STATUS\n0, or 1 after a failure.\n.SH ENVIRONMENT\n.TP\n.B RINGCAT_SOCKET\n\
-                   Socket of the daemon, /run/ringcat/control by default.\n";
+                   Socket of the daemon. By default that of a daemon of this user, or /run/ringcat/control.\n";
 
 /// The page of a command: `ethercat-slaves.8`.
 pub fn page(command: &Command) -> String {

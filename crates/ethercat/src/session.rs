@@ -6,16 +6,14 @@ use std::path::{Path, PathBuf};
 
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, Ask, MasterState};
+use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolAsk};
-use ringcat_control::{Client, DEFAULT_SOCKET, Refusal};
+use ringcat_control::{Client, Refusal};
 
 use crate::arguments::Arguments;
 use crate::failure::Failure;
 use crate::numbers::List;
 use crate::selection::{self, Slave};
-
-/// Names the socket of the daemon.
-const SOCKET: &str = "RINGCAT_SOCKET";
 
 /// A command at work.
 pub struct Session<'a> {
@@ -29,10 +27,9 @@ pub struct Session<'a> {
     errors: &'a mut dyn Write,
 }
 
-/// The socket of the daemon: that of the environment, or the one that services have.
+/// The socket of the daemon: that of the environment, or the place of this user or of root ([`to_connect_to`]).
 pub fn socket() -> PathBuf {
-    let named = std::env::var_os(SOCKET).filter(|path| !path.is_empty());
-    named.map_or_else(|| PathBuf::from(DEFAULT_SOCKET), PathBuf::from)
+    to_connect_to(|name| std::env::var_os(name))
 }
 
 impl<'a> Session<'a> {

@@ -328,8 +328,8 @@ EC_PUBLIC_API int ecrt_master_write_idn(
 EC_PUBLIC_API ec_master_t *ecrt_open_master(unsigned int master_index);
 /** Ends the application of this handle, and the handle with all that came from it. */
 EC_PUBLIC_API void ecrt_release_master(ec_master_t *master);
-/** Opens a master and reserves it. Returns once the bus is scanned and all SubDevices are in PREOP.
-  * NULL: no such master, or it is reserved. */
+/** Opens a master and reserves it. Returns once the bus is scanned; SubDevices may still be on their way to PREOP, and
+  * what needs a mailbox waits for that. NULL: no such master, or it is reserved. */
 EC_PUBLIC_API ec_master_t *ecrt_request_master(unsigned int master_index);
 /** Version of the interface of the library, as ECRT_VERSION_MAGIC. */
 EC_PUBLIC_API unsigned int ecrt_version_magic(void);

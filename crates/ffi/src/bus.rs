@@ -9,16 +9,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{ClientError, DaemonError, OwnedBus, Refusal};
-use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread};
+use ringcat::daemon::{BusLog, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal};
+use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
 
 use crate::any_links::{self, AnyLinks};
-use crate::code::{Code, Outcome, report};
+use crate::code::{Code, Outcome, report, report_as};
 use crate::door::{DaemonDoor, Door, code_of};
 use crate::environment::{program_name, source};
-use crate::host::{HeldSignals, be_an_ordinary_thread, generation, memory_hint, variable};
+use crate::host::{HeldSignals, generation, memory_hint, variable};
 use crate::locks::locked;
-use crate::messages::Messenger;
 
 /// Longest wait of a request for the scan.
 const READY_LIMIT: Duration = Duration::from_secs(20);
@@ -37,12 +36,14 @@ pub struct Bus {
     /// In a child of the process it is not used: its thread is in the parent.
     generation: u64,
     /// Ends before the acyclic half.
-    _messenger: Messenger,
+    _log: BusLog,
     supervisor: SupervisorThread,
     /// Links of the cyclic half while no application uses them.
     cyclic_links: Mutex<Option<AnyLinks>>,
     /// Gives the bus back to the daemon that it came from, when it is dropped.
     _owned: Mutex<Option<OwnedBus>>,
+    /// Of a bus from a daemon.
+    ownership: Option<OwnershipWatch>,
     door: Arc<Door>,
     is_reserved: AtomicBool,
 }
@@ -135,7 +136,7 @@ impl Bus {
             )
         })?;
         let (cyclic, acyclic) = any_links::open(&source)?;
-        let started = SupervisorThread::start(acyclic, &options, be_an_ordinary_thread);
+        let started = SupervisorThread::start(acyclic, &options, realtime::leave);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
         Bus::with(master, supervisor, cyclic, None)
     }
@@ -143,7 +144,7 @@ impl Bus {
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, be_an_ordinary_thread)?;
+        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
         Bus::with(master, owned.supervisor().clone(), AnyLinks::Second(links), Some(owned)).map_err(other)
@@ -155,13 +156,18 @@ impl Bus {
         cyclic: AnyLinks,
         owned: Option<OwnedBus>,
     ) -> Result<Bus, String> {
-        let messenger = Messenger::begin(master, supervisor.clone());
-        let _messenger = messenger.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
+        let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
+        let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
+        let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
+            0 => report_as(priority, format_args!("{line}")),
+            _ => report_as(priority, format_args!("master {master}: {line}")),
+        });
+        let _log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
         let (door, is_reserved) = (Arc::new(Door::Here(supervisor.clone())), AtomicBool::new(false));
         let _owned = Mutex::new(owned);
-        Ok(Bus { master, generation, _messenger, supervisor, cyclic_links, _owned, door, is_reserved })
+        Ok(Bus { master, generation, _log, supervisor, cyclic_links, _owned, ownership, door, is_reserved })
     }
 
     /// Number of the master.
@@ -172,6 +178,20 @@ impl Bus {
     /// The acyclic half.
     pub fn supervisor(&self) -> &SupervisorThread {
         &self.supervisor
+    }
+
+    /// Whether this process has the bus still; `None` if it did not come from a daemon.
+    pub fn ownership(&self) -> Option<OwnershipWatch> {
+        self.ownership.clone()
+    }
+
+    /// Checks that the daemon has not taken the bus back.
+    ///
+    /// # Errors
+    /// [`Code::GONE`]: it has.
+    pub fn check_held(&self) -> Outcome {
+        let is_lost = self.ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back);
+        if is_lost { Err(Code::GONE) } else { Ok(()) }
     }
 
     /// Reserves the bus for a handle.
@@ -214,14 +234,16 @@ impl Bus {
         self.door.clone()
     }
 
-    /// Waits until the scan has ended. SubDevices that are not in PREOP yet are on their way; what needs their
-    /// mailboxes waits for that, and an activation leads them on from where they are.
+    /// Waits until the scan has ended and the PDOs of the dictionaries are known. SubDevices that are not in PREOP yet
+    /// are on their way; what needs their mailboxes waits for that, and an activation leads them on from where they
+    /// are.
     pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {
             let Ok(seen) = self.door.look() else { return };
             let (responding, found) = (seen.responding(), seen.found);
-            if seen.is_scanned && found == u32::from(responding) && found > 0 {
+            let is_found = seen.is_scanned && found == u32::from(responding) && found > 0;
+            if is_found && !self.supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false) {
                 return;
             }
             let elapsed = begin.elapsed();

@@ -1,6 +1,11 @@
 //! Return codes: negative error numbers of Linux, as `ecrt.h` gives them to C.
 
-use std::io::Write;
+use std::sync::OnceLock;
+
+use ringcat::daemon::{OperatorLines, Priority};
+
+use crate::environment::program_name;
+use crate::host::variable;
 
 /// Why a call failed. The value is what C gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +43,16 @@ impl Code {
     pub const GONE: Code = Code(-libc::ENODEV);
 }
 
-/// Writes a line for the operator to standard error. A closed standard error is ignored.
+/// Writes a line for the operator about something that failed, as [`report_as`].
 pub fn report(line: std::fmt::Arguments<'_>) {
-    let _ = writeln!(std::io::stderr().lock(), "EtherCAT: {line}");
+    report_as(Priority::Error, line);
+}
+
+/// Writes a line for the operator to standard error, and to the journal where there is one. It never waits.
+pub fn report_as(priority: Priority, line: std::fmt::Arguments<'_>) {
+    static LINES: OnceLock<OperatorLines> = OnceLock::new();
+    let lines = LINES.get_or_init(|| OperatorLines::new(&program_name(), variable));
+    lines.write(priority, &format!("EtherCAT: {line}"));
 }
 
 /// The value that C gets.

@@ -1,23 +1,23 @@
 //! Which links a master has: from variables of the environment.
 //!
 //! `RINGCAT_SOCKET` names the socket of a daemon, and comes first. Without it the library opens links itself that
-//! variables name; where none does, it asks the daemon at the default socket. Master 0 takes `RINGCAT_SIM` (a segment
+//! variables name; where none does, it asks the daemon in the usual places. Master 0 takes `RINGCAT_SIM` (a segment
 //! file that is simulated in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces); master 1
 //! takes `RINGCAT_SIM_1`, `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes before
 //! `RINGCAT_MAIN`.
 
 use std::path::{Path, PathBuf};
 
-use ringcat::daemon::DEFAULT_SOCKET;
+use ringcat::daemon::find_socket;
 
-/// The socket of a daemon that `RINGCAT_SOCKET` names, or the default one if no variable names links. An empty variable
-/// counts as missing.
+/// The socket of a daemon that `RINGCAT_SOCKET` names, or one in the usual places if no variable names links. An empty
+/// variable counts as missing.
 pub fn socket(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<PathBuf> {
     let named = variable("RINGCAT_SOCKET").filter(|path| !path.is_empty());
-    match (named, source(master, variable)) {
+    match (named, source(master, &variable)) {
         (Some(path), _) => Some(path.into()),
         (None, Some(_)) => None,
-        (None, None) => Some(DEFAULT_SOCKET.into()),
+        (None, None) => Some(find_socket(|name| variable(name).map(Into::into))),
     }
 }
 
@@ -62,8 +62,9 @@ mod tests {
         };
         assert_eq!(of(&set, 0), Some("/tmp/s".into()));
         assert_eq!(of(&set[1..], 0), None);
-        assert_eq!(of(&set[1..], 1), Some(DEFAULT_SOCKET.into()));
-        assert_eq!(of(&[("RINGCAT_SOCKET", "")], 0), Some(DEFAULT_SOCKET.into()));
+        let usual = find_socket(|_| None);
+        assert_eq!(of(&set[1..], 1), Some(usual.clone()));
+        assert_eq!(of(&[("RINGCAT_SOCKET", "")], 0), Some(usual));
     }
 
     // covers: c-interface

@@ -51,21 +51,6 @@ impl Drop for HeldSignals {
     }
 }
 
-/// Gives the calling thread normal priority and all processors, whatever the thread had that started it.
-pub fn be_an_ordinary_thread() {
-    // SAFETY: all zeros are a valid `sched_param` and an empty `cpu_set_t`, which both outlive the calls; 0 is the
-    // calling thread. A refusal by the kernel leaves the thread as it is.
-    unsafe {
-        let parameters: libc::sched_param = std::mem::zeroed();
-        libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameters);
-        let mut processors: libc::cpu_set_t = std::mem::zeroed();
-        for processor in 0..libc::CPU_SETSIZE as usize {
-            libc::CPU_SET(processor, &mut processors);
-        }
-        libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const processors);
-    }
-}
-
 /// The process calls this function when it ends by `exit` or by a return of `main`. Only the first function counts.
 pub fn at_exit(end: extern "C" fn()) {
     static REGISTERED: Once = Once::new();

@@ -4,13 +4,12 @@
 //!
 //! | for | see |
 //! |---|---|
-//! | return codes, structures of C | `code`, `types` |
+//! | return codes, lines for the operator, structures of C | `code`, `types` |
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
 //! | questions, answered here or through a daemon | `door` |
-//! | lines for the operator about a bus | `messages` |
 //! | mutexes outside of the cyclic path | `locks` |
 //! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
-//! | a handle of a master: reservation, activation, cyclic calls | `master`, `claim`, `domain_words` |
+//! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
 //! | the functions of C | `c` |
 //!
@@ -18,6 +17,7 @@
 //! docs/ecrt.md has each function with its return codes by phase.
 #![deny(unsafe_op_in_unsafe_fn)]
 
+mod active;
 mod any_links;
 mod bus;
 mod c;
@@ -32,7 +32,6 @@ mod information;
 mod locks;
 mod mailbox;
 mod master;
-mod messages;
 mod request;
 mod settings;
 mod types;

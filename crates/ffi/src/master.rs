@@ -7,13 +7,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
-use ringcat::daemon::ClientError;
+use ringcat::daemon::{ClientError, OwnershipWatch};
 use ringcat::{
-    Application, ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, LiveStatus, ReferenceClock,
-    Services, SubDeviceId, SupervisorThread,
+    ClockDatagrams, Declaration, DomainId, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services, SubDeviceId,
 };
 
-use crate::any_links::AnyLinks;
+use crate::active::{Active, Slot};
 use crate::bus::Bus;
 use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
@@ -30,50 +29,6 @@ const END_LIMIT: Duration = Duration::from_secs(5);
 const CLAIM_LIMIT: Duration = Duration::from_secs(1);
 /// Memory of an image is allocated in pieces of this size, so that later applications can use it again.
 const MEMORY_GRAIN: usize = 4096;
-
-/// The application of a handle.
-type App = Application<AnyLinks, SupervisorThread>;
-
-/// The application, and the times of its last cycle.
-#[derive(Debug)]
-pub struct Active {
-    /// The application.
-    pub application: App,
-    /// The last call of send.
-    sent_at: Instant,
-    /// The call of send before that one: what is read from its frame is not old, whether or not the domain was
-    /// processed since the last call of receive.
-    awaited: Instant,
-    has_clock: bool,
-}
-
-impl Active {
-    /// Receives the frames that have arrived.
-    #[inline(always)]
-    pub fn receive(&mut self) {
-        self.application.receive();
-    }
-
-    /// Sends what was queued. Nothing is sent while the acyclic half measures the delays of clocks, for which the wire
-    /// must be empty: here frames count as on the wire from one send to the next receive.
-    #[inline(always)]
-    pub fn send(&mut self) {
-        if self.has_clock {
-            if self.application.pauses() {
-                return;
-            }
-            self.awaited = self.sent_at;
-            self.sent_at = self.application.now();
-        }
-        self.application.send();
-    }
-
-    /// The time of the reference clock, if one of the last two frames has returned with it.
-    pub fn reference_time(&self) -> Option<u64> {
-        let read = self.application.exchange().reference_time()?;
-        (read.sent_at >= self.awaited).then_some(read.time)
-    }
-}
 
 /// What a handle has of its master.
 #[derive(Debug)]
@@ -110,9 +65,9 @@ pub struct Master {
     /// The links of the active application are a ring.
     is_ring: AtomicBool,
     draft: Mutex<Draft>,
-    application: Claim<Option<Active>>,
+    application: Claim<Slot>,
     /// Of the bus, while this handle has one.
-    live: RwLock<Option<LiveStatus>>,
+    live: RwLock<Option<(LiveStatus, Option<OwnershipWatch>)>>,
     /// The last time of the application; 0 before.
     application_time: AtomicU64,
     /// When it was given, before activation.
@@ -140,7 +95,7 @@ impl Master {
             has_clock: AtomicBool::new(false),
             is_ring: AtomicBool::new(false),
             draft: Mutex::default(),
-            application: Claim::new(None),
+            application: Claim::new(Slot::Empty),
             live: RwLock::default(),
             application_time: AtomicU64::new(0),
             given_at: Mutex::default(),
@@ -163,10 +118,10 @@ impl Master {
     /// Where questions are answered.
     ///
     /// # Errors
-    /// It was released.
+    /// It was released, or the daemon has taken the bus back.
     pub fn door(&self) -> Outcome<Arc<Door>> {
         match &*locked(&self.access) {
-            Access::Bus(bus) => Ok(bus.door()),
+            Access::Bus(bus) => bus.check_held().map(|()| bus.door()),
             Access::Daemon(door) => Ok(door.clone()),
             Access::Released => Err(Code::INVALID),
         }
@@ -250,15 +205,16 @@ impl Master {
     /// Starts the application. It returns at once; SubDevices are configured while it cycles.
     ///
     /// # Errors
-    /// The handle has not reserved the bus, or the declaration does not fit.
+    /// The handle has not reserved the bus, the declaration does not fit, or the daemon has taken the bus back.
     pub fn activate(&self) -> Outcome {
         self.check_reserved()?;
         if self.is_active() {
             report(format_args!("the master is active already"));
             return Ok(());
         }
-        self.refresh()?;
         let bus = self.bus()?;
+        bus.check_held()?;
+        self.refresh()?;
         let draft = locked(&self.draft);
         // Another thread may have activated it meanwhile; its application uses the memory of the domains.
         if self.is_active() {
@@ -311,9 +267,8 @@ impl Master {
             application.exchange_mut().set_application_time(time, now);
         }
         self.follow_live_status(bus);
-        let has_clock = self.has_clock.load(Ordering::Relaxed);
-        let begun = Active { application, sent_at: now, awaited: now, has_clock };
-        self.application.use_within(CLAIM_LIMIT, |active| *active = Some(begun))
+        let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
+        self.application.use_within(CLAIM_LIMIT, |slot| *slot = Slot::Active(begun))
     }
 
     /// Zeroed memory for an image, as long or longer.
@@ -331,7 +286,7 @@ impl Master {
 
     fn follow_live_status(&self, bus: &Bus) {
         if let (Ok(fresh), Ok(mut live)) = (bus.supervisor().live_status(), self.live.write()) {
-            *live = Some(fresh);
+            *live = Some((fresh, bus.ownership()));
         }
     }
 
@@ -342,14 +297,16 @@ impl Master {
     pub fn deactivate(&self) -> Outcome {
         self.check_reserved()?;
         let bus = self.bus()?;
-        let taken = self.application.use_within(CLAIM_LIMIT, Option::take)?;
+        let taken = self.application.use_within(CLAIM_LIMIT, Slot::take)?;
         let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
+        // Nothing reaches the SubDevices of a bus that the daemon has taken back.
+        let limit = if bus.check_held().is_ok() { END_LIMIT } else { Duration::ZERO };
         let mut draft = locked(&self.draft);
         for (number, words) in draft.domains().iter().enumerate() {
             words.set_memory(std::ptr::null_mut());
             locked(&self.memory).extend(application.exchange_mut().give_memory_back(DomainId(number)));
         }
-        let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+        let ended = match application.deactivate(LastOutputs::Zero, limit) {
             Ok(ended) => ended,
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
@@ -382,13 +339,25 @@ impl Master {
     /// A cyclic call: uses the application, or does nothing while there is none.
     ///
     /// # Errors
-    /// The handle has not reserved the bus; another cyclic call runs.
+    /// The handle has not reserved the bus; another cyclic call runs; the daemon has taken the bus back, which
+    /// [`Master::receive`] finds.
     #[inline(always)]
     pub fn cycle<R: Default>(&self, work: impl FnOnce(&mut Active) -> R) -> Outcome<R> {
-        let done = self.application.use_now(|application| application.as_mut().map(work))?;
-        match done {
+        match self.application.use_now(|slot| slot.use_now(work))?? {
             Some(result) => Ok(result),
             None => self.check_reserved().map(|()| R::default()),
+        }
+    }
+
+    /// The first call of a cycle: receives the frames that have arrived.
+    ///
+    /// # Errors
+    /// As [`Master::cycle`].
+    #[inline(always)]
+    pub fn receive(&self) -> Outcome {
+        match self.application.use_now(Slot::receive)?? {
+            Some(()) => Ok(()),
+            None => self.check_reserved(),
         }
     }
 
@@ -402,7 +371,7 @@ impl Master {
             if link == Some(Link::Redundant) && !self.is_ring() {
                 return Err(Code::INVALID);
             }
-            return self.live(|live| match link {
+            return self.live(SegmentState::default(), |live| match link {
                 None => {
                     let all = live.segment();
                     SegmentState::new(all.responding, all.al_states, all.is_up)
@@ -426,13 +395,14 @@ impl Master {
         })
     }
 
-    /// Reads words of the active application.
+    /// Reads words of the active application; `lost` stands for them when the daemon has taken the bus back.
     ///
     /// # Errors
     /// Another thread activates or deactivates it.
-    pub fn live<R>(&self, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
+    pub fn live<R>(&self, lost: R, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
         let live = self.live.try_read().map_err(|_| Code::BUSY)?;
-        live.as_ref().map(read).ok_or(Code::BUSY)
+        let (status, ownership) = live.as_ref().ok_or(Code::BUSY)?;
+        Ok(if ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back) { lost } else { read(status) })
     }
 
     /// Whether a clock takes part in the application.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ringcat::wire::sii::SyncManagerKind;
 use ringcat::{
-    AlState, ConfigAddress, Direction, Idn, IpSettings, PdoEntry, PdoMapping, SdoDownload, StartupAction,
+    AlState, ConfigAddress, Direction, Idn, IpSettings, PdoEntry, PdoMapping, RefusedPdos, SdoDownload, StartupAction,
     SubDeviceConfig, SubDeviceInfo, SyncSignals, Transition, Watchdog,
 };
 
@@ -244,7 +244,7 @@ impl Settings {
             0 => ConfigAddress::Position(position),
             _ => ConfigAddress::Alias { alias, offset: position },
         };
-        let mut config = SubDeviceConfig::at(address).expect_product(vendor, product);
+        let mut config = SubDeviceConfig::at(address).expect_product(vendor, product).refused_pdos(RefusedPdos::Warn);
         for (number, sync_manager) in (0u8..).zip(&self.sync_managers) {
             config = sync_manager.declare(number, config, info);
         }

@@ -14,8 +14,10 @@ pub struct Capabilities(u64);
 impl Capabilities {
     /// None.
     pub const NONE: Capabilities = Capabilities(0);
-    /// Raw frames (`CAP_NET_RAW`), and interfaces up and down, made and configured (`CAP_NET_ADMIN`).
-    pub const NETWORK: Capabilities = Capabilities(1 << 13 | 1 << 12);
+    /// Raw frames (`CAP_NET_RAW`).
+    pub const RAW: Capabilities = Capabilities(1 << 13);
+    /// Interfaces up and down, made and configured (`CAP_NET_ADMIN`).
+    pub const ADMIN: Capabilities = Capabilities(1 << 12);
 }
 
 #[repr(C)]
@@ -32,18 +34,32 @@ struct Half {
     inheritable: u32,
 }
 
-/// Gives up all capabilities of the calling thread but these, for good: programs that it starts cannot gain any either,
-/// also not as root. Those that it does not have are not gained.
-///
-/// # Errors
-/// The system refuses; the thread has all that it had.
-pub fn keep(kept: Capabilities) -> io::Result<()> {
+/// Whether the calling thread has all of these.
+pub fn has(wanted: Capabilities) -> bool {
+    read().is_ok_and(|halves| {
+        let all = u64::from(halves[0].effective) | u64::from(halves[1].effective) << 32;
+        all & wanted.0 == wanted.0
+    })
+}
+
+fn read() -> io::Result<[Half; 2]> {
     let mut header = Header { version: VERSION, pid: 0 };
     let mut halves = [Half::default(); 2];
     // SAFETY: both pointers describe live values in the layout of version 3: a header, and two halves of 32 bits.
     if unsafe { libc::syscall(libc::SYS_capget, &raw mut header, halves.as_mut_ptr()) } < 0 {
         return Err(io::Error::last_os_error());
     }
+    Ok(halves)
+}
+
+/// Gives up all capabilities of the calling thread but these, for good: programs that it starts cannot gain any either,
+/// also not as root. Those that it does not have are not gained.
+///
+/// # Errors
+/// The system refuses; the thread has all that it had.
+pub fn keep(kept: Capabilities) -> io::Result<()> {
+    let header = Header { version: VERSION, pid: 0 };
+    let mut halves = read()?;
     for (half, bits) in halves.iter_mut().zip([kept.0 as u32, (kept.0 >> 32) as u32]) {
         half.permitted &= bits;
         (half.effective, half.inheritable) = (half.permitted, 0);
@@ -75,9 +91,10 @@ mod tests {
     fn a_thread_keeps_what_it_names_and_never_gains_anything() {
         let before = u64::from_str_radix(&status("CapPrm"), 16).expect("a number");
         let body = move || {
-            keep(Capabilities::NETWORK).expect("the kernel allows it");
+            keep(Capabilities::ADMIN).expect("the kernel allows it");
             let kept = u64::from_str_radix(&status("CapPrm"), 16).expect("a number");
-            assert_eq!(kept, before & Capabilities::NETWORK.0);
+            assert_eq!(kept, before & Capabilities::ADMIN.0);
+            assert_eq!((has(Capabilities::ADMIN), has(Capabilities::RAW)), (kept != 0, false));
             assert_eq!(status("CapEff"), status("CapPrm"));
             assert_eq!((status("CapInh").trim_matches('0'), status("NoNewPrivs").as_str()), ("", "1"));
             // A program that it starts has no more, also as root.

@@ -61,11 +61,22 @@ impl CarrierWatch {
     pub const PERIOD: Duration = Duration::from_millis(5);
 
     /// Starts the thread. The first states are known on return. An interface that disappears has no carrier.
+    ///
+    /// # Errors
+    /// An interface is missing, or the system cannot start a thread.
     pub fn start(interfaces: &[&str], period: Duration) -> Result<CarrierWatch, LinkError> {
-        let failed = |what| move |errno| LinkError::from_errno(&interfaces.join(" and "), what, errno);
         if let Some(missing) = interfaces.iter().find(|name| kernel::index_of(name).is_none()) {
             return Err(LinkError::NoInterface { name: missing.to_string(), present: interface::names() });
         }
+        CarrierWatch::start_for_any(interfaces, period)
+    }
+
+    /// The same where interfaces may be missing: they have no carrier until they come.
+    ///
+    /// # Errors
+    /// The system cannot start a thread.
+    pub fn start_for_any(interfaces: &[&str], period: Duration) -> Result<CarrierWatch, LinkError> {
+        let failed = |what| move |errno| LinkError::from_errno(&interfaces.join(" and "), what, errno);
         let socket = kernel::request_socket().map_err(failed("opening a socket to read the carrier"))?;
         let watched: Vec<(String, Carrier)> =
             interfaces.iter().map(|name| (name.to_string(), Carrier::new(has_carrier(&socket, name)))).collect();

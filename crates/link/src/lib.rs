@@ -3,7 +3,7 @@
 //! * [`packet_socket`]: sending and receiving frames on an interface: `AF_PACKET` with a memory-mapped receive ring;
 //! * [`descriptors`]: sockets that another process has opened, passed over a Unix socket;
 //! * [`frame_pipe`]: frames over a pair of Unix sockets, to a simulated segment in another process;
-//! * [`process`]: the peer of a Unix socket, the end of a process;
+//! * [`process`]: the peer of a Unix socket, the end of a process; [`private_file`]: files for this user only;
 //! * [`filter`]: frames that the kernel puts into that ring;
 //! * [`listener`]: frames of one sender on interfaces where they are not expected;
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
@@ -11,6 +11,7 @@
 //! * [`interface`], [`carrier`]: the interfaces of the host, their other users, their carrier;
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
+//! * [`operator`]: lines on the standard error and in the journal, without waiting;
 //! * [`signals`]: signals that request the end of a program;
 //! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
 //!   interface passively.
@@ -30,9 +31,11 @@ pub mod interface;
 mod kernel;
 pub mod listener;
 pub mod monotonic;
+pub mod operator;
 pub mod packet_socket;
 pub mod pcapng;
 mod permission;
+pub mod private_file;
 pub mod process;
 pub mod realtime;
 mod receive_mode;
@@ -51,7 +54,8 @@ pub use error::LinkError;
 pub use filter::ClassFilter;
 pub use frame_pipe::{FramePipe, wait_pipes};
 pub use listener::{Listener, Sender};
-pub use packet_socket::handed::{HandedSocket, revoke};
+pub use packet_socket::binding::{PresentInterface, revoke};
+pub use packet_socket::handed::HandedSocket;
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket};
 pub use receive_mode::ReceiveMode;
 pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};

@@ -4,6 +4,7 @@
 //! ring none. One socket serves one thread; a MainDevice opens two per interface, one for each class of frames
 //! ([`ClassFilter`]). The socket receives only EtherType 0x88A4 and no frames sent by this host.
 
+pub mod binding;
 pub mod handed;
 pub mod prepared;
 

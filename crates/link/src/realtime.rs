@@ -97,7 +97,7 @@ fn set_scheduler(policy: libc::c_int, priority: i32) -> libc::c_long {
 }
 
 /// Gives the calling thread ordinary scheduling on any processor, in place of inherited settings.
-pub(crate) fn leave() {
+pub fn leave() {
     // Both calls only drop privileges or restore the defaults of the process: there is nothing to report.
     set_scheduler(libc::SCHED_OTHER, 0);
     // SAFETY: all bytes are a valid set, the pointer refers to a live set and thread 0 is the calling thread.

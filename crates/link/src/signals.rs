@@ -79,9 +79,43 @@ impl HeldSignals {
     }
 }
 
+/// Lets the signals end this process again: a program inherits what the one that has started it blocked. To be called
+/// before there are further threads.
+pub fn unblock() {
+    // SAFETY: all bytes zero is a valid set; the pointers are to live values, and no old mask is asked for.
+    unsafe {
+        let mut set: libc::sigset_t = zeroed();
+        libc::sigemptyset(&mut set);
+        for signal in Signal::ALL {
+            libc::sigaddset(&mut set, signal.number());
+        }
+        libc::pthread_sigmask(libc::SIG_UNBLOCK, &set, std::ptr::null_mut());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // covers: signals
+    #[test]
+    fn signals_that_a_thread_has_blocked_are_unblocked_again() {
+        let blocked = || {
+            let text = std::fs::read_to_string("/proc/thread-self/status").expect("it is there");
+            let mask = text.lines().find_map(|line| line.strip_prefix("SigBlk:")).expect("it has the key");
+            u64::from_str_radix(mask.trim(), 16).expect("a number")
+        };
+        let masks = std::thread::spawn(move || {
+            unblock();
+            let before = blocked();
+            HeldSignals::hold();
+            let held = blocked();
+            unblock();
+            (before, held, blocked())
+        });
+        let (before, held, after) = masks.join().expect("no panic");
+        assert!(before != held && before == after, "{before:x} {held:x} {after:x}");
+    }
 
     // covers: signals
     #[test]

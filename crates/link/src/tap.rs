@@ -1,8 +1,9 @@
 //! TAP interfaces: network interfaces of this host whose other end is this process.
 //!
 //! [`TapInterface::receive`] returns the Ethernet frames that the host sends on the interface; the host receives the
-//! frames of [`TapInterface::send`]. An interface exists as long as its value. The administrator of the host switches
-//! it on, assigns addresses and bridges it (`ip link set NAME up`). Without a carrier the host sends nothing.
+//! frames of [`TapInterface::send`]. An interface exists as long as its value and the duplicates of its descriptor that
+//! other processes have, or until it is removed ([`TapInterface::create_lasting`]). The administrator of the host
+//! switches it on, assigns addresses and bridges it (`ip link set NAME up`). Without a carrier the host sends nothing.
 //!
 //! Creating one needs CAP_NET_ADMIN; reading and writing do not. Constants are those of `linux/if_tun.h`.
 
@@ -20,6 +21,7 @@ const DEVICE: &CStr = c"/dev/net/tun";
 const TUNSETIFF: libc::c_ulong = 0x4004_54CA;
 const TUNSETCARRIER: libc::c_ulong = 0x4004_54E2;
 const TUNGETIFF: libc::c_ulong = 0x8004_54D2;
+const TUNSETPERSIST: libc::c_ulong = 0x4004_54CB;
 /// Bytes of a MAC address in `sockaddr`.
 const MAC_LEN: usize = 6;
 /// Length of the host's transmit queue. Further frames are dropped, so that connections of the host notice congestion
@@ -44,6 +46,13 @@ pub enum TapError {
     Taken {
         /// The name.
         name: String,
+    },
+    /// A process that makes interfaces for this one refuses.
+    Refused {
+        /// The interface.
+        name: String,
+        /// Why.
+        cause: String,
     },
     /// Another system call error.
     Os {
@@ -84,6 +93,7 @@ impl fmt::Display for TapError {
             TapError::Taken { name } => {
                 write!(f, "there is an interface {name} already: another MainDevice with this number? See `ip link`")
             }
+            TapError::Refused { name, cause } => write!(f, "{name}: {cause}"),
             TapError::Os { name, what, errno } => {
                 write!(f, "{name}: {what}: {}", io::Error::from_raw_os_error(*errno))
             }
@@ -93,7 +103,7 @@ impl fmt::Display for TapError {
 
 impl Error for TapError {}
 
-/// A TAP interface; removed when it is dropped.
+/// A TAP interface.
 #[derive(Debug)]
 pub struct TapInterface {
     fd: OwnedFd,
@@ -114,6 +124,61 @@ impl TapInterface {
     /// # Errors
     /// A missing permission or device, or a name that is taken.
     pub fn create(name: &str, mac: [u8; MAC_LEN]) -> Result<TapInterface, TapError> {
+        let tap = TapInterface::open(name, libc::IFF_TUN_EXCL)?;
+        tap.set_up(mac)?;
+        Ok(tap)
+    }
+
+    /// The same for an interface that outlasts this process: one with this name that no process has open is gone on
+    /// with as it is. It is removed by [`TapInterface::end_with_processes`], or by `ip link del`.
+    ///
+    /// # Errors
+    /// As [`TapInterface::create`]; another process has it open.
+    pub fn create_lasting(name: &str, mac: [u8; MAC_LEN]) -> Result<TapInterface, TapError> {
+        let is_left = kernel::index_of(name).is_some();
+        let tap = TapInterface::open(name, 0)?;
+        if !is_left {
+            tap.set_up(mac)?;
+        }
+        let kept = set_lasting(&tap.fd, true);
+        kept.map_err(|errno| TapError::from_errno(name, "making it last", errno))?;
+        Ok(tap)
+    }
+
+    /// From now on it exists as long as a process has it.
+    pub fn end_with_processes(&self) {
+        // It was removed otherwise.
+        let _ = set_lasting(&self.fd, false);
+    }
+
+    /// An interface whose descriptor another process has passed on. No privilege is needed.
+    ///
+    /// # Errors
+    /// The descriptor is none of a TAP interface.
+    pub fn adopt(fd: OwnedFd) -> Result<TapInterface, TapError> {
+        let failed = |errno| TapError::from_errno("a descriptor", "going on with an interface", errno);
+        // The kernel writes the whole of it.
+        let mut request = kernel::named("any").map_err(failed)?;
+        ioctl(&fd, TUNGETIFF, &mut request).map_err(failed)?;
+        // SAFETY: the request has filled this member.
+        let flags = libc::c_int::from(unsafe { request.ifr_ifru.ifru_flags });
+        if flags & libc::IFF_TAP == 0 {
+            return Err(failed(libc::ENOTTY));
+        }
+        let name: Vec<u8> = request.ifr_name.iter().take_while(|it| **it != 0).map(|it| *it as u8).collect();
+        Ok(TapInterface { fd, name: String::from_utf8_lossy(&name).into_owned() })
+    }
+
+    /// A duplicate, for another part of this process or another process.
+    ///
+    /// # Errors
+    /// The process has no more descriptors.
+    pub fn duplicate(&self) -> io::Result<TapInterface> {
+        Ok(TapInterface { fd: self.fd.try_clone()?, name: self.name.clone() })
+    }
+
+    /// Opens the device, and makes an interface or finds it.
+    fn open(name: &str, flags: libc::c_int) -> Result<TapInterface, TapError> {
         // SAFETY: the path is a null-terminated string.
         let fd = unsafe { libc::open(DEVICE.as_ptr(), libc::O_RDWR | libc::O_NONBLOCK | libc::O_CLOEXEC) };
         if fd < 0 {
@@ -126,13 +191,18 @@ impl TapInterface {
         let fd = unsafe { OwnedFd::from_raw_fd(fd) };
         let failed = |what, errno| TapError::from_errno(name, what, errno);
         let mut request = kernel::named(name).map_err(|errno| failed("its name", errno))?;
-        request.ifr_ifru.ifru_flags = (libc::IFF_TAP | libc::IFF_NO_PI | libc::IFF_TUN_EXCL) as libc::c_short;
+        request.ifr_ifru.ifru_flags = (libc::IFF_TAP | libc::IFF_NO_PI | flags) as libc::c_short;
         ioctl(&fd, TUNSETIFF, &mut request).map_err(|errno| failed("making it", errno))?;
-        let tap = TapInterface { fd, name: name.to_owned() };
-        tap.set_mac(mac).map_err(|errno| failed("setting its address", errno))?;
-        tap.set_queue().map_err(|errno| failed("setting its queue", errno))?;
-        tap.set_carrier(false);
-        Ok(tap)
+        Ok(TapInterface { fd, name: name.to_owned() })
+    }
+
+    /// A new interface has its address and queue, and no carrier.
+    fn set_up(&self, mac: [u8; MAC_LEN]) -> Result<(), TapError> {
+        let failed = |what| move |errno| TapError::from_errno(&self.name, what, errno);
+        self.set_mac(mac).map_err(failed("setting its address"))?;
+        self.set_queue().map_err(failed("setting its queue"))?;
+        self.set_carrier(false);
+        Ok(())
     }
 
     /// Its name.
@@ -197,6 +267,13 @@ unsafe impl Argument for libc::ifreq {}
 unsafe impl Argument for libc::c_int {}
 
 const _: () = assert!(size_of::<libc::c_int>() == 4, "the size is part of the request's number");
+
+/// Whether an interface outlasts its processes.
+fn set_lasting(fd: &OwnedFd, lasting: bool) -> Result<(), i32> {
+    // SAFETY: the argument of this request is a number, not a pointer.
+    let result = unsafe { libc::ioctl(fd.as_raw_fd(), TUNSETPERSIST as _, libc::c_ulong::from(lasting)) };
+    if result < 0 { Err(errno()) } else { Ok(()) }
+}
 
 fn ioctl<T: Argument>(fd: &OwnedFd, request: libc::c_ulong, argument: &mut T) -> Result<(), i32> {
     // SAFETY: the argument is live and of the type that the request takes (`Argument`).

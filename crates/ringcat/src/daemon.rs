@@ -21,21 +21,32 @@
 //! ```
 
 mod application;
+mod bus_log;
 mod error;
+mod ethernet;
+#[cfg(feature = "eoe")]
+mod interfaces;
 mod links;
+mod orders;
 mod owned;
+mod ownership;
 mod questions;
+mod received;
+mod receiver;
 mod refusing;
 pub mod serving;
 mod tool;
 
 pub use application::socket;
+pub use bus_log::{BusLog, Followed, Lines, OperatorLines, Priority};
 pub use error::DaemonError;
 pub use links::{DaemonLinks, adopt_links};
 pub use owned::OwnedBus;
+pub use ownership::{Ownership, OwnershipWatch};
 pub use ringcat_control::DEFAULT_SOCKET;
 pub use ringcat_control::client::{Client, ClientError};
 pub use ringcat_control::message::SegmentLook;
-pub use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, MasterState, Right};
+pub use ringcat_control::message::{Answer, Ask, HandedBus, HandedLink, HandedLinks, MasterState, Right};
 pub use ringcat_control::refusal::{Refusal, ServiceFault};
+pub use ringcat_control::socket::to_connect_to as find_socket;
 pub use ringcat_control::tool as known;

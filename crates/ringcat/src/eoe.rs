@@ -9,6 +9,8 @@
 //!
 //! An interface that cannot be created is reported once; all other interfaces work.
 
+mod host_interface;
+
 use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,6 +23,8 @@ use ringcat_engine::main_device::{Address, EthernetSubDevice, MainDevice as Engi
 use ringcat_engine::time::Instant;
 use ringcat_link::tap::{TapError, TapInterface};
 
+pub use self::host_interface::HostInterface;
+use self::host_interface::Lasting;
 use crate::error::Error;
 use crate::supervisor_thread::SupervisorThread;
 
@@ -31,42 +35,8 @@ const BURST: usize = 64;
 /// Maximum number of events that are kept until they are taken.
 const UNREAD_EVENTS: usize = 64;
 
-/// A network interface of the host, from the side of the MainDevice.
-pub trait HostInterface: Send {
-    /// Copies the oldest frame that the host sent into `room`. Returns its length in bytes; `None` if there is no
-    /// frame.
-    fn receive(&mut self, room: &mut [u8]) -> Option<usize>;
-
-    /// Passes a frame to the host; false if the host does not accept it.
-    fn send(&mut self, frame: &[u8]) -> bool;
-
-    /// Sets whether the interface has a carrier, so that frames can pass.
-    fn set_carrier(&mut self, carrier: bool);
-
-    /// Whether the interface still exists on the host.
-    fn exists(&self) -> bool {
-        true
-    }
-}
-
-impl HostInterface for TapInterface {
-    fn receive(&mut self, room: &mut [u8]) -> Option<usize> {
-        TapInterface::receive(self, room)
-    }
-
-    fn send(&mut self, frame: &[u8]) -> bool {
-        TapInterface::send(self, frame)
-    }
-
-    fn set_carrier(&mut self, carrier: bool) {
-        // A kernel without support for this always shows a carrier; frames are then dropped.
-        TapInterface::set_carrier(self, carrier);
-    }
-
-    fn exists(&self) -> bool {
-        TapInterface::exists(self)
-    }
-}
+/// Makes an interface, or gives one that is there; `None`: not yet.
+type Make = Box<dyn FnMut(&str, [u8; 6]) -> Result<Option<Box<dyn HostInterface>>, TapError> + Send>;
 
 /// Creates an interface with this name and MAC address.
 pub type MakeInterface = Box<dyn FnMut(&str, [u8; 6]) -> Result<Box<dyn HostInterface>, TapError> + Send>;
@@ -199,10 +169,17 @@ impl Ethernet {
     }
 }
 
-impl Drop for Ethernet {
-    fn drop(&mut self) {
+impl Ethernet {
+    /// No frame is moved from now on, as after a drop.
+    pub fn end(&self) {
         self.0.ended.store(true, Ordering::Relaxed);
         self.0.waker.wake_by_ref();
+    }
+}
+
+impl Drop for Ethernet {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -220,17 +197,45 @@ impl SupervisorThread {
     /// # Errors
     /// The thread has ended.
     pub fn start_ethernet(&self, options: EthernetOptions) -> Result<Ethernet, Error> {
+        let create = |name: &str, mac| TapInterface::create(name, mac).map(Some);
+        self.start_taps(options, create, |tap| Box::new(tap))
+    }
+
+    /// The same with interfaces that outlast this MainDevice: `source` gives a duplicate of the one with this name and
+    /// address, makes it, or says that it is not there yet, and is then asked again. It runs in the thread of the
+    /// acyclic half and must not wait.
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn start_lasting_ethernet(
+        &self,
+        options: EthernetOptions,
+        source: impl FnMut(&str, [u8; 6]) -> Result<Option<TapInterface>, TapError> + Send + 'static,
+    ) -> Result<Ethernet, Error> {
+        self.start_taps(options, source, |tap| Box::new(Lasting(tap)))
+    }
+
+    fn start_taps(
+        &self,
+        options: EthernetOptions,
+        mut source: impl FnMut(&str, [u8; 6]) -> Result<Option<TapInterface>, TapError> + Send + 'static,
+        end: impl Fn(TapInterface) -> Box<dyn HostInterface> + Send + 'static,
+    ) -> Result<Ethernet, Error> {
         let wake_up = self.wake_up();
         let is_called = wake_up.is_some();
         let make = move |name: &str, mac| {
-            let tap = TapInterface::create(name, mac)?;
+            let Some(tap) = source(name, mac)? else { return Ok(None) };
             // Without it frames of the host wait for the next turn of the thread.
             if let Some(wake_up) = &wake_up {
                 wake_up.watch(&tap);
             }
-            Ok(Box::new(tap) as Box<dyn HostInterface>)
+            Ok(Some(end(tap)))
         };
-        let (ethernet, mut switch) = Switch::new(options, Box::new(make), self.waker());
+        self.start_switch(options, Box::new(make), is_called)
+    }
+
+    fn start_switch(&self, options: EthernetOptions, make: Make, is_called: bool) -> Result<Ethernet, Error> {
+        let (ethernet, mut switch) = Switch::new(options, make, self.waker());
         self.publish_ethernet(&(ethernet.0.clone() as Arc<dyn Any + Send + Sync>));
         if is_called {
             self.attend(move |engine, now| switch.work(engine, now))?;
@@ -244,11 +249,8 @@ impl SupervisorThread {
     ///
     /// # Errors
     /// The thread has ended.
-    pub fn start_ethernet_on(&self, options: EthernetOptions, make: MakeInterface) -> Result<Ethernet, Error> {
-        let (ethernet, mut switch) = Switch::new(options, make, self.waker());
-        self.publish_ethernet(&(ethernet.0.clone() as Arc<dyn Any + Send + Sync>));
-        self.attend_often(move |engine, now| switch.work(engine, now))?;
-        Ok(ethernet)
+    pub fn start_ethernet_on(&self, options: EthernetOptions, mut make: MakeInterface) -> Result<Ethernet, Error> {
+        self.start_switch(options, Box::new(move |name, mac| make(name, mac).map(Some)), false)
     }
 }
 
@@ -257,14 +259,15 @@ struct End {
     name: String,
     subdevice: EthernetSubDevice,
     interface: Box<dyn HostInterface>,
-    carrier: bool,
+    /// `None`: not known yet.
+    carrier: Option<bool>,
     refused: u64,
 }
 
 /// Runs in the supervisor's thread.
 struct Switch {
     options: EthernetOptions,
-    make: MakeInterface,
+    make: Make,
     shared: Arc<Shared>,
     ends: Vec<End>,
     /// SubDevices with an interface that cannot be created.
@@ -273,7 +276,7 @@ struct Switch {
 }
 
 impl Switch {
-    fn new(options: EthernetOptions, make: MakeInterface, waker: Waker) -> (Ethernet, Switch) {
+    fn new(options: EthernetOptions, make: Make, waker: Waker) -> (Ethernet, Switch) {
         let shared = Arc::new(Shared { ended: AtomicBool::new(false), published: Mutex::default(), waker });
         let (ends, refused, refresh_at) = (Vec::new(), Vec::new(), Instant(0));
         (Ethernet(shared.clone()), Switch { options, make, shared, ends, refused, refresh_at })
@@ -292,8 +295,9 @@ impl Switch {
         for end in &mut self.ends {
             if let Some(up) = end.pass(engine) {
                 end.interface.set_carrier(up);
-                end.carrier = up;
-                publish(&self.shared, EthernetEvent::Carrier { name: end.name.clone(), carrier: up });
+                if end.carrier.replace(up).is_some() || up {
+                    publish(&self.shared, EthernetEvent::Carrier { name: end.name.clone(), carrier: up });
+                }
             }
         }
         false
@@ -310,6 +314,10 @@ impl Switch {
             // A declaration with this SubDevice may have begun or ended.
             let now = found.iter().find(|it| it.is_at_place_of(&end.subdevice));
             end.subdevice = *now.unwrap_or(&end.subdevice);
+            if now.is_none() {
+                // One that outlasts its place here leads nowhere meanwhile.
+                end.interface.set_carrier(false);
+            }
             !removed && now.is_some()
         });
         self.refused.retain(|refused| found.iter().any(|it| it.is_at_place_of(refused)));
@@ -319,7 +327,8 @@ impl Switch {
                 continue;
             }
             match self.make(subdevice) {
-                Ok(end) => {
+                Ok(None) => {}
+                Ok(Some(end)) => {
                     let name = end.name.clone();
                     publish(&self.shared, EthernetEvent::Made { name, subdevice: subdevice.subdevice });
                     self.ends.push(end);
@@ -342,14 +351,17 @@ impl Switch {
         }
     }
 
-    fn make(&mut self, subdevice: EthernetSubDevice) -> Result<End, TapError> {
+    fn make(&mut self, subdevice: EthernetSubDevice) -> Result<Option<End>, TapError> {
         let mut name = self.options.name(&subdevice);
         if self.ends.iter().any(|end| end.name == name) {
             // An alias that two SubDevices share is not used in names.
             name = self.options.name(&EthernetSubDevice::new(subdevice.subdevice, subdevice.position, 0));
         }
         let interface = (self.make)(&name, self.options.mac(&subdevice))?;
-        Ok(End { name, subdevice, interface, carrier: false, refused: 0 })
+        Ok(interface.map(|interface| {
+            let carrier = (!interface.may_have_carrier()).then_some(false);
+            End { name, subdevice, interface, carrier, refused: 0 }
+        }))
     }
 }
 
@@ -372,7 +384,7 @@ impl End {
                     break;
                 }
             }
-            return self.carrier.then_some(false);
+            return (self.carrier != Some(false)).then_some(false);
         };
         for _ in 0..BURST {
             let Some(frame) = port.pop_frame() else { break };
@@ -383,7 +395,7 @@ impl End {
             // A frame that is too long cannot pass; there is room for it.
             let _ = port.send(&room[..length]);
         }
-        (!self.carrier).then_some(true)
+        (self.carrier != Some(true)).then_some(true)
     }
 }
 

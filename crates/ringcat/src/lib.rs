@@ -160,7 +160,7 @@ pub use ringcat_engine::Urgency;
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, ConfigError, DeclaredArea, DeclaredSyncManager, Expected, Group, IdentityField,
     IdnWrite, IpSettings, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock,
-    RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout,
+    RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout,
     SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog, WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
@@ -234,14 +234,14 @@ pub use ringcat_engine::Topology;
 pub use ringcat_engine::config::SyncManagerOverride;
 pub use ringcat_engine::event::history::Incident;
 pub use ringcat_engine::exchange::Exchange;
-pub use ringcat_engine::info::{ControllerInfo, InfoWarning, MailboxSyncManagers, PdoInfo};
+pub use ringcat_engine::info::{ControllerInfo, InfoWarning, MailboxSyncManagers, PdoInfo, PdoSource};
 pub use ringcat_engine::layout::LayoutError;
 pub use ringcat_engine::mail::eoe::{EoeError, EoeFailure, EthernetCounters, EthernetRate, EthernetStatus};
 pub use ringcat_engine::mail::stream::{Overflow, Sink, Source};
 pub use ringcat_engine::mail::{Conversation, Lane, MailCounters, MailboxSizes};
 pub use ringcat_engine::main_device::MainDevice as Engine;
 pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice, PlacedEntry};
-pub use ringcat_engine::{PlanFault, PlanProblem, PlanWarning, SmPlan};
+pub use ringcat_engine::{PdoPlan, PlanFault, PlanProblem, PlanWarning, SmPlan};
 pub use ringcat_engine::{SiiProgramError, SiiReadError};
 #[cfg(feature = "packet")]
 pub use ringcat_link::pcapng::Direction as FrameDirection;

@@ -42,8 +42,8 @@ pub struct Options {
     /// in [`MainDevice::bring_up`]. The less, the sooner SubDevices are in OP; the rest is read in the background
     /// afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is needed.
     pub sii_extent: Option<SiiExtent>,
-    /// SubDevices with dictionaries that are read for PDOs after a scan.
-    pub pdos: ReadPdos,
+    /// Dictionaries read for PDOs. `None`: [`ReadPdos::Missing`], in PREOP with idle operation [`ReadPdos::Always`].
+    pub pdos: Option<ReadPdos>,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
     /// automatically.
     pub supervision: bool,
@@ -82,7 +82,7 @@ impl Default for Options {
         Options {
             sii_cache: true,
             sii_extent: None,
-            pdos: ReadPdos::default(),
+            pdos: None,
             supervision: true,
             source_address: MacCodec::FlagsFirst,
             settle: Duration::from_millis(5),
@@ -116,7 +116,7 @@ impl Options {
     /// Sets [`Options::pdos`].
     #[must_use]
     pub fn with_pdos(mut self, pdos: ReadPdos) -> Options {
-        self.pdos = pdos;
+        self.pdos = Some(pdos);
         self
     }
 

@@ -4,6 +4,7 @@
 //! then asleep. A link that is down drops frames, and works again as soon as it is up.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::sync::Arc;
 use std::task::Waker;
 use std::time::Duration;
 
@@ -42,8 +43,16 @@ pub struct PacketLinks {
     names: [Option<String>; 2],
     /// Interfaces that were switched off to be disconnected.
     disconnected: [bool; 2],
+    /// Switches them in place of this process.
+    switch: Option<Arc<dyn SwitchLinks>>,
     /// The place in a ring may be in doubt.
     is_searching: bool,
+}
+
+/// Switches interfaces of links off and on, in place of the process that uses them.
+pub trait SwitchLinks: std::fmt::Debug + Send + Sync {
+    /// Switches the interface of a link; false if that is not possible. Does not wait.
+    fn switch(&self, link: Link, up: bool) -> bool;
 }
 
 /// A socket that another process has opened, with what it said about it.
@@ -109,6 +118,7 @@ impl PacketLinks {
             wake_up: None,
             names,
             disconnected: [false; 2],
+            switch: None,
             is_searching: false,
         })
     }
@@ -153,14 +163,24 @@ impl PacketLinks {
             wake_up: None,
             names,
             disconnected: [false; 2],
+            switch: None,
             is_searching: true,
         })
     }
 
-    fn watch_own_carriers(self) -> Result<PacketLinks, LinkError> {
+    fn watch_own_carriers(mut self) -> Result<PacketLinks, LinkError> {
         let names = self.names.clone();
-        let [main, redundant] = names.each_ref().map(|name| name.as_deref());
-        self.watch_carriers(main.unwrap_or_default(), redundant)
+        let names: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+        let carriers = Some(CarrierWatch::start_for_any(&names, CarrierWatch::PERIOD)?);
+        self.carriers = carriers;
+        Ok(self)
+    }
+
+    /// Another process switches the interfaces.
+    #[must_use]
+    pub fn with_switch(mut self, switch: Arc<dyn SwitchLinks>) -> PacketLinks {
+        self.switch = Some(switch);
+        self
     }
 
     /// What another process must know to go on with the sockets, beside duplicates of their descriptors.
@@ -313,10 +333,13 @@ impl Links for PacketLinks {
         }
     }
 
-    /// Switches the interface off or on, which needs CAP_NET_ADMIN.
+    /// Switches the interface off or on, which needs CAP_NET_ADMIN here, or in the process that does it.
     fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
         let Some(name) = &self.names[link.index()] else { return false };
-        let done = interface::switch(name, !disconnect);
+        let done = match &self.switch {
+            Some(switch) => switch.switch(link, !disconnect),
+            None => interface::switch(name, !disconnect),
+        };
         if done {
             self.disconnected[link.index()] = disconnect;
         }

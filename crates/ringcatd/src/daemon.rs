@@ -19,6 +19,13 @@ pub struct Daemon {
     _listening: Listening,
 }
 
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        // Threads of clients may have the masters for longer.
+        self.masters.all.iter().for_each(Master::end);
+    }
+}
+
 impl Daemon {
     /// Serves clients at this socket.
     ///

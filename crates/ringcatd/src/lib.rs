@@ -1,8 +1,10 @@
 //! The daemon of RingCAT: it drives segments while no application does, and hands them over.
 //!
-//! * [`source`]: the links of a master as an option names them; [`wires`]: opened, revoked, opened anew;
+//! * [`source`]: the links of a master as an option names them; [`wires`]: opened anew for each owner; [`opened`]: as
+//!   long as a process has them; [`opener`]: packet sockets from a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
-//! * [`master`]: a master with the process that drives it;
+//! * [`master`]: a master with the process that drives it; [`driving`]: this daemon while it does;
+//! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
@@ -13,9 +15,13 @@
 #![forbid(unsafe_code)]
 
 pub mod daemon;
+pub mod driving;
+pub mod ethernet;
 pub mod listening;
 pub mod log;
 pub mod master;
+pub mod opened;
+pub mod opener;
 pub mod owner;
 pub mod owner_lock;
 pub mod process_state;

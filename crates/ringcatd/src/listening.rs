@@ -2,14 +2,15 @@
 
 use std::fs::{File, TryLockError};
 use std::io;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt, chown};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, chown};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 use ringcat_control::{Connection, Content, Refusal, Right};
+use ringcat_link::private_file;
 use ringcat_link::process::{Peer, watch_peer};
 
 use crate::log::say;
@@ -27,6 +28,7 @@ pub struct Listening {
     path: PathBuf,
     /// Device and number of the socket's file.
     inode: (u64, u64),
+    is_over: Arc<AtomicBool>,
     _lock: SocketLock,
 }
 
@@ -104,9 +106,11 @@ impl Prepared {
         let failed = |error: io::Error| format!("{}: {error}", path.display());
         let inode = inode(&hidden).map_err(failed)?;
         std::fs::rename(hidden, &path).map_err(failed)?;
-        let body = move || accept(&listener, rights, &masters);
+        let is_over = Arc::new(AtomicBool::new(false));
+        let ends = is_over.clone();
+        let body = move || accept(&listener, rights, &masters, &ends);
         thread::Builder::new().name("clients".into()).spawn(body).map_err(failed)?;
-        Ok(Listening { path, inode, _lock: lock })
+        Ok(Listening { path, inode, is_over, _lock: lock })
     }
 }
 
@@ -147,8 +151,7 @@ impl SocketLock {
         let path = PathBuf::from(path);
         let failed = |error: io::Error| format!("{}: {error}", path.display());
         loop {
-            let mut options = File::options();
-            let file = options.write(true).create(true).truncate(false).mode(0o600).open(&path).map_err(failed)?;
+            let file = private_file::open(&path).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
@@ -175,8 +178,11 @@ impl Drop for SocketLock {
 
 impl Drop for Listening {
     fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
         // Another file may be at its place.
         if inode(&self.path).is_ok_and(|there| there == self.inode) {
+            // The thread that accepts clients sees the end by another one.
+            let _ = UnixStream::connect(&self.path);
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -193,9 +199,9 @@ fn bind(hidden: &Path, rights: Rights) -> io::Result<UnixListener> {
     Ok(listener)
 }
 
-fn accept(listener: &UnixListener, rights: Rights, masters: &Arc<Masters>) {
+fn accept(listener: &UnixListener, rights: Rights, masters: &Arc<Masters>, is_over: &AtomicBool) {
     let counts = Arc::new(Counts::default());
-    loop {
+    while !is_over.load(Ordering::Acquire) {
         let stream = match listener.accept() {
             Ok((stream, _)) => stream,
             Err(_) => {

@@ -1,4 +1,4 @@
-//! Lines for the operator on the standard error.
+//! Lines for the operator on the standard error, and in the journal of the system.
 //!
 //! A thread writes them: a terminal that is stopped, or a pipe that nothing reads, holds up this thread alone. Lines
 //! that wait are bounded in number; what does not fit is counted.
@@ -10,10 +10,12 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use ringcat_link::operator::{OperatorLines, Priority, lost_lines};
+
+/// Name of the program, in front of its own lines and in the journal.
+const NAME: &str = "ringcatd";
 /// Lines that wait to be written.
 const MOST_WAITING: usize = 256;
-/// Longest line; names of programs and files are in them.
-const LONGEST: usize = 4096;
 /// The end of the program waits so long for its last lines.
 const LAST: Duration = Duration::from_secs(1);
 
@@ -26,7 +28,7 @@ struct Log {
 }
 
 struct Lines {
-    waiting: VecDeque<String>,
+    waiting: VecDeque<(Priority, String)>,
     lost: u64,
     has_thread: bool,
     /// The thread writes a line.
@@ -43,11 +45,10 @@ impl Log {
         self.lines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn push(&self, mut line: String) {
-        line.truncate(line.floor_char_boundary(LONGEST));
+    fn push(&self, priority: Priority, line: String) {
         let mut lines = self.lines();
         if lines.waiting.len() < MOST_WAITING {
-            lines.waiting.push_back(line);
+            lines.waiting.push_back((priority, line));
             self.changed.notify_all();
         } else {
             lines.lost += 1;
@@ -55,15 +56,15 @@ impl Log {
     }
 
     /// Body of the thread.
-    fn write(&self, mut out: impl Write) {
+    fn write(&self, to: &OperatorLines, mut out: impl Write) {
         let mut lines = self.lines();
         loop {
             let lost = std::mem::take(&mut lines.lost);
             let next = match lost {
                 0 => lines.waiting.pop_front(),
-                _ => Some(format!("{lost} lines were lost: nothing took them")),
+                _ => Some((Priority::Warning, format!("{NAME}: {}", lost_lines(lost)))),
             };
-            let Some(line) = next else {
+            let Some((priority, line)) = next else {
                 lines.is_writing = false;
                 self.changed.notify_all();
                 lines = self.changed.wait(lines).unwrap_or_else(PoisonError::into_inner);
@@ -71,8 +72,7 @@ impl Log {
             };
             lines.is_writing = true;
             drop(lines);
-            // Where nothing takes it, it is lost: a daemon goes on without a terminal.
-            let _ = writeln!(out, "ringcatd: {line}");
+            to.write_and_wait(priority, &line, &mut out);
             lines = self.lines();
         }
     }
@@ -90,15 +90,21 @@ impl Log {
     }
 }
 
-/// Says a line. It is written soon, and never waited for.
+/// A line of the daemon itself. It is written soon, and never waited for.
 pub fn say(line: fmt::Arguments<'_>) {
+    print(Priority::Info, format!("{NAME}: {line}"));
+}
+
+/// A line as it is. It is written soon, and never waited for.
+pub fn print(priority: Priority, line: String) {
     let is_first = !std::mem::replace(&mut LOG.lines().has_thread, true);
     if is_first {
-        let thread = thread::Builder::new().name("log".into()).spawn(|| LOG.write(std::io::stderr()));
+        let body = || LOG.write(&OperatorLines::new(NAME, |name| std::env::var(name).ok()), std::io::stderr());
+        let thread = thread::Builder::new().name("log".into()).spawn(body);
         // Without a thread now, the next line tries again.
         LOG.lines().has_thread = thread.is_ok();
     }
-    LOG.push(line.to_string());
+    LOG.push(priority, line);
 }
 
 /// Waits for the lines that were said, a second at most: to be called at the end of the program.
@@ -120,11 +126,12 @@ mod tests {
         let (reader, writer) = io::pipe().expect("a pipe");
         log.lines().has_thread = true;
         let writing = log.clone();
-        thread::spawn(move || writing.write(writer));
+        let no_journal = OperatorLines::new(NAME, |_| Some(String::new()));
+        thread::spawn(move || writing.write(&no_journal, writer));
         let begin = Instant::now();
         // More than a pipe and the queue hold.
         for _ in 0..1000 {
-            log.push("x".repeat(1000));
+            log.push(Priority::Info, "x".repeat(1000));
         }
         log.flush(Duration::from_millis(50));
         assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
@@ -132,9 +139,10 @@ mod tests {
         let mut lines = BufReader::new(reader).lines();
         while written + lost < 1000 {
             let line = lines.next().expect("there are more").expect("it is text");
-            let text = line.strip_prefix("ringcatd: ").expect("the name of the program");
-            match text.strip_suffix(" lines were lost: nothing took them") {
-                Some(number) => lost += number.parse::<u64>().expect("a number"),
+            let text =
+                line.strip_prefix("ringcatd: ").and_then(|text| text.split_once(" were lost: nothing took them"));
+            match text.and_then(|(count, _)| count.split_once(' ')) {
+                Some((number, _)) => lost += number.parse::<u64>().expect("a number"),
                 None => written += 1,
             }
         }

@@ -2,17 +2,20 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Parser;
-use ringcat_control::DEFAULT_SOCKET;
+use ringcat_control::socket::to_listen_at;
 use ringcat_link::HeldSignals;
 use ringcat_link::capabilities::{Capabilities, keep};
 use ringcat_link::process::raise_descriptors;
 use ringcatd::daemon::Daemon;
+use ringcatd::ethernet::EthernetInterfaces;
 use ringcatd::listening::Prepared;
 use ringcatd::log::{flush, say};
-use ringcatd::master::Master;
+use ringcatd::master::{Master, Settings};
+use ringcatd::opener::{self, Opener};
 use ringcatd::owner_lock::OwnerLock;
 use ringcatd::rights::{Rights, group, mode};
 use ringcatd::segment_process;
@@ -31,11 +34,14 @@ struct Arguments {
     /// A master and its links: 0=eth1, 0=eth1,eth2 (a ring), 0=sim:FILE (a simulated segment)
     ///
     /// Can be given several times. A simulated segment runs in a process of its own and needs no permission.
-    #[arg(long = "master", value_name = "NUMBER=LINKS", required_unless_present = "simulate")]
+    #[arg(long = "master", value_name = "NUMBER=LINKS", required_unless_present_any = ["simulate", "open_sockets"])]
     masters: Vec<MasterOption>,
     /// Where the daemon listens
-    #[arg(long, value_name = "PATH", default_value = DEFAULT_SOCKET)]
-    socket: PathBuf,
+    ///
+    /// By default /run/ringcat/control as root; as another user ringcat/control in XDG_RUNTIME_DIR or /run/user/UID, or
+    /// /tmp/ringcat-UID/control where there is neither.
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
     /// Mode of the socket, in octal: which users can connect, and read
     #[arg(long, default_value = "0660", value_parser = mode)]
     mode: u32,
@@ -52,21 +58,39 @@ struct Arguments {
     /// PREOP by default. Can be given once for each master.
     #[arg(long = "safe-state", value_name = "NUMBER=STATE")]
     safe_states: Vec<SafeState>,
+    /// Make no network interfaces for SubDevices with Ethernet over EtherCAT
+    ///
+    /// Otherwise they are eoeXsY with the master's number X and the position Y, or eoeXaY with the alias Y. They stay
+    /// when applications begin and end. Needs CAP_NET_ADMIN.
+    #[arg(long)]
+    no_eoe: bool,
     /// The process of a simulated segment
     #[arg(long = "simulate", hide = true, value_name = "FILE")]
     simulate: Option<PathBuf>,
+    /// The process that opens packet sockets
+    #[arg(long = "open-sockets", hide = true)]
+    open_sockets: bool,
+}
+
+/// What a process with this program does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Daemon,
+    /// A process of the daemon, which tells the operator itself.
+    Part,
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let result = match &arguments.simulate {
-        Some(file) => segment_process::run(file),
-        None => run(&arguments),
+    let (role, result) = match &arguments.simulate {
+        Some(file) => (Role::Part, segment_process::run(file)),
+        None if arguments.open_sockets => (Role::Part, opener::run()),
+        None => (Role::Daemon, run(&arguments)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // The daemon says what its segment has said.
-        Err(_) if arguments.simulate.is_some() => ExitCode::from(2),
+        // The daemon says what the other process has said.
+        Err(_) if role == Role::Part => ExitCode::from(2),
         Err(error) => {
             say(format_args!("{error}"));
             flush();
@@ -85,25 +109,31 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     raise_descriptors(DESCRIPTORS);
     std::panic::set_hook(Box::new(|panic| say(format_args!("{panic}"))));
     let rights = Rights { group: arguments.group, mode: arguments.mode };
-    let socket = Prepared::new(&arguments.socket, rights)?;
+    let path = match &arguments.socket {
+        Some(path) => path.clone(),
+        None => to_listen_at(|name| std::env::var_os(name))?,
+    };
+    let socket = Prepared::new(&path, rights)?;
     // Before there are threads and segments, which inherit what is left.
     let has_interfaces = arguments.masters.iter().any(|it| matches!(it.source, Source::Interfaces(..)));
-    let kept = if has_interfaces { Capabilities::NETWORK } else { Capabilities::NONE };
-    keep(kept).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
+    let opener = Arc::new(if has_interfaces { Opener::start()? } else { Opener::Here });
+    keep(Capabilities::ADMIN).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
     let mut masters = Vec::new();
     for option in &arguments.masters {
         let failed = |error| format!("master {}: {error}", option.master);
-        let lock = OwnerLock::open(&arguments.socket, option.master).map_err(failed)?;
-        let wires = Wires::of(&option.source).map_err(failed)?;
-        let master = Master::with_lock(option.master, option.source.to_string(), wires, lock);
-        masters.push(match arguments.safe_states.iter().find(|it| it.master == option.master) {
-            Some(safe) => master.with_safe_state(safe.state),
-            None => master,
-        });
+        let lock = OwnerLock::open(&path, option.master).map_err(failed)?;
+        let wires = Wires::of(&option.source, &opener).map_err(failed)?;
+        let mut settings = Settings::new(option.master, option.source.to_string());
+        settings.lock = Some(lock);
+        settings.interfaces = (!arguments.no_eoe).then(|| EthernetInterfaces::new(option.master));
+        if let Some(safe) = arguments.safe_states.iter().find(|it| it.master == option.master) {
+            settings.safe_state = safe.state;
+        }
+        masters.push(Master::start(settings, wires));
     }
     let stop_limit = Duration::from_millis(arguments.stop_limit);
     let daemon = Daemon::serve(masters, socket, stop_limit)?;
-    say(format_args!("listens at {}", arguments.socket.display()));
+    say(format_args!("listens at {}", path.display()));
     while held.wait(LOOK).is_none() {
         daemon.look_after();
     }

@@ -3,31 +3,51 @@
 //! The daemon drives it, or an application; while it passes from one to the other nothing does. Fresh links are opened
 //! each time it comes back, so that nothing that had it before reaches the segment any more.
 
+use std::os::fd::AsRawFd;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ringcat::daemon::{adopt_links, serving};
-use ringcat::{
-    Activity, AlState, Error, Handover, Knowledge, Options, Retries, Services, StateScope, SupervisorThread,
-};
-use ringcat_control::message::{Ask, MasterState};
+use ringcat::daemon::{Lines, serving};
+use ringcat::{AlState, Handover, Knowledge};
+use ringcat_control::message::{Answer, Ask, HandedBus, MasterState, ToolAnswer, ToolAsk};
 use ringcat_control::{Content, Message, Refusal};
+use ringcat_link::TapInterface;
 
+use crate::driving::{Driving, Lasting};
+use crate::ethernet::EthernetInterfaces;
 use crate::log::say;
+use crate::opened::Opened;
 use crate::owner::{Answered, OwnerLink};
 use crate::owner_lock::OwnerLock;
-use crate::wires::{Opened, Wires};
+use crate::wires::Wires;
 
-/// A hand-over waits so long for the end of a scan.
-const SCAN: Duration = Duration::from_secs(20);
-/// A hand-over waits so long for SubDevices that change their states.
-const SETTLE: Duration = Duration::from_secs(3);
-/// States that do not change for this time stay as they are.
-const STILL: Duration = Duration::from_millis(100);
-/// SubDevices reach their safe state within this time.
-const LEAD: Duration = Duration::from_secs(10);
-/// Interval of looks at a scan.
-const LOOK: Duration = Duration::from_millis(1);
+/// An owner is told within this time that the daemon has failed.
+const TELL: Duration = Duration::from_millis(100);
+/// What it is told, and the operator.
+const FAILED: &str = "a thread of the daemon has failed";
+
+/// How a master is driven.
+#[derive(Debug)]
+pub struct Settings {
+    /// Its number.
+    pub number: u32,
+    /// Its links, as in the option of the daemon.
+    pub links: String,
+    /// The state of its SubDevices after the end of an application.
+    pub safe_state: AlState,
+    /// A lock that its owners hold: while one has it from an earlier daemon, this one waits.
+    pub lock: Option<OwnerLock>,
+    /// Network interfaces of EoE; `None`: none is made.
+    pub interfaces: Option<EthernetInterfaces>,
+}
+
+impl Settings {
+    /// PREOP, without a lock and network interfaces.
+    pub fn new(number: u32, links: String) -> Settings {
+        Settings { number, links, safe_state: AlState::PreOp, lock: None, interfaces: None }
+    }
+}
 
 /// A master.
 #[derive(Debug)]
@@ -38,17 +58,23 @@ pub struct Master {
     wires: Mutex<Wires>,
     lock: Mutex<Option<OwnerLock>>,
     driver: Mutex<Driver>,
+    /// Network interfaces of EoE; `None`: none is to be made.
+    interfaces: Option<Arc<EthernetInterfaces>>,
     /// What is known of the segment while the daemon does not drive it.
     knowledge: Mutex<Vec<u8>>,
+    /// What was printed of the bus.
+    lines: Arc<Mutex<Lines>>,
+    /// Level of messages, whatever drives the master.
+    debug_level: AtomicU32,
 }
 
 /// What drives a master.
 #[derive(Debug)]
 enum Driver {
     /// This daemon, with descriptors for the next owner.
-    Daemon(SupervisorThread, Opened),
-    /// An application.
-    Owner(Arc<OwnerLink>),
+    Daemon(Driving, Arc<Opened>),
+    /// An application, with the descriptors that it has.
+    Owner(Arc<OwnerLink>, Arc<Opened>),
     /// It passes from one process to another.
     Changing,
     /// Nothing, because of this.
@@ -72,7 +98,7 @@ pub enum End {
 #[must_use]
 pub struct Tenancy<'a> {
     master: &'a Master,
-    opened: Opened,
+    opened: Arc<Opened>,
     is_over: bool,
 }
 
@@ -88,7 +114,7 @@ impl Drop for Tenancy<'_> {
     fn drop(&mut self) {
         if !self.is_over {
             self.opened.revoke();
-            self.master.fail("a thread of the daemon has failed");
+            self.master.fail(FAILED);
         }
     }
 }
@@ -98,30 +124,34 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Master {
-    /// A master with these links, driven by the daemon from now on. Links that cannot be opened are tried again by
-    /// [`Master::look_after`].
+    /// A master with these links, driven by the daemon from now on, without a lock and network interfaces.
     pub fn new(number: u32, links: String, wires: Wires) -> Master {
-        Master::begin(number, links, wires, None)
+        Master::start(Settings::new(number, links), wires)
     }
 
-    /// The same with a lock that its owners hold: while one has it from an earlier daemon, this one waits.
-    pub fn with_lock(number: u32, links: String, wires: Wires, lock: OwnerLock) -> Master {
-        Master::begin(number, links, wires, Some(lock))
-    }
-
-    fn begin(number: u32, links: String, wires: Wires, lock: Option<OwnerLock>) -> Master {
+    /// The same with settings. Links that cannot be opened are tried again by [`Master::look_after`].
+    pub fn start(settings: Settings, wires: Wires) -> Master {
+        let Settings { number, links, safe_state, lock, interfaces } = settings;
         let master = Master {
             number,
             links,
-            safe_state: AlState::PreOp,
+            safe_state,
             wires: Mutex::new(wires),
             lock: Mutex::new(lock),
             driver: Mutex::new(Driver::Changing),
+            interfaces: interfaces.map(Arc::new),
             knowledge: Mutex::default(),
+            lines: Arc::default(),
+            debug_level: AtomicU32::new(0),
         };
         master.drive(Handover::Orderly);
         master.prepare();
         master
+    }
+
+    /// The end of the daemon: network interfaces last as long as an application has them.
+    pub fn end(&self) {
+        self.interfaces.iter().for_each(|interfaces| interfaces.end());
     }
 
     /// Prepares sockets for the next time that the daemon takes the master back. Takes tens of milliseconds, without a
@@ -135,13 +165,6 @@ impl Master {
         }
     }
 
-    /// The state of its SubDevices after the end of an application, in place of PREOP.
-    #[must_use]
-    pub fn with_safe_state(mut self, state: AlState) -> Master {
-        self.safe_state = state;
-        self
-    }
-
     /// Its number.
     pub fn number(&self) -> u32 {
         self.number
@@ -150,7 +173,7 @@ impl Master {
     /// Its links, and what drives it.
     pub fn state(&self) -> MasterState {
         let (owner, fault) = match &*locked(&self.driver) {
-            Driver::Owner(owner) => (Some(owner.owner().clone()), None),
+            Driver::Owner(owner, _) => (Some(owner.owner().clone()), None),
             Driver::Fault(cause) => (None, Some(cause.clone())),
             Driver::Daemon(..) | Driver::Changing => (None, None),
         };
@@ -159,10 +182,25 @@ impl Master {
 
     /// Answers a question, from the process that drives it.
     pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+        let level = match what {
+            Ask::Tool(ToolAsk::SetDebugLevel { level }) => Some(level),
+            _ => None,
+        };
+        let mut answered = self.ask_driver(what, bytes);
+        if let Ok((Answer::Tool(ToolAnswer::Master(report)), _)) = &mut answered {
+            report.is_orphaned = self.opened().is_none_or(|opened| opened.is_without_device());
+        }
+        if let Some(level) = level.filter(|_| answered.is_ok()) {
+            self.debug_level.store(level, Ordering::Release);
+        }
+        answered
+    }
+
+    fn ask_driver(&self, what: Ask, bytes: Vec<u8>) -> Answered {
         let master = self.number;
         let supervisor = match &*locked(&self.driver) {
-            Driver::Daemon(supervisor, _) => Ok(supervisor.clone()),
-            Driver::Owner(owner) => Err(owner.clone()),
+            Driver::Daemon(driving, _) => Ok(driving.supervisor().clone()),
+            Driver::Owner(owner, _) => Err(owner.clone()),
             Driver::Changing => return Err(Refusal::Changing { master }),
             Driver::Fault(cause) => return Err(Refusal::Fault { master, cause: cause.clone() }),
         };
@@ -184,23 +222,12 @@ impl Master {
     /// # Errors
     /// Why not. The daemon drives the master then, as far as it did before.
     pub fn hand_over(&self, owner: &Arc<OwnerLink>) -> Result<Tenancy<'_>, Refusal> {
-        let (supervisor, opened) = self.begin_change()?;
+        let (driving, opened) = self.begin_change()?;
         let tenancy = Tenancy { master: self, opened, is_over: false };
-        wait_for_scan(&supervisor);
-        wait_until_settled(&supervisor);
-        // A thread that has ended knows nothing.
-        let knowledge = supervisor.hand_over().ok().flatten();
-        drop(supervisor);
-        let bytes = knowledge.as_ref().map(Knowledge::to_bytes).unwrap_or_default();
+        let bytes = driving.hand_over();
         locked(&self.knowledge).clone_from(&bytes);
-        let message = Message { content: Content::Taken(tenancy.opened.links.clone()), bytes };
-        let mut raw: Vec<_> = tenancy.opened.descriptors.iter().map(std::os::fd::AsRawFd::as_raw_fd).collect();
-        if let Some(lock) = &mut *locked(&self.lock) {
-            lock.note(owner.owner());
-            raw.push(lock.descriptor());
-        }
-        let sent = owner.connection().send_with(&message, &raw);
-        *locked(&self.driver) = Driver::Owner(owner.clone());
+        let sent = self.send_bus(owner, &tenancy.opened, bytes);
+        *locked(&self.driver) = Driver::Owner(owner.clone(), tenancy.opened.clone());
         match sent {
             Ok(()) => Ok(tenancy),
             Err(error) => {
@@ -211,16 +238,59 @@ impl Master {
         }
     }
 
+    /// Sends links, lock, network interfaces and what is known of the segment.
+    fn send_bus(&self, owner: &OwnerLink, opened: &Opened, knowledge: Vec<u8>) -> std::io::Result<()> {
+        let interfaces = match &self.interfaces {
+            Some(interfaces) if owner.moves_ethernet() => interfaces.all(),
+            Some(interfaces) => {
+                interfaces.leave();
+                Vec::new()
+            }
+            None => Vec::new(),
+        };
+        let mut lock = locked(&self.lock);
+        lock.iter_mut().for_each(|lock| lock.note(owner.owner()));
+        let handed = HandedBus {
+            links: opened.links().clone(),
+            has_lock: lock.is_some(),
+            interfaces: interfaces.iter().map(|(name, _)| name.clone()).collect(),
+            can_switch: opened.can_switch(),
+            debug_level: self.debug_level.load(Ordering::Acquire),
+        };
+        let mut raw: Vec<_> = opened.descriptors().iter().map(AsRawFd::as_raw_fd).collect();
+        raw.extend(lock.iter().map(OwnerLock::descriptor));
+        raw.extend(interfaces.iter().map(|(_, descriptor)| descriptor.as_raw_fd()));
+        owner.connection().send_with(&Message { content: Content::Taken(handed), bytes: knowledge }, &raw)
+    }
+
+    /// An owner needs a network interface: its descriptor.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn make_interface(&self, name: &str, mac: [u8; 6]) -> Result<TapInterface, String> {
+        let interfaces = self.interfaces.as_ref().ok_or_else(|| "ringcatd makes no network interfaces".to_owned())?;
+        interfaces.make(name, mac).map_err(|error| error.to_string())
+    }
+
+    /// An owner orders a link down or up.
+    ///
+    /// # Errors
+    /// Why it stays as it is.
+    pub fn switch_link(&self, is_redundant: bool, up: bool) -> Result<(), String> {
+        let opened = self.opened().ok_or_else(|| "nothing drives the master".to_owned())?;
+        opened.switch(usize::from(is_redundant), up)
+    }
+
     /// Takes what the daemon drives out of its hands.
-    fn begin_change(&self) -> Result<(SupervisorThread, Opened), Refusal> {
+    fn begin_change(&self) -> Result<(Driving, Arc<Opened>), Refusal> {
         let master = self.number;
         let mut driver = locked(&self.driver);
         match std::mem::replace(&mut *driver, Driver::Changing) {
-            Driver::Daemon(supervisor, opened) => Ok((supervisor, opened)),
+            Driver::Daemon(driving, opened) => Ok((driving, opened)),
             Driver::Changing => Err(Refusal::Changing { master }),
-            Driver::Owner(owner) => {
+            Driver::Owner(owner, opened) => {
                 let by = owner.owner().clone();
-                *driver = Driver::Owner(owner);
+                *driver = Driver::Owner(owner, opened);
                 Err(Refusal::Owned { master, by })
             }
             Driver::Fault(cause) => {
@@ -242,14 +312,18 @@ impl Master {
     /// Nothing drives the master, because of this.
     fn fail(&self, cause: &str) {
         say(format_args!("master {} is not driven: {cause}", self.number));
-        if let Driver::Owner(owner) = std::mem::replace(&mut *locked(&self.driver), Driver::Fault(cause.to_owned())) {
+        let fault = Driver::Fault(cause.to_owned());
+        if let Driver::Owner(owner, _) = std::mem::replace(&mut *locked(&self.driver), fault) {
             owner.end();
+            // It may have ended.
+            let told = Content::TakenBack { cause: cause.to_owned() };
+            let _ = owner.connection().send_within(&told.into(), TELL);
         }
     }
 
     /// The time of its owner has ended: the daemon drives the master.
     fn take_back(&self, opened: &Opened, end: End) {
-        if let Driver::Owner(owner) = std::mem::replace(&mut *locked(&self.driver), Driver::Changing) {
+        if let Driver::Owner(owner, _) = std::mem::replace(&mut *locked(&self.driver), Driver::Changing) {
             owner.end();
         }
         let handover = match end {
@@ -274,39 +348,38 @@ impl Master {
         self.lead_to_safe_state();
     }
 
-    /// Brings all SubDevices to the safe state, in a thread: PREOP needs none.
-    fn lead_to_safe_state(&self) {
-        let (state, number) = (self.safe_state, self.number);
-        let supervisor = match &*locked(&self.driver) {
-            Driver::Daemon(supervisor, _) if state != AlState::PreOp => supervisor.clone(),
-            _ => return,
-        };
-        let lead = move || {
-            wait_for_scan(&supervisor);
-            match supervisor.request_state_of_all(state, StateScope::All, LEAD) {
-                // The next application has the master already.
-                Ok(()) | Err(Error::Gone) => {}
-                Err(error) => say(format_args!("master {number}: not all SubDevices are in {state}: {error}")),
-            }
-        };
-        if let Err(error) = std::thread::Builder::new().name("safe state".into()).spawn(lead) {
-            say(format_args!("master {number}: all SubDevices stay in PREOP: {error}"));
-        }
-    }
-
-    /// Tries again what was not possible before, and prepares sockets for the next owner's end.
+    /// Tries again what was not possible before, prepares sockets for the next owner's end, and gives interfaces that
+    /// have come back to the process that drives the master.
     pub fn look_after(&self) {
         self.prepare();
         let is_faulty = matches!(&*locked(&self.driver), Driver::Fault(_));
         if is_faulty {
             self.drive(Handover::AfterCrash);
         }
+        for change in self.opened().map(|opened| opened.follow_interfaces()).unwrap_or_default() {
+            say(format_args!("master {}: {change}", self.number));
+        }
+        let changes = match &*locked(&self.driver) {
+            Driver::Daemon(driving, _) => driving.changes(),
+            _ => Vec::new(),
+        };
+        for change in changes {
+            say(format_args!("master {}: {change}", self.number));
+        }
+    }
+
+    /// The links of the process that drives it; `None` while nothing does.
+    fn opened(&self) -> Option<Arc<Opened>> {
+        match &*locked(&self.driver) {
+            Driver::Daemon(_, opened) | Driver::Owner(_, opened) => Some(opened.clone()),
+            Driver::Changing | Driver::Fault(_) => None,
+        }
     }
 
     /// Drives the master on fresh links, and goes on with what is known.
     fn drive(&self, handover: Handover) {
-        let driver = match self.start(handover) {
-            Ok((supervisor, opened)) => Driver::Daemon(supervisor, opened),
+        let driver = match self.try_to_drive(handover) {
+            Ok((driving, opened)) => Driver::Daemon(driving, opened),
             Err(cause) => {
                 if !matches!(&*locked(&self.driver), Driver::Fault(before) if *before == cause) {
                     say(format_args!("master {} is not driven: {cause}", self.number));
@@ -317,49 +390,22 @@ impl Master {
         *locked(&self.driver) = driver;
     }
 
-    fn start(&self, handover: Handover) -> Result<(SupervisorThread, Opened), String> {
+    fn try_to_drive(&self, handover: Handover) -> Result<(Driving, Arc<Opened>), String> {
         // Never beside a process that may still drive it.
         locked(&self.lock).as_mut().map_or(Ok(()), OwnerLock::hold)?;
-        let opened = locked(&self.wires).open()?;
-        let adopted = adopt_links(&opened.links, opened.duplicates()?);
-        let (_cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
-        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let supervisor = match Knowledge::from_bytes(&locked(&self.knowledge)) {
-            Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
-            // Nothing is known yet.
-            Err(_) => SupervisorThread::start(acyclic, &options, || ()),
-        };
-        let supervisor = supervisor.map_err(|error| error.to_string())?;
-        Ok((supervisor, opened))
+        let opened = Arc::new(locked(&self.wires).open()?);
+        let knowledge = locked(&self.knowledge);
+        let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
+        let interfaces = self.interfaces.clone();
+        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces };
+        let driving = Driving::start(&opened, &lasting, handover)?;
+        Ok((driving, opened))
     }
-}
 
-/// Waits until no SubDevice changes its state any more: after the end of an application, or when they have just got
-/// power, they are on their way to PREOP, and what leads them there is not interrupted. OP does not depend on it
-/// (decision 0094); it stays because an application that asks for mailboxes first finds them in use.
-fn wait_until_settled(supervisor: &SupervisorThread) {
-    let settled = AlState::PreOp.code();
-    let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());
-    while let Ok(seen) = serving::look(supervisor) {
-        if seen.al_states != last {
-            (last, since) = (seen.al_states, Instant::now());
-        }
-        // Some may be in a safe state, or in an error that nothing ends.
-        let is_still = since.elapsed() >= STILL || begin.elapsed() >= SETTLE;
-        if seen.al_states == settled || seen.responding() == 0 || is_still {
-            return;
-        }
-        std::thread::sleep(LOOK);
-    }
-}
-
-/// Waits for the end of a scan that runs.
-fn wait_for_scan(supervisor: &SupervisorThread) {
-    let begin = Instant::now();
-    while begin.elapsed() < SCAN {
-        match supervisor.with(|engine| engine.snapshot().activity) {
-            Ok(Activity::Scanning) => std::thread::sleep(LOOK),
-            _ => return,
+    /// Brings all SubDevices to the safe state, if the daemon drives the master.
+    fn lead_to_safe_state(&self) {
+        if let Driver::Daemon(driving, _) = &*locked(&self.driver) {
+            driving.lead_to(self.safe_state, self.number);
         }
     }
 }
@@ -372,6 +418,7 @@ mod tests {
     use ringcat::piped::segment::PipedSegment;
     use ringcat::sim::network::Network;
     use ringcat::sim::segment::Segment;
+    use ringcat_control::Limits;
 
     use super::*;
     use crate::owner::for_tests;
@@ -388,7 +435,7 @@ mod tests {
             segment_process::serve(&mut PipedSegment::new(network), &far, |_| true).expect("a socket");
         });
         let master = Master::new(0, "test".to_owned(), Wires::to_segment(near).expect("it is right"));
-        let (owner, _far) = for_tests().expect("a pair");
+        let (owner, far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             let _tenancy = master.hand_over(&owner).expect("the daemon drives it");
@@ -397,7 +444,11 @@ mod tests {
         assert!(failed.is_err());
         assert!(matches!(owner.ask(Ask::State, Vec::new()), Err(Refusal::Changing { .. })));
         let fault = master.state().fault.expect("nothing drives it");
-        assert_eq!(fault, "a thread of the daemon has failed");
+        assert_eq!(fault, FAILED);
+        let told = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
+        assert!(matches!(told, Content::Taken(_)), "{told:?}");
+        let told = far.receive(Limits::OWNER, None).expect("it is told");
+        assert_eq!(told, Content::TakenBack { cause: FAILED.to_owned() }.into());
         master.look_after();
         assert_eq!((master.state().fault, master.state().owner), (None, None));
         master.hand_over(&owner).expect("the daemon drives it").end(End::Ended);

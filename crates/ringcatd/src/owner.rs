@@ -29,6 +29,8 @@ pub type Answered = Result<(Answer, Vec<u8>), Refusal>;
 pub struct OwnerLink {
     master: u32,
     owner: Owner,
+    /// It moves frames of EoE.
+    moves_ethernet: bool,
     connection: Arc<Connection>,
     questions: Mutex<Questions>,
     changed: Condvar,
@@ -60,8 +62,14 @@ enum Standing {
 
 impl OwnerLink {
     /// The process at the other end of this connection.
-    pub fn new(master: u32, owner: Owner, connection: Arc<Connection>) -> OwnerLink {
-        OwnerLink { master, owner, connection, questions: Mutex::default(), changed: Condvar::new() }
+    pub fn new(master: u32, owner: Owner, moves_ethernet: bool, connection: Arc<Connection>) -> OwnerLink {
+        let (questions, changed) = (Mutex::default(), Condvar::new());
+        OwnerLink { master, owner, moves_ethernet, connection, questions, changed }
+    }
+
+    /// Whether it moves frames between network interfaces of EoE and mailboxes.
+    pub fn moves_ethernet(&self) -> bool {
+        self.moves_ethernet
     }
 
     /// The application.
@@ -201,7 +209,7 @@ impl OwnerLink {
 pub fn for_tests() -> io::Result<(OwnerLink, Connection)> {
     let (near, far) = UnixStream::pair()?;
     let owner = Owner { pid: 42, program: "test".to_owned() };
-    Ok((OwnerLink::new(0, owner, Arc::new(Connection::new(near)?)), Connection::new(far)?))
+    Ok((OwnerLink::new(0, owner, false, Arc::new(Connection::new(near)?)), Connection::new(far)?))
 }
 
 #[cfg(test)]

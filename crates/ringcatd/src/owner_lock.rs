@@ -2,14 +2,16 @@
 //!
 //! The lock is on an open file (`flock`), of which the owner gets a duplicate with its links. When the daemon is killed
 //! the owner goes on and keeps the lock, so a daemon that is started anew waits for its end. The file says which
-//! process it is; the system removes the lock with the last duplicate, however the processes end.
+//! process it is; the system removes the lock with the last duplicate, however the processes end. No other user can
+//! open the file, since a descriptor is enough to lock it.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::os::fd::{AsRawFd, RawFd};
 use std::path::{Path, PathBuf};
 
 use ringcat_control::Owner;
+use ringcat_link::private_file;
 
 /// Longest text that is read of the file.
 const LONGEST: u64 = 200;
@@ -26,7 +28,7 @@ impl OwnerLock {
     /// The lock of a master of the daemon at this socket; not held yet.
     ///
     /// # Errors
-    /// The file cannot be made, for the operator.
+    /// The file cannot be made, or something else has its name, for the operator.
     pub fn open(socket: &Path, master: u32) -> Result<OwnerLock, String> {
         let mut path = socket.as_os_str().to_owned();
         path.push(format!(".{master}.lock"));
@@ -35,8 +37,7 @@ impl OwnerLock {
         if let Some(directory) = path.parent().filter(|it| !it.as_os_str().is_empty()) {
             std::fs::create_dir_all(directory).map_err(failed)?;
         }
-        let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
-        let file = options.map_err(failed)?;
+        let file = private_file::open(&path).map_err(failed)?;
         Ok(OwnerLock { path, file, is_held: false })
     }
 

@@ -15,7 +15,9 @@ use std::time::{Duration, Instant};
 use ringcat::esi::load_segment;
 use ringcat::piped::segment::{FarEnds, PipedSegment};
 use ringcat::sim::network::Network;
+use ringcat_link::capabilities::{Capabilities, keep};
 use ringcat_link::descriptors;
+use ringcat_link::signals::unblock;
 
 /// The option of the daemon's program that makes it the process of a segment.
 pub const OPTION: &str = "--simulate";
@@ -73,6 +75,9 @@ pub fn greeting(control: &UnixStream) -> Result<bool, String> {
 /// # Errors
 /// What is wrong, for the operator; the daemon was told.
 pub fn run(file: &Path) -> Result<(), String> {
+    // The daemon waits for its signals; the segment ends by them.
+    unblock();
+    keep(Capabilities::NONE).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
     let failed = |error: io::Error| format!("the standard input: {error}");
     let control = UnixStream::from(io::stdin().as_fd().try_clone_to_owned().map_err(failed)?);
     match load(file) {

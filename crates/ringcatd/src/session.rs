@@ -13,7 +13,7 @@ use ringcat_link::process::Peer;
 use crate::log::say;
 use crate::master::Master;
 use crate::owner::{Answered, OwnerLink};
-use crate::tenure::{self, Signs};
+use crate::tenure::{self, Ended, Signs};
 
 /// A client greets within this time.
 const GREETING: Duration = Duration::from_secs(5);
@@ -97,10 +97,11 @@ fn converse(connection: &Arc<Connection>, process: ClientProcess, masters: &Mast
                 reply(connection, Message { content: Content::Answer(Numbered { id, master, what }), bytes });
             }
             Content::Take { .. } if right < Right::Change => return Err(Refusal::ReadOnly),
-            Content::Take { master } => {
+            Content::Take { master, ethernet } => {
                 let owner = Owner { pid: peer.pid, program };
                 let signs = Signs::new(peer.pid, end)?;
-                return own(connection, masters, masters.find(master)?, owner, signs);
+                let owner = OwnerLink::new(master, owner, ethernet, connection.clone());
+                return own(masters, masters.find(master)?, owner, signs);
             }
             _ => return Err(expected("a question, or a request for a master")),
         }
@@ -119,20 +120,15 @@ fn expected(expected: &str) -> Refusal {
 }
 
 /// The client drives a master until its time ends.
-fn own(
-    connection: &Arc<Connection>,
-    masters: &Masters,
-    master: &Master,
-    owner: Owner,
-    signs: Signs,
-) -> Result<(), Refusal> {
-    let owner = Arc::new(OwnerLink::new(master.number(), owner, connection.clone()));
+fn own(masters: &Masters, master: &Master, owner: OwnerLink, signs: Signs) -> Result<(), Refusal> {
+    let owner = Arc::new(owner);
     let tenancy = master.hand_over(&owner)?;
     say(format_args!("master {}: driven by {}", master.number(), owner.owner()));
-    let (end, why) = tenure::serve(master, &owner, signs, masters.stop_limit);
-    tenancy.end(end);
+    let Ended { how, is_release, why } = tenure::serve(master, &owner, signs, masters.stop_limit);
+    tenancy.end(how);
     say(format_args!("master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner()));
-    reply(connection, Content::Released.into());
+    let told = if is_release { Content::Released } else { Content::TakenBack { cause: why.to_owned() } };
+    reply(owner.connection(), told.into());
     master.prepare();
     Ok(())
 }

@@ -6,12 +6,13 @@
 //! never whole, keeps no sign from being seen.
 
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::time::{Duration, Instant};
 
 use ringcat_control::{Arriving, Content, Limits, Message, ReceiveError, Refusal};
 use ringcat_link::process::wait_readable;
 
+use crate::log::say;
 use crate::master::{End, Master};
 use crate::owner::OwnerLink;
 use crate::process_state::{ProcessFile, ProcessState};
@@ -56,8 +57,20 @@ impl Signs {
     }
 }
 
-/// Serves an owner until its time ends. Returns how, and why for the log.
-pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: Duration) -> (End, &'static str) {
+/// The end of the time of an owner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// How it has ended.
+    pub how: End,
+    /// The owner has given the master back itself.
+    pub is_release: bool,
+    /// Why, for the log.
+    pub why: &'static str,
+}
+
+/// Serves an owner until its time ends.
+pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: Duration) -> Ended {
+    let ended = |how, why| Ended { how, is_release: false, why };
     let connection = owner.connection();
     let mut arriving = Arriving::new(Limits::OWNER);
     let mut stopped: Option<Instant> = None;
@@ -69,21 +82,21 @@ pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: D
             match connection.receive_part(&mut arriving) {
                 Ok(message) => {
                     if let Some(end) = message.and_then(|message| said(master, owner, message)) {
-                        return (end, "it has given the master back");
+                        return Ended { how: end, is_release: true, why: "it has given the master back" };
                     }
                 }
-                Err(ReceiveError::Ended) => return (signs.of_connection(), "its connection has ended"),
-                Err(_) => return (End::MayGoOn, "it has sent something that is no message"),
+                Err(ReceiveError::Ended) => return ended(signs.of_connection(), "its connection has ended"),
+                Err(_) => return ended(End::MayGoOn, "it has sent something that is no message"),
             }
         }
         if ready & 2 != 0 {
-            return (End::Ended, "its process has ended");
+            return ended(End::Ended, "its process has ended");
         }
         match signs.file.as_mut().and_then(ProcessFile::look) {
-            Some(ProcessState::Ends) => return (End::Ended, "a signal has ended its process"),
+            Some(ProcessState::Ends) => return ended(End::Ended, "a signal has ended its process"),
             Some(ProcessState::Stopped) => {
                 if stopped.get_or_insert_with(Instant::now).elapsed() >= stop_limit {
-                    return (End::MayGoOn, "its process was stopped");
+                    return ended(End::MayGoOn, "its process was stopped");
                 }
             }
             Some(ProcessState::Runs) | None => stopped = None,
@@ -100,10 +113,25 @@ fn said(master: &Master, owner: &OwnerLink, message: Message) -> Option<End> {
         // Without its knowledge the counters are those from before its time.
         Content::Release if master.keep(message.bytes) => return Some(End::Released),
         Content::Release => return Some(End::Ended),
+        Content::MakeInterface { name, mac } => make_interface(master, owner, name, mac),
+        Content::SwitchLink { is_redundant, up } => {
+            if let Err(cause) = master.switch_link(is_redundant, up) {
+                say(format_args!("master {}: {cause}", master.number()));
+            }
+        }
         // An owner of this version says nothing else.
         _ => {}
     }
     None
+}
+
+/// Makes a network interface for an owner, and answers it.
+fn make_interface(master: &Master, owner: &OwnerLink, name: String, mac: [u8; 6]) {
+    let made = master.make_interface(&name, mac);
+    let descriptors: Vec<_> = made.iter().map(|tap| tap.as_fd().as_raw_fd()).collect();
+    let answer = Content::Interface { name, fault: made.as_ref().err().cloned() };
+    // Of an owner that is gone, or does not read, the connection shows the end.
+    let _ = owner.connection().send_with(&answer.into(), &descriptors);
 }
 
 #[cfg(test)]
@@ -111,13 +139,15 @@ mod tests {
     use ringcat_control::Content;
 
     use super::*;
+    use crate::opener::Opener;
     use crate::owner::for_tests;
     use crate::source::Source;
     use crate::wires::Wires;
 
     fn master() -> Master {
         let source = Source::Interfaces("nonexistent".to_owned(), None);
-        Master::new(0, source.to_string(), Wires::of(&source).expect("it has a name"))
+        let wires = Wires::of(&source, &std::sync::Arc::new(Opener::Here)).expect("it has a name");
+        Master::new(0, source.to_string(), wires)
     }
 
     // covers: daemon
@@ -138,7 +168,7 @@ mod tests {
         let mut child = std::process::Command::new("sleep").arg("60").spawn().expect("sleep is there");
         let end = ringcat_link::process::watch(child.id()).map(Some);
         let signs = Signs::new(child.id(), end).expect("it lives");
-        std::io::Write::write_all(&mut far.stream(), b"RCTL\x02").expect("there is room");
+        std::io::Write::write_all(&mut far.stream(), b"RCTL").expect("there is room");
         let begin = Instant::now();
         let killed = std::thread::scope(|scope| {
             let served = scope.spawn(|| serve(&master, &owner, signs, Duration::from_secs(60)));
@@ -146,7 +176,7 @@ mod tests {
             child.kill().expect("it runs");
             served.join().expect("no panic")
         });
-        assert_eq!(killed.0, End::Ended, "{}", killed.1);
+        assert_eq!((killed.how, killed.is_release), (End::Ended, false), "{}", killed.why);
         assert!(begin.elapsed() < Duration::from_secs(1), "{:?}", begin.elapsed());
         child.wait().expect("it has ended");
     }
@@ -158,7 +188,7 @@ mod tests {
         let pid = std::process::id();
         let signs = || Signs::new(pid, ringcat_link::process::watch(pid).map(Some)).expect("it lives");
         far.shut_down();
-        assert_eq!(serve(&master, &owner, signs(), Duration::from_secs(60)).0, End::MayGoOn);
+        assert_eq!(serve(&master, &owner, signs(), Duration::from_secs(60)).how, End::MayGoOn);
     }
 
     // covers: daemon

@@ -3,22 +3,22 @@
 //! Descriptors cannot be revoked. Pipes to a simulated segment lose their far ends; packet sockets are bound to the
 //! loopback interface, which acts on the one socket that both processes hold. The next owner gets fresh ones.
 
-use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::net::UnixStream;
 use std::process::Child;
+use std::sync::Arc;
 
 use ringcat::piped::segment::connect;
 use ringcat_control::message::{HandedLink, HandedLinks};
-use ringcat_link::packet_socket::prepared::Prepared;
-use ringcat_link::{ClassFilter, LinkError, PacketOptions, PacketSocket, ReceiveMode, descriptors, revoke};
+use ringcat_link::descriptors;
 
+use crate::opened::Opened;
+use crate::opener::Opener;
 use crate::segment_process;
 use crate::source::Source;
 
 /// Sets of sockets that are prepared: applications that end in quick succession find one each.
 const SETS: usize = 2;
-/// Slots of a receive ring for one class of frames, 2 KiB each.
-const SLOTS: u32 = 128;
 
 /// Where fresh links come from.
 #[derive(Debug)]
@@ -39,26 +39,19 @@ pub enum Wires {
 /// Network interfaces, with sockets for the next process.
 #[derive(Debug)]
 pub struct Interfaces {
-    main: String,
-    redundant: Option<String>,
+    /// Main, redundant.
+    names: Vec<String>,
     /// Sets of sockets that wait without an interface, since the kernel takes long to make their rings; each in the
     /// order of [`HandedLinks`].
-    spares: Vec<Vec<Prepared>>,
+    spares: Vec<Vec<OwnedFd>>,
+    opener: Arc<Opener>,
 }
 
 /// What makes sockets for the next process, without the lock of the links.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Lacking {
     links: usize,
-}
-
-/// Descriptors of links, to be duplicated for the process that drives them.
-#[derive(Debug)]
-pub struct Opened {
-    /// What they are.
-    pub links: HandedLinks,
-    /// The descriptors in the order of [`HandedLinks`].
-    pub descriptors: Vec<OwnedFd>,
+    opener: Arc<Opener>,
 }
 
 impl Wires {
@@ -66,15 +59,15 @@ impl Wires {
     ///
     /// # Errors
     /// What is wrong, for the operator.
-    pub fn of(source: &Source) -> Result<Wires, String> {
+    pub fn of(source: &Source, opener: &Arc<Opener>) -> Result<Wires, String> {
         match source {
             Source::Simulated(file) => {
                 let (child, control, is_ring) = segment_process::start(file)?;
                 Ok(Wires::Segment { control, is_ring, child: Some(child) })
             }
             Source::Interfaces(main, redundant) => {
-                let (main, redundant) = (main.clone(), redundant.clone());
-                Ok(Wires::Interfaces(Interfaces { main, redundant, spares: Vec::new() }))
+                let names = [Some(main), redundant.as_ref()].into_iter().flatten().cloned().collect();
+                Ok(Wires::Interfaces(Interfaces { names, spares: Vec::new(), opener: opener.clone() }))
             }
         }
     }
@@ -88,7 +81,7 @@ impl Wires {
         Ok(Wires::Segment { control, is_ring, child: None })
     }
 
-    /// Opens fresh links.
+    /// Opens fresh links. Of two interfaces one may be absent.
     ///
     /// # Errors
     /// What is wrong, for the operator.
@@ -105,28 +98,28 @@ impl Wires {
                 sent.map_err(|error| format!("the process of the simulated segment: {error}"))?;
                 let half = |(main, redundant): (OwnedFd, Option<OwnedFd>)| [Some(main), redundant];
                 let all = [half(near.cyclic), half(near.acyclic)];
-                let redundant = is_ring.then_some(HandedLink::Pipe);
-                Ok(Opened {
-                    links: HandedLinks { main: HandedLink::Pipe, redundant },
-                    descriptors: all.into_iter().flatten().flatten().collect(),
-                })
+                let links = HandedLinks { main: HandedLink::Pipe, redundant: is_ring.then_some(HandedLink::Pipe) };
+                Ok(Opened::pipes(links, all.into_iter().flatten().flatten().collect()))
             }
-            Wires::Interfaces(interfaces) => interfaces.open(),
+            Wires::Interfaces(Interfaces { names, spares, opener }) => {
+                let set = spares.pop().map_or_else(|| opener.set(names.len()), Ok)?;
+                Opened::interfaces(names, set)
+            }
         }
     }
 
     /// Whether sockets for the next process are to be prepared.
     pub fn lacking(&self) -> Option<Lacking> {
         match self {
-            Wires::Interfaces(Interfaces { redundant, spares, .. }) if spares.len() < SETS => {
-                Some(Lacking { links: 1 + usize::from(redundant.is_some()) })
+            Wires::Interfaces(Interfaces { names, spares, opener }) if spares.len() < SETS => {
+                Some(Lacking { links: names.len(), opener: opener.clone() })
             }
             Wires::Interfaces(_) | Wires::Segment { .. } => None,
         }
     }
 
     /// Keeps a set of sockets.
-    pub fn keep(&mut self, prepared: Vec<Prepared>) {
+    pub fn keep(&mut self, prepared: Vec<OwnedFd>) {
         if let Wires::Interfaces(Interfaces { spares, .. }) = self {
             spares.push(prepared);
         }
@@ -134,31 +127,12 @@ impl Wires {
 }
 
 impl Lacking {
-    /// Makes a set. The kernel takes 10 to 20 ms for each.
+    /// Makes a set. The kernel takes 10 to 20 ms for each socket.
     ///
     /// # Errors
     /// This user may not, or there is no memory for them.
-    pub fn prepare(self) -> Result<Vec<Prepared>, LinkError> {
-        let both = [ClassFilter::Cyclic, ClassFilter::Acyclic];
-        let each = both.into_iter().flat_map(|filter| std::iter::repeat_n(filter, self.links));
-        each.map(|filter| Prepared::new(&options(filter))).collect()
-    }
-}
-
-impl Interfaces {
-    /// Opens the links with the sockets that were prepared, or with new ones.
-    fn open(&mut self) -> Result<Opened, String> {
-        let Interfaces { main, redundant, spares } = self;
-        let mut prepared = spares.pop().unwrap_or_default().into_iter();
-        let mut descriptors = Vec::new();
-        for filter in [ClassFilter::Cyclic, ClassFilter::Acyclic] {
-            for name in [Some(&*main), redundant.as_ref()].into_iter().flatten() {
-                descriptors.push(socket(name, filter, prepared.next())?);
-            }
-        }
-        let link = |name: &String| HandedLink::Interface { name: name.clone(), slots: SLOTS };
-        let links = HandedLinks { main: link(main), redundant: redundant.as_ref().map(link) };
-        Ok(Opened { links, descriptors })
+    pub fn prepare(&self) -> Result<Vec<OwnedFd>, String> {
+        self.opener.set(self.links)
     }
 }
 
@@ -167,40 +141,6 @@ impl Drop for Wires {
         if let Wires::Segment { child: Some(child), .. } = self {
             // It may live on for an application; if it has ended no zombie is left.
             let _ = child.try_wait();
-        }
-    }
-}
-
-fn options(filter: ClassFilter) -> PacketOptions {
-    PacketOptions::default().with_filter(filter).with_receive(ReceiveMode::Blocking).with_ring_frames(SLOTS)
-}
-
-/// A packet socket for one class of frames. Its ring is unmapped here, and mapped by the process that drives it.
-fn socket(interface: &str, filter: ClassFilter, prepared: Option<Prepared>) -> Result<OwnedFd, String> {
-    let socket = match prepared {
-        Some(prepared) => prepared.bind(interface),
-        None => PacketSocket::open(interface, &options(filter)),
-    };
-    let socket = socket.map_err(|error| error.to_string())?;
-    socket.as_fd().try_clone_to_owned().map_err(|error| format!("{interface}: {error}"))
-}
-
-impl Opened {
-    /// Duplicates, for this process.
-    ///
-    /// # Errors
-    /// The process has no more descriptors.
-    pub fn duplicates(&self) -> Result<Vec<OwnedFd>, String> {
-        self.descriptors.iter().map(OwnedFd::try_clone).collect::<Result<_, _>>().map_err(|error| error.to_string())
-    }
-
-    /// Takes the interfaces away from all processes that have these descriptors. Pipes end when fresh ones are opened.
-    pub fn revoke(&self) {
-        if matches!(self.links.main, HandedLink::Interface { .. }) {
-            for socket in &self.descriptors {
-                // It was opened as a packet socket; nothing else can be wrong with it.
-                let _ = revoke(socket.as_fd());
-            }
         }
     }
 }

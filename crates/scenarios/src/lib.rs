@@ -31,6 +31,7 @@ pub mod one_buffer;
 pub mod parts;
 pub mod phases;
 pub mod pulses;
+pub mod recorded_links;
 pub mod ring_matrix;
 pub mod seeds;
 pub mod segments;

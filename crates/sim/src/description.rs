@@ -171,6 +171,10 @@ pub struct DeviceDescription {
     pub pdos: Vec<PdoDescription>,
     /// Objects in addition to the derived ones; they replace those with the same index.
     pub objects: Vec<Object>,
+    /// Indices of objects that a MainDevice cannot access: for it they do not exist.
+    pub left_out: Vec<u16>,
+    /// The dictionary falls back to that of power-on whenever the device is in INIT.
+    pub forgets_pdos_in_init: bool,
     /// Mailbox, if there is one.
     pub mailbox: Option<MailboxDescription>,
     /// Settings of the mailbox protocols.
@@ -249,6 +253,8 @@ impl DeviceDescription {
             sync_managers: Vec::new(),
             pdos: Vec::new(),
             objects: Vec::new(),
+            left_out: Vec::new(),
+            forgets_pdos_in_init: false,
             mailbox: None,
             services: Services::default(),
             dc: None,

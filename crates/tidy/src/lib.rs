@@ -14,6 +14,7 @@
 //! * [`publishing`]: manifests of crates that are published;
 //! * [`safety`]: files that may contain `unsafe`;
 //! * [`protocol`]: cited sections and statements of `docs/protocol` exist;
+//! * [`decisions`]: cited decisions have notes;
 //! * [`covers`]: names of tests, and ids in their `// covers:` lines;
 //! * [`features`]: tests cover every row of `docs/capabilities.md`, `docs/FEATURES.md` is its short form;
 //! * [`deny`]: licences, versions and sources of crates match `deny.toml`;
@@ -39,6 +40,7 @@ pub mod circles;
 pub mod coverage;
 pub mod covers;
 pub mod crates;
+pub mod decisions;
 pub mod deny;
 pub mod dependencies;
 pub mod errors;

@@ -121,7 +121,7 @@ fn in_file(file: &File, pages: &Pages) -> Vec<Finding> {
 }
 
 /// Words separated by blanks with their lines, without comment marks.
-fn words(text: &str) -> Vec<(&str, usize)> {
+pub(crate) fn words(text: &str) -> Vec<(&str, usize)> {
     let mut words = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let body = line.trim_start().trim_start_matches(['/', '!', '#']);
@@ -130,7 +130,8 @@ fn words(text: &str) -> Vec<(&str, usize)> {
     words
 }
 
-fn trimmed(word: &str) -> &str {
+/// A word without the punctuation around it.
+pub(crate) fn trimmed(word: &str) -> &str {
     word.trim_matches(|c: char| !c.is_ascii_alphanumeric())
 }
 

@@ -4,9 +4,9 @@ use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
-    Finding, coverage, covers, crates, deny, dependencies, errors, evidence, explorers, features, files, handed_on,
-    interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety, sources,
-    toolchain, words,
+    Finding, coverage, covers, crates, decisions, deny, dependencies, errors, evidence, explorers, features, files,
+    handed_on, interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety,
+    sources, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -120,6 +120,12 @@ fn the_lists_of_tests_are_current() {
 #[test]
 fn cited_sections_and_statements_exist() {
     none(protocol::unresolved(&tree()));
+}
+
+// covers: tree
+#[test]
+fn every_cited_decision_has_a_note() {
+    none(decisions::unresolved(&tree()));
 }
 
 #[test]

@@ -30,7 +30,7 @@ struct MasterArguments {
     /// Needs no permission but that of the daemon, which has the bus back at the end.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["main", "redundant", "force"])]
     master: Option<u32>,
-    /// Where the daemon listens; otherwise at RINGCAT_SOCKET, or /run/ringcat/control
+    /// Where the daemon listens; otherwise RINGCAT_SOCKET, the place of this user, or /run/ringcat/control
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
 }

@@ -7,7 +7,7 @@ use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
 use super::eni::EniFile;
-use super::esi::EsiList;
+use super::esi::{EsiDeclared, EsiList, EsiShow};
 use super::network::{Compare, Init};
 use super::ring::Ring;
 use super::run::Run;
@@ -32,6 +32,8 @@ pub enum Data {
     Standby(Standby),
     Eni(Box<EniFile>),
     EsiList(EsiList),
+    EsiShow(EsiShow),
+    EsiDeclared(EsiDeclared),
     SiiBuilt(SiiBuilt),
     SiiCompared(SiiCompared),
     SiiSkeleton(SiiSkeleton),

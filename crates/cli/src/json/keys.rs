@@ -97,6 +97,8 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("`sim`", keys::<sim::Sim>()),
         ("`eni`", keys::<eni::EniFile>()),
         ("`esi list`", keys::<esi::EsiList>()),
+        ("`esi show`", keys::<esi::EsiShow>()),
+        ("`esi declare`", keys::<esi::EsiDeclared>()),
         ("`sii build`", keys::<sii::SiiBuilt>()),
         ("`sii compare`", keys::<sii::SiiCompared>()),
         ("`sii skeleton`", keys::<sii::SiiSkeleton>()),

@@ -10,8 +10,16 @@ pub struct Init {
     pub subdevices: usize,
     /// Variables of the process image
     pub variables: usize,
+    /// SubDevices that a description describes; null without descriptions
+    pub described: Option<usize>,
+    /// Names of PDOs and entries that come from descriptions
+    pub named: usize,
     /// Bytes of the file
     pub bytes: usize,
+    /// Time of the scan, and of firmware versions where they are read, in microseconds
+    pub scan_us: u64,
+    /// Time until the file was written, in microseconds
+    pub file_us: u64,
     /// SHA-256 of the canonical text of the file, in hexadecimal digits
     pub digest: String,
 }

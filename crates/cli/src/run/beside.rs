@@ -22,8 +22,8 @@ pub struct BesideArguments {
     /// Make a network interface for each SubDevice with Ethernet over EtherCAT
     ///
     /// Their names are eoeXsY with this MainDevice's number X and the position Y, or eoeXaY with the alias Y. Needs
-    /// cap_net_admin.
-    #[arg(long)]
+    /// cap_net_admin. With --master the daemon makes them.
+    #[arg(long, conflicts_with = "master")]
     eoe: bool,
     /// Number of this MainDevice in the names of these interfaces
     #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = number(0..=u16::MAX, 1))]

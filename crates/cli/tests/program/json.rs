@@ -74,7 +74,7 @@ fn good(page: &Page, command: &str, options: &str) -> Value {
     result
 }
 
-// covers: json, esi-read, esi-use
+// covers: json, esi-read, esi-use, esi-declare
 #[test]
 fn descriptions_and_images_are_printed_with_the_documented_keys() {
     let page = Page::read();
@@ -86,6 +86,14 @@ fn descriptions_and_images_are_printed_with_the_documented_keys() {
     assert_eq!(list["devices"][0]["type"], "A2", "{list}");
     assert_eq!(list["devices"][0]["choice"], "exact", "{list}");
     assert!(list["files"].as_u64() >= Some(4), "{list}");
+    let shown = good(&page, "esi show", &format!("{folder}/acme.xml --type AM01"));
+    let first = |key: &str| shown[key][0]["name"].as_str().map(str::to_owned);
+    assert_eq!((first("modes"), first("slots")), (Some("FreeRun".into()), Some("Axis 1".into())), "{shown}");
+    let out = directory.file("machine.toml");
+    let declared = good(&page, "esi declare", &format!("{folder}/acme.xml --type AM01 --mode DC4 --out {out}"));
+    assert_eq!((declared["mode"].as_str(), declared["name"].as_str()), (Some("DC4"), Some("AM01")), "{declared}");
+    let bare = good(&page, "esi declare", &format!("{folder}/acme.xml --type AK10 --out {out} --append"));
+    assert!(bare["mode"].is_null() && bare["pdos"] == 0, "{bare}");
     let built = good(&page, "sii build", &format!("{esi} --out {image}"));
     assert_eq!(built["bytes"], 512, "{built}");
     let compared = good(&page, "sii compare", &format!("{image} --esi {esi}"));
@@ -141,7 +149,16 @@ fn what_cannot_be_done_is_an_object_too() {
         "clocks --main no-such",
         "capture --main no-such --out /tmp/never.pcapng",
         "sim --main no-such --segment FILE",
+        "standby --main no-such --redundant no-such-2",
+        "init --main no-such --out /tmp/never.toml",
+        "compare --main no-such --network FILE.missing",
         "eni FILE.xml",
+        "esi list FILE.missing",
+        "esi show FILE.missing",
+        "esi declare FILE.missing --out /tmp/never.toml",
+        "sii build FILE.missing --out /tmp/never.bin",
+        "sii compare FILE.missing --esi FILE.missing",
+        "sii skeleton FILE.missing --out /tmp/never.xml",
         "demo --segment FILE.missing",
         "bench echo --main no-such",
         "bench round-trip --main no-such",
@@ -151,19 +168,43 @@ fn what_cannot_be_done_is_an_object_too() {
         "nonsense",
     ];
     std::fs::write(&file, "[[device]]\ntype = \"coupler\"\n").expect("the temporary directory is writable");
+    let mut named = std::collections::BTreeSet::new();
     for line in commands {
         let output = ringcat(&format!("{} --json", line.replace("FILE", &file.display().to_string())));
         let command = match line.split(' ').collect::<Vec<_>>().as_slice() {
-            ["bench", what, ..] => format!("bench {what}"),
+            [group @ ("bench" | "esi" | "sii"), what, ..] => format!("{group} {what}"),
             [command, ..] => (*command).to_owned(),
             [] => String::new(),
         };
+        named.insert(command.clone());
         let result = page.check(&command, &text(&output.stdout));
         let (outcome, message) = (&result["result"]["outcome"], result["result"]["message"].as_str().unwrap_or("none"));
         assert_eq!((outcome.as_str(), output.status.code()), (Some("error"), Some(2)), "{line}");
         assert!(text(&output.stderr).ends_with(&format!("result: FAILED: {message}\n")), "{line}: {message}");
     }
     std::fs::remove_file(&file).expect("it was just written");
+    for command in all_commands() {
+        assert!(named.contains(&command), "`{command}` is missing in the list");
+    }
+}
+
+/// Every command that the help names, with those of a group.
+fn all_commands() -> Vec<String> {
+    let under = |line: &str| -> Vec<String> {
+        let output = text(&ringcat(line).stdout);
+        let list = output.split("Commands:").nth(1).unwrap_or_default().split("\n\n").next().unwrap_or_default();
+        let names = list.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+        names.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect()
+    };
+    let mut all = Vec::new();
+    for command in under("-h").into_iter().filter(|command| command != "help") {
+        match under(&format!("{command} -h")) {
+            none if none.is_empty() => all.push(command),
+            some => all.extend(some.iter().filter(|it| *it != "help").map(|it| format!("{command} {it}"))),
+        }
+    }
+    assert!(all.len() > 15, "{all:?}");
+    all
 }
 
 // covers: json

@@ -4,5 +4,6 @@ mod daemon;
 mod demo;
 mod documented;
 mod exit_codes;
+mod files;
 mod json;
 mod pages;

@@ -75,7 +75,9 @@ impl DifferenceKind {
 
     pub(super) const fn of_field(field: IdentityField) -> DifferenceKind {
         match field {
-            IdentityField::Revision | IdentityField::MinimumRevision => DifferenceKind::Revision,
+            IdentityField::Revision | IdentityField::MinimumRevision | IdentityField::RevisionBits => {
+                DifferenceKind::Revision
+            }
             IdentityField::Serial => DifferenceKind::Serial,
             IdentityField::Identification => DifferenceKind::Identification,
             _ => DifferenceKind::Device,

@@ -21,6 +21,8 @@ pub enum FileKind {
     LinuxCnc,
     /// An encrypted file, with the evidence.
     Encrypted(&'static str),
+    /// A signed file; the parameter says where the signature is.
+    Signed(&'static str),
     /// Not XML: no `<` at the beginning.
     NotXml,
     /// Another XML file, with the name of its root.
@@ -51,6 +53,16 @@ impl FileKind {
         let is_cipher = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "EncryptedData" | "CipherData");
         if root.children().chain([root]).any(|node| is_cipher(&node)) {
             return Some(FileKind::Encrypted("XML encryption"));
+        }
+        // XML signatures: around the configuration, or in it (protocol ES-153).
+        let is_signature =
+            |node: Node<'_, '_>| node.is_element() && matches!(node.tag_name().name(), "Signature" | "SignedInfo");
+        if is_signature(root) {
+            return Some(FileKind::Signed("around the configuration"));
+        }
+        let config = root.children().filter(|node| node.tag_name().name() == "Config");
+        if root.children().chain(config.flat_map(|config| config.children())).any(is_signature) {
+            return Some(FileKind::Signed("in the configuration"));
         }
         match name {
             "EtherCATConfig" if is_beremiz(root) => Some(FileKind::BeremizProject),
@@ -134,6 +146,11 @@ impl fmt::Display for FileKind {
                 f,
                 "an encrypted or packed file ({what}), perhaps an encrypted ENI as EC-Engineer of acontis exports it \
                  for MainDevices that have its key. RingCAT reads plain ENIs only: export it without encryption. {eni}"
+            ),
+            FileKind::Signed(place) => write!(
+                f,
+                "a signed file (an XML signature {place}). RingCAT cannot check the signature, and follows no file \
+                 whose signature it has not checked: export it without one. {eni}"
             ),
             FileKind::NotXml => write!(f, "no XML file. {eni}"),
             FileKind::OtherXml(root) => write!(f, "an XML file with the root {}, not an ENI. {eni}", shown(root)),

@@ -186,22 +186,9 @@ impl<'a> Element<'a> {
         Ok(Names::new(names))
     }
 
-    /// Notes children with other names.
-    pub fn knows(&self, names: &[&str]) {
-        for child in self.all().filter(|child| !names.contains(&child.name())) {
-            let text = format!("{}/{} is not known: not used", self.name(), shown(child.name()).trim_matches('"'));
-            self.file.note(child.line(), text);
-        }
-    }
-
-    /// Notes attributes with other names; those of a name space belong to the tools.
-    pub fn knows_attributes(&self, names: &[&str]) {
-        let attributes = self.node.attributes().filter(|attribute| attribute.namespace().is_none());
-        for attribute in attributes.filter(|attribute| !names.contains(&attribute.name())) {
-            let name = shown(attribute.name());
-            let text = format!("{}@{} is not known: not used", self.name(), name.trim_matches('"'));
-            self.file.note(self.line(), text);
-        }
+    /// The names of its attributes; those of a name space belong to the tools.
+    pub fn attribute_names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.node.attributes().filter(|attribute| attribute.namespace().is_none()).map(|attribute| attribute.name())
     }
 
     pub fn note(&self, text: impl Into<String>) {

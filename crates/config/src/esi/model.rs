@@ -16,7 +16,7 @@ pub use device::{
 pub use dictionary::{
     Access, ArrayBounds, DataType, Dictionary, Flags, Object, ObjectInfo, Profile, SubItem, SubItemInfo,
 };
-pub use mailbox::{CoeCommand, CoeSettings, EoeSettings, Mailbox, RawCommand, SoeCommand, Transition};
+pub use mailbox::{AoeSettings, CoeCommand, CoeSettings, EoeSettings, Mailbox, RawCommand, SoeCommand, Transition};
 pub use names::Names;
 pub use pdo::{Pdo, PdoEntry, SlotIndex};
 pub use slots::{AllowedModule, Module, ModuleClass, Slot, SlotDistances, SlotGroupData, Slots};
@@ -40,6 +40,8 @@ pub struct Esi {
     pub modules: Vec<Module>,
     /// `InfoReference`: further files with modules, as written.
     pub references: Vec<Reference>,
+    /// Those of them that are not there, after [`read_with`](super::read_with).
+    pub missing: Vec<Reference>,
     /// What is not used, or in another way than written.
     pub notices: Vec<Notice>,
 }

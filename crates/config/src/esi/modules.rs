@@ -104,7 +104,12 @@ fn allowed(esi: &Esi, slot: &Slot) -> String {
     let fitting: Vec<String> =
         esi.modules.iter().filter(|module| fits(esi, slot, module)).map(|module| shown(module.kind.trim())).collect();
     match fitting.len() {
-        0 => "no module of the file fits it".to_owned(),
+        0 => match &esi.missing[..] {
+            [] => "no module of the file fits it".to_owned(),
+            [gone, ..] => {
+                format!("no module of the file fits it, and the file {} with modules is missing", shown(&gone.path))
+            }
+        },
         count if count > NAMED => {
             format!("expected {} or one of {} others", fitting[..NAMED].join(", "), count - NAMED)
         }
@@ -130,10 +135,10 @@ impl PlacedModule<'_> {
         u16::try_from(index).ok()
     }
 
-    fn shifted(&self, esi: &Esi, line: u32, of: SlotIndex) -> Result<SlotIndex, EsiError> {
+    fn shifted(&self, line: u32, of: SlotIndex) -> Result<SlotIndex, EsiError> {
         let index = self.index(of).ok_or_else(|| {
             let reason = format!("index {:#06x} in slot {} is above 0xffff", of.index, self.slot);
-            EsiError::rule(&esi.file, line, self.module.kind.trim(), reason)
+            EsiError::rule(&self.module.file, line, self.module.kind.trim(), reason)
         })?;
         Ok(SlotIndex { index, by_slot: false, by_group: false })
     }
@@ -142,15 +147,15 @@ impl PlacedModule<'_> {
     ///
     /// # Errors
     /// An index above 0xFFFF.
-    pub fn pdos(&self, esi: &Esi, pdos: &[Pdo]) -> Result<Vec<Pdo>, EsiError> {
+    pub fn pdos(&self, pdos: &[Pdo]) -> Result<Vec<Pdo>, EsiError> {
         let shifted = |pdo: &Pdo| -> Result<Pdo, EsiError> {
             let mut pdo = pdo.clone();
-            pdo.index = self.shifted(esi, pdo.line, pdo.index)?;
+            pdo.index = self.shifted(pdo.line, pdo.index)?;
             for exclude in &mut pdo.excludes {
-                *exclude = self.shifted(esi, pdo.line, *exclude)?;
+                *exclude = self.shifted(pdo.line, *exclude)?;
             }
             for entry in &mut pdo.entries {
-                entry.index = self.shifted(esi, pdo.line, entry.index)?;
+                entry.index = self.shifted(pdo.line, entry.index)?;
             }
             Ok(pdo)
         };
@@ -161,9 +166,9 @@ impl PlacedModule<'_> {
     ///
     /// # Errors
     /// An index above 0xFFFF.
-    pub fn commands(&self, esi: &Esi) -> Result<Vec<CoeCommand>, EsiError> {
+    pub fn commands(&self) -> Result<Vec<CoeCommand>, EsiError> {
         let shifted = |command: &CoeCommand| -> Result<CoeCommand, EsiError> {
-            Ok(CoeCommand { index: self.shifted(esi, command.line, command.index)?, ..command.clone() })
+            Ok(CoeCommand { index: self.shifted(command.line, command.index)?, ..command.clone() })
         };
         self.module.commands.iter().map(shifted).collect()
     }
@@ -172,7 +177,7 @@ impl PlacedModule<'_> {
     ///
     /// # Errors
     /// An index above 0xFFFF.
-    pub fn object(&self, esi: &Esi, object: &Object) -> Result<Object, EsiError> {
-        Ok(Object { index: self.shifted(esi, object.line, object.index)?, ..object.clone() })
+    pub fn object(&self, object: &Object) -> Result<Object, EsiError> {
+        Ok(Object { index: self.shifted(object.line, object.index)?, ..object.clone() })
     }
 }

@@ -12,6 +12,7 @@ mod profile;
 mod slots;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use roxmltree::{Document, Node};
 
@@ -19,14 +20,19 @@ use super::element::{Element, File};
 use super::error::{EsiError, EsiProblem};
 use super::limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_TEXT_BYTES};
 use super::model::{Device, Dictionary, Esi, Group, Reference, Vendor};
+use super::schema;
 use crate::xml::{self, shown};
 
 /// The model of a file with devices (root `EtherCATInfo`) or modules (root `EtherCATModule`).
 pub(super) fn parse(name: &str, text: &str) -> Result<Esi, EsiError> {
     let document = document(name, text)?;
     let file = File::new(name, text);
-    let mut esi = root(Element::new(document.root_element(), &file))?;
+    let element = Element::new(document.root_element(), &file);
+    let mut esi = root(element)?;
+    schema::check(element);
     esi.file = name.to_owned();
+    let shared: Arc<str> = name.into();
+    esi.modules.iter_mut().for_each(|module| module.file = Arc::clone(&shared));
     esi.notices = file.into_notices().into_list();
     Ok(esi)
 }
@@ -62,8 +68,21 @@ fn document<'a>(name: &str, text: &'a str) -> Result<Document<'a>, EsiError> {
     Ok(document)
 }
 
+/// What an element of encryption or a signature makes of a file (protocol ES-153).
+fn protection(name: &str) -> Option<&'static str> {
+    match name {
+        "EncryptedData" | "EncryptedKey" | "CipherData" => Some("an encrypted file (XML encryption)"),
+        "Signature" | "SignedInfo" => Some("a signed file (an XML signature, which RingCAT cannot check)"),
+        _ => None,
+    }
+}
+
 fn root(root: Element<'_>) -> Result<Esi, EsiError> {
     let version = root.attribute("Version").map(str::to_owned);
+    let names = std::iter::once(root.name()).chain(root.all().map(|child| child.name()));
+    if let Some(kind) = names.filter_map(protection).next() {
+        return Err(root.error(EsiProblem::WrongFile { kind: kind.to_owned() }));
+    }
     match root.name() {
         "EtherCATInfo" => {}
         "EtherCATModule" => {
@@ -73,10 +92,8 @@ fn root(root: Element<'_>) -> Result<Esi, EsiError> {
         }
         other => return Err(root.error(EsiProblem::WrongFile { kind: kind(other) })),
     }
-    root.knows(&["InfoReference", "Vendor", "Descriptions", "VendorSpecific"]);
     let vendor = vendor(root.required("Vendor")?)?;
     let descriptions = root.required("Descriptions")?;
-    descriptions.knows(&["Groups", "Devices", "Modules"]);
     let references = root.children("InfoReference");
     let references = references.map(|it| Reference { line: it.line(), path: it.raw().trim().to_owned() }).collect();
     let groups = descriptions.child("Groups").into_iter().flat_map(|groups| groups.children("Group"));

@@ -5,7 +5,7 @@
 
 use super::error::{EsiError, Notice};
 use super::limits::MAX_REFERENCES;
-use super::model::{Esi, Profile};
+use super::model::{Esi, Profile, Reference};
 use super::{parse, read};
 use crate::xml::{self, shown};
 
@@ -81,6 +81,7 @@ impl Files<'_> {
             let Some(bytes) = self.references.open(&path) else {
                 let text = format!("InfoReference {}: no such file, its modules are missing", shown(&written));
                 esi.notices.push(Notice { line, text, times: 1 });
+                esi.missing.push(Reference { line, path: written });
                 continue;
             };
             let other = read(&path, &bytes)?;

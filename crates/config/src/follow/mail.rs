@@ -1,11 +1,9 @@
 //! Commands through mailboxes: CoE, SoE and EoE become start-up commands (protocol 6, 8.1).
 
-use std::borrow::Cow;
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
 use ringcat_engine::config::{IdnWrite, IpSettings, SdoDownload, SdoUpload, StartupAction, StartupCommand};
-use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::bus::Bus;
@@ -13,16 +11,13 @@ use super::messages::{contradiction, named};
 use super::notices::Notices;
 use super::transitions::{at_transitions, comment};
 use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Transition};
+use crate::ip;
 
 /// SoE: the element flag of the value of an IDN, and the op code of a write.
 const SOE_VALUE: u8 = 0x40;
 const SOE_WRITE: u8 = 3;
 /// Drives of a SubDevice (protocol 6.6).
 const SOE_DRIVES: u8 = 8;
-/// EoE type of a Set IP Parameter request.
-const EOE_SET_IP: u8 = 2;
-/// Bytes of the DNS name in the request.
-const EOE_NAME: usize = 32;
 
 /// Appends the mailbox commands of a SubDevice.
 pub(super) fn startup(
@@ -69,7 +64,7 @@ pub(super) fn startup(
     for command in mailbox.eoe.iter().filter(|command| !command.disabled) {
         let subject = named("EoE/InitCmd", &command.comment);
         let EoeCommand { place, transitions, timeout_ms, comment, .. } = command;
-        match ip(command).map(StartupAction::Ip) {
+        match settings(command).map(StartupAction::Ip) {
             Ok(action) => add(*place, transitions, &subject, *timeout_ms, comment, action, notices),
             Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
         }
@@ -114,46 +109,12 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     Ok(StartupAction::Idn(IdnWrite::new(command.drive, Idn(command.idn), command.data.clone())))
 }
 
-/// The Set IP Parameter message. Some tools write only the part after the EoE header (protocol 6.5) and leave the
-/// header to the MainDevice: flags and the fields that match its length.
-fn with_header(data: &[u8]) -> Cow<'_, [u8]> {
-    /// Type 2, port 0, no result.
-    const HEADER: [u8; 4] = [EOE_SET_IP, 0, 0, 0];
-    let is_whole =
-        data.first().is_some_and(|kind| kind & 0x0F == EOE_SET_IP) && data.get(4..).is_some_and(are_addresses);
-    if is_whole || !are_addresses(data) {
-        return Cow::Borrowed(data);
-    }
-    Cow::Owned([&HEADER, data].concat())
-}
-
-/// Whether the data has the length of flags plus all fields, or plus the fields that the flags name.
-fn are_addresses(data: &[u8]) -> bool {
-    /// Bytes of MAC address, address, mask, gateway, DNS server, name.
-    const FIELDS: [usize; 6] = [6, 4, 4, 4, 4, EOE_NAME];
-    let Some((flags, fields)) = data.split_first_chunk() else { return false };
-    let flags = u32::from_le_bytes(*flags);
-    let named = FIELDS.iter().enumerate().filter(|(bit, _)| flags >> bit & 1 != 0);
-    let packed: usize = named.map(|(_, bytes)| bytes).sum();
-    let all: usize = FIELDS.iter().sum();
-    flags != 0 && flags < 1 << FIELDS.len() && (fields.len() == packed || fields.len() == all)
-}
-
 /// The IP settings, from separate elements or from the message.
-fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
+fn settings(command: &EoeCommand) -> Result<IpSettings, &'static str> {
     if !command.data.is_empty() {
-        return match EoeMessage::decode(&with_header(&command.data)) {
-            Ok(EoeMessage { body: EoeBody::SetIp(found), .. }) => Ok(IpSettings::default()
-                .with_mac(found.mac)
-                .with_address(found.address)
-                .with_mask(found.mask)
-                .with_gateway(found.gateway)
-                .with_dns(found.dns)
-                .with_name(found.name.map(<[u8]>::to_vec))),
-            Ok(_) | Err(_) => Err("a message that does not set addresses (EoE type 2) is not sent"),
-        };
+        return ip::settings(&command.data);
     }
-    if command.kind.is_some_and(|kind| kind != EOE_SET_IP) {
+    if command.kind.is_some_and(|kind| kind != ip::SET_IP) {
         return Err("a message that does not set addresses is not sent");
     }
     let address = |bytes: &Option<Vec<u8>>| match bytes.as_deref() {
@@ -166,7 +127,7 @@ fn ip(command: &EoeCommand) -> Result<IpSettings, &'static str> {
         Some(bytes) => Some(bytes.try_into().map_err(|_| "a MAC address that has not six bytes: not sent")?),
     };
     let name = command.name.as_ref().filter(|name| !name.is_empty()).map(|name| name.clone().into_bytes());
-    if name.as_ref().is_some_and(|name| name.len() > EOE_NAME) {
+    if name.as_ref().is_some_and(|name| name.len() > ip::NAME) {
         return Err("a name of more than 32 bytes: not sent");
     }
     let settings = IpSettings::default()

@@ -256,7 +256,7 @@ fn raw(
         return Err(contradiction(eni, index, command.place, what, "an end within 64 KiB", got, ""));
     }
     let register = RegisterCommand::new(ado, access)
-        .with_retries(u8::try_from(command.retries).unwrap_or(u8::MAX))
+        .with_retries(command.retries)
         .with_required(command.datagram.count.is_some_and(|count| count > 0));
     startup.extend(at_transitions(command.place, &command.transitions, index, &subject, notices, |transition| {
         StartupCommand::new(transition, StartupAction::Register(register.clone()))

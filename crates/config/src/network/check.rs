@@ -274,11 +274,12 @@ fn of_sync_manager(file: &NetworkFile, sync_manager: &SyncManager) -> Checked {
     }
     domain(file, sync_manager.domain.as_deref(), &["domain".into()])?;
     let mut bits = 0u32;
+    let mut indices = BTreeMap::new();
     for (at, pdo) in sync_manager.pdo.iter().enumerate() {
         if pdo.index == 0 {
             return fault(["pdo".into(), at.into(), "index".into()], "expected the index of a PDO, got 0");
         }
-        if let Some(first) = sync_manager.pdo[..at].iter().position(|other| other.index == pdo.index) {
+        if let Some(first) = indices.insert(pdo.index, at) {
             let message = format!("{:#06x} is also the index of pdo[{first}]", pdo.index);
             return fault(["pdo".into(), at.into(), "index".into()], message);
         }

@@ -28,6 +28,9 @@ use crate::compare::Stated;
 use crate::configuration::{Configuration, ImageArea, ProcessImage, SubDeviceFacts, Variable};
 use crate::eni::Port;
 
+/// Words of a revision.
+const LOW_WORD: u32 = 0x0000_FFFF;
+const HIGH_WORD: u32 = 0xFFFF_0000;
 /// Parts of the name of a variable are separated by this.
 const SEPARATOR: char = '.';
 
@@ -262,10 +265,21 @@ fn member(at: usize, subdevice: &SubDevice, domain: &str, first: Option<&str>) -
 fn fill(config: &mut SubDeviceConfig, of: &SubDevice) {
     config.expected.vendor_id = of.vendor;
     config.expected.product_code = of.product;
+    let expected = &mut config.expected;
     match of.check_revision {
         CheckRevision::None => {}
-        CheckRevision::Equal => config.expected.revision = of.revision,
-        CheckRevision::EqualOrGreater => config.expected.minimum_revision = of.revision,
+        CheckRevision::Equal => expected.revision = of.revision,
+        CheckRevision::EqualOrGreater => expected.minimum_revision = of.revision,
+        CheckRevision::LowEqual => (expected.revision, expected.revision_mask) = (of.revision, LOW_WORD),
+        CheckRevision::LowEqualHighEqualOrGreater => {
+            (expected.revision, expected.revision_mask) = (of.revision, LOW_WORD);
+            expected.minimum_revision = of.revision;
+        }
+        CheckRevision::HighEqual => (expected.revision, expected.revision_mask) = (of.revision, HIGH_WORD),
+        CheckRevision::HighEqualLowEqualOrGreater => {
+            (expected.revision, expected.revision_mask) = (of.revision, HIGH_WORD);
+            expected.minimum_revision = of.revision;
+        }
     }
     config.expected.serial = of.serial;
     config.expected.identification = of.check_identification;
@@ -310,6 +324,18 @@ fn assignment(of: &SyncManager) -> PdoAssignment {
         }
     };
     PdoAssignment::new(of.number, direction(of), of.pdo.iter().map(mapping).collect())
+}
+
+impl From<SyncSignals> for model::Sync {
+    fn from(of: SyncSignals) -> model::Sync {
+        model::Sync {
+            assign_activate: of.assign_activate,
+            sync0_cycle: Shift(of.sync0_cycle_ns.into()),
+            sync0_shift: Shift(of.sync0_shift_ns.into()),
+            sync1_cycle: Shift(of.sync1_cycle_ns.into()),
+            sync1_shift: Shift(of.sync1_shift_ns.into()),
+        }
+    }
 }
 
 fn signals(of: &model::Sync) -> SyncSignals {

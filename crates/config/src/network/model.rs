@@ -253,6 +253,14 @@ pub enum CheckRevision {
     Equal,
     /// Equal or greater.
     EqualOrGreater,
+    /// Low words equal.
+    LowEqual,
+    /// Low words equal, high word equal or greater.
+    LowEqualHighEqualOrGreater,
+    /// High words equal.
+    HighEqual,
+    /// High words equal, low word equal or greater.
+    HighEqualLowEqualOrGreater,
 }
 
 /// Where a cable ends.

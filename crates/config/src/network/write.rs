@@ -228,6 +228,10 @@ fn subdevice(out: &mut Text, of: &SubDevice, implied: Option<u16>) {
         CheckRevision::None => "none",
         CheckRevision::Equal => "equal",
         CheckRevision::EqualOrGreater => "equal-or-greater",
+        CheckRevision::LowEqual => "low-equal",
+        CheckRevision::LowEqualHighEqualOrGreater => "low-equal-high-equal-or-greater",
+        CheckRevision::HighEqual => "high-equal",
+        CheckRevision::HighEqualLowEqualOrGreater => "high-equal-low-equal-or-greater",
     });
     out.some("serial", of.serial);
     out.some("check_identification", of.check_identification);
@@ -399,7 +403,8 @@ fn startup(out: &mut Text, of: &Startup) {
     };
     let pair = |key: &str, value: String| Some(format!("{key} = {value}"));
     let flag = |key: &str, is_set: bool| is_set.then(|| format!("{key} = true"));
-    let small = |key: &str, value: u8| (value != 0).then(|| format!("{key} = {value}"));
+    let large = |key: &str, value: u16| (value != 0).then(|| format!("{key} = {value}"));
+    let small = |key: &str, value: u8| large(key, value.into());
     if let Some(sdo) = &of.sdo {
         let index = pair("index", hex_4(sdo.index).to_string());
         let data = pair("data", bytes(&sdo.data));
@@ -424,13 +429,13 @@ fn startup(out: &mut Text, of: &Startup) {
     if let Some(write) = &of.write {
         let address = pair("address", hex_4(write.address).to_string());
         let data = pair("data", bytes(&write.data));
-        inline("write", vec![address, data, small("retries", write.retries), flag("required", write.required)]);
+        inline("write", vec![address, data, large("retries", write.retries), flag("required", write.required)]);
     }
     if let Some(check) = &of.check {
         let address = pair("address", hex_4(check.address).to_string());
         let (data, mask) = (pair("data", bytes(&check.data)), check.mask.as_ref().and_then(|m| pair("mask", bytes(m))));
         let within = check.within.and_then(|within| pair("within", InQuotes(within).to_string()));
-        let (retries, required) = (small("retries", check.retries), flag("required", check.required));
+        let (retries, required) = (large("retries", check.retries), flag("required", check.required));
         inline("check", vec![address, data, mask, within, retries, required]);
     }
     out.time("limit", of.limit);

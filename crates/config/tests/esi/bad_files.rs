@@ -98,6 +98,32 @@ fn values_out_of_range_and_duplicates_name_line_and_device() {
     }
 }
 
+// covers: esi-read, ES-160
+#[test]
+fn many_pdos_take_a_time_that_grows_with_their_number() {
+    let pdo = |index: u32| format!("<RxPdo><Index>{}</Index><Name>x</Name></RxPdo>", index & 0xFFFF);
+    let pdos: String = (0..120_000).map(pdo).collect();
+    let text = ACME.replacen("<RxPdo Fixed", &format!("{pdos}<RxPdo Fixed"), 1);
+    let begin = Instant::now();
+    let esi = esi::read("many.xml", text.as_bytes()).unwrap();
+    assert!(begin.elapsed() < Duration::from_secs(10), "{:?}: linear, not quadratic", begin.elapsed());
+    assert_eq!(esi.devices[1].rx_pdos.len(), 0x1_0000);
+    assert!(esi.notices.iter().map(|notice| notice.times).sum::<usize>() > 50_000, "the second ones are noted");
+}
+
+// covers: esi-read, ES-153
+#[test]
+fn encrypted_and_signed_files_are_named() {
+    for (text, kind) in [
+        ("<EncryptedData xmlns=\"http://www.w3.org/2001/04/xmlenc#\"/>", "an encrypted file"),
+        ("<ds:Signature xmlns:ds=\"http://www.w3.org/2000/09/xmldsig#\"/>", "a signed file"),
+        ("<EtherCATInfo><Signature/></EtherCATInfo>", "a signed file"),
+    ] {
+        let error = refusal(text);
+        assert!(error.contains(kind), "{error}");
+    }
+}
+
 /// Files by name.
 struct Files(BTreeMap<String, String>);
 

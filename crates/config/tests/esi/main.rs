@@ -2,9 +2,11 @@
 //! files if they are beside the repository.
 
 mod bad_files;
+mod editions;
 mod images;
 mod reading;
 mod real_files;
+mod select;
 mod slots;
 
 /// A coupler, a terminal without mailbox, one with CoE and a dictionary, a modular drive.

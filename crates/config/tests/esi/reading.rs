@@ -18,8 +18,13 @@ impl References for Folder {
 
 /// The file with its modules.
 pub fn acme() -> Esi {
+    acme_of(ACME)
+}
+
+/// A variant of the file with its modules.
+pub fn acme_of(text: &str) -> Esi {
     let folder = Folder(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/files"));
-    esi::read_with("acme.xml", ACME.as_bytes(), &folder).unwrap_or_else(|error| panic!("{error}"))
+    esi::read_with("acme.xml", text.as_bytes(), &folder).unwrap_or_else(|error| panic!("{error}"))
 }
 
 // covers: esi-read, ES-05, ES-12, ES-14, ES-15, ES-30

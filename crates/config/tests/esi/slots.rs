@@ -1,6 +1,6 @@
 //! Modules in slots: presets, classes, indices that shift.
 
-use ringcat_config::esi::{EsiError, Part, SlotIndex, parts, place_modules};
+use ringcat_config::esi::{EsiError, NoReferences, Part, SlotIndex, parts, place_modules};
 
 use crate::reading::acme;
 
@@ -21,9 +21,20 @@ fn indices_shift_with_the_slot_and_presets_fill_slots() {
     assert_eq!([0, 1, 2].map(|slot| in_slot(slot, 0x607A)), [0x607A, 0x687A, 0x707A].map(Some));
     assert_eq!(all[2].index(SlotIndex { index: 0xFF00, by_slot: true, by_group: false }), None);
     assert_eq!(all[2].index(SlotIndex { index: 0xFF00, by_slot: false, by_group: false }), Some(0xFF00));
-    let pdos = all[2].pdos(&esi, &all[2].module.rx_pdos).unwrap();
+    let pdos = all[2].pdos(&all[2].module.rx_pdos).unwrap();
     assert_eq!((pdos[0].index.index, pdos[0].entries[1].index.index), (0x1620, 0x707A));
-    assert_eq!(all[2].commands(&esi).unwrap()[0].index.index, 0x7060);
+    // The other set of vectors: 1 and 16.
+    let other = crate::ACME.replacen(
+        "SlotPdoIncrement=\"#x10\" SlotIndexIncrement=\"#x800\"",
+        "SlotPdoIncrement=\"1\" SlotIndexIncrement=\"16\"",
+        1,
+    );
+    let other = crate::reading::acme_of(&other);
+    let placed = place_modules(&other, &other.devices[3], &choices(&["csp axis", "csp axis", "csp axis"])).unwrap();
+    let index = |slot: usize, index| placed[slot].index(SlotIndex { index, by_slot: true, by_group: false });
+    assert_eq!([0, 1, 2].map(|slot| index(slot, 0x1A00)), [0x1A00, 0x1A01, 0x1A02].map(Some));
+    assert_eq!([0, 1, 2].map(|slot| index(slot, 0x6000)), [0x6000, 0x6010, 0x6020].map(Some));
+    assert_eq!(all[2].commands().unwrap()[0].index.index, 0x7060);
     let skipped = place_modules(&esi, drive, &choices(&["csp axis", "-", "status axis"])).unwrap();
     assert_eq!(skipped.iter().map(|it| it.slot).collect::<Vec<_>>(), [0, 2]);
 }
@@ -41,6 +52,9 @@ fn modules_that_do_not_fit_name_the_slot_and_the_line() {
     assert!(refused(3, &["axis"]).contains("there is no module \"axis\": expected \"csp axis\", \"status axis\""));
     assert!(refused(3, &["csp axis"; 4]).contains("4 modules for 3 slots"));
     assert!(refused(1, &["csp axis"]).contains("it has no slots"));
+    let alone = ringcat_config::esi::read_with("acme.xml", crate::ACME.as_bytes(), &NoReferences).unwrap();
+    let error = place_modules(&alone, &alone.devices[3], &[]).unwrap_err().to_string();
+    assert!(error.contains("and the file \"modules\\\\acme-modules.xml\" with modules is missing"), "{error}");
 }
 
 // covers: ES-22, ES-72, ES-73, ES-76

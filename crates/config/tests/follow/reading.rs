@@ -239,6 +239,21 @@ fn an_encrypted_file_is_refused_with_the_tool_that_writes_such_files() {
     assert!(eni::read(text.as_bytes()).expect_err("it is no ENI").to_string().contains("this is no XML file"));
 }
 
+// covers: eni-read, ES-153
+#[test]
+fn a_signed_file_is_refused_by_name() {
+    let signature = r#"<ds:Signature xmlns:ds="http://www.w3.org/2000/09/xmldsig#"><ds:SignedInfo/></ds:Signature>"#;
+    for (text, place) in [
+        (signature.to_owned(), "around the configuration"),
+        (SMALL.replacen("<Config>", &format!("{signature}<Config>"), 1), "in the configuration"),
+        (SMALL.replacen("<Master>", &format!("{signature}<Master>"), 1), "in the configuration"),
+    ] {
+        let error = refusal(&text);
+        assert!(error.contains(&format!("this is a signed file (an XML signature {place})")), "{error}");
+        assert!(error.contains("cannot check the signature") && error.contains("export it without one"), "{error}");
+    }
+}
+
 // covers: eni-read
 #[test]
 fn names_and_comments_are_on_one_line() {

@@ -7,6 +7,8 @@ use ringcat_engine::JunctionMode;
 use ringcat_engine::config::{ConfigAddress, StartupAction, Transition, Watchdog};
 use ringcat_engine::declared::GroupId;
 use ringcat_engine::info::Direction;
+use ringcat_engine::layout::LrwPolicy;
+use ringcat_engine::main_device::Required;
 
 use crate::WHOLE;
 
@@ -53,6 +55,7 @@ fn every_key_is_in_the_declaration() {
     assert_eq!((second.address, second.group), (ConfigAddress::Alias { alias: 5, offset: 1 }, Some(GroupId(0))));
     assert_eq!(switch.address, ConfigAddress::Identification { value: 9, offset: 2 });
     assert_eq!(configuration.groups, ["tool 1"]);
+    assert_eq!((declaration.required, declaration.lrw), (Required::All, LrwPolicy::PerSubDevice));
     let pdos = drive.pdos.as_ref().expect("PDOs");
     let shape: Vec<_> = pdos.iter().map(|it| (it.sync_manager, it.direction, it.pdos.len())).collect();
     assert_eq!(shape, [(2, Direction::Outputs, 1), (3, Direction::Inputs, 2)]);

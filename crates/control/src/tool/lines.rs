@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The master as a whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MasterReport {
-    /// All its links are without a carrier.
+    /// No network device is attached: all its interfaces are absent.
     pub is_orphaned: bool,
     /// An application is active.
     pub is_active: bool,

@@ -24,7 +24,7 @@ fn a_message_is_a_header_its_content_and_its_data() {
 fn messages_are_decoded_as_they_were() {
     for content in [
         Content::Hello { program: "a \"quoted\" program".to_owned() },
-        Content::Take { master: 3 },
+        Content::Take { master: 3, ethernet: true },
         Content::Knowledge,
         Content::Refused(Refusal::Version { here: 1, there: 2 }),
         Content::Answer(Numbered { id: 9, master: 0, what: Err(Refusal::ReadOnly) }),
@@ -44,7 +44,7 @@ fn another_version_is_told_from_the_header_alone() {
     let error = decode(&bytes, Limits::CLIENT).expect_err("it is refused");
     assert_eq!(error, WireError::Version { there: 1 });
     let text = error.refusal().to_string();
-    assert_eq!(text, "expected control version 3, got 1: install ringcatd and library of one release");
+    assert_eq!(text, format!("expected control version {VERSION}, got 1: install ringcatd and library of one release"));
 }
 
 // covers: daemon
@@ -73,7 +73,8 @@ fn no_change_of_a_byte_and_no_length_makes_the_decoder_panic() {
 #[test]
 fn lengths_beyond_the_limits_are_refused_from_the_header() {
     let mut header = [0; HEADER];
-    header[..6].copy_from_slice(b"RCTL\x03\x00");
+    header[..4].copy_from_slice(b"RCTL");
+    header[4..6].copy_from_slice(&VERSION.to_le_bytes());
     header[12..].fill(0xFF);
     let limit = Limits::CLIENT.bytes;
     let error = Header::decode(&header, Limits::CLIENT).expect_err("it is refused");

@@ -7,9 +7,9 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use super::{
-    ConfigAddress, DeclaredSyncManager, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping, Repetition,
-    SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerOverride, SyncSignals,
-    Timeouts, Transition, Watchdog,
+    ConfigAddress, DeclaredSyncManager, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping,
+    RefusedPdos, Repetition, SdoDownload, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
+    SyncManagerOverride, SyncSignals, Timeouts, Transition, Watchdog,
 };
 use crate::info::{Direction, PdoEntryInfo, PdoInfo, SubDeviceInfo};
 
@@ -63,6 +63,14 @@ impl SubDeviceConfig {
         self
     }
 
+    /// Expects these bits of the revision, as descriptions compare its high or its low word.
+    #[must_use]
+    pub const fn expect_revision_bits(mut self, revision: u32, mask: u32) -> SubDeviceConfig {
+        self.expected.revision = Some(revision);
+        self.expected.revision_mask = mask;
+        self
+    }
+
     /// Expects an explicit device identification.
     #[must_use]
     pub fn expect_identification(mut self, value: u16) -> SubDeviceConfig {
@@ -105,6 +113,13 @@ impl SubDeviceConfig {
         let assignments = self.pdos.get_or_insert_with(Vec::new);
         assignments.retain(|assignment| assignment.sync_manager != sync_manager);
         assignments.push(PdoAssignment { sync_manager, direction, pdos });
+        self
+    }
+
+    /// What follows if it refuses the assignment or mapping of its PDOs.
+    #[must_use]
+    pub fn refused_pdos(mut self, refused_pdos: RefusedPdos) -> SubDeviceConfig {
+        self.refused_pdos = refused_pdos;
         self
     }
 

@@ -108,6 +108,7 @@ impl SubDeviceConfig {
             group,
             sync_managers,
             pdos,
+            refused_pdos,
             declared,
             declared_bootstrap,
             watchdog_divider,
@@ -134,6 +135,7 @@ impl SubDeviceConfig {
             ConfigPart::ProcessData => {
                 digest.field(5, sync_managers, &default.sync_managers);
                 digest.field(6, pdos, &default.pdos);
+                digest.field(21, refused_pdos, &default.refused_pdos);
                 digest.field(7, declared, &default.declared);
                 digest.field(8, declared_bootstrap, &default.declared_bootstrap);
             }

@@ -32,7 +32,7 @@ pub struct RegisterCommand {
     /// Action.
     pub access: RegisterAccess,
     /// Number of retries for a command that the SubDevice did not process.
-    pub retries: u8,
+    pub retries: u16,
     /// The SubDevice must process the write. Otherwise a write that it did not process is ignored (no `Cnt` in the
     /// file). A check always needs a response.
     pub required: bool,
@@ -46,7 +46,7 @@ impl RegisterCommand {
 
     /// Sets [`RegisterCommand::retries`].
     #[must_use]
-    pub const fn with_retries(mut self, retries: u8) -> RegisterCommand {
+    pub const fn with_retries(mut self, retries: u16) -> RegisterCommand {
         self.retries = retries;
         self
     }

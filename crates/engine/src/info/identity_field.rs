@@ -14,6 +14,8 @@ pub enum IdentityField {
     Revision,
     /// Lowest revision.
     MinimumRevision,
+    /// The compared bits of the revision.
+    RevisionBits,
     /// Serial number.
     Serial,
     /// Explicit device identification (protocol 5.3); 0 for a SubDevice without one.
@@ -27,6 +29,7 @@ impl fmt::Display for IdentityField {
             IdentityField::ProductCode => "product code",
             IdentityField::Revision => "revision",
             IdentityField::MinimumRevision => "a revision not below",
+            IdentityField::RevisionBits => "compared bits of the revision",
             IdentityField::Serial => "serial number",
             IdentityField::Identification => "identification",
         })

@@ -12,6 +12,7 @@ use ringcat_wire::sii::{
 };
 
 use super::extent::SiiExtent;
+use super::pdo_source::PdoSource;
 use super::warning::{InfoWarning, SiiProblem};
 use crate::direction::Direction;
 
@@ -162,10 +163,11 @@ pub struct SubDeviceInfo {
     pub sync_managers: Vec<SiiSyncManager>,
     /// Purpose of each FMMU, FMMU 0 first.
     pub fmmu_usages: Vec<FmmuUsage>,
-    /// PDOs of both directions: outputs first, each direction in the order of the SII.
+    /// PDOs of both directions. Of the SII outputs first, each direction in its order; PDOs of the dictionary behind
+    /// them.
     pub pdos: Vec<PdoInfo>,
-    /// SyncManagers with PDOs that were read from the object dictionary.
-    pub read_online: Vec<u8>,
+    /// Where the PDOs are known from.
+    pub pdo_source: PdoSource,
     /// Operation modes of the distributed clock.
     pub dc_modes: Vec<DcMode>,
     /// Faults of the SII.
@@ -193,12 +195,15 @@ impl SubDeviceInfo {
         self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
-    /// Takes over the PDOs that an earlier scan read from the object dictionary of the same SubDevice.
-    pub(crate) fn keep_read_online(&mut self, known: &SubDeviceInfo) {
-        if !known.read_online.is_empty() {
-            self.pdos.clone_from(&known.pdos);
-            self.read_online.clone_from(&known.read_online);
+    /// Takes over the PDOs that were read before from the object dictionary of the same SubDevice. It may hold others
+    /// now, unless they are those of power-on.
+    pub(crate) fn keep_dictionary(&mut self, known: &SubDeviceInfo) {
+        if !known.pdo_source.is_of_dictionary() {
+            return;
         }
+        self.pdos.clone_from(&known.pdos);
+        let is_of_power_on = self.pdo_source.is_of_power_on() && known.pdo_source.is_of_power_on();
+        self.pdo_source = if is_of_power_on { PdoSource::Dictionary } else { PdoSource::Outdated };
     }
 
     /// The same SubDevice with other ports, at another position; shared if nothing differs.

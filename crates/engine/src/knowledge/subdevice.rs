@@ -14,7 +14,7 @@ use super::code::{Code, Input, by_number, choice, fields};
 use super::error::KnowledgeError;
 use crate::direction::Direction;
 use crate::info::{
-    ControllerInfo, InfoWarning, PdoEntryInfo, PdoInfo, SiiExtent, SiiProblem, SubDeviceInfo, is_possible,
+    ControllerInfo, InfoWarning, PdoEntryInfo, PdoInfo, PdoSource, SiiExtent, SiiProblem, SubDeviceInfo, is_possible,
 };
 
 by_number!(Position, u16, |position| position.0, Position);
@@ -44,6 +44,7 @@ fields!(PdoInfo {
 fields!(InfoWarning { category: Option<CategoryKind>, offset: Option<usize>, problem: SiiProblem });
 
 choice!(Direction, "a direction" { 0 = Outputs, 1 = Inputs });
+choice!(PdoSource, "a source of PDOs" { 0 = Sii, 1 = Dictionary, 2 = Written, 3 = Outdated });
 choice!(SiiExtent, "an extent of an SII" { 0 = Operation, 1 = Clocks, 2 = Complete });
 choice!(SiiProblem, "a fault of an SII" {
     0 = Blank,
@@ -134,7 +135,7 @@ plain! {
     sync_managers: Vec<SiiSyncManager>,
     fmmu_usages: Vec<FmmuUsage>,
     pdos: Vec<PdoInfo>,
-    read_online: Vec<u8>,
+    pdo_source: PdoSource,
     dc_modes: Vec<DcMode>,
     warnings: Vec<InfoWarning>,
 }

@@ -129,6 +129,16 @@ impl Mailbox {
         self.shared.state_mut().last_error = before;
     }
 
+    /// Whether a download to an object of PDO assignment or mapping was queued since [`Mailbox::forget_written_pdos`].
+    pub(crate) fn has_written_pdos(&self) -> bool {
+        self.shared.state().has_written_pdos
+    }
+
+    /// What such downloads have changed is known to the model.
+    pub(crate) fn forget_written_pdos(&self) {
+        self.shared.state_mut().has_written_pdos = false;
+    }
+
     /// Takes the oldest kept emergency, with the time at which it was read. Each emergency is also an event.
     pub fn pop_emergency(&self) -> Option<ReceivedEmergency> {
         self.emergencies().pop()

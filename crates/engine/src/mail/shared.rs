@@ -78,6 +78,8 @@ pub(super) struct MailboxState {
     pub counters: MailCounters,
     /// Code of the last error that the SubDevice reported; 0 for none.
     pub last_error: u32,
+    /// A download to an object of PDO assignment or mapping was queued.
+    pub has_written_pdos: bool,
 }
 
 /// One mailbox, shared by its handles, conversations and tasks.
@@ -119,6 +121,7 @@ impl SharedMailbox {
             ethernet: Traffic::new(),
             counters: MailCounters::default(),
             last_error: 0,
+            has_written_pdos: false,
         };
         let (changed, work) = (bus.signal(), bus.signal());
         let subdevice = Cell::new(subdevice);

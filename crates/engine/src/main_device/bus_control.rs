@@ -18,6 +18,7 @@ use crate::procedures::scan::ScanError;
 use crate::role::RoleRequest;
 use crate::role::{Denial, Function, MainDeviceRole, NotPermitted};
 use crate::segment::{KeptState, Observation, UndeclaredObservation, UpkeepProgress};
+use crate::time::Instant;
 
 impl MainDevice {
     /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.

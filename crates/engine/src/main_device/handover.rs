@@ -9,13 +9,13 @@ use ringcat_wire::al::AlState;
 
 use super::MainDevice;
 use super::activate_error::ActivateError;
-use crate::info::SubDeviceInfo;
+use crate::info::{PdoSource, SubDeviceInfo};
 use crate::knowledge::{Handover, Knowledge, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::procedures::resume::{Before, Known, resume};
 use crate::ring::Sequence;
 use crate::role::Function;
 use crate::segment::clocks::ClockObservation;
-use crate::segment::{Found, Observation, UpkeepProgress};
+use crate::segment::{Addressed, Found, Observation, UpkeepProgress};
 
 /// Activations by which a session after a crash differs at least from those of the former owner: half of all sessions.
 const AFTER_CRASH: u32 = 512;
@@ -54,7 +54,20 @@ impl MainDevice {
         // A declared SubDevice, or one that nothing is requested of.
         let progress = if self.options.idle_operation { KnownProgress::Due } else { KnownProgress::None };
         let (target, progress, mailbox) = kept.unwrap_or((AlState::PreOp, progress, None));
-        KnownSubDevice { info: (**info).clone(), target, progress, mailbox }
+        let mut info = (**info).clone();
+        if self.has_written_pdos(info.station) {
+            info.pdo_source = PdoSource::Outdated;
+        }
+        KnownSubDevice { info, target, progress, mailbox }
+    }
+
+    /// Whether mail has changed the PDOs of a SubDevice since they were known.
+    fn has_written_pdos(&self, station: StationAddress) -> bool {
+        let view = self.segment.view();
+        let of_member = view.subdevices().member_of(station).map(Addressed::Member);
+        let subdevice = of_member.or_else(|| view.undeclared_at(station).map(Addressed::Undeclared));
+        let mailbox = subdevice.and_then(|subdevice| self.segment.mailbox_of(subdevice));
+        mailbox.is_some_and(|mailbox| mailbox.has_written_pdos())
     }
 
     /// State and mailbox of a SubDevice without a declaration.
@@ -94,12 +107,13 @@ impl MainDevice {
         self.begin_idle();
         self.go_on(sequence, activations, offered, handover);
         let count = subdevices.len();
-        let all: Vec<Known> = subdevices.into_iter().chain(others).map(Known::from).collect();
+        let all = subdevices.into_iter().chain(others);
+        let all: Vec<Known> = all.map(|known| Known::from(in_doubt(known, handover))).collect();
         let scanned = all.iter().take(count).map(|known| known.info.clone()).collect();
         let found = Found { subdevices: scanned, topology, main_count };
         let before = Before { all, found, handover };
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
-        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        let options = self.own_scan_options();
         self.supervisor.spawn(async move {
             if let Err(error) = resume(&bus, &segment, &options, before).await {
                 let reason = slot.borrow_mut().insert(error).to_string();
@@ -125,6 +139,14 @@ impl MainDevice {
         self.activations = self.activations.max(activations);
         self.segment.observe(Observation::Offered(offered));
     }
+}
+
+/// After a crash the dictionary may hold what the former owner has written since, or another one.
+fn in_doubt(mut known: KnownSubDevice, handover: Handover) -> KnownSubDevice {
+    if handover == Handover::AfterCrash {
+        known.info.pdo_source = PdoSource::Outdated;
+    }
+    known
 }
 
 fn with_station(info: Rc<SubDeviceInfo>, station: StationAddress) -> Rc<SubDeviceInfo> {

@@ -8,9 +8,10 @@ use super::MainDevice;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::loops::restore;
+use crate::procedures::scan::ScanOptions;
 use crate::procedures::services::ServiceError;
 use crate::role::{Function, MainDevicePhase, MainDeviceRole};
-use crate::segment::{Addressed, Found, IdleObservation, Observation, Scan, UndeclaredObservation};
+use crate::segment::{Addressed, Found, IdleObservation, Observation, ReadPdos, Scan, UndeclaredObservation};
 use crate::time::Instant;
 
 impl MainDevice {
@@ -33,6 +34,12 @@ impl MainDevice {
     /// Whether the MainDevice keeps SubDevices without a declaration in their states.
     pub fn has_idle_operation(&self) -> bool {
         self.options.idle_operation
+    }
+
+    /// Whether PDOs of dictionaries are about to replace those of the SIIs: SubDevices are on their first way to PREOP,
+    /// or their dictionaries are being read. Without an application only.
+    pub fn are_pdos_awaited(&self) -> bool {
+        self.active().is_none() && self.segment.view().are_pdos_awaited()
     }
 
     /// The SubDevice with an address.
@@ -88,17 +95,19 @@ impl MainDevice {
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
-        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        let options = ScanOptions { pdos: ReadPdos::Never, ..self.own_scan_options() };
         let is_kept = self.options.idle_operation;
         if is_kept {
             segment.observe_undeclared(UndeclaredObservation::KeepingBegun);
+            segment.observe_idle(IdleObservation::Deactivating);
+            segment.observe_idle(IdleObservation::Begun);
         }
         self.supervisor.spawn(async move {
             restore(&bus, &segment).await;
             let result = deactivate(&bus, &segment, &options, remainder, limit).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {
-                segment.observe_idle(IdleObservation::Begun);
+                segment.observe_idle(IdleObservation::Deactivated);
             }
         });
         Ok(())

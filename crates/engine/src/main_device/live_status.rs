@@ -18,7 +18,9 @@ use crate::ring_status::LinkStatus;
 /// change, and once a second. Counts and working counters are those of the last evaluated cycle. Without supervision
 /// ([`super::Options`]) only configuration reads AL states.
 ///
-/// After the application has ended, no SubDevice is online.
+/// After the application has ended, no SubDevice is online. Without an application there are no declared SubDevices;
+/// with idle operation the state of the segment as a whole is that of the last broadcast, otherwise nothing responds. A
+/// status belongs to one application, or to the time until the next one.
 #[derive(Clone, Debug)]
 pub struct LiveStatus {
     board: Arc<Board>,
@@ -135,7 +137,7 @@ pub struct LostCopies {
 }
 
 impl MainDevice {
-    /// State of the segment and of each declared SubDevice, for any thread. Without an application: of none.
+    /// State of the segment and of each declared SubDevice, for any thread.
     pub fn live_status(&self) -> LiveStatus {
         LiveStatus { board: self.segment.board.clone() }
     }

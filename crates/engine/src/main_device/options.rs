@@ -8,10 +8,9 @@ use ringcat_wire::source_address::MacCodec;
 use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
-use crate::procedures::dictionary::ReadPdos;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
 use crate::role::MainDeviceRole;
-use crate::segment::Retries;
+use crate::segment::{ReadPdos, Retries};
 
 #[cfg(feature = "standby")]
 use super::standby_options::StandbyOptions;
@@ -31,8 +30,10 @@ pub struct Options {
     /// How much of each SII a scan reads; the rest follows in the background once all are in their target states.
     /// `None`: all of it, and in [`MainDevice::start_scan_for_operation`](super::MainDevice) what operation needs.
     pub sii_extent: Option<SiiExtent>,
-    /// Dictionaries that are read for PDOs after a scan.
-    pub pdos: ReadPdos,
+    /// Dictionaries that are read for PDOs: after a scan, which brings the SubDevice to PREOP and back for this, and of
+    /// undeclared SubDevices in PREOP. `None`: after a scan [`ReadPdos::Missing`], in PREOP [`ReadPdos::Always`] with
+    /// idle operation and [`ReadPdos::Missing`] without.
+    pub pdos: Option<ReadPdos>,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
     /// automatically.
     pub supervision: bool,
@@ -71,7 +72,7 @@ impl Options {
             codec: MacCodec::FlagsFirst,
             sii_cache: true,
             sii_extent: None,
-            pdos: ReadPdos::default(),
+            pdos: None,
             supervision: true,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),
@@ -98,6 +99,11 @@ impl Options {
             return MainDeviceRole::Inactive;
         }
         MainDeviceRole::Active
+    }
+
+    /// Dictionaries that are read of undeclared SubDevices in PREOP.
+    pub(super) fn pdos_in_preop(&self) -> ReadPdos {
+        self.pdos.unwrap_or(if self.idle_operation { ReadPdos::Always } else { ReadPdos::Missing })
     }
 
     /// The links in use.

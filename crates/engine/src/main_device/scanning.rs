@@ -8,7 +8,7 @@ use super::activate_error::ActivateError;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, end_scan, scan};
 use crate::role::Function;
-use crate::segment::Observation;
+use crate::segment::{Observation, ReadPdos};
 
 impl MainDevice {
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
@@ -47,9 +47,17 @@ impl MainDevice {
             extent,
             cache: self.cache.clone(),
             junctions: self.options.junctions,
-            pdos: self.options.pdos,
+            pdos: self.options.pdos.unwrap_or_default(),
             enhanced_line_crossed: self.options.enhanced_line_crossed,
         }
+    }
+
+    /// Options of scans that no application has requested. SubDevices that are kept in PREOP have their dictionaries
+    /// read there.
+    pub(super) fn own_scan_options(&self) -> ScanOptions {
+        let options = self.scan_options(self.options.sii_extent.unwrap_or_default());
+        let pdos = if self.options.idle_operation { ReadPdos::Never } else { options.pdos };
+        ScanOptions { pdos, ..options }
     }
 
     /// The result of the last scan, once it has ended.

@@ -117,8 +117,8 @@ plain! {
         pub protocols: u16,
         /// Bytes of its mailboxes: those of messages to it, and from it; zeros without a mailbox.
         pub mailbox_bytes: [u16; 2],
-        /// SyncManagers whose PDOs were read from its dictionary.
-        pub read_online: Vec<u8>,
+        /// Its PDOs were read from its dictionary.
+        pub are_pdos_read: bool,
         /// Its mailbox is in use.
         pub mailbox_open: bool,
         /// Messages written, mails read, and mails that no request waited for.
@@ -353,7 +353,7 @@ fn of_info(info: &SubDeviceInfo) -> SubDeviceSnapshot {
         name: info.name.clone(),
         protocols: info.protocols.0,
         mailbox_bytes: [layout.receive_size, layout.send_size],
-        read_online: info.read_online.clone(),
+        are_pdos_read: info.pdo_source.is_of_dictionary(),
         ..SubDeviceSnapshot::default()
     }
 }

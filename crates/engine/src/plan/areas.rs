@@ -9,12 +9,10 @@ use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan};
-use crate::config::{PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
+use crate::config::{ASSIGNMENT_BASE, PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
 use crate::info::{Direction, PdoInfo, SubDeviceInfo};
 use crate::order::InOrder;
 
-/// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
-pub(super) const ASSIGNMENT_BASE: u16 = 0x1C10;
 /// Largest number of PDOs in an assignment, and of entries in a PDO: subindices 1 to 254.
 const MAX_OBJECT_ENTRIES: usize = 254;
 
@@ -79,7 +77,7 @@ fn area(config: &SubDeviceConfig, info: &SubDeviceInfo, index: u8) -> Result<Opt
     };
     let bits: u64 = pdos.iter().flat_map(|pdo| &pdo.entries).map(|entry| u64::from(entry.bit_length)).sum();
     // The default length of the SII does not apply if the dictionary was read and assigns no PDO.
-    let is_known = assignment.is_some() || !pdos.is_empty() || info.read_online.contains(&index);
+    let is_known = assignment.is_some() || !pdos.is_empty() || info.pdo_source.is_of_dictionary();
     let length = if is_known {
         let too_long = PlanProblem::TooLong { sync_manager: index, bits };
         u16::try_from(bits.div_ceil(8)).map_err(|_| too_long)?

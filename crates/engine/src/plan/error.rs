@@ -147,15 +147,6 @@ pub enum PlanProblem {
         /// FMMUs of the controller.
         got: u8,
     },
-    /// The declared process data differs from the SII, and without CoE it cannot be written to the SubDevice.
-    FixedProcessData {
-        /// The SyncManager.
-        sync_manager: u8,
-        /// Bits that the SII describes.
-        expected: u64,
-        /// Requested bits.
-        got: u64,
-    },
     /// An SDO download for a SubDevice without CoE.
     NoCoe {
         /// Index of the object.
@@ -218,6 +209,11 @@ pub enum PlanProblem {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PlanWarning {
+    /// The declared PDOs differ from the SII, and the SubDevice has no CoE: they are not written.
+    NoCoe {
+        /// The SyncManager.
+        sync_manager: u8,
+    },
     /// The declared PDO assignment differs from the SII, which marks it as fixed. It is not written.
     FixedAssignment {
         /// The SyncManager.
@@ -280,10 +276,6 @@ impl fmt::Display for PlanProblem {
             Self::TooFewFmmus { expected, got } => {
                 write!(f, "{expected} FMMUs are needed, the controller has {got}")
             }
-            Self::FixedProcessData { sync_manager, expected, got } => {
-                write!(f, "SM {sync_manager}: the SII describes {expected} bits, {got} are declared, ")?;
-                f.write_str("and without CoE it cannot be changed")
-            }
             Self::NoCoe { .. } | Self::NoSoe { .. } | Self::NoEoe => self.fmt_protocol(f),
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
@@ -334,6 +326,10 @@ impl PlanProblem {
 impl fmt::Display for PlanWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            PlanWarning::NoCoe { sync_manager } => {
+                write!(f, "SM {sync_manager}: the declared PDOs differ from the SII, and without CoE ")?;
+                f.write_str("they are not written")
+            }
             PlanWarning::FixedAssignment { sync_manager } => {
                 write!(
                     f,

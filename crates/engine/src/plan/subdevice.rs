@@ -7,7 +7,7 @@ use ringcat_wire::register::SyncManager;
 use ringcat_wire::sii::MailboxLayout;
 
 use super::error::PlanWarning;
-use crate::config::SdoDownload;
+use super::sdos::PdoPlan;
 use crate::info::Direction;
 
 /// A SyncManager to write.
@@ -78,8 +78,8 @@ pub struct SubDevicePlan {
     pub process_data: Vec<AreaPlan>,
     /// SyncManagers of the controller to disable before SAFEOP: neither mailbox nor process data.
     pub unused: Vec<u8>,
-    /// SDO downloads for the planned PDO assignment and mapping, after the start-up commands of PREOP.
-    pub assign_sdos: Vec<SdoDownload>,
+    /// PDOs of the dictionary, compared and written after the start-up commands of PREOP.
+    pub pdos: Vec<PdoPlan>,
     /// The SubDevice supports LRW.
     pub lrw_supported: bool,
     /// Watchdog registers to write before SAFEOP.

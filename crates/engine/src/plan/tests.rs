@@ -12,7 +12,7 @@ use ringcat_wire::sii::{CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocol
 
 use super::*;
 use crate::config::{PdoEntry, PdoMapping, Watchdog};
-use crate::info::{InfoWarning, PdoEntryInfo, PdoInfo, Readout, SiiProblem};
+use crate::info::{InfoWarning, PdoEntryInfo, PdoInfo, PdoSource, Readout, SiiProblem};
 
 /// An ET1100: 8 FMMUs, 8 SyncManagers, 8 KiB, four MII ports, DC.
 const INFORMATION: [u8; Information::LEN] = [0x11, 0x01, 0x02, 0x00, 8, 8, 8, 0xFF, 0x0C, 0x00];
@@ -76,7 +76,8 @@ fn problem(config: &SubDeviceConfig, info: &SubDeviceInfo) -> PlanProblem {
 }
 
 fn sdos(plan: &SubDevicePlan) -> Vec<(u16, u8, Vec<u8>)> {
-    plan.assign_sdos.iter().map(|sdo| (sdo.index, sdo.sub_index, sdo.data.clone())).collect()
+    let all = plan.pdos.iter().flat_map(|planned| &planned.sdos);
+    all.map(|sdo| (sdo.index, sdo.sub_index, sdo.data.clone())).collect()
 }
 
 // covers: plan
@@ -93,7 +94,7 @@ fn the_sii_alone_gives_mailbox_areas_and_unused_sync_managers() {
     assert_eq!((inputs.sync_manager, inputs.direction, inputs.length), (3, Direction::Inputs, 4));
     assert_eq!(inputs.register.encode(), [0x80, 0x11, 0x04, 0x00, 0x20, 0, 1, 0]);
     assert_eq!(plan.unused, [4, 5, 6, 7]);
-    assert_eq!((plan.assign_sdos, plan.warnings, plan.watchdog), (vec![], vec![], vec![]));
+    assert_eq!((sdos(&plan), plan.warnings, plan.watchdog), (vec![], vec![], vec![]));
     assert!(plan.lrw_supported && plan.bootstrap.is_empty());
     assert_eq!(plan.station, StationAddress(0x1005));
 }
@@ -213,7 +214,7 @@ fn a_changed_mapping_is_written_while_the_pdo_is_not_assigned() {
 fn a_declaration_equal_to_the_sii_writes_nothing() {
     let entries = [PdoEntry::new(0x6000, 1, 16), PdoEntry::new(0x6000, 2, 16)];
     let config = any().assign(3, Direction::Inputs, vec![PdoMapping::of(0x1A00, entries)]);
-    assert_eq!(plan(&config, &device()).unwrap().assign_sdos, []);
+    assert_eq!(sdos(&plan(&config, &device()).unwrap()), []);
 }
 
 #[test]
@@ -232,17 +233,39 @@ fn a_change_that_the_sii_does_not_permit_is_a_warning_and_not_written() {
     let plan = plan(&any().assign(3, Direction::Inputs, vec![mapping]), &info).unwrap();
     let expected = [PlanWarning::FixedAssignment { sync_manager: 3 }, PlanWarning::FixedMapping { pdo: 0x1A02 }];
     assert_eq!(plan.warnings, expected);
-    assert_eq!((plan.assign_sdos, plan.process_data[1].length), (vec![], 1));
+    assert_eq!((sdos(&plan), plan.process_data[1].length), (vec![], 1));
 }
 
+// covers: plan
 #[test]
-fn other_process_data_without_coe_is_an_error() {
+fn other_process_data_without_coe_is_a_warning_and_configured_as_declared() {
     let entries = |bits| vec![PdoMapping::of(0x1600, [PdoEntry::new(0x3001, 1, bits)])];
-    let wrong = any().assign(0, Direction::Outputs, entries(8));
-    let expected = PlanProblem::FixedProcessData { sync_manager: 0, expected: 4, got: 8 };
-    assert_eq!(problem(&wrong, &terminal()), expected);
-    let renamed = any().assign(0, Direction::Outputs, entries(4));
-    assert_eq!(plan(&renamed, &terminal()).unwrap().assign_sdos, []);
+    for (bits, bytes) in [(4, 1), (16, 2)] {
+        let plan = plan(&any().assign(0, Direction::Outputs, entries(bits)), &terminal()).unwrap();
+        assert_eq!((sdos(&plan), plan.process_data[0].length), (vec![], bytes));
+        assert_eq!(plan.warnings, [PlanWarning::NoCoe { sync_manager: 0 }]);
+    }
+    let as_described = (0..4).map(|n| PdoMapping::of(0x1600 + n, [PdoEntry::new(0x3001, 1 + n as u8, 1)])).collect();
+    let plan = plan(&any().assign(0, Direction::Outputs, as_described), &terminal()).unwrap();
+    assert_eq!((sdos(&plan), plan.warnings), (vec![], vec![]));
+}
+
+/// A former owner may have written others: all that is not known is written.
+// covers: plan
+#[test]
+fn downloads_bring_any_dictionary_to_what_is_planned() {
+    let plan = plan(&any(), &device()).unwrap();
+    let [outputs, _] = &plan.pdos[..] else { panic!("{:?}", plan.pdos) };
+    assert_eq!(outputs.wanted.pdos.iter().map(|pdo| pdo.index).collect::<Vec<_>>(), [0x1600, 0x1601]);
+    let written = |held: &HeldPdos| outputs.downloads(held).iter().map(|sdo| (sdo.index, sdo.sub_index)).collect();
+    let all: Vec<(u16, u8)> = written(&HeldPdos::default());
+    let mappings = [(0x1600, 0), (0x1600, 1), (0x1600, 2), (0x1600, 3), (0x1600, 0), (0x1601, 0), (0x1601, 1)];
+    let assignment = [(0x1601, 0), (0x1C12, 1), (0x1C12, 2), (0x1C12, 0)];
+    assert_eq!(all, [&[(0x1C12, 0)][..], &mappings, &assignment].concat());
+    let held = HeldPdos { assigned: Some(vec![0x1600, 0x1601]), mapped: outputs.wanted.pdos.clone() };
+    assert_eq!(outputs.downloads(&held), []);
+    let reordered = HeldPdos { assigned: Some(vec![0x1601, 0x1600]), ..held };
+    assert_eq!(written(&reordered), [(0x1C12, 0), (0x1C12, 1), (0x1C12, 2), (0x1C12, 0)]);
 }
 
 // covers: plan
@@ -356,7 +379,7 @@ fn a_dictionary_without_pdos_overrides_the_default_length() {
     let mut info = device();
     info.pdos.retain(|pdo| pdo.sync_manager != Some(2));
     assert_eq!(plan(&any(), &info).unwrap().process_data[0].length, 3);
-    info.read_online = vec![2];
+    info.pdo_source = PdoSource::Dictionary;
     assert_eq!(plan(&any(), &info).unwrap().process_data[0].length, 0);
 }
 

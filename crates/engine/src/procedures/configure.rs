@@ -3,6 +3,7 @@
 mod compare;
 mod error;
 mod leave;
+mod pdos;
 mod register_error;
 mod registers;
 mod startup;
@@ -20,10 +21,9 @@ use super::al_state;
 use super::clocks;
 use super::shared_segment::SharedSegment;
 use super::sii;
-use crate::config::{SdoDownload, SubDeviceConfig, Transition};
+use crate::config::{SubDeviceConfig, Transition};
 use crate::event::Subject;
-use crate::mail::coe::{self, SdoAddress};
-use crate::mail::{Limits, Mailbox};
+use crate::mail::Mailbox;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::{MemberFinding, ProcessDataStep};
@@ -248,15 +248,5 @@ impl BringUp<'_> {
             self.bus.sleep(CYCLE_PAUSE).await;
         }
         self.request(AlState::SafeOp, AlState::Op).await
-    }
-
-    async fn assign_pdos(&self) -> Result<(), ConfigureError> {
-        let limits = Limits::new(self.config.timeouts.mailbox_request, self.config.timeouts.sdo);
-        for SdoDownload { index, sub_index, complete_access, data } in &self.setup.plan.assign_sdos {
-            let object = SdoAddress { index: *index, sub_index: *sub_index, complete_access: *complete_access };
-            self.bus.step(Subject::Mail, || format!("{}: SDO {index:#06x}:{sub_index:02x} assigns PDOs", self.station));
-            coe::write(&self.mailbox, object, data, limits).await?;
-        }
-        Ok(())
     }
 }

@@ -1,45 +1,50 @@
 //! Operation without an application: passes links, number and states of the SubDevices to the model, scans after
 //! changes.
 //!
-//! One broadcast read of AL status per period shows how many SubDevices are on each link, the OR of their states, and
-//! whether a port has changed. Other datagrams are sent only after a change, and once a second.
+//! One frame per period: a broadcast read of AL status shows how many SubDevices are on each link, the OR of their
+//! states, and whether a port has changed. Reads of single SubDevices, in turn, show states that the OR hides, and
+//! station addresses that another program has written. Other frames are sent only after a change.
 
 mod changes;
 mod places;
 mod rescue;
+mod state_turns;
 
 use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
+use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::Wkc;
 use ringcat_wire::al::AlStatus;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlStatus, map};
 
 pub(crate) use changes::{nothing, scan_again};
 pub(crate) use rescue::rescue;
 
-use super::inspect::read_subdevice;
+use self::state_turns::StateTurns;
+use super::read_state;
 use super::scan::{ScanError, ScanOptions, end_scan, scan};
 use super::shared_segment::{SharedSegment, until_active};
 use crate::board::{RingWord, Supervision};
 use crate::event::Subject;
-use crate::segment::{Change, Found, IdleObservation, Observation, StateRead, Words};
+use crate::segment::{Change, Found, IdleObservation, Observation, StateRead, SubDeviceKey, Words};
 use crate::supervisor::Bus;
 
 /// Interval of the broadcast: a change is detected within it.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// Watches the segment until an application is activated, or the MainDevice stops.
+/// Watches the segment until an application is activated, or the MainDevice stops; also while a procedure works on it.
 pub(crate) async fn watch(bus: Bus, segment: SharedSegment) {
     until_active(&segment, async {
         segment.observe_idle(IdleObservation::Watched(bus.carriers(), bus.ring()));
-        let mut number = 0;
+        let (mut number, mut turns) = (0, StateTurns::default());
         loop {
-            broadcast(&bus, &segment, number).await;
-            segment.until(|model| (!model.is_idle_busy()).then_some(())).await;
+            broadcast(&bus, &segment, number, &mut turns).await;
             bus.sleep(PERIOD).await;
             number = number.wrapping_add(1);
         }
@@ -53,23 +58,49 @@ fn words(bus: &Bus) -> Words {
     Words { links: bus.links(), carriers: bus.carriers(), ring, supervision: None, cycles: 0 }
 }
 
-/// One broadcast, unless a scan is under way or no link has a carrier.
-async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32) {
+/// One broadcast, unless no link has a carrier; in the same frame the states of some SubDevices. While a scan is under
+/// way only the live status follows it.
+async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut StateTurns) {
     let before = words(bus);
     segment.observe(Observation::Words(before));
+    segment.board.post_carriers(before.carriers);
+    let is_unplugged = before.is_unplugged();
+    let kept = turns.next(segment);
+    let reply = if is_unplugged { None } else { ask(bus, &kept).await };
+    let now = if is_unplugged { before } else { Words { ring: words(bus).ring, ..before } };
+    let Some((supervision, read)) = reply else {
+        segment.board.post_silence();
+        if segment.view().is_scanning() {
+            return;
+        }
+        return segment.observe_idle(IdleObservation::Unanswered(now));
+    };
+    segment.board.post_supervision(supervision.pack());
     if segment.view().is_scanning() {
         return;
     }
-    if before.is_unplugged() {
-        return segment.observe_idle(IdleObservation::Unanswered(before));
-    }
-    let reply = bus.brd(map::AL_STATUS, AlStatus::LEN).await;
-    let now = Words { ring: words(bus).ring, ..before };
-    let Ok(reply) = reply else { return segment.observe_idle(IdleObservation::Unanswered(now)) };
+    segment.observe(Observation::Words(Words { supervision: Some((number, supervision)), ..now }));
+    segment.observe_idle(IdleObservation::SomeRead(&read));
+}
+
+/// One frame with a broadcast read of AL status and reads of single SubDevices; `None` if it is lost.
+async fn ask(bus: &Bus, kept: &[(SubDeviceKey, Option<u32>)]) -> Option<(Supervision, Vec<StateRead>)> {
+    let all = (Command::Brd, Target::Broadcast(map::AL_STATUS), vec![0; AlStatus::LEN]);
+    let one = |(key, _): &(SubDeviceKey, Option<u32>)| {
+        (Command::Fprd, Target::Station(key.station, map::AL_STATUS), vec![0; read_state::LEN])
+    };
+    let reads: Vec<_> = core::iter::once(all).chain(kept.iter().map(one)).collect();
+    let replies = bus.transfer_all(reads, None).await.ok()?;
+    let reply = replies.first()?;
     let al_status = [reply.data.first().copied().unwrap_or_default(), 0];
     let (main, redundant, irq) = (reply.main, reply.redundant, reply.irq);
     let supervision = Supervision { main, redundant, al_status, irq, returned: false };
-    segment.observe(Observation::Words(Words { supervision: Some((number, supervision)), ..now }));
+    let read = kept.iter().zip(replies.get(1..)?).map(|((key, attempt), reply)| StateRead {
+        key: *key,
+        attempt: *attempt,
+        shown: read_state::shown(reply),
+    });
+    Some((supervision, read.collect()))
 }
 
 /// The first scan, as soon as a SubDevice answers.
@@ -123,7 +154,7 @@ pub(super) async fn read_states(bus: Bus, segment: SharedSegment) {
     until_active(&segment, async {
         let kept = segment.view().kept();
         let read = bus.gather(kept, |bus, (key, attempt)| async move {
-            StateRead { key, attempt, reading: read_subdevice(&bus, key.station).await }
+            StateRead { key, attempt, shown: read_state::read(&bus, key.station).await }
         });
         let read: Vec<StateRead> = read.await;
         segment.observe_idle(IdleObservation::StatesRead(&read));

@@ -5,6 +5,7 @@ use alloc::string::ToString;
 use super::scan::read_one;
 use super::shared_segment::SharedSegment;
 use super::sii::{self, SiiCache};
+use crate::info::PdoSource;
 use crate::segment::MemberFinding;
 use crate::supervisor::Bus;
 
@@ -21,7 +22,9 @@ pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, (index, attem
         // The reason was reported before.
         Ok(info) if info.is_blank() => {}
         Ok(mut info) => {
-            info.keep_read_online(&known);
+            // A boot loader may have brought another dictionary.
+            info.pdo_source = PdoSource::Outdated;
+            info.keep_dictionary(&known);
             segment.observe_member((index, attempt), MemberFinding::ReadAgain(&info));
         }
         Err(error) => segment.observe_member((index, attempt), MemberFinding::NotReadAgain(error.to_string())),

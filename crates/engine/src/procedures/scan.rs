@@ -8,6 +8,7 @@ mod end;
 mod error;
 mod identification;
 mod options;
+mod power_on;
 mod scanned;
 mod stations;
 
@@ -35,6 +36,7 @@ use self::count::Count;
 pub(crate) use self::end::end_scan;
 pub use self::error::ScanError;
 pub use self::options::ScanOptions;
+use self::power_on::PowerOns;
 use self::scanned::Scanned;
 pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
@@ -46,7 +48,7 @@ use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::{Event, Notice, Subject};
-use crate::info::{InfoWarning, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
+use crate::info::{InfoWarning, PdoSource, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
@@ -77,12 +79,13 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError
     let mut attempts = 1;
     bus.step(Subject::Scan, || "scan begins: SubDevices are counted".to_string());
     let mut expected = count::first(bus, options, begin).await?;
+    let mut power_ons = PowerOns::default();
     loop {
         bus.step(Subject::Scan, || {
             let LinkCounts { main, redundant } = expected.by_link();
             format!("scan: {main} SubDevices on MAIN, {redundant} on REDUNDANT; they go to INIT and get addresses")
         });
-        expected = match attempt(bus, options, expected).await {
+        expected = match attempt(bus, options, expected, &mut power_ons).await {
             Ok(mut scanned) => {
                 complete(bus, &mut scanned.scan, options.pdos).await;
                 let subdevices = scanned.scan.subdevices.len();
@@ -135,12 +138,17 @@ impl<E: Into<ScanError>> From<E> for Failure {
     }
 }
 
-async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Scanned, Failure> {
+async fn attempt(
+    bus: &Bus,
+    options: &ScanOptions,
+    expected: Count,
+    power_ons: &mut PowerOns,
+) -> Result<Scanned, Failure> {
     let total = expected.total();
     if total > u32::from(MAX_SUBDEVICES) {
         return Err(ScanError::TooMany { count: total }.into());
     }
-    let contents = read_while_settling(bus, options, &expected).await?;
+    let contents = read_while_settling(bus, options, &expected, power_ons).await?;
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let stations = (0..total as u16).map(Position).zip(contents);
     let describing = bus.gather(stations, |bus, (position, contents)| async move {
@@ -171,28 +179,35 @@ async fn attempt(bus: &Bus, options: &ScanOptions, expected: Count) -> Result<Sc
 }
 
 /// Reads the data of the counted SubDevices while the count settles. A changed count ends the attempt at once,
-/// regardless of the reading.
-async fn read_while_settling(bus: &Bus, options: &ScanOptions, expected: &Count) -> Result<Vec<Said>, Failure> {
-    let settling = async { count::settle(bus, expected, options.settle).await.map_err(Failure::Unsettled) };
-    let mut settling = pin!(settling);
-    let mut reading = pin!(identify(bus, expected.total() as u16, options));
-    let (mut settled, mut read) = (false, None);
+/// regardless of the reading: also later, because slow EEPROMs may take long.
+async fn read_while_settling(
+    bus: &Bus,
+    options: &ScanOptions,
+    expected: &Count,
+    power_ons: &mut PowerOns,
+) -> Result<Vec<Said>, Failure> {
+    let mut reading = pin!(identify(bus, expected.total() as u16, options, power_ons));
+    let mut read = None;
+    let mut settling = pin!(count::settle(bus, expected, options.settle));
     poll_fn(|context| {
-        if !settled && let Poll::Ready(result) = settling.as_mut().poll(context) {
-            if let Err(failure) = result {
-                return Poll::Ready(Err(failure));
-            }
-            settled = true;
-        }
         if read.is_none()
             && let Poll::Ready(result) = reading.as_mut().poll(context)
         {
             read = Some(result);
         }
-        if !settled {
-            return Poll::Pending;
-        }
-        read.take().map_or(Poll::Pending, |result| Poll::Ready(result.map_err(Failure::from)))
+        settling.as_mut().poll(context).map_err(Failure::Unsettled)
+    })
+    .await?;
+    if let Some(read) = read {
+        return read.map_err(Failure::from);
+    }
+    let mut changed = pin!(count::until_changed(bus, expected));
+    poll_fn(|context| match reading.as_mut().poll(context) {
+        Poll::Ready(result) => Poll::Ready(result.map_err(Failure::from)),
+        Poll::Pending => changed.as_mut().poll(context).map(|after| {
+            let before = expected.by_link();
+            Err(ScanError::Changed { before, after }.into())
+        }),
     })
     .await
 }
@@ -230,18 +245,33 @@ pub(super) async fn connect(
     Ok(Learned { topology, closings, not_learned })
 }
 
-/// Data of one SubDevice: its SII and its identification.
-pub(super) type Said = (SiiContents, Option<u16>);
+/// Data of one SubDevice.
+pub(super) struct Said {
+    /// Its SII.
+    pub contents: SiiContents,
+    /// Its explicit device identification.
+    pub identification: Option<u16>,
+    /// Whether its dictionary may have been written since power-on.
+    pub pdo_source: PdoSource,
+}
 
 /// Sets the common initial state and station addresses, and reads each SubDevice.
-async fn identify(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Said>, ScanError> {
-    level(bus).await?;
+async fn identify(
+    bus: &Bus,
+    count: u16,
+    options: &ScanOptions,
+    power_ons: &mut PowerOns,
+) -> Result<Vec<Said>, ScanError> {
+    let (levelled, sources) = bus.both(level(bus), power_ons.read(bus, count)).await;
+    levelled?;
     let are_clean = to_init(bus, count).await?;
     assign_addresses(bus, count).await?;
     if !are_clean {
         clear_errors(bus, count).await?;
     }
-    read_all(bus, count, options).await
+    let mut all = read_all(bus, count, options).await?;
+    all.iter_mut().zip(sources).for_each(|(said, source)| said.pdo_source = source);
+    Ok(all)
 }
 
 pub(crate) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
@@ -353,11 +383,12 @@ pub(super) async fn ask(
         // A broken EEPROM fails only its own SubDevice.
         Err(error) => {
             bus.notice(Notice::SiiOddity { position, what: error.to_string() });
-            return Ok((SiiContents::unreadable(), None));
+            let contents = SiiContents::unreadable();
+            return Ok(Said { contents, identification: None, pdo_source: PdoSource::Outdated });
         }
     };
     let identification = identification::read(bus, station, &contents).await?;
-    Ok((contents, identification))
+    Ok(Said { contents, identification, pdo_source: PdoSource::Outdated })
 }
 
 /// Reads one SubDevice: SII, controller, ports, alias, receive times.
@@ -379,7 +410,8 @@ pub(super) async fn read_whole(
     cache: &SiiCache,
 ) -> Result<SubDeviceInfo, ServiceError> {
     let contents = sii::read(bus, station, cache, SiiExtent::Complete).await.map_err(SiiProgramError::Read)?;
-    Ok(describe(read_registers(bus, position, station).await?, &(contents, None)))
+    let said = Said { contents, identification: None, pdo_source: PdoSource::Outdated };
+    Ok(describe(read_registers(bus, position, station).await?, &said))
 }
 
 /// Reads controller, ports, alias and receive times.
@@ -422,9 +454,10 @@ fn answered<const N: usize, const M: usize>(
     data.ok_or(BusError::Wkc { target, expected, got })
 }
 
-pub(super) fn describe(readout: Readout, (contents, identification): &Said) -> SubDeviceInfo {
+pub(super) fn describe(readout: Readout, said: &Said) -> SubDeviceInfo {
+    let Said { contents, .. } = said;
     let mut info = SubDeviceInfo::from_parts(readout, &contents.header, contents.categories());
-    info.identification = *identification;
+    (info.identification, info.pdo_source) = (said.identification, said.pdo_source);
     info.limit_to(contents.extent);
     let (category, offset, problem) = match contents.end {
         ChainEnd::Unreadable => {

@@ -20,7 +20,9 @@ use crate::mail::Mailbox;
 use crate::segment::clocks::ClockObservation;
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
-use crate::segment::{Addressed, IdleObservation, MemberFinding, Observation, Segment, UndeclaredObservation, Words};
+use crate::segment::{
+    Addressed, IdleObservation, MemberFinding, Observation, PdoFinding, Segment, UndeclaredObservation, Words,
+};
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
 
@@ -69,15 +71,22 @@ impl SharedSegment {
     /// continue beside it share procedures to be started, and changes wake them as well.
     pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
         let Beside { mailboxes, cache, statistics } = beside;
+        // No broadcast follows.
+        self.board.post_end();
         let eeproms = EepromTurns::new(bus);
         let (mailboxes, results) = (mailboxes.into(), AttemptResults::default());
         SharedSegment { mailboxes, results, cache, statistics, board, eeproms, ..self.clone() }
     }
 
     /// The same model, without an application and on another bus.
+    /// While broadcasts follow, what is shown of the segment as a whole goes on.
     pub fn without_application(&self, bus: &Bus) -> SharedSegment {
         let undeclared = self.undeclared.renewed(bus);
-        SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared)
+        let without = SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared);
+        if self.view().has_idle_operation() {
+            without.board.go_on_from(&self.board);
+        }
+        without
     }
 
     fn without(
@@ -163,6 +172,16 @@ impl SharedSegment {
             ring: self.board.ring(),
             supervision: self.board.supervision(),
             cycles: self.board.cycles(),
+        }
+    }
+
+    /// Passes to the model which members have got mail that has changed their PDOs since they were known.
+    pub(crate) fn observe_written_pdos(&self) {
+        for (index, mailbox) in self.mailboxes.iter().enumerate().filter(|(_, mailbox)| mailbox.has_written_pdos()) {
+            mailbox.forget_written_pdos();
+            let attempt = self.view().member(index).map(|member| member.attempt);
+            let outdated = |attempt| self.observe_member((index, attempt), MemberFinding::Pdos(PdoFinding::Outdated));
+            attempt.into_iter().for_each(outdated);
         }
     }
 

@@ -74,9 +74,9 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
 /// States of SubDevices without a declaration that had reached them before the round.
 fn observe_states(segment: &SharedSegment, settled: &[(SubDeviceKey, u32)], read: &[(SubDeviceKey, Reading)]) {
     let reading = |key: SubDeviceKey| read.iter().find(|(other, _)| *other == key).map(|(_, reading)| *reading);
-    let read = settled
-        .iter()
-        .filter_map(|(key, attempt)| Some(StateRead { key: *key, attempt: *attempt, reading: reading(*key)? }));
+    let read = settled.iter().filter_map(|(key, attempt)| {
+        Some(StateRead { key: *key, attempt: Some(*attempt), shown: reading(*key)?.into() })
+    });
     let read: Vec<StateRead> = read.collect();
     if !read.is_empty() {
         segment.observe_undeclared(UndeclaredObservation::StatesRead(&read));

@@ -9,7 +9,7 @@ mod mailboxes;
 mod request;
 
 pub(super) use attempt::bring_undeclared;
-pub(super) use bring::{keep_outputs, unmap};
+pub(super) use bring::{keep_outputs, read_pdos, unmap};
 pub(super) use keep::{keep, settle};
 pub(super) use mail::watch_undeclared_mail;
 pub(crate) use mailboxes::UndeclaredMailboxes;

@@ -13,6 +13,19 @@ pub enum Retries {
     OnRequest,
 }
 
+/// Object dictionaries from which PDO assignment and mapping are read. They have priority over the SII.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ReadPdos {
+    /// None.
+    Never,
+    /// Those of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
+    #[default]
+    Missing,
+    /// Those of all SubDevices with CoE.
+    Always,
+}
+
 /// Settings at activation.
 #[derive(Clone, Copy, Debug)]
 pub struct Choices {
@@ -28,4 +41,6 @@ pub struct Choices {
     pub supervision: bool,
     /// What follows a failed configuration.
     pub retries: Retries,
+    /// Dictionaries that are read of undeclared SubDevices in PREOP, SAFEOP and OP.
+    pub pdos: ReadPdos,
 }

@@ -129,6 +129,13 @@ pub enum Task {
         /// Number of the attempt.
         attempt: u32,
     },
+    /// Reads the PDOs in the dictionary of a SubDevice without a declaration that is in its requested state.
+    ReadPdos {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// Number of the attempt that has reached the state.
+        attempt: u32,
+    },
     /// Writes the outputs of a SubDevice without a declaration as long as it is to stay in OP.
     KeepOutputs {
         /// The SubDevice.

@@ -6,17 +6,16 @@ mod change;
 mod differences;
 mod observation;
 
-use core::time::Duration;
-
 pub use change::Change;
 pub use differences::Differences;
 pub use observation::IdleObservation;
 
-use crate::ring_status::LinkCounts;
-use crate::time::Instant;
+use alloc::vec::Vec;
 
-/// Interval of reads of all states: an OR can hide one state behind others.
-pub(super) const ROUTINE: Duration = Duration::from_secs(1);
+use ringcat_wire::address::StationAddress;
+
+use crate::ring_status::LinkCounts;
+
 /// Consecutive broadcasts without an answer after which no SubDevice is connected.
 pub(super) const SILENT: u8 = 3;
 /// Consecutive failures of a scan after which they are reported.
@@ -61,10 +60,14 @@ pub(super) enum Work {
     Nothing,
     /// The first scan.
     FirstScan,
-    /// The scan after a change, or by request.
+    /// The scan after a change, or by request, while it gives addresses or changes ports.
     Follow,
+    /// The same scan while it only reads EEPROMs, which may take long.
+    FollowReads,
     /// Reads of all states.
     ReadStates,
+    /// The end of an application.
+    Deactivation,
 }
 
 /// Operation without an application.
@@ -75,15 +78,24 @@ pub(super) struct Idle {
     pub silent: u8,
     /// The procedure that works on the segment.
     pub work: Work,
-    pub next_routine: Instant,
+    /// SubDevices on each link as they were reported, or found, last.
+    pub counted: Option<LinkCounts>,
+    /// Changes that broadcasts have shown, also while a procedure works.
+    pub changes: u32,
+    /// Former station addresses of SubDevices that the scan under way has given others.
+    pub readdressed: Vec<StationAddress>,
+    /// The unexpected OR of the states for which all states were read last.
+    pub read_for: Option<u8>,
     pub rescans: Rescans,
 }
 
 impl Idle {
-    /// A new beginning, with other numbers of requests than before.
+    /// A new beginning, with other numbers of requests than before. A deactivation goes on.
     pub fn renewed(&self) -> Idle {
         let asked = self.rescans.asked;
-        Idle { rescans: Rescans { asked, ended: (asked, Differences::default()) }, ..Idle::default() }
+        let work = if self.work == Work::Deactivation { Work::Deactivation } else { Work::Nothing };
+        let rescans = Rescans { asked, ended: (asked, Differences::default()) };
+        Idle { work, rescans, changes: self.changes, ..Idle::default() }
     }
 
     /// A procedure has ended. Another one may be under way since.
@@ -91,6 +103,20 @@ impl Idle {
         if self.work == work {
             self.work = Work::Nothing;
         }
+    }
+
+    /// The scan under way only reads EEPROMs from now on, or no longer.
+    pub fn read(&mut self, is_reading: bool) {
+        match (self.work, is_reading) {
+            (Work::Follow, true) => self.work = Work::FollowReads,
+            (Work::FollowReads, false) => self.work = Work::Follow,
+            _ => {}
+        }
+    }
+
+    /// Whether broadcasts show the segment as it is: no procedure changes ports or addresses.
+    pub fn is_visible(&self) -> bool {
+        matches!(self.work, Work::Nothing | Work::ReadStates | Work::FollowReads)
     }
 
     /// The number of the last request for a rescan, if it has no result yet.

@@ -15,9 +15,11 @@ use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
 use super::effect::Shown;
+use super::given::Given;
 use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
 use super::model::Declared;
+use super::pdo_finding::PdoFinding;
 use super::port_control::BlockedPort;
 use super::reading::Reading;
 use super::ring::Words;
@@ -115,6 +117,8 @@ pub enum MemberFinding<'a> {
     NotReadAgain(String),
     /// What it refuses differs from its own description.
     Oddity(String),
+    /// Something was found about the PDOs in its dictionary.
+    Pdos(PdoFinding<'a>),
 }
 
 /// An observation.
@@ -245,7 +249,7 @@ pub enum Observation<'a> {
         /// Positions of the SubDevices with these addresses.
         view: &'a View,
         /// The addresses.
-        given: &'a [StationAddress],
+        given: &'a [Given],
     },
     /// A search for SubDevices without a known address has ended; the reason if not all are known.
     Searched(Result<(), String>),

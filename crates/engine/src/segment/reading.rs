@@ -3,6 +3,8 @@
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::register::DlStatus;
 
+use super::undeclared::ShownState;
+
 /// Result of the read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reading {
@@ -24,12 +26,17 @@ pub enum Reading {
     },
 }
 
-impl Reading {
-    /// Its station address is not, or not only, its own.
-    pub const fn is_elsewhere(&self) -> bool {
-        matches!(self, Reading::Silent | Reading::Doubled)
+impl From<Reading> for ShownState {
+    fn from(reading: Reading) -> ShownState {
+        match reading {
+            Reading::Unknown => ShownState::Unknown,
+            Reading::Silent | Reading::Doubled => ShownState::Elsewhere,
+            Reading::Answer { status, code, .. } => ShownState::Shown((status, code)),
+        }
     }
+}
 
+impl Reading {
     /// It answered.
     pub const fn is_answer(&self) -> bool {
         matches!(self, Reading::Answer { .. })

@@ -10,6 +10,7 @@ mod matches;
 mod members;
 mod neighbours;
 mod observe;
+mod pdos;
 mod ports;
 mod recabling;
 #[cfg(feature = "standby")]

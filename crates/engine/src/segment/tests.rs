@@ -78,8 +78,14 @@ fn choices() -> Choices {
         follow_groups: false,
         idle_operation: false,
         supervision: true,
+        pdos: crate::segment::ReadPdos::Missing,
         retries: Retries::Always,
     }
+}
+
+/// An address that was given to a SubDevice with another one.
+fn given(station: StationAddress) -> Given {
+    Given { station, before: StationAddress(0x7777) }
 }
 
 /// SubDevices with these station addresses and product codes.

@@ -11,6 +11,7 @@ use super::key::SubDeviceKey;
 use super::knowledge::Knowledge;
 use super::owners::Owners;
 use super::undeclared::Upkeep;
+use crate::info::PdoSource;
 use crate::time::Instant;
 
 /// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.
@@ -31,6 +32,8 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
+    /// Where the PDOs of its SII are known from when it is read.
+    pub(super) pdo_source: PdoSource,
     /// Its requested state and the attempts to reach it; `None` without a request.
     pub upkeep: Option<Upkeep>,
 }
@@ -55,6 +58,7 @@ impl Unassigned {
             from_main: at.position < at.main_count,
             reported: false,
             held_since: None,
+            pdo_source: PdoSource::Outdated,
             upkeep: None,
         }
     }

@@ -5,5 +5,5 @@ mod observation;
 mod upkeep;
 
 pub(super) use keeping::Keeping;
-pub use observation::{KeptState, StateRead, UndeclaredObservation};
-pub use upkeep::{AttemptFailure, Upkeep, UpkeepProgress};
+pub use observation::{KeptState, ShownState, StateRead, UndeclaredObservation};
+pub use upkeep::{AttemptFailure, PdoReading, Upkeep, UpkeepProgress};

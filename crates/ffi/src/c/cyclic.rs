@@ -2,13 +2,14 @@
 
 use std::ffi::{c_int, c_uint};
 
-use ringcat::RingState;
+use ringcat::{DomainStatus, RingState};
 
 use super::handle::{alive, call};
 use super::memory::{list, put};
 use super::objects::{DomainObject, MasterObject, ec_domain_t, ec_master_t};
+use crate::active::Active;
 use crate::code::{Code, Outcome};
-use crate::master::{Active, Master};
+use crate::master::Master;
 use crate::settings::Name;
 use crate::types::{DomainState, PdoEntryReg};
 
@@ -18,7 +19,7 @@ const UNKNOWN: u32 = u32::MAX;
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_receive(master: *mut ec_master_t) -> c_int {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(master, |master| master.0.master.cycle(Active::receive)) }
+    unsafe { call(master, |master| master.0.master.receive()) }
 }
 
 #[unsafe(no_mangle)]
@@ -30,11 +31,15 @@ unsafe extern "C" fn ecrt_master_send(master: *mut ec_master_t) -> c_int {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_domain_process(domain: *mut ec_domain_t) -> c_int {
     let process = |domain: &DomainObject| {
-        domain.owner.master.cycle(|active| {
+        let done = domain.owner.master.cycle(|active| {
             let status = active.application.process(domain.id);
             let is_open_ring = domain.owner.master.is_ring() && active.application.ring() == RingState::Open;
             domain.words.post(&status, is_open_ring);
-        })
+        });
+        if done == Err(Code::GONE) {
+            domain.words.post(&DomainStatus::default(), false);
+        }
+        done
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(domain, process) }

@@ -2,7 +2,7 @@
 
 use std::ffi::{c_int, c_uint};
 
-use ringcat::Position;
+use ringcat::{Position, SubDeviceStatus};
 
 use super::handle::{alive, call};
 use super::memory::put;
@@ -26,7 +26,8 @@ fn state_of(slave: &SlaveObject) -> Outcome<SlaveConfigState> {
         SlaveConfigState(c_uint::from(online) | c_uint::from(operational) << 1 | c_uint::from(al_state & 0x0F) << 2)
     };
     if master.is_active() {
-        let status = master.live(|live| live.subdevice(slave.id()))?.ok_or(Code::NOT_FOUND)?;
+        let status =
+            master.live(Some(SubDeviceStatus::default()), |live| live.subdevice(slave.id()))?.ok_or(Code::NOT_FOUND)?;
         return Ok(pack(status.online, status.operational, status.al_state.map_or(0, |state| state.code())));
     }
     let position = master.look(|draft| draft.info(slave.index).map(|info| info.position))?;

@@ -31,6 +31,8 @@ struct Seen {
     in_preop: AtomicBool,
     /// When the links were connected last.
     connected_ns: AtomicU64,
+    /// A SubDevice has outputs that are not zero.
+    outputs_are_set: AtomicBool,
     ends: AtomicBool,
 }
 
@@ -64,6 +66,9 @@ impl Bench {
             let described = load_segment(&file).expect("it is right");
             let mut segment = PipedSegment::new(Network::from_description(described).expect("it is right"));
             let show = |segment: &mut PipedSegment| {
+                let has_outputs =
+                    segment.network_mut().devices().any(|device| device.outputs().iter().any(|it| *it != 0));
+                shown.outputs_are_set.store(has_outputs, Ordering::Release);
                 shown.connected_ns.store(segment.connected_ns(), Ordering::Release);
                 let mut states = segment.network_mut().devices().map(|device| device.al_status().al_state());
                 shown.in_preop.store(states.all(|state| state == Some(AlState::PreOp)), Ordering::Release);
@@ -87,6 +92,10 @@ impl Bench {
 
     pub fn connected_ns(&self) -> u64 {
         self.seen.connected_ns.load(Ordering::Acquire)
+    }
+
+    pub fn outputs_are_set(&self) -> bool {
+        self.seen.outputs_are_set.load(Ordering::Acquire)
     }
 
     pub fn command(&self, program: &Path) -> Command {

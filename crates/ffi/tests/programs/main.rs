@@ -5,9 +5,13 @@
 mod beside;
 mod conformance;
 mod daemon;
+mod exits;
 mod fake;
 mod hosts;
 mod library;
 mod linking;
+mod lost;
 mod machine;
+mod operator;
+mod readme;
 mod shape;

@@ -1,23 +1,23 @@
 //! A socket with its ring that another process opened: this process goes on with it.
 
 use std::cell::Cell;
-use std::os::fd::{AsRawFd, BorrowedFd, OwnedFd, RawFd};
+use std::os::fd::{AsRawFd, OwnedFd, RawFd};
 
-use super::{LinkCounters, PacketSocket, bind, ethernet};
+use super::{LinkCounters, PacketSocket, ethernet};
 use crate::error::LinkError;
 use crate::kernel;
 use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
 use crate::rx_ring::{self, RxRing};
 
-/// The interface that leads nowhere.
-const LOOPBACK: &str = "lo";
-
 /// What a process must know to go on with a socket, beside its descriptor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HandedSocket {
     /// Name of the interface to which it is bound.
     pub interface: String,
+    /// The address that stands for the interface while it is absent: the socket gets it when it comes, from a process
+    /// that has a duplicate ([`give`](super::binding::give)). `None`: it is there.
+    pub absent_mac: Option<[u8; 6]>,
     /// Slots of its ring, as they were created.
     pub slots: u32,
     /// The slot that is read next; `None` if it is not known, because the former owner crashed. It is found then.
@@ -31,6 +31,7 @@ impl PacketSocket {
     pub fn handed(&self) -> HandedSocket {
         HandedSocket {
             interface: self.interface.clone(),
+            absent_mac: None,
             slots: self.ring.slots() as u32,
             next_slot: (!self.is_searching).then(|| self.ring.next_slot()),
             receive: self.mode,
@@ -47,9 +48,12 @@ impl PacketSocket {
     /// The descriptor is no packet socket with such a ring, or it is bound to another interface.
     pub fn adopt(fd: OwnedFd, handed: &HandedSocket) -> Result<PacketSocket, LinkError> {
         let interface = &handed.interface;
-        let (index, mac) = ethernet(interface)?;
         let failed = |what| move |errno| LinkError::from_errno(interface, what, errno);
-        check(fd.as_raw_fd(), index).map_err(failed("going on with the socket of another process"))?;
+        let (expected, mac) = match handed.absent_mac {
+            Some(mac) => (Expected::Any, mac),
+            None => ethernet(interface).map(|(index, mac)| (Expected::Interface(index), mac))?,
+        };
+        check(fd.as_raw_fd(), expected).map_err(failed("going on with the socket of another process"))?;
         let layout = rx_ring::layout(handed.slots);
         // The kernel refuses another length than that of the ring.
         let mut ring = RxRing::map(fd.as_raw_fd(), &layout).map_err(failed("mapping the ring of another process"))?;
@@ -89,24 +93,25 @@ impl PacketSocket {
     }
 }
 
-/// Takes the interface away from a socket of which another process may have a duplicate: what it still sends goes to
-/// the loopback interface, and it receives nothing.
-///
-/// # Errors
-/// The descriptor is no packet socket.
-pub fn revoke(socket: BorrowedFd<'_>) -> Result<(), LinkError> {
-    let failed = |errno| LinkError::from_errno(LOOPBACK, "taking the interface away from a socket", errno);
-    let index = kernel::index_of(LOOPBACK).ok_or_else(|| failed(libc::ENODEV))?;
-    bind(socket.as_raw_fd(), index as libc::c_int, 0).map_err(failed)
+/// What a socket is bound to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Expected {
+    /// The interface with this number.
+    Interface(libc::c_int),
+    /// Any, or none yet.
+    Any,
 }
 
-/// Whether it is a packet socket with a ring of our version, bound to this interface.
-fn check(fd: RawFd, index: libc::c_int) -> Result<(), i32> {
+/// Whether it is a packet socket with a ring of our version, bound as expected.
+fn check(fd: RawFd, expected: Expected) -> Result<(), i32> {
     let domain = kernel::option::<libc::c_int>(fd, libc::SOL_SOCKET, libc::SO_DOMAIN, 0);
     let kind = kernel::option::<libc::c_int>(fd, libc::SOL_SOCKET, libc::SO_TYPE, 0);
     let version = kernel::option::<libc::c_int>(fd, libc::SOL_PACKET, kernel::PACKET_VERSION, -1);
     if (domain, kind, version) != (libc::AF_PACKET, libc::SOCK_RAW, kernel::TPACKET_V2) {
         return Err(libc::ENOTSOCK);
     }
-    if kernel::bound_interface(fd)? == index { Ok(()) } else { Err(libc::ENODEV) }
+    match expected {
+        Expected::Interface(index) if kernel::bound_interface(fd)? != index => Err(libc::ENODEV),
+        _ => Ok(()),
+    }
 }

@@ -55,6 +55,12 @@ impl Prepared {
         Ok(Prepared { ring, fd, options: *options, passing })
     }
 
+    /// The descriptor alone, for another process, which maps the ring
+    /// ([`PacketSocket::adopt`](crate::PacketSocket::adopt)).
+    pub fn into_descriptor(self) -> OwnedFd {
+        self.fd
+    }
+
     /// Binds it to an interface, which may be down and come up later.
     ///
     /// # Errors

@@ -126,8 +126,13 @@ fn other_process(path: &str) {
     let mut bytes = [0; 64];
     let (_, mut all) = descriptors::receive(&stream, &mut bytes).expect("it is sent");
     let slots = u32::from(bytes[0]);
-    let handed =
-        HandedSocket { interface: "near".to_owned(), slots, next_slot: Some(0), receive: ReceiveMode::Blocking };
+    let handed = HandedSocket {
+        interface: "near".to_owned(),
+        absent_mac: None,
+        slots,
+        next_slot: Some(0),
+        receive: ReceiveMode::Blocking,
+    };
     let mut socket = PacketSocket::adopt(all.remove(0), &handed).expect("it is a packet socket");
     loop {
         for _ in take(&mut socket, 1) {

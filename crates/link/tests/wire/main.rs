@@ -3,6 +3,7 @@
 //! Needs root and RINGCAT_ON_THE_WIRE=1; otherwise each test prints what it needs and passes.
 
 mod bench;
+mod binding;
 mod exclusive;
 mod faults;
 mod frames;

@@ -4,9 +4,10 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use ringcat_control::DEFAULT_SOCKET;
+use ringcat_control::socket::to_connect_to as find_socket;
 use ringcat_engine::Scan;
 use ringcat_engine::main_device::Declaration;
+use ringcat_link::realtime;
 
 use super::error::DaemonError;
 use super::links::DaemonLinks;
@@ -16,10 +17,10 @@ use crate::error::Error;
 use crate::main_device::Options;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Where the daemon listens: the variable `RINGCAT_SOCKET` of the environment, or the default socket.
+/// Where the daemon listens: the variable `RINGCAT_SOCKET` of the environment, or the usual place of this user or of
+/// root ([`find_socket`]).
 pub fn socket() -> PathBuf {
-    let named = std::env::var_os("RINGCAT_SOCKET").filter(|path| !path.is_empty());
-    named.unwrap_or_else(|| DEFAULT_SOCKET.into()).into()
+    find_socket(|name| std::env::var_os(name))
 }
 
 /// Name of this program, without its directory.
@@ -29,12 +30,13 @@ fn program() -> String {
 }
 
 impl OwnedBus {
-    /// Takes the bus of a master from the daemon at [`socket`], as [`OwnedBus::take`].
+    /// Takes the bus of a master from the daemon at [`socket`], as [`OwnedBus::take`]. Its threads have normal priority
+    /// on all processors, whatever the calling thread has.
     ///
     /// # Errors
     /// As [`OwnedBus::take`].
     pub fn request(master: u32, options: &Options) -> Result<OwnedBus, DaemonError> {
-        OwnedBus::take(&socket(), master, &program(), options, || ())
+        OwnedBus::take(&socket(), master, &program(), options, realtime::leave)
     }
 
     /// What is on the bus: what the daemon knew and was found again at the hand-over, otherwise a new scan.

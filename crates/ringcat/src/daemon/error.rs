@@ -23,8 +23,13 @@ pub enum DaemonError {
     Knowledge(KnowledgeError),
     /// The MainDevice reports an error.
     Bus(Error),
-    /// The daemon has ended, or drives the bus again, because this process was stopped.
+    /// The daemon has ended, or does not answer.
     Lost,
+    /// The daemon has taken the bus back before.
+    TakenBack {
+        /// Why.
+        cause: String,
+    },
 }
 
 impl fmt::Display for DaemonError {
@@ -34,9 +39,8 @@ impl fmt::Display for DaemonError {
             DaemonError::Links(error) => error.fmt(f),
             DaemonError::Knowledge(error) => write!(f, "what ringcatd knows of the segment: {error}"),
             DaemonError::Bus(error) => error.fmt(f),
-            DaemonError::Lost => {
-                f.write_str("ringcatd has ended, or drives the bus again because this process was stopped")
-            }
+            DaemonError::Lost => f.write_str("ringcatd has ended, or does not answer"),
+            DaemonError::TakenBack { cause } => write!(f, "ringcatd has taken the bus back before: {cause}"),
         }
     }
 }
@@ -48,7 +52,7 @@ impl std::error::Error for DaemonError {
             DaemonError::Links(error) => Some(error),
             DaemonError::Knowledge(error) => Some(error),
             DaemonError::Bus(error) => Some(error),
-            DaemonError::Lost => None,
+            DaemonError::Lost | DaemonError::TakenBack { .. } => None,
         }
     }
 }

@@ -51,7 +51,7 @@ pub fn adopt_links(links: &HandedLinks, descriptors: Vec<OwnedFd>) -> Result<(Da
 
 /// A packet socket as it is described.
 fn socket(link: &Handed, fd: OwnedFd) -> Option<HandedLink> {
-    let Handed::Interface { name, slots } = link else { return None };
-    let receive = ReceiveMode::Blocking;
-    Some((fd, HandedSocket { interface: name.clone(), slots: *slots, next_slot: None, receive }))
+    let Handed::Interface { name, slots, absent_mac } = link else { return None };
+    let (interface, receive) = (name.clone(), ReceiveMode::Blocking);
+    Some((fd, HandedSocket { interface, absent_mac: *absent_mac, slots: *slots, next_slot: None, receive }))
 }

@@ -1,44 +1,38 @@
 //! A bus that a daemon has handed over to this process.
 //!
-//! A thread receives what the daemon says: questions of its clients, and the end of the connection. It tells the daemon
-//! what is known of the segment after each scan, so that a crash of this process costs no scan.
+//! A thread receives what the daemon says ([`Receiver`]): questions of its clients, and the end of the connection. It
+//! tells the daemon what is known of the segment after each scan, so that a crash of this process costs no scan.
 
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use ringcat_control::Arriving;
 use ringcat_control::client::Client;
 use ringcat_control::connection::Connection;
 use ringcat_control::message::{Content, HandedLinks, Message};
-use ringcat_control::refusal::Refusal;
-use ringcat_control::wire::Limits;
 use ringcat_engine::Scan;
-use ringcat_engine::event::{ClientId, Subject, Subjects};
-use ringcat_engine::knowledge::{Handover, Knowledge};
-use ringcat_link::process::wait_readable;
+use ringcat_engine::event::{LogFilter, LogLevel, Subject, Subjects};
+use ringcat_engine::knowledge::Handover;
 
 use super::error::DaemonError;
-use super::links::{DaemonLinks, adopt_links};
+use super::ethernet::Ethernet;
+use super::links::DaemonLinks;
+use super::orders::Orders;
+use super::ownership::{Ownership, OwnershipWatch};
 use super::questions::Questions;
+use super::received::Received;
+use super::receiver::Receiver;
 use crate::links::Links;
 use crate::main_device::Options;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 
-/// The daemon hands a bus over within this time: it waits for the end of a scan.
-const TAKE: Duration = Duration::from_secs(30);
-/// Stack of the thread that receives: a program may have locked its memory, and with it this.
-const STACK_BYTES: usize = 512 << 10;
 /// The daemon answers to a release within this time, unless it is stopped.
 const RELEASE: Duration = Duration::from_secs(2);
 /// Interval of looks for its answer.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Interval of looks for new events of scans.
-const LOOK: Duration = Duration::from_millis(200);
 /// Events of scans that are kept between two looks: one is enough to tell that there were any.
 const KEPT: usize = 1;
 
@@ -51,19 +45,12 @@ pub struct OwnedBus {
     /// A daemon that is started anew sees by it that this process has the bus.
     _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
+    _ethernet: Ethernet,
     connection: Arc<Connection>,
-    shared: Arc<Shared>,
+    ownership: OwnershipWatch,
     receiver: Option<JoinHandle<()>>,
     /// A child of `fork` has no threads of this: it gives nothing back.
     process: u32,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    /// The bus is given back.
-    is_over: AtomicBool,
-    /// The daemon has ended the connection before.
-    is_lost: AtomicBool,
 }
 
 impl OwnedBus {
@@ -99,19 +86,13 @@ impl OwnedBus {
     ) -> Result<OwnedBus, DaemonError> {
         // Whatever the daemon does: an application that drives the bus is not taken down because its messages wait.
         let connection = Arc::new(Client::connect(socket, program)?.into_connection().patient());
-        connection.send(&Content::Take { master }.into())?;
-        let (message, mut descriptors) = connection.receive_with_descriptors(Limits::OWNER, Some(TAKE))?;
-        let handed = match message.content {
-            Content::Taken(handed) => handed,
-            Content::Refused(refusal) => return Err(refusal.into()),
-            _ => return Err(Refusal::Unexpected { expected: "links of a master".to_owned() }.into()),
-        };
-        let lock = if descriptors.len() > handed.descriptors() { descriptors.pop() } else { None };
+        let orders = Orders::new()?;
+        let received = Received::take(&connection, master, &orders)?;
+        let Received { bus: handed, cyclic, acyclic, lock, interfaces, knowledge } = received;
         let in_threads = prepare.clone();
-        let (cyclic, acyclic) = adopt_links(&handed, descriptors)?;
-        let acyclic = around(&handed, acyclic)?;
-        let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
-        let options = options.clone().with_idle_operation(true);
+        let main = acyclic.addresses().main;
+        let acyclic = around(&handed.links, acyclic)?;
+        let (options, is_known) = (options.clone().with_idle_operation(true), knowledge.is_some());
         let supervisor = match knowledge {
             Some(knowledge) => {
                 let known = (knowledge, Handover::Orderly);
@@ -119,27 +100,27 @@ impl OwnedBus {
             }
             None => SupervisorThread::start(acyclic, &options, prepare)?,
         };
+        supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(handed.debug_level)))?;
+        let ethernet = Ethernet::start(&supervisor, (master, main), interfaces, &orders)?;
         let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
         let events = supervisor.register_client(scans, KEPT)?;
         // A segment that does not answer any more is watched as any other.
-        let scan = if message.bytes.is_empty() { None } else { supervisor.finish_scan(|| ()).ok() };
-        let shared = Arc::new(Shared::default());
+        let scan = if is_known { supervisor.finish_scan(|| ()).ok() } else { None };
         let questions = Questions::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
+        let (ownership, links) = (OwnershipWatch::default(), handed.links);
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
-            shared: shared.clone(),
+            ownership: ownership.clone(),
             questions,
+            orders,
+            ethernet: ethernet.clone(),
             events,
         };
-        let thread = std::thread::Builder::new().name("daemon".into()).stack_size(STACK_BYTES);
-        let run = move || {
-            in_threads();
-            receiver.run();
-        };
-        let receiver = thread.spawn(run).map_err(crate::error::Error::Thread)?;
-        let (links, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
-        Ok(OwnedBus { supervisor, scan, handed, _lock: lock, links, connection, shared, receiver, process })
+        let receiver = receiver.start(in_threads).map_err(crate::error::Error::Thread)?;
+        let (cyclic, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
+        let (handed, links, _lock, _ethernet) = (links, cyclic, lock, ethernet);
+        Ok(OwnedBus { supervisor, scan, handed, _lock, links, _ethernet, connection, ownership, receiver, process })
     }
 
     /// The acyclic half. It knows the SubDevices that the daemon knew.
@@ -162,17 +143,17 @@ impl OwnedBus {
         self.links = Some(links);
     }
 
-    /// Whether the daemon drives the bus again, because this process was stopped; or the daemon has ended, then the bus
-    /// can still be driven.
-    pub fn is_lost(&self) -> bool {
-        self.shared.is_lost.load(Ordering::Acquire)
+    /// Whether this process has the bus still: a loss without a release shows here, for any thread.
+    pub fn ownership(&self) -> &OwnershipWatch {
+        &self.ownership
     }
 
     /// Gives the bus back, and waits until the daemon has it. An active application is to be ended before; otherwise
     /// its outputs last until the daemon has its SubDevices in PREOP.
     ///
     /// # Errors
-    /// The daemon has ended, has the bus already, or has not answered for 2 s. It has the bus when it goes on.
+    /// The daemon has ended, has taken the bus back already, or has not answered for 2 s. It has the bus when it goes
+    /// on.
     pub fn release(mut self) -> Result<(), DaemonError> {
         self.give_back()
     }
@@ -190,8 +171,7 @@ impl OwnedBus {
             Ok(None) | Err(_) => Vec::new(),
         };
         self.links = None;
-        let was_lost = self.shared.is_lost.load(Ordering::Acquire);
-        self.shared.is_over.store(true, Ordering::Release);
+        let before = self.ownership.release();
         let begin = Instant::now();
         let sent = self.connection.send_within(&Message { content: Content::Release, bytes }, RELEASE);
         while !receiver.is_finished() && sent.is_ok() && begin.elapsed() < RELEASE {
@@ -202,8 +182,11 @@ impl OwnedBus {
         self.connection.shut_down();
         // Its panic was reported by itself.
         let _ = receiver.join();
-        // A daemon that does not listen any more has ended, or has taken the bus back.
-        if was_lost || sent.is_err() || !is_answered { Err(DaemonError::Lost) } else { Ok(()) }
+        match before {
+            Ownership::TakenBack => Err(DaemonError::TakenBack { cause: self.ownership.cause().to_owned() }),
+            Ownership::Held if sent.is_ok() && is_answered => Ok(()),
+            _ => Err(DaemonError::Lost),
+        }
     }
 }
 
@@ -211,55 +194,5 @@ impl Drop for OwnedBus {
     fn drop(&mut self) {
         // The daemon takes the bus back at the end of the connection, too.
         let _ = self.give_back();
-    }
-}
-
-/// The thread that receives what the daemon says.
-struct Receiver {
-    supervisor: SupervisorThread,
-    connection: Arc<Connection>,
-    shared: Arc<Shared>,
-    questions: Questions,
-    events: Option<ClientId>,
-}
-
-impl Receiver {
-    fn run(self) {
-        let mut arriving = Arriving::new(Limits::OWNER);
-        loop {
-            if wait_readable(&[self.connection.as_fd()], LOOK) == 0 {
-                self.tell_knowledge();
-                continue;
-            }
-            match self.connection.receive_part(&mut arriving) {
-                Ok(None) => {}
-                Ok(Some(message)) => match message.content {
-                    Content::Ask(question) => self.questions.take(question, message.bytes),
-                    Content::Released => return self.end(),
-                    // A daemon of this version says nothing else.
-                    _ => {}
-                },
-                Err(_) => return self.end(),
-            }
-        }
-    }
-
-    /// The daemon drives the bus from now on, or is gone. Without a release the bus is lost.
-    fn end(&self) {
-        let is_over = self.shared.is_over.load(Ordering::Acquire);
-        self.shared.is_lost.store(!is_over, Ordering::Release);
-    }
-
-    /// Tells the daemon what is known, if a scan has ended since the last time.
-    fn tell_knowledge(&self) {
-        let Some(events) = self.events else { return };
-        match self.supervisor.client_events(events) {
-            Ok(Some(events)) if !events.events.is_empty() => {}
-            _ => return,
-        }
-        if let Ok(Some(knowledge)) = self.supervisor.knowledge() {
-            // If the daemon is gone the next look finds that.
-            let _ = self.connection.send(&Message { content: Content::Knowledge, bytes: knowledge.to_bytes() });
-        }
     }
 }

@@ -36,8 +36,8 @@ pub(super) fn describe(
     if !has_pdos {
         description.pdos = of_device(device);
     }
-    add_modules(esi, device, &placed, &mut description)?;
-    description.objects = objects::objects(esi, device, &placed, &description.pdos)?;
+    add_modules(device, &placed, &mut description)?;
+    description.objects = objects::objects(device, &placed, &description.pdos)?;
     description.controller_fmmus = device.info.fmmu_count.filter(|count| *count > 0);
     Ok(description)
 }
@@ -83,7 +83,6 @@ fn entry(of: &ringcat_config::esi::PdoEntry) -> Vec<PdoEntryDescription> {
 
 /// Adds the PDOs of the modules behind those of the device, and removes placeholders of missing PDOs.
 fn add_modules(
-    esi: &Esi,
     device: &Device,
     placed: &[PlacedModule<'_>],
     description: &mut DeviceDescription,
@@ -93,7 +92,7 @@ fn add_modules(
         for (pdos, direction) in
             [(&module.module.rx_pdos, PdoDirection::Rx), (&module.module.tx_pdos, PdoDirection::Tx)]
         {
-            let pdos = module.pdos(esi, pdos).map_err(|error| error.to_string())?;
+            let pdos = module.pdos(pdos).map_err(|error| error.to_string())?;
             added.extend(pdos.iter().map(|pdo| described(device, pdo, direction)));
         }
     }

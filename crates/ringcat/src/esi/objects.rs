@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_config::esi::{Device, Dictionary, Esi, Object as EsiObject, Part, PlacedModule, parts};
+use ringcat_config::esi::{Device, Dictionary, Object as EsiObject, Part, PlacedModule, parts};
 use ringcat_sim::application::dictionary::{Access, Entry, Object, ObjectRole};
 use ringcat_sim::description::{PdoDescription, data_type};
 use ringcat_wire::mailbox::coe::AccessRights;
@@ -22,7 +22,6 @@ const NUMBER: usize = 8;
 
 /// The objects of device and modules.
 pub(super) fn objects(
-    esi: &Esi,
     device: &Device,
     placed: &[PlacedModule<'_>],
     pdos: &[PdoDescription],
@@ -40,7 +39,7 @@ pub(super) fn objects(
     for module in placed {
         for dictionary in module.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
             for object in &dictionary.objects {
-                let object = module.object(esi, object).map_err(|error| error.to_string())?;
+                let object = module.object(object).map_err(|error| error.to_string())?;
                 add(dictionary, &object);
             }
         }

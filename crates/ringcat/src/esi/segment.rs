@@ -73,13 +73,25 @@ fn chosen<'a>(esi: &'a Esi, wanted: &DescribedDevice) -> Result<&'a Device, Desc
         let message = format!("expected one of {}, got \"{}\"", known(), kind.escape_debug());
         return fault("type", message);
     }
-    match wanted.revision {
-        None => of_kind().max_by_key(|device| device.revision),
-        Some(revision) => of_kind().find(|device| device.revision == revision),
+    let of_product = || of_kind().filter(|device| wanted.product.is_none_or(|product| device.product_code == product));
+    let revision = wanted.revision.or(of_product().map(|device| device.revision).max()).unwrap_or_default();
+    let found: Vec<&Device> = of_product().filter(|device| device.revision == revision).collect();
+    let list = |value: fn(&Device) -> u32, of: &mut dyn Iterator<Item = &Device>| {
+        of.map(|device| format!("{:#010x}", value(device))).collect::<Vec<_>>().join(", ")
+    };
+    match (&found[..], wanted.product) {
+        ([only], _) => Ok(only),
+        ([], None) => {
+            let revisions = list(|device| device.revision, &mut of_kind());
+            Err(DescriptionFault::new("revision", format!("expected one of {revisions}, got {revision:#010x}")))
+        }
+        ([], Some(product)) => {
+            let products = list(|device| device.product_code, &mut of_kind());
+            Err(DescriptionFault::new("product", format!("expected one of {products}, got {product:#010x}")))
+        }
+        (several, _) => {
+            let products = list(|device| device.product_code, &mut several.iter().copied());
+            Err(DescriptionFault::new("product", format!("expected a key product, one of {products}")))
+        }
     }
-    .ok_or_else(|| {
-        let revisions: Vec<String> = of_kind().map(|device| format!("{:#010x}", device.revision)).collect();
-        let got = wanted.revision.unwrap_or_default();
-        DescriptionFault::new("revision", format!("expected one of {}, got {got:#010x}", revisions.join(", ")))
-    })
 }

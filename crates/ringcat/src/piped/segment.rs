@@ -137,9 +137,9 @@ impl PipedSegment {
         self.cyclic_frames
     }
 
-    /// Whether all processes at the near ends are gone.
+    /// Whether no process is at the near ends: all are gone, or none has been connected yet.
     pub fn is_abandoned(&self) -> bool {
-        !self.pipes.is_empty() && self.pipes.iter().all(|far| far.pipe.is_ended())
+        self.pipes.iter().all(|far| far.pipe.is_ended())
     }
 
     /// The segment, to read from it or to inject faults.

@@ -1,11 +1,16 @@
 //! The first application of the guide, on the bus of a daemon: only the constructor differs.
 
+use std::process::Command;
 use std::time::Duration;
 
 use ringcat::daemon::OwnedBus;
 use ringcat::{AlState, Declaration, LastOutputs, Options, SubDeviceConfig};
+use ringcat_link::realtime;
 
 use crate::bench::Bench;
+
+/// Set in the process that is pinned to a processor.
+const PINNED: &str = "RINGCAT_TEST_PINNED";
 
 // covers: daemon, api
 #[test]
@@ -48,4 +53,35 @@ fn a_declaration_that_does_not_fit_leaves_the_links_for_another_attempt() {
     bus.activate(wrong).expect_err("it is another product");
     let right = ringcat::automatic(&bus.scan().expect("it is known").subdevices, Duration::from_millis(1));
     bus.activate(right).expect("it fits").wait_until_op(Duration::from_secs(10)).expect("all reach OP");
+}
+
+/// Processors that threads of this process may use, other than the calling one.
+fn processors_of_others() -> Vec<String> {
+    let own = std::fs::read_link("/proc/thread-self").expect("it is there");
+    let tasks = std::fs::read_dir("/proc/self/task").expect("it is there").flatten();
+    let others = tasks.filter(|task| Some(task.file_name().as_os_str()) != own.file_name());
+    let status = others.map(|task| std::fs::read_to_string(task.path().join("status")).unwrap_or_default());
+    let line = |status: String| status.lines().find_map(|it| it.strip_prefix("Cpus_allowed_list:").map(str::to_owned));
+    status.filter_map(line).map(|list| list.trim().to_owned()).collect()
+}
+
+// covers: daemon, api
+#[test]
+fn threads_of_a_requested_bus_use_all_processors_whatever_the_caller_may() {
+    if std::env::var_os(PINNED).is_none() {
+        let bench = Bench::start(2);
+        let mut pinned = Command::new(std::env::current_exe().expect("it is known"));
+        pinned.args(["--exact", "application::threads_of_a_requested_bus_use_all_processors_whatever_the_caller_may"]);
+        pinned.env(PINNED, "1").env("RINGCAT_SOCKET", &bench.socket);
+        let output = pinned.output().expect("it runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+        return;
+    }
+    let before = processors_of_others();
+    realtime::affinity(0).expect("there is a processor");
+    let bus = OwnedBus::request(0, &Options::default()).expect("the daemon drives it");
+    let with_bus = processors_of_others();
+    assert!(with_bus.len() > before.len(), "it has threads: {with_bus:?}");
+    assert!(with_bus.iter().all(|list| *list == before[0]), "{with_bus:?}, before {before:?}");
+    bus.release().expect("the daemon takes it");
 }

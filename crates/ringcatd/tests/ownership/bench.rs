@@ -16,7 +16,7 @@ use ringcat::sim::segment::Segment;
 use ringcat::{Activity, AlState, AlStatus, Options};
 use ringcat_control::{Answer, Ask};
 use ringcatd::daemon::Daemon;
-use ringcatd::master::Master;
+use ringcatd::master::{Master, Settings};
 use ringcatd::rights::Rights;
 use ringcatd::segment_process;
 use ringcatd::wires::Wires;
@@ -90,7 +90,8 @@ impl Bench {
         let wires = Wires::to_segment(near).expect("the segment is right");
         let directory = directory();
         let socket = directory.join("socket");
-        let master = Master::new(0, "test".to_owned(), wires).with_safe_state(safe_state);
+        let settings = Settings { safe_state, ..Settings::new(0, "test".to_owned()) };
+        let master = Master::start(settings, wires);
         let rights = Rights { group: None, mode: 0o666 };
         let daemon = Daemon::start(vec![master], &socket, rights, stop_limit).expect("it listens");
         let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));

@@ -136,7 +136,7 @@ fn fifty_clients_at_100_hz_are_answered_beside_an_application_in_op() {
     assert_eq!(refused, 0, "of {asked}");
     owner.input_ends();
     println!("{}", owner.wait_for("cycles: "));
-    assert_eq!(owner.wait_for("ended"), "ended: Ok(()), lost false");
+    assert_eq!(owner.wait_for("ended"), "ended: Ok(()), Held");
 }
 
 /// Socket for the process of another user.

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
+use ringcat::daemon::{Answer, Ask};
 
 use crate::bench::{Bench, LONG, check_bar};
 use crate::owner_process::{OwnerProcess, Work};
@@ -33,16 +34,40 @@ fn wait_for_first_frame(bench: &Bench, after_ns: u64) -> Duration {
     }
 }
 
+/// Rounds and seed of tests that kill applications at random moments; `RINGCAT_KILLS=500:7` asks for others.
+fn rounds() -> (usize, Random) {
+    let asked = std::env::var("RINGCAT_KILLS").unwrap_or_else(|_| "50:1".to_owned());
+    let (count, seed) = asked.split_once(':').unwrap_or((&asked, "1"));
+    println!("RINGCAT_KILLS={count}:{seed}");
+    (count.parse().expect("a number of rounds"), Random(seed.parse().expect("a seed")))
+}
+
+/// Random numbers from a seed (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    fn below(&mut self, limit: Duration) -> Duration {
+        Duration::from_nanos(self.next() % limit.as_nanos() as u64)
+    }
+}
+
 // covers: daemon
 #[test]
 fn fifty_killed_applications_leave_the_bus_to_the_daemon_within_20_ms() {
     let bench = Bench::start(8);
     let (mut first, mut preop) = (Vec::new(), Vec::new());
-    for round in 0..50_u64 {
+    let (count, mut random) = rounds();
+    for round in 0..count {
         let work = if round % 5 == 0 { Work::Hold } else { Work::Cycle };
         let mut owner = OwnerProcess::start(&bench.socket, work);
-        // Between 0 and 20 ms, the same in each run.
-        std::thread::sleep(Duration::from_micros(round.wrapping_mul(7_919) % 20_000));
+        std::thread::sleep(random.below(Duration::from_millis(20)));
         let killed = now_ns();
         owner.child.kill().expect("it runs");
         first.push(wait_for_first_frame(&bench, killed));
@@ -52,12 +77,38 @@ fn fifty_killed_applications_leave_the_bus_to_the_daemon_within_20_ms() {
     }
     first.sort_unstable();
     preop.sort_unstable();
-    let (median, longest) = (first[25], first[49]);
+    let (median, longest) = (first[count / 2], first[count - 1]);
     println!("SIGKILL to the first frame of the daemon: median {median:?}, longest {longest:?}");
-    println!("from there to PREOP of all 8 SubDevices: median {:?}, longest {:?}", preop[25], preop[49]);
+    println!("from there to PREOP of all 8 SubDevices: median {:?}, longest {:?}", preop[count / 2], preop[count - 1]);
     check_bar("median", median, FIRST_FRAME[0]);
     check_bar("longest", longest, FIRST_FRAME[1]);
-    check_bar("to PREOP", preop[49], PREOP);
+    check_bar("to PREOP", preop[count - 1], PREOP);
+}
+
+/// An application takes so long from its start to OP.
+const START: Duration = Duration::from_millis(150);
+
+// covers: daemon
+#[test]
+fn an_application_may_be_killed_at_any_moment_of_its_start() {
+    let bench = Bench::start(4);
+    let (count, mut random) = rounds();
+    let mut had = 0;
+    for _ in 0..count {
+        let connected = bench.inside(|segment| segment.connected_ns());
+        let mut owner = OwnerProcess::begin(&bench.socket, Work::Cycle);
+        std::thread::sleep(random.below(START));
+        owner.child.kill().expect("it runs");
+        owner.child.wait().expect("it has ended");
+        bench.wait_until("the daemon has it", |bench| {
+            matches!(bench.client().ask(0, Ask::Masters, Vec::new()),
+                Ok((Answer::Masters(masters), _)) if masters[0].owner.is_none() && masters[0].fault.is_none())
+        });
+        bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+        had += usize::from(bench.inside(|segment| segment.connected_ns()) > connected);
+    }
+    println!("{had} of {count} were killed while they had the bus");
+    bench.take().release().expect("the daemon drives it");
 }
 
 // covers: daemon
@@ -72,8 +123,15 @@ fn an_application_that_ends_without_a_release_leaves_the_bus_to_the_daemon() {
         owner.signal(signal);
         wait_for_first_frame(&bench, at);
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
-        crate::bench::ask(&mut client, ringcat::daemon::Ask::State);
+        crate::bench::ask(&mut client, Ask::State);
     }
+    let mut owner = OwnerProcess::start(&bench.socket, Work::Exit);
+    let at = now_ns();
+    owner.input_ends();
+    wait_for_first_frame(&bench, at);
+    bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+    assert!(owner.child.wait().expect("it has ended").success(), "it ends by exit");
+    bench.take().release().expect("the daemon drives it");
 }
 
 // covers: daemon
@@ -117,7 +175,8 @@ fn a_stopped_application_loses_the_bus_after_the_limit_and_sends_nothing_later()
     // It goes on with its cycles for a while.
     std::thread::sleep(Duration::from_millis(200));
     let said = owner.end();
-    assert!(said.ends_with("lost true"), "{said}");
+    let released = "Err(\"ringcatd has taken the bus back before: its process was stopped\")";
+    assert_eq!(said, format!("ended: {released}, TakenBack"));
     assert_eq!(bench.inside(|segment| segment.cyclic_frames()), frames, "none of its frames reaches the segment");
     assert!(bench.are_in(AlState::PreOp));
     bench.take().release().expect("the daemon drives it");
@@ -157,8 +216,8 @@ fn an_application_that_is_killed_and_started_again_at_once_reaches_op() {
         let begin = Instant::now();
         while begin.elapsed() < Duration::from_secs(2)
             && !matches!(
-                crate::bench::ask(&mut bench.client(), ringcat::daemon::Ask::Masters),
-                ringcat::daemon::Answer::Masters(masters) if masters[0].owner.is_none()
+                crate::bench::ask(&mut bench.client(), Ask::Masters),
+                Answer::Masters(masters) if masters[0].owner.is_none()
             )
         {
             std::thread::yield_now();

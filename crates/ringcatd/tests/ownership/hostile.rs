@@ -26,12 +26,13 @@ fn is_answered(bench: &Bench) {
 /// What a hostile client sends.
 fn attacks() -> Vec<Vec<u8>> {
     let hello = ringcat_control::wire::encode(&Content::Hello { program: "x".repeat(3000) }.into()).expect("short");
-    let mut header = b"RCTL\x03\0\0\0".to_vec();
+    let beginning = hello[..8].to_vec();
+    let mut header = beginning.clone();
     header.extend([0xFF; 8]);
     let mut deep = hello.clone();
-    deep.extend(b"RCTL\x03\0\0\0\xA0\x0F\0\0\0\0\0\0");
+    deep.extend([&beginning[..], b"\xA0\x0F\0\0\0\0\0\0"].concat());
     deep.extend([0x81; 4000]);
-    let take = ringcat_control::wire::encode(&Content::Take { master: 0 }.into()).expect("short");
+    let take = ringcat_control::wire::encode(&Content::Take { master: 0, ethernet: true }.into()).expect("short");
     let answer = Content::Answer(Numbered { id: 1, master: 0, what: Ok(Answer::Done) });
     let answer = ringcat_control::wire::encode(&answer.into()).expect("short");
     vec![
@@ -66,7 +67,7 @@ fn any_bytes_cost_a_client_its_connection_and_nothing_else() {
         is_answered(&bench);
     }
     assert!(bench.are_in(AlState::Op), "the application goes on");
-    assert_eq!(owner.end(), "ended: Ok(()), lost false");
+    assert_eq!(owner.end(), "ended: Ok(()), Held");
 }
 
 // covers: daemon

@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use ringcat::daemon::OwnedBus;
-use ringcat::{Options, automatic};
+use ringcat::{Declaration, Options, Output, Services, SubDeviceConfig};
 
 /// Socket of the daemon, for the process that is an application.
 const SOCKET: &str = "RINGCAT_TEST_OWNER";
@@ -21,8 +21,20 @@ const MEMORY: usize = 64 << 20;
 pub enum Work {
     /// Nothing.
     Hold,
-    /// It brings all SubDevices to OP and cycles at 1 kHz.
+    /// It brings all SubDevices to OP and cycles at 1 kHz, with all outputs of the first one set.
     Cycle,
+    /// The same where the first one has no watchdog of process data.
+    Unwatched,
+    /// As [`Work::Cycle`], and ends by `exit` without a release.
+    Exit,
+}
+
+impl Work {
+    fn of_environment() -> Work {
+        let name = std::env::var(WORK).expect("it is set with the socket");
+        let all = [Work::Hold, Work::Cycle, Work::Unwatched, Work::Exit];
+        all.into_iter().find(|work| format!("{work:?}") == name).expect("it is one of them")
+    }
 }
 
 /// An application. It is killed at the latest when this is dropped.
@@ -35,7 +47,17 @@ pub struct OwnerProcess {
 impl OwnerProcess {
     /// Starts one; it has the bus, and with [`Work::Cycle`] all SubDevices in OP, when this returns.
     pub fn start(socket: &Path, work: Work) -> OwnerProcess {
+        OwnerProcess::begin(socket, work).ready()
+    }
+
+    /// Starts one, without waiting for anything.
+    pub fn begin(socket: &Path, work: Work) -> OwnerProcess {
         OwnerProcess::start_by(Command::new(std::env::current_exe().expect("it is known")), socket, work)
+    }
+
+    fn ready(mut self) -> OwnerProcess {
+        self.wait_for("ready");
+        self
     }
 
     /// Starts one that writes its core where a signal asks for that, into this directory.
@@ -43,7 +65,7 @@ impl OwnerProcess {
         let mut shell = Command::new("sh");
         shell.args(["-c", "ulimit -c unlimited; exec \"$0\" \"$@\""]).current_dir(directory);
         shell.arg(std::env::current_exe().expect("it is known"));
-        OwnerProcess::start_by(shell, socket, Work::Cycle)
+        OwnerProcess::start_by(shell, socket, Work::Cycle).ready()
     }
 
     fn start_by(mut command: Command, socket: &Path, work: Work) -> OwnerProcess {
@@ -53,9 +75,7 @@ impl OwnerProcess {
         let mut child = command.spawn().expect("it starts");
         let input = child.stdin.take();
         let lines = BufReader::new(child.stdout.take().expect("it is piped"));
-        let mut owner = OwnerProcess { child, input, lines };
-        owner.wait_for("ready");
-        owner
+        OwnerProcess { child, input, lines }
     }
 
     /// Waits for a line.
@@ -83,6 +103,15 @@ impl OwnerProcess {
         self.input = None;
     }
 
+    /// Tells it to end in order. The debug level that it had.
+    pub fn end_with_level(mut self) -> String {
+        self.input_ends();
+        let said = self.wait_for("debug level");
+        self.wait_for("ended");
+        self.child.wait().expect("it ends");
+        said
+    }
+
     /// Tells it to end in order, and waits.
     pub fn end(mut self) -> String {
         self.input_ends();
@@ -105,14 +134,13 @@ impl Drop for OwnerProcess {
 #[test]
 fn an_application_drives_the_bus_until_its_input_ends() {
     if let Ok(socket) = std::env::var(SOCKET) {
-        let work = if std::env::var(WORK).as_deref() == Ok("Cycle") { Work::Cycle } else { Work::Hold };
-        run(Path::new(&socket), work);
+        run(Path::new(&socket), Work::of_environment());
         return;
     }
     let bench = crate::bench::Bench::start(4);
     let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
     assert!(bench.are_in(ringcat::AlState::Op), "{:?}", bench.states());
-    assert_eq!(owner.end(), "ended: Ok(()), lost false");
+    assert_eq!(owner.end(), "ended: Ok(()), Held");
     bench.wait_until("all in PREOP", |bench| bench.are_in(ringcat::AlState::PreOp));
 }
 
@@ -144,22 +172,38 @@ fn run(socket: &Path, work: Work) {
                 std::thread::sleep(Duration::from_millis(5));
             }
         }
-        Work::Cycle => {
-            let found = bus.supervisor().with(|engine| engine.subdevices()).expect("it runs");
-            let links = bus.take_links().expect("they are unused");
-            let declaration = automatic(&found, Duration::from_millis(1));
-            let activated = bus.supervisor().clone().activate(declaration, links);
-            let mut application = activated.expect("it fits the scan");
-            application.wait_until_op(Duration::from_secs(20)).expect("all reach OP");
-            say("ready");
-            while ended.try_recv().is_err() {
-                application.cycle(|_| ());
-            }
-            say(&format!("cycles: {:?}", application.pace()));
-        }
+        Work::Cycle | Work::Unwatched | Work::Exit => cycle(&mut bus, work, &ended),
     }
     drop(memory);
-    let lost = bus.is_lost();
+    let had = bus.ownership().now();
+    let level = bus.supervisor().log_filter().map(|filter| filter.level.number()).unwrap_or_default();
     let released = bus.release().map_err(|error| error.to_string());
-    say(&format!("ended: {released:?}, lost {lost}"));
+    say(&format!("debug level {level}"));
+    say(&format!("ended: {released:?}, {had:?}"));
+}
+
+/// Brings all to OP, and cycles until the input ends.
+fn cycle(bus: &mut OwnedBus, work: Work, ended: &std::sync::mpsc::Receiver<()>) {
+    let found = bus.supervisor().with(|engine| engine.subdevices()).expect("it runs");
+    let links = bus.take_links().expect("they are unused");
+    let mut declaration = Declaration::new(Duration::from_millis(1));
+    let declared = found.iter().enumerate().map(|(at, info)| match SubDeviceConfig::from_info(info) {
+        config if work == Work::Unwatched && at == 0 => config.watchdog(None, Some(0)),
+        config => config,
+    });
+    let subdevices: Vec<_> = declared.map(|config| declaration.add(config)).collect();
+    let activated = bus.supervisor().clone().activate(declaration, links);
+    let mut application = activated.expect("it fits the scan");
+    let outputs = (0..8).map(|at| application.output(subdevices[0], 0x7000 + 0x10 * at, 1).expect("it has eight"));
+    let outputs: Vec<Output<bool>> = outputs.collect();
+    application.wait_until_op(Duration::from_secs(20)).expect("all reach OP");
+    say("ready");
+    while ended.try_recv().is_err() {
+        application.cycle(|data| outputs.iter().for_each(|output| data.set(*output, true)));
+    }
+    if work == Work::Exit {
+        // Nothing is dropped.
+        std::process::exit(0);
+    }
+    say(&format!("cycles: {:?}", application.pace()));
 }

@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use ringcat::{
-    Address, Direction, DomainId, PdoMapping, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo, SyncSignals,
+    Address, Direction, DomainId, PdoMapping, RefusedPdos, Services, SubDeviceConfig, SubDeviceId, SubDeviceInfo,
+    SyncSignals,
 };
 use ringcat_engine::config::PdoEntry;
 use ringcat_engine::exchange::Entry;
-use ringcat_sim::description::{DeviceDescription, PdoEntryDescription};
+use ringcat_sim::description::{DeviceDescription, PdoDescription, PdoEntryDescription};
 use ringcat_wire::sii::PdoDirection;
 
 use super::errno::Errno;
@@ -34,15 +35,63 @@ pub fn syncs_of(device: &DeviceDescription) -> Vec<SyncInfo> {
     let mut syncs: Vec<SyncInfo> = Vec::new();
     for pdo in &device.pdos {
         let Some(index) = pdo.sync_manager else { continue };
-        let direction = if pdo.direction == PdoDirection::Rx { Direction::Outputs } else { Direction::Inputs };
-        let entry = |entry: &PdoEntryDescription| PdoEntry::new(entry.index, entry.sub_index, entry.bit_length);
-        let mapping = PdoMapping::of(pdo.index, pdo.entries.iter().map(entry).collect::<Vec<_>>());
         match syncs.iter_mut().find(|sync| sync.index == index) {
-            Some(sync) => sync.pdos.push(mapping),
-            None => syncs.push(SyncInfo { index, direction, pdos: vec![mapping] }),
+            Some(sync) => sync.pdos.push(mapping(pdo)),
+            None => syncs.push(SyncInfo { index, direction: direction(pdo), pdos: vec![mapping(pdo)] }),
         }
     }
     syncs
+}
+
+/// PDOs that a program chooses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChosenPdos {
+    /// Those that the SubDevice has by default, by name.
+    Named,
+    /// Those that it does not assign by default; without such ones all but the last.
+    Others,
+    /// Its default PDOs with their first entries only.
+    Shortened,
+}
+
+impl ChosenPdos {
+    /// All choices.
+    pub const ALL: [ChosenPdos; 3] = [ChosenPdos::Named, ChosenPdos::Others, ChosenPdos::Shortened];
+
+    /// SyncManagers and PDOs of a device as chosen; its default ones where it permits no others.
+    pub fn of(self, device: &DeviceDescription) -> Vec<SyncInfo> {
+        let mut syncs = syncs_of(device);
+        let details = device.mailbox.filter(|_| device.has_coe()).map(|mailbox| mailbox.coe_details);
+        let (can_assign, can_map) = details.map_or((false, false), |it| (it.pdo_assign(), it.pdo_configuration()));
+        for sync in &mut syncs {
+            match self {
+                ChosenPdos::Others if can_assign => sync.pdos = others(device, sync),
+                ChosenPdos::Shortened if can_assign && can_map => sync.pdos.iter_mut().for_each(shorten),
+                ChosenPdos::Named | ChosenPdos::Others | ChosenPdos::Shortened => {}
+            }
+        }
+        syncs
+    }
+}
+
+fn others(device: &DeviceDescription, sync: &SyncInfo) -> Vec<PdoMapping> {
+    let others = device.pdos.iter().filter(|pdo| pdo.sync_manager.is_none() && direction(pdo) == sync.direction);
+    let others: Vec<PdoMapping> = others.map(mapping).collect();
+    let all_but_the_last = sync.pdos.len().saturating_sub(1).max(1);
+    if others.is_empty() { sync.pdos.iter().take(all_but_the_last).cloned().collect() } else { others }
+}
+
+fn shorten(pdo: &mut PdoMapping) {
+    pdo.entries.iter_mut().for_each(|entries| entries.truncate(1));
+}
+
+fn direction(pdo: &PdoDescription) -> Direction {
+    if pdo.direction == PdoDirection::Rx { Direction::Outputs } else { Direction::Inputs }
+}
+
+fn mapping(pdo: &PdoDescription) -> PdoMapping {
+    let entry = |entry: &PdoEntryDescription| PdoEntry::new(entry.index, entry.sub_index, entry.bit_length);
+    PdoMapping::of(pdo.index, pdo.entries.iter().map(entry).collect::<Vec<_>>())
 }
 
 impl Ecrt {
@@ -72,6 +121,7 @@ impl Ecrt {
         }
         self.plan.keys.push(key);
         let config = SubDeviceConfig::at_alias(alias, position).expect_product(identity.0, identity.1);
+        let config = config.refused_pdos(RefusedPdos::Warn);
         Ok(self.plan.declaration.add_without_domain(config))
     }
 

@@ -138,7 +138,7 @@ impl Ecrt {
         Err(Errno::NxIo)
     }
 
-    /// `ecrt_master_state`: without an activation as the last scan shows it.
+    /// `ecrt_master_state`: without an activation as the last broadcast shows it.
     pub fn master_state(&mut self) -> SegmentStatus {
         match self.side.application() {
             Some(application) => Services::live_status(application).segment(),

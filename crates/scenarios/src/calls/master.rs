@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::time::Duration;
 
 use ringcat::{
-    AlState, ClockDatagrams, Error, Instant, LastOutputs, MainDevicePhase, Options, RegisterRequest, Retries,
+    AlState, ClockDatagrams, Error, Event, Instant, LastOutputs, MainDevicePhase, Options, RegisterRequest, Retries,
     SdoRequest, Services, SoeRequest, StateScope, VoeHandler,
 };
 use ringcat_sim::network::Network;
@@ -66,6 +66,8 @@ pub struct Ecrt {
     /// The application's time when the host's is zero.
     pub clock_base: u64,
     log: VecDeque<String>,
+    /// Events since it was emptied last, for scenarios that look at them.
+    pub events: Option<Vec<Event>>,
 }
 
 impl Drop for Ecrt {
@@ -91,6 +93,7 @@ impl Ecrt {
             pulses_may_come: false,
             clock_base: MONOTONIC,
             log: VecDeque::new(),
+            events: None,
         }
     }
 
@@ -132,6 +135,7 @@ impl Ecrt {
     pub fn look(&mut self) {
         while let Some(event) = self.side.pop_event() {
             self.note(format!("  {:?}", event.event));
+            self.events.iter_mut().for_each(|events| events.push(event.event.clone()));
         }
         let may_come = self.pulses_may_come;
         let network = self.side.links_mut().network();

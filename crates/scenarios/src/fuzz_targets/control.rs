@@ -1,14 +1,14 @@
 //! Messages of the daemon and any bytes: an error, or a message that survives a round trip.
 
-use ringcat_control::message::{Answer, Ask, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
+use ringcat_control::message::{Answer, Ask, HandedBus, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
 use ringcat_control::wire::{decode, encode};
-use ringcat_control::{Content, Limits, Message, Refusal};
+use ringcat_control::{Content, Limits, Message, Refusal, VERSION};
 
 /// Takes a message from bytes as they are, and from the same as content behind a header that fits.
 pub fn target(bytes: &[u8]) {
     check(bytes);
     let length = (bytes.len() as u32).to_le_bytes();
-    check(&[b"RCTL\x03\0\0\0", &length[..], &[0; 4], bytes].concat());
+    check(&[b"RCTL", &VERSION.to_le_bytes()[..], &[0; 2], &length, &[0; 4], bytes].concat());
 }
 
 fn check(bytes: &[u8]) {
@@ -23,7 +23,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
     let numbered = |what| Content::Ask(Numbered { id: 1, master: 0, what });
     let answered = |what| Content::Answer(Numbered { id: 1, master: 0, what });
     let links = HandedLinks {
-        main: HandedLink::Interface { name: "eth1".to_owned(), slots: 128 },
+        main: HandedLink::Interface { name: "eth1".to_owned(), slots: 128, absent_mac: Some([2, 0, 0, 0, 0, 1]) },
         redundant: Some(HandedLink::Pipe),
     };
     let contents = [
@@ -36,8 +36,17 @@ pub fn seeds() -> Vec<Vec<u8>> {
         Content::Underway { id: 1 },
         answered(Ok(Answer::State(Box::default()))),
         answered(Err(Refusal::NoMaster { master: 1, present: vec![0, 2] })),
-        Content::Take { master: 0 },
-        Content::Taken(links),
+        Content::Take { master: 0, ethernet: true },
+        Content::Taken(HandedBus {
+            links,
+            has_lock: true,
+            interfaces: vec!["eoe0s1".to_owned()],
+            can_switch: true,
+            debug_level: 1,
+        }),
+        Content::MakeInterface { name: "eoe0s1".to_owned(), mac: [2, 0, 0, 0, 0, 1] },
+        Content::Interface { name: "eoe0s1".to_owned(), fault: Some("taken".to_owned()) },
+        Content::SwitchLink { is_redundant: true, up: false },
         Content::Release,
         Content::Refused(Refusal::TooManyClients { limit: 64 }),
     ];

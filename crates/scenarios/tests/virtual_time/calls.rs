@@ -5,6 +5,7 @@ mod cycles;
 mod mailbox;
 mod misfits;
 mod orders;
+mod pdos;
 mod seeds;
 
 use ringcat::{DomainId, SubDeviceId};

@@ -251,3 +251,40 @@ fn a_requested_retry_does_not_wait_for_the_end_of_a_pause() {
         assert!(application.all_settled());
     }
 }
+
+/// Other PDOs, then those of the SII, of a MainDevice that keeps no SubDevice in PREOP by itself.
+// covers: stop, plan
+#[test]
+fn declarations_with_other_pdos_follow_each_other_without_idle_operation() {
+    use scenarios::calls::configure::ChosenPdos;
+    for network in networks() {
+        let (mut main_device, scan) = scanned(network, &Options::default());
+        for chosen in [ChosenPdos::Others, ChosenPdos::Named, ChosenPdos::Shortened, ChosenPdos::Named] {
+            for is_scanned_again in [false, true] {
+                if is_scanned_again {
+                    main_device.scan().expect("it can be scanned");
+                }
+                let mut declaration = declare(&scan, &[0, 1, 2, 3, 4, 5], false);
+                for at in [0, 3] {
+                    for sync in chosen.of(&scenarios::segments::describe("servo", "servo")) {
+                        let config = declaration.subdevices[at].clone();
+                        declaration.subdevices[at] = config.assign(sync.index, sync.direction, sync.pdos);
+                    }
+                }
+                let mut application = activate(main_device, declaration);
+                settle(&mut application);
+                cycles(&mut application, 5);
+                let dictionary = application.links().network().device(DeviceIndex(3)).application.dictionary();
+                let now = (dictionary.assigned(2).next(), dictionary.assigned_bits(2));
+                let expected = match chosen {
+                    ChosenPdos::Others => (Some(0x1601), 16),
+                    ChosenPdos::Named => (Some(0x1600), 96),
+                    ChosenPdos::Shortened => (Some(0x1600), 16),
+                };
+                assert_eq!(now, expected, "{chosen:?}");
+                main_device = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+                assert_eq!(statuses(&mut main_device), [PREOP; MIXED.len()], "{chosen:?}");
+            }
+        }
+    }
+}

@@ -80,6 +80,10 @@ fn wrong_descriptions_in_a_segment_file_name_line_device_and_key() {
             "esi = \"acme.xml\"\ntype = \"AD08\"\nrevision = 7",
             "line 4: device \"AD08-1\": revision: expected one of 0x00120000",
         ),
+        (
+            "esi = \"acme.xml\"\ntype = \"AD08\"\nproduct = 7",
+            "line 4: device \"AD08-1\": product: expected one of 0x00001008",
+        ),
         ("esi = \"acme.xml\"\ntype = \"AD08\"\nmodules = [\"a\"]", "line 4: device \"AD08-1\": modules: "),
         ("esi = \"acme.xml\"\ntype = \"AM01\"\nmodules = [\"-\"]", "slot 0 \"Axis 1\" has to be filled: expected"),
         ("esi = \"acme.xml\"\ntype = \"AM01\"\nmodules = [\"x\"]", "there is no module \"x\": expected \"csp axis\""),
@@ -111,9 +115,10 @@ fn real() -> Vec<PathBuf> {
 }
 
 /// One SubDevice to OP; the reason if it does not get there.
-fn reaches_op(file: &Path, kind: &str, revision: u32) -> Result<(), String> {
+fn reaches_op(file: &Path, kind: &str, (revision, product): (u32, u32)) -> Result<(), String> {
     let name = file.file_name().unwrap().to_string_lossy();
-    let text = format!("[[device]]\nname = \"it\"\nesi = '{name}'\ntype = '''{kind}'''\nrevision = {revision}\n");
+    let identity = format!("revision = {revision}\nproduct = {product}");
+    let text = format!("[[device]]\nname = \"it\"\nesi = '{name}'\ntype = '''{kind}'''\n{identity}\n");
     let mut main_device = MainDevice::request(links(&text, file.parent().unwrap())?, &Options::default());
     let scan = main_device.scan().map_err(|error| error.to_string())?;
     if scan.subdevices.len() != 1 {
@@ -133,7 +138,7 @@ fn devices_of_real_descriptions_reach_op() {
         let esi = load(&file).unwrap();
         let devices: Vec<_> = esi.devices.iter().filter(|device| !device.is_invisible).collect();
         for device in [devices.first(), devices.last()].into_iter().flatten() {
-            match reaches_op(&file, device.kind.trim(), device.revision) {
+            match reaches_op(&file, device.kind.trim(), (device.revision, device.product_code)) {
                 Ok(()) => reached += 1,
                 Err(error) => failed.push(format!("{} {}: {error}", file.display(), device.kind.trim())),
             }

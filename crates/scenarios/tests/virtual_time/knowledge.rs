@@ -6,7 +6,9 @@ mod bytes;
 mod changes;
 mod clocks;
 mod crashes;
+mod frames;
 mod mail;
+mod pdos;
 mod rounds;
 mod under_way;
 
@@ -14,7 +16,7 @@ use std::time::Duration;
 
 use ringcat::{
     Application, ClockConfig, Declaration, DomainId, Error, Event, Handover, JunctionMode, Knowledge, LastOutputs,
-    MainDevice, Options, Position, automatic,
+    MainDevice, Options, PdoSource, Position, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::device::Device;
@@ -162,9 +164,13 @@ fn a_known_segment_goes_on_without_a_scan() {
             let mut former = idle(network);
             exchange_sdos(&mut former);
             spoil_siis(&mut former);
-            let (known, kept) = (former.subdevices(), kept_registers(&mut former));
+            let (mut known, kept) = (former.subdevices(), kept_registers(&mut former));
             let topology = former.knowledge().expect("it is scanned").topology;
             let mut main_device = hand_over(former, handover);
+            if handover == Handover::AfterCrash {
+                // Nothing is known of what the former owner has written since.
+                known.iter_mut().for_each(|info| info.pdo_source = PdoSource::Outdated);
+            }
             assert_eq!(main_device.subdevices(), known, "network {number}");
             assert_eq!(main_device.knowledge().expect("it is known").topology, topology);
             exchange_sdos(&mut main_device);

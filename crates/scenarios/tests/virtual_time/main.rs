@@ -32,6 +32,7 @@ mod eeprom;
 mod eeprom_writes;
 mod eni;
 mod esi;
+mod esi_declared;
 mod ethernet;
 mod explorer;
 mod failures;

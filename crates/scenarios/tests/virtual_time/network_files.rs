@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use ringcat::config::network::model::SubDevice;
 use ringcat::config::{DifferenceKind, FoundNetwork};
 use ringcat::eni::EniImage;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -77,6 +78,42 @@ fn differences_between_the_file_and_another_bus_are_named() {
     assert_eq!(on(&segment(2, 2)), [(DifferenceKind::Missing, Some(6))]);
     assert_eq!(on(&segment(4, 2)), [(DifferenceKind::Additional, None), cable]);
     assert_eq!(on(&segment(3, 1)), [(DifferenceKind::Missing, Some(8))]);
+}
+
+// covers: network-file
+#[test]
+fn other_contents_of_a_subdevice_are_named_by_their_kind() {
+    let (_, scan) = scanned(&segment(1, 1));
+    let drive = 5;
+    let kinds = |change: &dyn Fn(&mut SubDevice)| {
+        let mut network = LoadedNetwork::from_bytes("machine.toml", text_of(&scan).as_bytes()).expect("it is valid");
+        change(&mut network.file.subdevice[drive]);
+        let network = LoadedNetwork::new(network.file);
+        let mut firmware = vec![None; scan.subdevices.len()];
+        firmware[drive] = Some("1.0".to_owned());
+        let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &firmware };
+        let differences = network.configuration.differences(found, &network.stated());
+        assert!(differences.iter().all(|it| it.text.contains("position 5 \"servo\"")), "{differences:?}");
+        differences.into_iter().map(|it| (it.kind, it.prevents_op)).collect::<Vec<_>>()
+    };
+    let entries = |drive: &mut SubDevice| drive.sync_manager[0].pdo[0].entries.clone().expect("entries");
+    assert_eq!(kinds(&|_| ()), []);
+    assert_eq!(kinds(&|drive| drive.firmware = "1.0".to_owned()), []);
+    assert_eq!(kinds(&|drive| drive.firmware = "1.1".to_owned()), [(DifferenceKind::Firmware, false)]);
+    assert_eq!(
+        kinds(&|drive| drive.mailbox.as_mut().expect("CoE").read.length += 2),
+        [(DifferenceKind::Mailbox, false)]
+    );
+    assert_eq!(kinds(&|drive| drive.check_identification = Some(5)), [(DifferenceKind::Identification, true)]);
+    let shorter = kinds(&|drive| {
+        let mut list = entries(drive);
+        list.pop();
+        drive.sync_manager[0].pdo[0].entries = Some(list);
+    });
+    assert_eq!(shorter, [(DifferenceKind::Pdos, false)]);
+    assert_eq!(kinds(&|drive| drive.sync_manager[0].pdo[0].index = 0x1617)[0], (DifferenceKind::Pdos, false));
+    let beyond = kinds(&|drive| drive.sync_manager[0].number = 9);
+    assert_eq!(beyond, [(DifferenceKind::ProcessData, true)]);
 }
 
 // covers: network-file

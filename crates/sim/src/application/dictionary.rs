@@ -34,12 +34,15 @@ pub struct Dictionary {
     unacknowledged: u8,
     /// Counter of value changes.
     revision: u32,
+    /// Objects that no MainDevice can access.
+    hidden: Vec<u16>,
 }
 
 impl Dictionary {
     /// The dictionary of a description; it has PDO lists also for devices without CoE.
     pub fn new(description: &DeviceDescription) -> Dictionary {
-        Dictionary { objects: objects::build(description), unacknowledged: 0, revision: 0 }
+        let (objects, hidden) = (objects::build(description), description.left_out.clone());
+        Dictionary { objects, unacknowledged: 0, revision: 0, hidden }
     }
 
     /// All objects, indices ascending.
@@ -50,6 +53,12 @@ impl Dictionary {
     /// Finds an object.
     pub fn object(&self, index: u16) -> Option<&Object> {
         self.objects.binary_search_by_key(&index, |object| object.index).ok().map(|place| &self.objects[place])
+    }
+
+    /// Finds an object that a MainDevice accesses.
+    fn visible(&self, index: u16) -> Result<&Object, AbortCode> {
+        let object = self.object(index).filter(|_| !self.hidden.contains(&index));
+        object.ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)
     }
 
     /// Counter of value changes: equal counters mean equal values.
@@ -74,14 +83,14 @@ impl Dictionary {
 
     /// The value of one entry.
     pub fn read(&self, index: u16, sub_index: u8) -> Result<&[u8], AbortCode> {
-        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let object = self.visible(index)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
         if entry.access == Access::WriteOnly { Err(AbortCode::WRITE_ONLY) } else { Ok(&entry.value) }
     }
 
     /// All entries from subindex 0 (padded to 16 bits) or 1 on, packed (protocol 6.3, complete access).
     pub fn read_complete(&self, index: u16, from: u8) -> Result<Vec<u8>, AbortCode> {
-        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let object = self.visible(index)?;
         let mut bytes = Vec::new();
         if from == 0 {
             bytes.push(object.entry(0).and_then(|entry| entry.value.first().copied()).unwrap_or(0));
@@ -111,7 +120,7 @@ impl Dictionary {
 
     /// Writes a whole list by SDO: first the entries, then their number; an error changes nothing.
     pub fn write_complete(&mut self, index: u16, from: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
-        let before = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?.clone();
+        let before = self.visible(index)?.clone();
         let result = self.write_parts(&before, from, data, state);
         if result.is_err()
             && let Some(object) = self.object_mut(index)
@@ -157,13 +166,13 @@ impl Dictionary {
 
     /// Whether an SDO may write this number of bytes to an entry in `state`, for any values.
     pub fn check_access(&self, index: u16, sub_index: u8, length: usize, state: AlState) -> Result<(), AbortCode> {
-        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let object = self.visible(index)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
         entry.check_access(length, state)
     }
 
     fn check_write(&self, index: u16, sub_index: u8, data: &[u8], state: AlState) -> Result<(), AbortCode> {
-        let object = self.object(index).ok_or(AbortCode::OBJECT_DOES_NOT_EXIST)?;
+        let object = self.visible(index)?;
         let entry = object.entry(sub_index).ok_or(AbortCode::SUB_INDEX_DOES_NOT_EXIST)?;
         entry.check_access(data.len(), state)?;
         entry.check_value(data)?;
@@ -225,6 +234,15 @@ impl Dictionary {
             for (place, byte) in entry.value.iter_mut().enumerate() {
                 *byte = data.get(place).copied().unwrap_or(0);
             }
+        }
+    }
+
+    /// Sets assignments and mappings back to those of power-on.
+    pub(super) fn forget_pdos(&mut self, description: &DeviceDescription) {
+        self.revision = self.revision.wrapping_add(1);
+        let of_pdos = |object: &Object| matches!(object.role, ObjectRole::Assignment(_) | ObjectRole::Mapping(_));
+        for object in objects::build(description).into_iter().filter(of_pdos) {
+            self.objects.iter_mut().filter(|own| own.index == object.index).for_each(|own| own.clone_from(&object));
         }
     }
 

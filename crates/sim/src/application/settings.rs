@@ -90,6 +90,9 @@ pub fn process_data(
     actual: &[SyncManager],
     ram_kib: u8,
 ) -> Result<Layout, AlStatusCode> {
+    if !modules_match(dictionary) {
+        return Err(AlStatusCode::MODULES_DO_NOT_MATCH);
+    }
     let mut layout = Layout::default();
     for (number, entry) in (0u8..).zip(&description.sync_managers) {
         let (areas, direction, wrong, wrong_mapping) = match entry.kind {
@@ -175,6 +178,19 @@ fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, num
         return dictionary.assigned_bits(number).div_ceil(8);
     }
     u32::from(description.default_length(number))
+}
+
+/// Whether the list of modules that was written is that of the detected ones; a list without idents is none (ES-69).
+fn modules_match(dictionary: &Dictionary) -> bool {
+    const CONFIGURED: u16 = 0xF030;
+    const DETECTED: u16 = 0xF050;
+    let list = |index: u16| -> Vec<u64> {
+        let entries = || dictionary.numbers(index..=index);
+        let count = entries().find(|(_, sub, _)| *sub == 0).map_or(0, |(.., count)| count);
+        entries().filter(|(_, sub, _)| (1..=count).contains(&u64::from(*sub))).map(|(.., ident)| ident).collect()
+    };
+    let configured = list(CONFIGURED);
+    configured.iter().all(|ident| *ident == 0) || configured == list(DETECTED)
 }
 
 fn assigned_twice(dictionary: &Dictionary, number: u8) -> bool {

@@ -164,6 +164,9 @@ impl Application {
             (_, AlState::Init) => {
                 self.process_data.stop(now);
                 self.mailbox = None;
+                if description.forgets_pdos_in_init {
+                    self.dictionary.forget_pdos(description);
+                }
             }
             (AlState::SafeOp | AlState::Op, AlState::PreOp) => self.process_data.stop(now),
             (AlState::PreOp, AlState::SafeOp) => {

@@ -15,6 +15,8 @@ pub struct DescribedDevice {
     pub kind: Option<String>,
     /// Key `revision`; `None`: the highest.
     pub revision: Option<u32>,
+    /// Key `product`: the product code, where several devices have one type and revision.
+    pub product: Option<u32>,
     /// Key `modules`: the modules in the slots, in order.
     pub modules: Vec<String>,
 }
@@ -23,7 +25,7 @@ pub struct DescribedDevice {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DescriptionFault {
-    /// `esi`, `type`, `revision` or `modules`.
+    /// `esi`, `type`, `revision`, `product` or `modules`.
     pub key: &'static str,
     /// Expected and actual value.
     pub message: String,

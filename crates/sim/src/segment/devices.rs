@@ -114,6 +114,7 @@ fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<De
         (None, None) => return Err(("type: expected a key type or sii, got neither".into(), None)),
     };
     let of_esi = entry.revision.as_ref().map(|it| ("revision", it.span()));
+    let of_esi = of_esi.or(entry.product.as_ref().map(|it| ("product", it.span())));
     let of_esi = of_esi.or(entry.modules.first().map(|it| ("modules", it.span())));
     if let (None, Some((key, span))) = (&entry.esi, of_esi) {
         return Err((format!("{key}: expected a device of a description file (key esi)"), Some(span)));
@@ -133,12 +134,16 @@ fn described(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<D
         path: sources.base_dir.join(esi.get_ref()),
         kind: entry.kind.as_ref().map(|kind| kind.get_ref().clone()),
         revision: entry.revision.as_ref().map(|revision| *revision.get_ref()),
+        product: entry.product.as_ref().map(|product| *product.get_ref()),
         modules: entry.modules.iter().map(|module| module.get_ref().clone()).collect(),
     };
     sources.descriptions.device(&wanted, name).map_err(|fault| {
         let span = match fault.key {
             "type" => entry.kind.as_ref().map(|kind| kind.span()),
             "revision" => entry.revision.as_ref().map(|revision| revision.span()),
+            "product" => {
+                entry.product.as_ref().map(|product| product.span()).or(entry.kind.as_ref().map(|it| it.span()))
+            }
             "modules" => entry.modules.first().map(|module| module.span()),
             _ => None,
         };

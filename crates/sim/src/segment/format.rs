@@ -48,6 +48,7 @@ pub(super) struct DeviceEntry {
     pub(super) sii: Option<Spanned<String>>,
     pub(super) esi: Option<Spanned<String>>,
     pub(super) revision: Option<Spanned<u32>>,
+    pub(super) product: Option<Spanned<u32>>,
     #[serde(default)]
     pub(super) modules: Vec<Spanned<String>>,
     pub(super) count: Option<Spanned<usize>>,

@@ -62,6 +62,7 @@ pub(super) const DEVICE: Keys = &[
     ("sii", Text),
     ("esi", Text),
     ("revision", BITS_32),
+    ("product", BITS_32),
     ("modules", Texts),
     ("count", BITS_63),
     ("alias", BITS_16),

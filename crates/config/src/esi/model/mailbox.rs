@@ -7,8 +7,8 @@ pub struct Mailbox {
     pub line: u32,
     /// Lost mail is repeated (data link layer).
     pub data_link_layer: bool,
-    /// ADS over EtherCAT with its start-up commands.
-    pub aoe: Option<Vec<RawCommand>>,
+    /// ADS over EtherCAT.
+    pub aoe: Option<AoeSettings>,
     /// Ethernet over EtherCAT.
     pub eoe: Option<EoeSettings>,
     /// CAN application protocol.
@@ -19,6 +19,19 @@ pub struct Mailbox {
     pub soe: Option<(u8, Vec<SoeCommand>)>,
     /// Vendor protocol.
     pub voe: bool,
+}
+
+/// Features of ADS over EtherCAT.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AoeSettings {
+    /// The device forwards ADS between its channels.
+    pub is_router: bool,
+    /// The configuration tool chooses its net id.
+    pub generate_net_id: bool,
+    /// Its net id is sent to it.
+    pub initialize_net_id: bool,
+    /// Start-up commands.
+    pub commands: Vec<RawCommand>,
 }
 
 /// Features of Ethernet over EtherCAT.
@@ -51,16 +64,23 @@ pub struct CoeSettings {
     pub segmented: Option<bool>,
     /// The diagnosis history 0x10F3 exists.
     pub diagnosis_history: bool,
+    /// Uploads state the largest length that the MainDevice takes.
+    pub upload_with_max_length: bool,
+    /// Objects of the time distribution exist.
+    pub time_distribution: bool,
+    /// Electronic data sheet, a file of CANopen.
+    pub eds_file: Option<String>,
     /// Start-up commands.
     pub commands: Vec<CoeCommand>,
 }
 
 /// State change at which a start-up command is sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.
     Ip,
     /// PREOP to SAFEOP.
+    #[default]
     Ps,
     /// SAFEOP to OP.
     So,

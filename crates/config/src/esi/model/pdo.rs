@@ -49,7 +49,7 @@ pub struct Pdo {
 impl Pdo {
     /// Sum of the entries in bits.
     pub fn bit_length(&self) -> u32 {
-        self.entries.iter().map(|entry| u32::from(entry.bit_length)).sum()
+        self.entries.iter().fold(0, |bits: u32, entry| bits.saturating_add(entry.bit_length.into()))
     }
 }
 

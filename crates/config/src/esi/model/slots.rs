@@ -1,7 +1,9 @@
 //! Slots of modular devices and their modules (MDP, protocol ES-64 to ES-71).
 
+use std::sync::Arc;
+
 use super::dictionary::Profile;
-use super::mailbox::CoeCommand;
+use super::mailbox::{CoeCommand, Transition};
 use super::names::Names;
 use super::pdo::Pdo;
 
@@ -29,6 +31,8 @@ pub struct Slots {
     pub most: Option<u16>,
     /// The list of module idents is written to 0xF030.
     pub download_idents: bool,
+    /// When it is written.
+    pub download_transition: Transition,
     /// The list of module addresses is written to 0xF020.
     pub download_addresses: bool,
     /// Slots in document order.
@@ -110,4 +114,6 @@ pub struct Module {
     pub op_mode: Option<String>,
     /// Vendor of the file.
     pub vendor_id: u32,
+    /// The file with the module.
+    pub file: Arc<str>,
 }

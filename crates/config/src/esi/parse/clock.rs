@@ -5,15 +5,6 @@ use crate::esi::error::EsiError;
 use crate::esi::model::{ClockSettings, OpMode, OpModeSyncManager, ScaledTime};
 
 pub(super) fn clock(element: Element<'_>) -> Result<ClockSettings, EsiError> {
-    element.knows(&["OpMode", "VendorSpecific"]);
-    element.knows_attributes(&[
-        "UnknownFRMW",
-        "Unknown64Bit",
-        "ExternalRefClock",
-        "PotentialReferenceClock",
-        "TimeLoopControlOnly",
-        "PdoOversampling",
-    ]);
     Ok(ClockSettings {
         line: element.line(),
         potential_reference: element.is("PotentialReferenceClock")?,
@@ -25,18 +16,6 @@ pub(super) fn clock(element: Element<'_>) -> Result<ClockSettings, EsiError> {
 }
 
 fn mode(element: Element<'_>) -> Result<OpMode, EsiError> {
-    element.knows(&[
-        "Name",
-        "Desc",
-        "AssignActivate",
-        "ActivateAdditional",
-        "CycleTimeSync0",
-        "ShiftTimeSync0",
-        "CycleTimeSync1",
-        "ShiftTimeSync1",
-        "Sm",
-        "VendorSpecific",
-    ]);
     let time = |name: &str| -> Result<ScaledTime, EsiError> {
         let Some(child) = element.child(name) else { return Ok(ScaledTime::default()) };
         // Negative times are also written as unsigned numbers.

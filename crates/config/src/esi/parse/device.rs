@@ -15,38 +15,7 @@ use crate::esi::model::{
 };
 use crate::xml::shown;
 
-const ELEMENTS: [&str; 26] = [
-    "Sci",
-    "Type",
-    "HideType",
-    "AlternativeType",
-    "SubDevice",
-    "Name",
-    "Comment",
-    "URL",
-    "Info",
-    "GroupType",
-    "Profile",
-    "Fmmu",
-    "Sm",
-    "Su",
-    "RxPdo",
-    "TxPdo",
-    "Mailbox",
-    "Dc",
-    "Slots",
-    "ESC",
-    "Eeprom",
-    "Image16x14",
-    "ImageFile16x14",
-    "ImageData16x14",
-    "VendorSpecific",
-    "OpMode",
-];
-
 pub(super) fn device(element: Element<'_>) -> Result<Device, EsiError> {
-    element.knows(&ELEMENTS);
-    element.knows_attributes(&["Physics", "Invisible", "Crc32"]);
     let kind = element.required("Type")?;
     let name = element.names("Name")?;
     for missing in ["Name", "GroupType"].into_iter().filter(|name| element.child(name).is_none()) {
@@ -81,20 +50,6 @@ pub(super) fn device(element: Element<'_>) -> Result<Device, EsiError> {
 }
 
 fn identity(kind: Element<'_>, device: &mut Device) -> Result<(), EsiError> {
-    kind.knows_attributes(&[
-        "ProductCode",
-        "RevisionNo",
-        "SerialNo",
-        "CheckProductCode",
-        "CheckRevisionNo",
-        "CheckSerialNo",
-        "UseLrdLwr",
-        "ModulePdoGroup",
-        "TcSmClass",
-        "TcCfgModeSafeOp",
-        "DownloadModuleList",
-        "ShowHideableSubDevices",
-    ]);
     device.kind = kind.text();
     device.product_code = kind.number_in("ProductCode")?.unwrap_or(0);
     device.revision = kind.number_in("RevisionNo")?.unwrap_or(0);
@@ -165,19 +120,6 @@ fn fmmu(element: Element<'_>) -> Result<Fmmu, EsiError> {
 }
 
 fn sync_manager(element: Element<'_>) -> Result<SyncManager, EsiError> {
-    element.knows_attributes(&[
-        "MinSize",
-        "MaxSize",
-        "DefaultSize",
-        "StartAddress",
-        "ControlByte",
-        "Enable",
-        "Virtual",
-        "OpOnly",
-        "OneByteMode",
-        "Watchdog",
-        "FixedAssignment",
-    ]);
     let text = element.raw();
     let role = match text.trim() {
         "MBoxOut" => SyncManagerRole::MailboxOut,

@@ -10,7 +10,6 @@ use crate::esi::model::{Access, ArrayBounds, DataType, Dictionary, Flags, Object
 const ALL_STATES: u8 = 7;
 
 pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
-    element.knows(&["UnitTypes", "DataTypes", "Objects", "VendorSpecific"]);
     let mut data_types: Vec<DataType> = Vec::new();
     for of in element.child("DataTypes").into_iter().flat_map(|types| types.children("DataType")) {
         data_types.push(data_type(of)?);

@@ -8,7 +8,6 @@ use crate::esi::model::{Eeprom, EepromCategory, EepromContent};
 const MAX_BYTES: u32 = 0x1_0000 * 128;
 
 pub(super) fn eeprom(element: Element<'_>) -> Result<Eeprom, EsiError> {
-    element.knows(&["Data", "ByteSize", "ConfigData", "BootStrap", "Category", "VendorSpecific"]);
     let byte_size: Option<u32> = element.number_of("ByteSize")?;
     if let Some(size) = byte_size.filter(|size| *size > MAX_BYTES || *size == 0) {
         let expected = format!("1 to {MAX_BYTES} bytes");

@@ -5,21 +5,6 @@ use crate::esi::error::EsiError;
 use crate::esi::model::{Info, PortKind, PortSettings, StateTimes};
 
 pub(super) fn info(element: Element<'_>) -> Result<Info, EsiError> {
-    element.knows(&[
-        "Electrical",
-        "StateMachine",
-        "Mailbox",
-        "EtherCATController",
-        "Port",
-        "IdentificationReg134",
-        "IdentificationAdo",
-        "StationAliasSupported",
-        "DeviceFeature",
-        "ExecutionUnit",
-        "VendorSpecific",
-        "BackupParameterSupport",
-        "ErrorHandlingSupport",
-    ]);
     let mut info = Info {
         identification_al_status: element.flag_of("IdentificationReg134")?.unwrap_or_default(),
         identification_address: element.number_of("IdentificationAdo")?,

@@ -3,11 +3,11 @@
 use super::pdo::slot_index;
 use crate::esi::element::Element;
 use crate::esi::error::EsiError;
-use crate::esi::model::{CoeCommand, CoeSettings, EoeSettings, Mailbox, RawCommand, SoeCommand, Transition};
+use crate::esi::model::{
+    AoeSettings, CoeCommand, CoeSettings, EoeSettings, Mailbox, RawCommand, SoeCommand, Transition,
+};
 
 pub(super) fn mailbox(element: Element<'_>) -> Result<Mailbox, EsiError> {
-    element.knows(&["AoE", "EoE", "CoE", "FoE", "SoE", "VoE", "VendorSpecific"]);
-    let aoe = element.child("AoE").map(|aoe| aoe.children("InitCmd").map(raw).collect()).transpose()?;
     let soe = |soe: Element<'_>| -> Result<_, EsiError> {
         let commands = soe.children("InitCmd").map(soe_command).collect::<Result<_, _>>()?;
         Ok((soe.number_in("ChannelCount")?.unwrap_or(1), commands))
@@ -15,12 +15,21 @@ pub(super) fn mailbox(element: Element<'_>) -> Result<Mailbox, EsiError> {
     Ok(Mailbox {
         line: element.line(),
         data_link_layer: element.is("DataLinkLayer")?,
-        aoe,
+        aoe: element.child("AoE").map(aoe).transpose()?,
         eoe: element.child("EoE").map(eoe).transpose()?,
         coe: element.child("CoE").map(coe).transpose()?,
         foe: element.child("FoE").is_some(),
         soe: element.child("SoE").map(soe).transpose()?,
         voe: element.child("VoE").is_some(),
+    })
+}
+
+fn aoe(element: Element<'_>) -> Result<AoeSettings, EsiError> {
+    Ok(AoeSettings {
+        is_router: element.is("AdsRouter")?,
+        generate_net_id: element.is("GenerateOwnNetId")?,
+        initialize_net_id: element.is("InitializeOwnNetId")?,
+        commands: element.children("InitCmd").map(raw).collect::<Result<_, _>>()?,
     })
 }
 
@@ -35,7 +44,6 @@ fn eoe(element: Element<'_>) -> Result<EoeSettings, EsiError> {
 
 /// `CoE` of a device or module.
 pub(super) fn coe(element: Element<'_>) -> Result<CoeSettings, EsiError> {
-    element.knows(&["InitCmd", "Object", "VendorSpecific"]);
     Ok(CoeSettings {
         sdo_info: element.is("SdoInfo")?,
         pdo_assign: element.is("PdoAssign")?,
@@ -44,6 +52,9 @@ pub(super) fn coe(element: Element<'_>) -> Result<CoeSettings, EsiError> {
         complete_access: element.is("CompleteAccess")?,
         segmented: element.flag_in("SegmentedSdo")?,
         diagnosis_history: element.is("DiagHistory")?,
+        upload_with_max_length: element.is("SdoUploadWithMaxLength")?,
+        time_distribution: element.is("TimeDistribution")?,
+        eds_file: element.attribute("EdsFile").map(str::to_owned),
         commands: element.children("InitCmd").map(coe_command).collect::<Result<_, _>>()?,
     })
 }
@@ -81,15 +92,22 @@ fn raw(element: Element<'_>) -> Result<RawCommand, EsiError> {
     })
 }
 
+/// A transition by its name.
+pub(super) fn transition(name: &str) -> Option<Transition> {
+    Some(match name.trim() {
+        "IP" => Transition::Ip,
+        "PS" => Transition::Ps,
+        "SO" => Transition::So,
+        "SP" => Transition::Sp,
+        "OP" => Transition::Op,
+        "OS" => Transition::Os,
+        _ => return None,
+    })
+}
+
 fn transitions(element: Element<'_>) -> Result<Vec<Transition>, EsiError> {
-    let one = |element: Element<'_>| match element.raw().trim() {
-        "IP" => Ok(Transition::Ip),
-        "PS" => Ok(Transition::Ps),
-        "SO" => Ok(Transition::So),
-        "SP" => Ok(Transition::Sp),
-        "OP" => Ok(Transition::Op),
-        "OS" => Ok(Transition::Os),
-        _ => Err(element.wrong("a transition IP, PS, SO, SP, OP or OS")),
+    let one = |element: Element<'_>| {
+        transition(&element.raw()).ok_or_else(|| element.wrong("a transition IP, PS, SO, SP, OP or OS"))
     };
     let found: Vec<Transition> = element.children("Transition").map(one).collect::<Result<_, _>>()?;
     if found.is_empty() {

@@ -1,39 +1,27 @@
 //! PDOs of devices and modules (protocol ES-47).
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
 use crate::esi::element::Element;
 use crate::esi::error::EsiError;
 use crate::esi::model::{Names, Pdo, PdoEntry, SlotIndex};
 
-/// Attributes of a PDO that are read, or have no effect on what a MainDevice does.
-const ATTRIBUTES: [&str; 15] = [
-    "Fixed",
-    "Mandatory",
-    "Virtual",
-    "Sm",
-    "Su",
-    "OSFac",
-    "OSMin",
-    "OSMax",
-    "OSIndexInc",
-    "OverwrittenByModule",
-    "PdoOrder",
-    "SRA_Parameter",
-    "SafetyPdoType",
-    "SafetyConnNumber",
-    "PdoName",
-];
-
 /// PDOs of one direction. A second one of the same index is not used (protocol ES-160).
 pub(super) fn pdos(parent: Element<'_>, name: &str) -> Result<Vec<Pdo>, EsiError> {
     let mut pdos: Vec<Pdo> = Vec::new();
+    let mut lines: HashMap<SlotIndex, u32> = HashMap::new();
     for element in parent.children(name) {
         let pdo = pdo(element)?;
-        match pdos.iter().find(|known| known.index == pdo.index) {
-            Some(first) => {
-                let text = format!("{name} {:#06x} of line {} is there already: not used", pdo.index.index, first.line);
-                element.note(text);
+        match lines.entry(pdo.index) {
+            Entry::Occupied(first) => {
+                let (index, line) = (pdo.index.index, first.get());
+                element.note(format!("{name} {index:#06x} of line {line} is there already: not used"));
             }
-            None => pdos.push(pdo),
+            Entry::Vacant(place) => {
+                place.insert(pdo.line);
+                pdos.push(pdo);
+            }
         }
     }
     Ok(pdos)
@@ -49,8 +37,6 @@ pub(super) fn slot_index(element: Element<'_>) -> Result<SlotIndex, EsiError> {
 }
 
 fn pdo(element: Element<'_>) -> Result<Pdo, EsiError> {
-    element.knows(&["Index", "Name", "Exclude", "Entry", "ExcludedSm"]);
-    element.knows_attributes(&ATTRIBUTES);
     let samples = |name| element.number_in::<u32>(name);
     let oversampling = match samples("OSFac")? {
         Some(factor) => Some([
@@ -80,7 +66,6 @@ fn pdo(element: Element<'_>) -> Result<Pdo, EsiError> {
 }
 
 fn entry(element: Element<'_>) -> Result<PdoEntry, EsiError> {
-    element.knows(&["Index", "SubIndex", "BitLen", "Name", "Comment", "DataType"]);
     let index = match element.child("Index") {
         Some(index) => slot_index(index)?,
         None => {

@@ -1,23 +1,37 @@
 //! Slots and modules (protocol ES-64 to ES-67).
 
-use super::mailbox::coe;
+use super::mailbox::{coe, transition};
 use super::pdo::pdos;
 use super::profile::profiles;
 use crate::esi::element::Element;
 use crate::esi::error::EsiError;
-use crate::esi::model::{AllowedModule, Module, ModuleClass, Slot, SlotDistances, SlotGroupData, Slots};
+use crate::esi::model::{AllowedModule, Module, ModuleClass, Slot, SlotDistances, SlotGroupData, Slots, Transition};
+use crate::xml::shown;
 
 pub(super) fn slots(element: Element<'_>) -> Result<Slots, EsiError> {
-    element.knows(&["Slot", "SlotGroupData", "ModulePdoGroup", "SlotSelections", "ModuleGroups", "VendorSpecific"]);
     Ok(Slots {
         line: element.line(),
         distances: distances(element)?,
         most: element.number_in("MaxSlotCount")?,
         download_idents: element.is("DownloadModuleIdentList")?,
+        download_transition: download_transition(element),
         download_addresses: element.is("DownloadModuleAddressList")?,
         slots: element.children("Slot").map(slot).collect::<Result<_, _>>()?,
         groups: element.children("SlotGroupData").map(group).collect::<Result<_, _>>()?,
     })
+}
+
+/// When the list of modules is written: PS, which an edition prints as SP (protocol ES-70).
+fn download_transition(element: Element<'_>) -> Transition {
+    let Some(text) = element.attribute("DownloadModuleListTransition") else { return Transition::Ps };
+    match transition(text) {
+        Some(found @ (Transition::Ip | Transition::Ps | Transition::So)) => found,
+        Some(Transition::Sp) => Transition::Ps,
+        _ => {
+            element.note(format!("DownloadModuleListTransition {}: taken as PS", shown(text)));
+            Transition::Ps
+        }
+    }
 }
 
 fn distances(element: Element<'_>) -> Result<SlotDistances, EsiError> {
@@ -71,5 +85,6 @@ pub(super) fn module(element: Element<'_>, vendor_id: u32) -> Result<Module, Esi
         profiles: profiles(element)?,
         op_mode: element.child("DcOpModeName").map(|name| name.text().trim().to_owned()),
         vendor_id,
+        file: "".into(),
     })
 }

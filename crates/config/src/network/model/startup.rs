@@ -117,6 +117,19 @@ pub struct Ip {
     pub name: Option<String>,
 }
 
+impl From<ringcat_engine::config::IpSettings> for Ip {
+    fn from(settings: ringcat_engine::config::IpSettings) -> Ip {
+        Ip {
+            mac: settings.mac.map(Mac),
+            address: settings.address,
+            mask: settings.mask,
+            gateway: settings.gateway,
+            dns: settings.dns,
+            name: settings.name.map(|name| String::from_utf8_lossy(&name).into_owned()),
+        }
+    }
+}
+
 /// A register write.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -128,7 +141,7 @@ pub struct Write {
     pub data: Bytes,
     /// Retries of a write that the SubDevice did not process.
     #[serde(default)]
-    pub retries: u8,
+    pub retries: u16,
     /// The SubDevice must process the write.
     #[serde(default)]
     pub required: bool,
@@ -149,7 +162,7 @@ pub struct Check {
     pub within: Option<Time>,
     /// Retries of a read that the SubDevice did not process.
     #[serde(default)]
-    pub retries: u8,
+    pub retries: u16,
     /// The SubDevice must process the read.
     #[serde(default)]
     pub required: bool,

@@ -5,11 +5,21 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::mailbox::Header;
+use ringcat_wire::mailbox::sdo::SdoRequest;
 
 use super::SharedMailbox;
+use crate::config::is_of_pdos;
 use crate::mail::error::MailboxError;
 use crate::mail::lane::{Lane, Outgoing};
 use crate::mail::{reader, writer};
+
+/// Whether a message begins a download to an object of PDO assignment or mapping.
+fn writes_pdos(payload: &[u8]) -> bool {
+    match SdoRequest::decode(payload) {
+        Ok(SdoRequest::DownloadExpedited { index, .. } | SdoRequest::DownloadNormal { index, .. }) => is_of_pdos(index),
+        _ => false,
+    }
+}
 
 impl SharedMailbox {
     /// Queues a message; returns its number.
@@ -33,6 +43,7 @@ impl SharedMailbox {
                 return Err(MailboxError::Full { limit });
             }
             state.next_id = state.next_id.wrapping_add(1);
+            state.has_written_pdos |= lane == Lane::Coe && writes_pdos(&payload);
             queue.outbox.push_back(Outgoing { id: state.next_id, lane, payload, limit, turn, answer_limit });
             state.next_id
         };

@@ -37,7 +37,7 @@ fn declared_sync_managers_replace_the_sii_without_assignments() {
     assert_eq!(mailbox, [(0, [0, 0x10, 0, 1, 0x26, 0, 1, 0]), (1, [0, 0x11, 0, 1, 0x22, 0, 1, 0])]);
     let areas: Vec<_> = plan.process_data.iter().map(|a| (a.sync_manager, a.direction, a.physical, a.length)).collect();
     assert_eq!(areas, [(2, Direction::Outputs, 0x1400, 4), (3, Direction::Inputs, 0x1480, 6)]);
-    assert_eq!((&plan.assign_sdos[..], &plan.warnings[..]), (&[][..], &[][..]));
+    assert_eq!((&plan.pdos[..], &plan.warnings[..]), (&[][..], &[][..]));
     assert_eq!(plan.unused, [4, 5, 6, 7]);
     let layout = plan.mailbox_layout().unwrap();
     assert_eq!((layout.receive_offset, layout.send_offset, layout.send_size), (0x1000, 0x1100, 0x100));

@@ -3,6 +3,9 @@
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
+use core::future::{Future, poll_fn};
+use core::pin::pin;
+use core::task::Poll;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::map;
@@ -10,11 +13,13 @@ use ringcat_wire::register::map;
 use super::places::wrong_addresses;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::dictionary::complete;
-use crate::procedures::scan::{Learned, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers};
+use crate::procedures::scan::{
+    Learned, MAX_SUBDEVICES, Said, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers,
+};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
-use crate::segment::Found;
 use crate::segment::view::View;
+use crate::segment::{Found, Given, IdleObservation};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -34,25 +39,25 @@ pub(crate) async fn scan_again(
         return Ok(Some(nothing()));
     }
     let mut others = unknown(&before, known);
-    others.extend(wrong_addresses(bus, segment, (&before, last), known).await?);
-    let (given, now) = if others.is_empty() {
-        (Vec::new(), before)
-    } else {
-        let (given, is_complete) = give(bus, segment, &before, &others).await?;
-        let now = if is_complete { seen(bus).await? } else { None };
-        let Some(now) = now else { return Ok(None) };
-        (given, now)
-    };
+    let lost = lost(&before, known);
+    let wrong = while_reading(segment, &lost, wrong_addresses(bus, segment, (&before, last), known)).await;
+    let Some(wrong) = wrong else { return Ok(None) };
+    others.extend(wrong?);
+    let readdressed = [others.clone(), lost].concat();
+    let Some((given, now)) = give_all(bus, segment, before, others).await? else { return Ok(None) };
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
     let places: Vec<(Position, StationAddress)> = (0..).map(Position).zip(now.stations.iter().copied()).collect();
-    let fresh = places.iter().copied().filter(|(_, station)| given.contains(station)).collect();
-    let mut read = read_new(bus, options, fresh).await?.into_iter();
+    let of = |station: StationAddress| given.iter().find(|given| given.station == station);
+    let fresh = places.iter().filter_map(|(position, station)| Some((*position, *of(*station)?))).collect();
+    let reading = while_reading(segment, &readdressed, read_new(bus, options, fresh));
+    let Some(read) = reading.await else { return Ok(None) };
+    let mut read = read?.into_iter();
     let registers =
         bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
     let mut subdevices = Vec::with_capacity(now.stations.len());
     for registers in registers.await {
         let registers = registers?;
-        let known = known.iter().find(|info| info.station == registers.station && !given.contains(&info.station));
+        let known = known.iter().find(|info| info.station == registers.station && of(info.station).is_none());
         subdevices.push(match known {
             Some(info) => info.seen_at(&registers),
             None => {
@@ -65,6 +70,49 @@ pub(crate) async fn scan_again(
     let infos: Vec<SubDeviceInfo> = subdevices.iter().map(|info| (**info).clone()).collect();
     let Learned { topology, .. } = connect(bus, options.junctions, &infos, main_count).await?;
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
+}
+
+/// Gives each SubDevice with one of these addresses one of its own, in as many rounds as that takes. `None` if no
+/// address could be given in one of them.
+async fn give_all(
+    bus: &Bus,
+    segment: &SharedSegment,
+    mut now: View,
+    mut old: Vec<StationAddress>,
+) -> Result<Option<(Vec<Given>, View)>, BusError> {
+    let mut given: Vec<Given> = Vec::new();
+    while !old.is_empty() {
+        let (more, is_complete) = give(bus, segment, &now, &old).await?;
+        let is_stuck = more.is_empty() || given.len() > usize::from(MAX_SUBDEVICES);
+        given.extend(more);
+        let Some(view) = seen(bus).await?.filter(|_| is_complete || !is_stuck) else { return Ok(None) };
+        now = view;
+        if is_complete {
+            break;
+        }
+        old.retain(|station| now.positions(*station).next().is_some());
+    }
+    Ok(Some((given, now)))
+}
+
+/// Runs a procedure that only reads, and may take long because of slow EEPROMs; `None` as soon as broadcasts show
+/// another change. `readdressed`: addresses of which it is known that no SubDevice, or several, have them.
+async fn while_reading<T>(
+    segment: &SharedSegment,
+    readdressed: &[StationAddress],
+    procedure: impl Future<Output = T>,
+) -> Option<T> {
+    segment.observe_idle(IdleObservation::ReadingBegun(readdressed));
+    let begun = segment.view().idle_changes();
+    let mut procedure = pin!(procedure);
+    let mut changed = pin!(segment.until(|model| (model.idle_changes() != begun).then_some(())));
+    let result = poll_fn(|context| match procedure.as_mut().poll(context) {
+        Poll::Ready(result) => Poll::Ready(Some(result)),
+        Poll::Pending => changed.as_mut().poll(context).map(|()| None),
+    });
+    let result = result.await;
+    segment.observe_idle(IdleObservation::ReadingEnded);
+    result
 }
 
 /// A segment without SubDevices.
@@ -94,22 +142,29 @@ fn unknown(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
     unknown
 }
 
+/// Addresses of known SubDevices that none has any more, or several have.
+fn lost(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
+    let stations = known.iter().map(|info| info.station);
+    stations.filter(|station| view.position(*station).is_none()).collect()
+}
+
 /// Reads SubDevices with new addresses; they are in INIT.
 async fn read_new(
     bus: &Bus,
     options: &ScanOptions,
-    fresh: Vec<(Position, StationAddress)>,
+    fresh: Vec<(Position, Given)>,
 ) -> Result<Vec<SubDeviceInfo>, ScanError> {
     if fresh.is_empty() {
         return Ok(Vec::new());
     }
     let cache = options.cache.clone();
-    let read = bus.gather(fresh, |bus, (position, station)| {
-        let cache = cache.clone();
+    let read = bus.gather(fresh, |bus, (position, given)| {
+        let (cache, station) = (cache.clone(), given.station);
         async move {
             level(&bus, station).await?;
-            let contents = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
-            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &contents))
+            let said = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
+            let said = Said { pdo_source: given.pdo_source(), ..said };
+            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &said))
         }
     });
     let subdevices = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;

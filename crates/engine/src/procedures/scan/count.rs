@@ -15,6 +15,11 @@ use crate::time::Instant;
 /// Pause between two counts.
 const PAUSE: Duration = Duration::from_millis(1);
 
+/// Pause between two counts while EEPROMs are read.
+const WATCH_PAUSE: Duration = Duration::from_millis(20);
+/// Consecutive counts without an answer after which no SubDevice is connected.
+const SILENT: u32 = 3;
+
 /// SubDevices on both links, and the time since which the count is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Count {
@@ -74,4 +79,18 @@ pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Res
     let LinkCounts { main, redundant } = expected.by_link();
     bus.notice(Notice::Counted { main, redundant });
     Ok(())
+}
+
+/// Counts now and then until the number is another one. Lost frames are no evidence: the last ones count none.
+pub(super) async fn until_changed(bus: &Bus, expected: &Count) -> LinkCounts {
+    let mut lost = 0;
+    loop {
+        bus.sleep(WATCH_PAUSE).await;
+        let counted = count(bus).await.unwrap_or_default();
+        lost = if counted.is_none() { lost + 1 } else { 0 };
+        let changed = counted.filter(|counted| !counted.is_same(expected)).map(|counted| counted.by_link());
+        if let Some(now) = changed.or_else(|| (lost >= SILENT).then(LinkCounts::default)) {
+            return now;
+        }
+    }
 }

@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
-use crate::procedures::dictionary::ReadPdos;
 use crate::procedures::sii::SiiCache;
+use crate::segment::ReadPdos;
 
 /// Options of a scan.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use core::future::{Future, poll_fn};
 use core::pin::{Pin, pin};
 use core::task::Poll;
 
-use super::bring::bring;
+use super::bring::Bringing;
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::recover::is_of_bus;
 use crate::procedures::shared_segment::SharedSegment;
@@ -35,7 +35,7 @@ async fn run(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Result<()
     let (Some((info, target)), Some(mailbox)) = (known, segment.undeclared.of(key)) else {
         return Err(ConfigureError::NoSetup);
     };
-    bring(bus, &info, &mailbox, target).await
+    Bringing { bus, segment, key, info, mailbox }.bring(target).await
 }
 
 /// Runs an attempt until another one begins or the SubDevice has left. It is pinned by the caller: a future that an

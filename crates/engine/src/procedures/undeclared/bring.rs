@@ -3,6 +3,7 @@
 //! It exchanges no process data: it has no FMMU, and its outputs are zeros that are written to its memory. A SubDevice
 //! that goes to OP only with outputs, or whose watchdog monitors them, therefore gets them.
 
+use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::convert::Infallible;
@@ -16,34 +17,134 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, map};
 
 use crate::config::{SubDeviceConfig, Timeouts};
-use crate::info::{Direction, SubDeviceInfo};
-use crate::mail::Mailbox;
+use crate::info::{Direction, PdoSource, SubDeviceInfo};
+use crate::mail::{Limits, Mailbox};
 use crate::plan::{SubDevicePlan, plan};
 use crate::procedures::al_state;
+use crate::procedures::assign_pdos::{Known, assign};
 use crate::procedures::configure::ConfigureError;
+use crate::procedures::dictionary::{self, Dictionary};
+use crate::procedures::read_state;
+use crate::procedures::recover::is_of_bus;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::visit::visit;
-use crate::segment::SubDeviceKey;
 use crate::segment::setup::SetupError;
+use crate::segment::{PdoFinding, ShownState, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::{Bus, BusError};
 
+/// Time limits of one request for PDOs.
+const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
+/// Pause before PDOs are read again after a loss of frames.
+const READ_PAUSE: Duration = Duration::from_millis(20);
 /// Interval at which outputs are written: a fifth of the default time of the watchdog.
 const OUTPUTS_PERIOD: Duration = Duration::from_millis(20);
 
-/// Brings it to the requested state, through INIT. Its mailbox is open from PREOP and BOOT on.
-pub(super) async fn bring(
-    bus: &Bus,
-    info: &SubDeviceInfo,
-    mailbox: &Mailbox,
-    target: AlState,
-) -> Result<(), ConfigureError> {
-    unmap(bus, info).await?;
-    match target {
-        AlState::Init | AlState::PreOp | AlState::Boot => visit(bus, info, mailbox, target).await,
-        AlState::SafeOp | AlState::Op => {
-            visit(bus, info, mailbox, AlState::PreOp).await?;
-            raise(bus, info, target).await
+/// A SubDevice that is brought to a state.
+pub(super) struct Bringing<'a> {
+    pub bus: &'a Bus,
+    pub segment: &'a SharedSegment,
+    pub key: SubDeviceKey,
+    pub info: Rc<SubDeviceInfo>,
+    pub mailbox: Mailbox,
+}
+
+impl Bringing<'_> {
+    /// Brings it to the requested state, through INIT. Its mailbox is open from PREOP and BOOT on.
+    pub(super) async fn bring(mut self, target: AlState) -> Result<(), ConfigureError> {
+        unmap(self.bus, &self.info).await?;
+        match target {
+            AlState::Init | AlState::Boot => visit(self.bus, &self.info, &self.mailbox, target).await,
+            AlState::PreOp | AlState::SafeOp | AlState::Op => {
+                visit(self.bus, &self.info, &self.mailbox, AlState::PreOp).await?;
+                self.read_pdos(true).await;
+                if target == AlState::PreOp {
+                    return Ok(());
+                }
+                self.assign_pdos().await?;
+                raise(self.bus, &self.info, target).await
+            }
         }
+    }
+
+    /// Reads the PDOs in its dictionary, unless they are known. False if they are still to be read.
+    async fn read_pdos(&mut self, from_init: bool) -> bool {
+        if !self.segment.view().wants_pdos(&self.info, from_init) {
+            return true;
+        }
+        self.mailbox.forget_written_pdos();
+        let dictionary = self.while_in_preop(dictionary::read(self.bus, &self.info, &self.mailbox)).await;
+        let finding = match &dictionary {
+            Dictionary::Held(held) => PdoFinding::Held(held),
+            Dictionary::None => PdoFinding::Unreadable,
+            Dictionary::Unreadable(reason) => {
+                dictionary::report_unreadable(self.bus, &self.info, reason);
+                PdoFinding::Unreadable
+            }
+            Dictionary::Interrupted => return false,
+        };
+        self.observe(finding);
+        let view = self.segment.view();
+        if let Some(info) = view.unassigned(self.key).and_then(|it| it.knowledge.info()) {
+            self.info = info.clone();
+        }
+        true
+    }
+
+    /// Reads its dictionary until it shows a state without mail: no answer is waited for then.
+    async fn while_in_preop(&self, reading: impl Future<Output = Dictionary>) -> Dictionary {
+        let left = async {
+            loop {
+                self.bus.sleep(READ_PAUSE).await;
+                let shown = read_state::read(self.bus, self.info.station).await;
+                if matches!(shown, ShownState::Shown((status, _)) if status.al_state() == Some(AlState::Init)) {
+                    return Dictionary::Interrupted;
+                }
+            }
+        };
+        let (mut reading, mut left) = (pin!(reading), pin!(left));
+        poll_fn(|context| match reading.as_mut().poll(context) {
+            Poll::Ready(dictionary) => Poll::Ready(dictionary),
+            Poll::Pending => left.as_mut().poll(context),
+        })
+        .await
+    }
+
+    /// Has its dictionary hold what is known of it, if another owner may have written it and it cannot be read.
+    /// What it refuses stays: its application decides about SAFEOP.
+    async fn assign_pdos(&self) -> Result<(), ConfigureError> {
+        if self.info.pdo_source != PdoSource::Outdated || !self.mailbox.is_open() {
+            return Ok(());
+        }
+        for planned in &defaults(&self.info)?.pdos {
+            let assigned = assign(&self.mailbox, planned, Known::Doubtfully, LIMITS, |_| ()).await;
+            match assigned.map_err(ConfigureError::Sdo) {
+                Err(error) if is_of_bus(&error) => return Err(error),
+                Ok(_) | Err(_) => {}
+            }
+        }
+        self.mailbox.forget_written_pdos();
+        Ok(())
+    }
+
+    fn observe(&self, finding: PdoFinding<'_>) {
+        self.segment.observe_undeclared(UndeclaredObservation::Pdos { key: self.key, finding });
+    }
+}
+
+/// Reads the PDOs in the dictionary of a SubDevice that is in its requested state, while it is to stay there.
+pub(in crate::procedures) async fn read_pdos(bus: Bus, segment: SharedSegment, (key, attempt): (SubDeviceKey, u32)) {
+    loop {
+        let known = {
+            let view = segment.view();
+            let is_to_stay = view.upkeep(key).is_some_and(|upkeep| upkeep.is_reached(attempt));
+            view.unassigned(key).filter(|_| is_to_stay).and_then(|it| it.knowledge.info()).cloned()
+        };
+        let (Some(info), Some(mailbox)) = (known, segment.undeclared.of(key)) else { return };
+        let mut bringing = Bringing { bus: &bus, segment: &segment, key, info, mailbox };
+        if bringing.read_pdos(false).await {
+            return;
+        }
+        bus.sleep(READ_PAUSE).await;
     }
 }
 

@@ -1,21 +1,26 @@
-//! Unsolicited mail of SubDevices without a declaration: emergencies, Ethernet frames.
+//! Unsolicited mail of SubDevices without a declaration: emergencies, Ethernet frames; and mail that has changed their
+//! PDOs.
 
 use core::time::Duration;
 
 use ringcat_wire::register::SyncManagerStatus;
 
-use super::mailboxes::UndeclaredMailboxes;
 use crate::mail::Mailbox;
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::{PdoFinding, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Pause between two rounds: no cycle waits for this mail.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Polls the mailboxes in use, one round after the other. Runs until the MainDevice stops.
-pub(crate) async fn watch_undeclared_mail(bus: Bus, undeclared: UndeclaredMailboxes) {
+pub(crate) async fn watch_undeclared_mail(bus: Bus, segment: SharedSegment) {
     loop {
         bus.sleep(PAUSE).await;
-        bus.gather_in_turns(undeclared.in_use(), poll).await;
+        for key in segment.undeclared.take_written_pdos() {
+            segment.observe_undeclared(UndeclaredObservation::Pdos { key, finding: PdoFinding::Outdated });
+        }
+        bus.gather_in_turns(segment.undeclared.in_use(), poll).await;
     }
 }
 

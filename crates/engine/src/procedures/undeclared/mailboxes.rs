@@ -87,6 +87,13 @@ impl UndeclaredMailboxes {
         all.iter().filter(|entry| entry.mailbox.is_open()).map(|entry| entry.mailbox.clone()).collect()
     }
 
+    /// SubDevices with downloads to objects of PDO assignment or mapping since the last call.
+    pub(crate) fn take_written_pdos(&self) -> Vec<SubDeviceKey> {
+        let all = self.all.borrow();
+        let written = all.iter().filter(|entry| entry.mailbox.has_written_pdos());
+        written.inspect(|entry| entry.mailbox.forget_written_pdos()).map(|entry| entry.key).collect()
+    }
+
     /// An attempt has ended.
     pub(super) fn end(&self, key: SubDeviceKey, attempt: u32, result: AttemptResult) {
         if let Some(entry) = self.all.borrow_mut().iter_mut().find(|entry| entry.key == key) {

@@ -3,6 +3,8 @@
 use alloc::rc::Rc;
 use alloc::string::String;
 
+use ringcat_wire::address::StationAddress;
+
 use crate::ring::RingState;
 use crate::segment::ring::Words;
 use crate::segment::scan::Found;
@@ -35,4 +37,15 @@ pub enum IdleObservation<'a> {
     NotFollowed(Option<String>),
     /// The states of all SubDevices with a requested state were read.
     StatesRead(&'a [StateRead]),
+    /// The states of some of them were read, beside a broadcast.
+    SomeRead(&'a [StateRead]),
+    /// The scan under way reads EEPROMs from now on; addresses of which it knows that no SubDevice, or several, have
+    /// them.
+    ReadingBegun(&'a [StationAddress]),
+    /// It no longer does.
+    ReadingEnded,
+    /// The end of an application begins: broadcasts are followed when it has ended.
+    Deactivating,
+    /// The end of an application has ended.
+    Deactivated,
 }

@@ -9,12 +9,12 @@ use crate::event::Event;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
 use crate::segment::effect::{Effects, Task, Watch};
-use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, ROUTINE, SILENT, Work};
+use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, SILENT, Work};
 use crate::segment::model::Segment;
 use crate::segment::ring::Words;
 use crate::segment::scan::Found;
 use crate::segment::stage::Stage;
-use crate::segment::undeclared::StateRead;
+use crate::segment::undeclared::{ShownState, StateRead};
 use crate::segment::versions::Versions;
 use crate::time::Instant;
 
@@ -31,6 +31,11 @@ impl Segment {
     /// Whether a procedure of idle operation works on the segment.
     pub fn is_idle_busy(&self) -> bool {
         self.idle.work != Work::Nothing
+    }
+
+    /// Number of changes that broadcasts have shown; it changes with each.
+    pub fn idle_changes(&self) -> u32 {
+        self.idle.changes
     }
 
     /// Number of the last request for a rescan.
@@ -75,10 +80,12 @@ impl Segment {
             IdleObservation::Scanned => self.idle.end(Work::FirstScan),
             IdleObservation::RescanAsked => self.idle.rescans.asked += 1,
             IdleObservation::Followed { versions, found, wanted } => {
+                self.idle.read(false);
                 self.idle.end(Work::Follow);
                 self.end_follow((versions, found), wanted, now, effects);
             }
             IdleObservation::NotFollowed(reason) => {
+                self.idle.read(false);
                 self.idle.end(Work::Follow);
                 self.fail_to_follow(reason, effects);
             }
@@ -86,6 +93,14 @@ impl Segment {
                 self.idle.end(Work::ReadStates);
                 self.observe_idle_states(read, now, effects);
             }
+            IdleObservation::ReadingBegun(readdressed) => {
+                self.idle.read(true);
+                self.idle.readdressed = readdressed.to_vec();
+            }
+            IdleObservation::ReadingEnded => self.idle.read(false),
+            IdleObservation::SomeRead(read) => self.observe_idle_states(read, now, effects),
+            IdleObservation::Deactivating => self.idle.work = Work::Deactivation,
+            IdleObservation::Deactivated => self.idle.end(Work::Deactivation),
         }
     }
 
@@ -102,10 +117,16 @@ impl Segment {
     }
 
     fn evaluate_broadcast(&mut self, shown: Shown, ring: RingState, now: Instant, effects: &mut Effects) {
-        if self.is_scanning() || self.is_active() || self.is_idle_busy() {
+        if self.is_scanning() || self.is_active() {
             return;
         }
         self.ring.observe_broadcast(ring, shown.counts, now, effects);
+        if self.idle.is_visible() {
+            self.note_change(&shown, effects);
+        }
+        if self.is_idle_busy() {
+            return;
+        }
         let Some(scanned) = self.found().map(|found| found.counts()) else {
             if shown.counts != LinkCounts::default() {
                 self.begin_scan(false);
@@ -124,10 +145,33 @@ impl Segment {
         if self.idle.compared != Comparison::Same(shown.counts) || shown.ports_changed || wanted.is_some() {
             return self.follow_change(shown, wanted, effects);
         }
-        let is_other = self.expected_states().is_some_and(|expected| shown.al_status != expected);
-        if now >= self.idle.next_routine || (is_other && self.are_undeclared_settled()) {
-            self.idle.next_routine = now + ROUTINE;
+        self.compare_states(shown.al_status, effects);
+    }
+
+    /// An unexpected OR of the states: which SubDevice shows it is read at once. States that others hide in the OR, and
+    /// addresses, are read in turn.
+    fn compare_states(&mut self, al_status: u8, effects: &mut Effects) {
+        let is_other = self.expected_states().is_some_and(|expected| al_status != expected);
+        if !is_other {
+            self.idle.read_for = None;
+        } else if self.idle.read_for != Some(al_status) && self.are_undeclared_settled() {
+            self.idle.read_for = Some(al_status);
             self.begin_work((Work::ReadStates, Task::ReadStates), effects);
+        }
+    }
+
+    /// Another number of SubDevices is reported at once, also while a procedure works on the segment: what it finds is
+    /// outdated then.
+    fn note_change(&mut self, shown: &Shown, effects: &mut Effects) {
+        let counts = shown.counts;
+        // The first scan counts by itself.
+        let Some(found) = self.found().map(|found| found.counts()) else { return };
+        let is_counted = self.idle.counted.replace(counts).unwrap_or(found) == counts;
+        if !is_counted {
+            effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
+        }
+        if !is_counted {
+            self.idle.changes = self.idle.changes.wrapping_add(1);
         }
     }
 
@@ -139,10 +183,7 @@ impl Segment {
     /// The segment has changed, or a rescan is requested.
     fn follow_change(&mut self, shown: Shown, wanted: Option<u64>, effects: &mut Effects) {
         let Shown { counts, ports_changed, is_unplugged, .. } = shown;
-        if let Comparison::Same(before) = self.idle.compared {
-            if before != counts {
-                effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
-            }
+        if matches!(self.idle.compared, Comparison::Same(_)) {
             self.idle.compared = Comparison::CHANGED;
         }
         let change = Change { counts, ports_changed, is_unplugged, wanted };
@@ -165,7 +206,8 @@ impl Segment {
         let (added, removed) = (differences.added.len(), differences.removed.len());
         let (subdevices, counts) = (found.subdevices.len(), found.counts());
         self.find_again(versions, found);
-        self.idle.compared = Comparison::Same(counts);
+        (self.idle.compared, self.idle.counted) = (Comparison::Same(counts), Some(counts));
+        self.idle.readdressed.clear();
         if self.has_untouched() {
             self.take_over(now);
         }
@@ -190,10 +232,22 @@ impl Segment {
 
     fn observe_idle_states(&mut self, read: &[StateRead], now: Instant, effects: &mut Effects) {
         // A SubDevice without its station address has lost its power, or another program has written the address.
-        let has_lost = |read: &StateRead| read.reading.is_elsewhere() && self.unassigned(read.key).is_some();
-        if read.iter().any(has_lost) && matches!(self.idle.compared, Comparison::Same(_)) {
-            self.idle.compared = Comparison::CHANGED;
+        let has_lost = |read: &StateRead| {
+            read.shown == ShownState::Elsewhere
+                && self.unassigned(read.key).is_some()
+                && !self.idle.readdressed.contains(&read.key.station)
+        };
+        if self.idle.is_visible() && read.iter().any(has_lost) {
+            if matches!(self.idle.compared, Comparison::Same(_)) {
+                self.idle.compared = Comparison::CHANGED;
+            }
+            self.idle.changes = self.idle.changes.wrapping_add(1);
         }
         self.observe_states(read, now, effects);
+    }
+
+    /// Whether single SubDevices can be read beside broadcasts.
+    pub fn is_segment_visible(&self) -> bool {
+        self.idle.is_visible() && !self.is_scanning()
     }
 }

@@ -263,6 +263,11 @@ impl Segment {
             MemberFinding::Refused(before) => self.refuse(index, before),
             MemberFinding::ReadAgain(info) => self.observe_info(index, info, effects),
             MemberFinding::NotReadAgain(reason) => effects.report(Event::ScanFailed { reason }),
+            MemberFinding::Pdos(finding) => {
+                if let Some(station) = self.member(index).map(|member| member.station) {
+                    self.observe_pdos(station, finding, effects);
+                }
+            }
             MemberFinding::Oddity(what) => effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what }),
         }
     }

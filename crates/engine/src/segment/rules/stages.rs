@@ -23,7 +23,7 @@ impl Segment {
             self.addresses.change();
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning { is_requested };
-            self.idle.compared = Comparison::Open;
+            (self.idle.compared, self.idle.counted) = (Comparison::Open, None);
         }
     }
 

@@ -10,6 +10,7 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Check, Effects, Task};
+use crate::segment::given::Given;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::knowledge::Knowledge;
 use crate::segment::model::Segment;
@@ -58,8 +59,8 @@ impl Segment {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
-                let Unassigned { reported, held_since, upkeep, .. } = *it;
-                *it = Unassigned { reported, held_since, upkeep, ..Unassigned::at(&at) };
+                let Unassigned { reported, held_since, pdo_source, upkeep, .. } = *it;
+                *it = Unassigned { reported, held_since, pdo_source, upkeep, ..Unassigned::at(&at) };
             }
         }
     }
@@ -69,7 +70,7 @@ impl Segment {
         &mut self,
         versions: Versions,
         view: &View,
-        given: &[StationAddress],
+        given: &[Given],
         now: Instant,
         effects: &mut Effects,
     ) {
@@ -81,11 +82,12 @@ impl Segment {
         }
         let owners = self.owners(&view.stations);
         let main_count = usize::from(view.counts.0.0);
-        for station in given.iter().copied() {
-            let Some(position) = view.position(station) else { continue };
+        for given in given {
+            let Some(position) = view.position(given.station) else { continue };
             let at = At { position, owners: &owners, main_count };
-            let key = SubDeviceKey { station, since };
-            self.subdevices.add(key, Knowledge::Awaited(now), Unassigned::at(&at));
+            let key = SubDeviceKey { station: given.station, since };
+            let unassigned = Unassigned { pdo_source: given.pdo_source(), ..Unassigned::at(&at) };
+            self.subdevices.add(key, Knowledge::Awaited(now), unassigned);
             effects.start(Task::ReadUnassigned { key });
         }
     }
@@ -117,9 +119,12 @@ impl Segment {
         effects: &mut Effects,
     ) {
         self.attention.want();
-        let Some((knowledge, _)) = self.subdevices.unassigned_mut(key) else { return };
+        let Some((knowledge, it)) = self.subdevices.unassigned_mut(key) else { return };
         match read {
-            Ok(info) => *knowledge = Knowledge::Known(info),
+            Ok(mut info) => {
+                Rc::make_mut(&mut info).pdo_source = it.pdo_source;
+                *knowledge = Knowledge::Known(info);
+            }
             Err(None) => {}
             Err(Some(reason)) => {
                 if !matches!(knowledge, Knowledge::Unreadable(before) if *before == reason) {
@@ -192,7 +197,7 @@ impl Segment {
         let found = SubDeviceInfo::clone(it.knowledge.info()?);
         let mut info = SubDeviceInfo { station: member.station, position: it.position, ..found };
         if let Some(known) = member.info {
-            info.keep_read_online(known);
+            info.keep_dictionary(known);
         }
         let fits = Setup::new(index, &member.config, &info, &self.layout);
         Some(fits.map(|_| info).map_err(|error| error.to_string()))

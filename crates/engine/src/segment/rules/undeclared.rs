@@ -11,14 +11,21 @@ use crate::segment::choices::Retries;
 use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
-use crate::segment::reading::Reading;
-use crate::segment::undeclared::{AttemptFailure, KeptState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress};
+use crate::segment::pdo_finding::PdoFinding;
+use crate::segment::undeclared::{
+    AttemptFailure, KeptState, ShownState, StateRead, UndeclaredObservation, Upkeep, UpkeepProgress,
+};
 use crate::time::Instant;
 
 impl Segment {
     /// Whether SubDevices without a declaration are kept in their requested states.
     pub fn keeps_undeclared(&self) -> bool {
         self.keeping.is_on
+    }
+
+    /// Whether broadcasts watch the segment without an application.
+    pub fn has_idle_operation(&self) -> bool {
+        self.choices.idle_operation
     }
 
     /// What follows a failed configuration.
@@ -61,9 +68,14 @@ impl Segment {
         self.upkeeps().filter(|(_, it)| it.is_settled()).map(|(key, it)| (key, it.attempt)).collect()
     }
 
-    /// All with a requested state, reached or not, with the numbers of their last attempts.
-    pub fn kept(&self) -> Vec<(SubDeviceKey, u32)> {
-        self.upkeeps().map(|(key, it)| (key, it.attempt)).collect()
+    /// All with a requested state, with the numbers of the attempts that have reached it.
+    pub fn kept(&self) -> Vec<(SubDeviceKey, Option<u32>)> {
+        self.kept_from(0).collect()
+    }
+
+    /// The same without the first ones.
+    pub fn kept_from(&self, first: usize) -> impl Iterator<Item = (SubDeviceKey, Option<u32>)> + '_ {
+        self.upkeeps().skip(first).map(|(key, it)| (key, it.reached()))
     }
 
     /// Station addresses of the others.
@@ -95,6 +107,7 @@ impl Segment {
             UndeclaredObservation::AttemptEnded { key, attempt, failure } => {
                 self.end_attempt((key, attempt), failure, now, effects);
             }
+            UndeclaredObservation::Pdos { key, finding } => self.observe_undeclared_pdos(key, finding, effects),
             UndeclaredObservation::StatesRead(read) => self.observe_states(read, now, effects),
             UndeclaredObservation::Forced(key) => self.leave(key),
         }
@@ -135,6 +148,7 @@ impl Segment {
             self.take_over(now);
         }
         self.keeping.observe(&self.subdevices, effects);
+        self.read_open_pdos(effects);
     }
 
     /// Begins the attempts that are due.
@@ -187,6 +201,10 @@ impl Segment {
         let is_due = upkeep.end(failure.as_ref(), retries, now);
         match failure {
             None if upkeep.target == AlState::Op => effects.start(Task::KeepOutputs { key, attempt }),
+            // A boot loader may bring another dictionary.
+            None if upkeep.target == AlState::Boot => {
+                self.observe_undeclared_pdos(key, PdoFinding::Outdated, effects);
+            }
             None => {}
             Some(AttemptFailure { reason, .. }) if is_due && is_kept => {
                 effects.report(Event::UndeclaredFailed { position, reason });
@@ -216,11 +234,11 @@ impl Segment {
         if !self.keeping.is_on {
             return;
         }
-        for StateRead { key, attempt, reading } in read {
-            let Reading::Answer { status, code, .. } = *reading else { continue };
+        for StateRead { key, attempt, shown } in read {
+            let (ShownState::Shown((status, code)), Some(attempt)) = (*shown, *attempt) else { continue };
             let Some((_, it)) = self.subdevices.unassigned_mut(*key) else { continue };
             let position = it.position;
-            if it.upkeep.as_mut().is_some_and(|upkeep| upkeep.has_left(*attempt, status, now)) {
+            if it.upkeep.as_mut().is_some_and(|upkeep| upkeep.has_left(attempt, status, now)) {
                 effects.report(Event::UndeclaredState { position, status, code });
             }
         }

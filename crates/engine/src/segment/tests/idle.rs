@@ -171,32 +171,70 @@ fn a_rescan_on_request_has_the_result_of_a_scan_that_began_after_it() {
 
 #[test]
 fn a_lost_or_doubled_address_is_followed_unless_its_subdevice_has_left() {
-    for reading in [Reading::Silent, Reading::Doubled, Reading::Unknown] {
+    for shown in [ShownState::Elsewhere, ShownState::Unknown] {
         for has_left in [false, true] {
             let mut idle = Idle::kept();
-            idle.now += Duration::from_secs(1);
-            assert_eq!(idle.broadcast(3, PREOP), [Effect::Start(Task::ReadStates)]);
             let (key, attempt) = idle.segment.kept()[0];
             let key = if has_left { SubDeviceKey { since: key.since + 9, ..key } } else { key };
-            idle.seen(IdleObservation::StatesRead(&[StateRead { key, attempt, reading }]));
-            let is_followed = reading != Reading::Unknown && !has_left;
-            assert_eq!(idle.broadcast(3, PREOP) == [follow(3)], is_followed, "{reading:?}, has left: {has_left}");
+            idle.seen(IdleObservation::SomeRead(&[StateRead { key, attempt, shown }]));
+            let is_followed = shown != ShownState::Unknown && !has_left;
+            assert_eq!(idle.broadcast(3, PREOP) == [follow(3)], is_followed, "{shown:?}, has left: {has_left}");
         }
     }
 }
 
 #[test]
-fn an_unexpected_state_is_read_at_once_and_the_others_once_a_second() {
+fn an_unexpected_or_of_states_is_read_once_until_it_is_another_one() {
     let mut idle = Idle::kept();
-    assert_eq!(idle.broadcast(3, PREOP | 1), [Effect::Start(Task::ReadStates)]);
-    idle.seen(IdleObservation::StatesRead(&[]));
-    let until = idle.now + Duration::from_secs(10);
-    let mut routine = 0;
-    while idle.now < until {
-        routine += idle.broadcast(3, PREOP).len();
+    for (al_status, is_read) in
+        [(PREOP | 1, true), (PREOP | 1, false), (PREOP | 4, true), (PREOP, false), (PREOP | 4, true)]
+    {
+        let started = idle.broadcast(3, al_status);
+        assert_eq!(started == [Effect::Start(Task::ReadStates)], is_read, "{al_status}: {started:?}");
         idle.seen(IdleObservation::StatesRead(&[]));
     }
-    assert!((9..=10).contains(&routine), "{routine}");
+    let all: Vec<SubDeviceKey> = idle.segment.kept().into_iter().map(|(key, _)| key).collect();
+    assert_eq!(idle.segment.kept_from(2).map(|(key, _)| key).collect::<Vec<_>>(), all[2..]);
+    assert_eq!(idle.segment.kept_from(3).count(), 0);
+}
+
+/// While EEPROMs are read a change is reported and ends the reading; while a scan changes ports or addresses broadcasts
+/// show what it does itself.
+#[test]
+fn a_change_is_noticed_while_a_scan_reads_and_not_while_it_changes_the_segment() {
+    let mut idle = Idle::kept();
+    let counted = |main| Effect::Report(Event::Counted { main, redundant: 0 });
+    assert_eq!(idle.broadcast(2, PREOP), [counted(2), follow(2)]);
+    let begun = idle.segment.idle_changes();
+    assert_eq!(idle.broadcast(1, PREOP), [], "a port is closed to learn a ring");
+    let (key, attempt) = idle.segment.kept()[0];
+    let lost = [StateRead { key, attempt, shown: ShownState::Elsewhere }];
+    idle.seen(IdleObservation::SomeRead(&lost));
+    assert_eq!(idle.segment.idle_changes(), begun);
+    idle.seen(IdleObservation::ReadingBegun(&[key.station]));
+    idle.seen(IdleObservation::SomeRead(&lost));
+    assert_eq!(idle.broadcast(2, PREOP), []);
+    assert_eq!(idle.segment.idle_changes(), begun, "the scan has given it another address");
+    assert_eq!(idle.broadcast(3, PREOP), [counted(3)]);
+    assert_eq!(idle.segment.idle_changes(), begun + 1);
+    idle.seen(IdleObservation::ReadingBegun(&[]));
+    idle.seen(IdleObservation::SomeRead(&lost));
+    assert_eq!(idle.segment.idle_changes(), begun + 2);
+    idle.seen(IdleObservation::ReadingEnded);
+    idle.seen(IdleObservation::NotFollowed(None));
+    assert_eq!(idle.broadcast(3, PREOP), [follow(3)]);
+}
+
+/// An application ends: broadcasts are evaluated again when it has ended.
+#[test]
+fn broadcasts_during_a_deactivation_start_nothing() {
+    let mut idle = Idle::kept();
+    idle.seen(IdleObservation::Deactivating);
+    idle.seen(IdleObservation::Watched([Some(true); 2], RingState::Closed));
+    assert_eq!([idle.broadcast(2, 8), idle.broadcast(1, 1)], [vec![], vec![]]);
+    idle.seen(IdleObservation::Deactivated);
+    let counted = Effect::Report(Event::Counted { main: 1, redundant: 0 });
+    assert_eq!(idle.broadcast(1, PREOP), [counted, follow(1)]);
 }
 
 // covers: ring-flap

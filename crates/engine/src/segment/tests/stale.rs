@@ -51,7 +51,7 @@ fn view(others: &[StationAddress]) -> View {
 /// A fourth SubDevice, without a declaration, is found at the end and gets a temporary address.
 fn give(ring: &mut Ring) -> u32 {
     let versions = ring.segment.versions();
-    ring.observe(Observation::Given { versions, view: &view(&[TEMPORARY]), given: &[TEMPORARY] });
+    ring.observe(Observation::Given { versions, view: &view(&[TEMPORARY]), given: &[given(TEMPORARY)] });
     ring.segment.versions().addresses
 }
 
@@ -221,7 +221,7 @@ fn positions_that_were_read_before_a_change_of_addresses_are_not_stored() {
         let before = view(&[other, TEMPORARY]);
         ring.observe(Observation::Places { versions, view: &before });
         assert_eq!(first_unassigned(&ring).position, Position(3), "change {number}");
-        ring.observe(Observation::Given { versions, view: &before, given: &[other] });
+        ring.observe(Observation::Given { versions, view: &before, given: &[given(other)] });
         assert_eq!(ring.segment.subdevices.unassigned().count(), 1, "change {number}: the next search finds it");
     }
     let mut ring = Ring::closed(3);

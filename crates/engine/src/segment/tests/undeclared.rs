@@ -1,5 +1,7 @@
 //! SubDevices without a declaration: requested states, attempts, mailboxes, and findings that are refused.
 
+mod pdos;
+
 use alloc::string::String;
 
 use crate::segment::view::View;
@@ -106,9 +108,8 @@ fn lost() -> Option<AttemptFailure> {
     Some(AttemptFailure { is_of_bus: true, reason: String::from("lost") })
 }
 
-fn answer(state: AlState) -> Reading {
-    let status = AlStatus { state: state.code(), error: false, identification: false, reserved: 0 };
-    Reading::Answer { status, code: AlStatusCode(0), dl_status: node(PASS).dl_status }
+fn answer(state: AlState) -> ShownState {
+    ShownState::Shown((AlStatus::new(state), AlStatusCode(0)))
 }
 
 const THREE: [(u16, u32); 3] = [(0x1001, 1), (0x1002, 2), (0x1003, 3)];
@@ -218,10 +219,10 @@ fn a_retry_of_a_member_counts_for_it_alone() {
 fn a_state_that_was_left_is_reported_once_and_brought_back() {
     let mut idle = Idle::kept(&THREE);
     let (key, attempt) = idle.segment.settled()[1];
-    let read = |reading| [StateRead { key, attempt, reading }];
+    let read = |shown| [StateRead { key, attempt: Some(attempt), shown }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read(answer(PREOP)))), []);
     assert_eq!(
-        idle.seen(UndeclaredObservation::StatesRead(&read(Reading::Silent))),
+        idle.seen(UndeclaredObservation::StatesRead(&read(ShownState::Elsewhere))),
         [],
         "no information about its state"
     );
@@ -236,12 +237,14 @@ fn a_state_that_was_read_before_a_request_is_not_taken_for_a_lost_one() {
     let mut idle = Idle::kept(&THREE);
     let (key, attempt) = idle.segment.settled()[0];
     let begun = attempts(&idle.request(0, AlState::Op))[0];
+    assert_eq!(idle.segment.kept()[0], (key, None), "a read that is requested now shows no state that was left");
     idle.end(begun, None);
+    assert_eq!(idle.segment.kept()[0], (key, Some(begun.1)));
     // The read was requested in PREOP, and its answer is evaluated in OP.
-    let early = [StateRead { key, attempt, reading: answer(PREOP) }];
+    let early = [StateRead { key, attempt: Some(attempt), shown: answer(PREOP) }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&early)), []);
     assert_eq!(idle.progress(0), (AlState::Op, UpkeepProgress::Reached));
-    let late = [StateRead { key, attempt: begun.1, reading: answer(PREOP) }];
+    let late = [StateRead { key, attempt: Some(begun.1), shown: answer(PREOP) }];
     assert_eq!(reports(&idle.seen(UndeclaredObservation::StatesRead(&late))).len(), 1);
 }
 
@@ -254,7 +257,7 @@ fn a_forced_state_ends_the_attempt_and_stays_until_the_next_request() {
     assert_eq!(idle.end(begun, refusal()), []);
     assert_eq!((idle.progress(0).1, idle.segment.expected_states()), (UpkeepProgress::Left, None));
     let settled = idle.segment.settled();
-    let read = [StateRead { key, attempt: settled[0].1, reading: answer(AlState::SafeOp) }];
+    let read = [StateRead { key, attempt: Some(settled[0].1), shown: answer(AlState::SafeOp) }];
     assert_eq!(idle.seen(UndeclaredObservation::StatesRead(&read)), []);
     idle.observe(Observation::Retried(None));
     assert_eq!(idle.seen(UndeclaredObservation::AttemptsDue), []);
@@ -321,7 +324,7 @@ fn a_subdevice_that_is_found_beside_an_application_is_kept_as_well() {
         stations: stations.into_iter().chain([TEMPORARY]).collect(),
     };
     let versions = idle.segment.versions();
-    idle.observe(Observation::Given { versions, view: &view, given: &[TEMPORARY] });
+    idle.observe(Observation::Given { versions, view: &view, given: &[given(TEMPORARY)] });
     let key = idle.key(3);
     let info = SubDeviceInfo { station: TEMPORARY, ..SubDeviceInfo::default() };
     assert_eq!(mailboxes(&idle.observe(Observation::Read { key, read: Ok(Rc::new(info)) })), None, "may be a member");

@@ -6,17 +6,28 @@ use ringcat_wire::al::AlState;
 use super::upkeep::{AttemptFailure, UpkeepProgress};
 use crate::segment::effect::Shown;
 use crate::segment::key::SubDeviceKey;
-use crate::segment::reading::Reading;
+use crate::segment::pdo_finding::PdoFinding;
 
 /// The state of a SubDevice without a declaration was read.
 #[derive(Clone, Copy, Debug)]
 pub struct StateRead {
     /// The SubDevice.
     pub key: SubDeviceKey,
-    /// The attempt that had reached its state when the read was requested.
-    pub attempt: u32,
+    /// The attempt that had reached its state when the read was requested; without one only the address counts.
+    pub attempt: Option<u32>,
     /// The result.
-    pub reading: Reading,
+    pub shown: ShownState,
+}
+
+/// What a read of the state of one SubDevice has shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownState {
+    /// Its frames were lost: no information.
+    Unknown,
+    /// Its station address is not, or not only, its own.
+    Elsewhere,
+    /// Its AL status and code.
+    Shown(Shown),
 }
 
 /// The requested state of a SubDevice that another process has kept, as its registers show it now.
@@ -52,6 +63,13 @@ pub enum UndeclaredObservation<'a> {
         attempt: u32,
         /// Why it has failed; `None` if the state was reached.
         failure: Option<AttemptFailure>,
+    },
+    /// Something was found about the PDOs in the dictionary of one.
+    Pdos {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// The finding.
+        finding: PdoFinding<'a>,
     },
     /// States were read.
     StatesRead(&'a [StateRead]),

@@ -28,6 +28,17 @@ pub enum UpkeepProgress {
     Left,
 }
 
+/// Whether the PDOs in the dictionary of a SubDevice in its state are to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PdoReading {
+    /// They are read if they are not known.
+    Open,
+    /// A procedure reads them.
+    UnderWay,
+    /// They cannot be read.
+    Ended,
+}
+
 /// Why an attempt has failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -49,6 +60,8 @@ pub struct Upkeep {
     pub progress: UpkeepProgress,
     /// Number of the last attempt.
     pub attempt: u32,
+    /// Whether the PDOs in its dictionary are to be read.
+    pub reading: PdoReading,
     /// Consecutive failed attempts.
     failures: u32,
 }
@@ -57,18 +70,30 @@ impl Upkeep {
     /// PREOP is requested, and the first attempt is due at this time.
     pub(in crate::segment) fn due(at: Instant) -> Upkeep {
         let progress = UpkeepProgress::Due(at);
-        Upkeep { target: AlState::PreOp, before: AlState::PreOp, progress, attempt: 0, failures: 0 }
+        Upkeep {
+            target: AlState::PreOp,
+            before: AlState::PreOp,
+            progress,
+            attempt: 0,
+            reading: PdoReading::Open,
+            failures: 0,
+        }
     }
 
     /// Another process has brought it this far. A first refusal may be due to a request of that process: it is
     /// followed by another attempt, and only the next one by PREOP.
     pub(in crate::segment) fn handed_over(target: AlState, progress: UpkeepProgress) -> Upkeep {
-        Upkeep { target, before: target, progress, attempt: 0, failures: 0 }
+        Upkeep { target, before: target, progress, attempt: 0, reading: PdoReading::Open, failures: 0 }
     }
 
     /// Whether it is in its requested state, or left as it is.
     pub fn is_settled(&self) -> bool {
         matches!(self.progress, UpkeepProgress::Reached | UpkeepProgress::Left)
+    }
+
+    /// Whether no attempt has failed since the request, and it is not left as it is.
+    pub fn is_on_its_first_way(&self) -> bool {
+        self.failures == 0 && matches!(self.progress, UpkeepProgress::Due(_) | UpkeepProgress::UnderWay)
     }
 
     /// Whether this attempt is under way.
@@ -81,9 +106,14 @@ impl Upkeep {
         self.attempt == attempt && self.progress == UpkeepProgress::Reached
     }
 
+    /// The attempt that has reached its state, which is still requested.
+    pub(in crate::segment) fn reached(&self) -> Option<u32> {
+        Some(self.attempt).filter(|attempt| self.is_reached(*attempt))
+    }
+
     /// Begins another attempt. Returns its number.
     fn begin(&mut self) -> u32 {
-        self.progress = UpkeepProgress::UnderWay;
+        (self.progress, self.reading) = (UpkeepProgress::UnderWay, PdoReading::Open);
         self.attempt = self.attempt.wrapping_add(1);
         self.attempt
     }

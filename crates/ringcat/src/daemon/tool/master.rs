@@ -35,7 +35,8 @@ fn of_engine(engine: &mut Engine) -> MasterReport {
     let links = links
         .filter_map(|(mac, link)| Some(LinkReport { mac: mac?.0, carrier: link.carrier, traffic: Traffic::default() }));
     MasterReport {
-        is_orphaned: phase == MainDevicePhase::Orphaned,
+        // It has links here; a daemon knows whether their devices are there.
+        is_orphaned: false,
         is_active: phase == MainDevicePhase::Operation,
         is_scanning: snapshot.activity == Activity::Scanning,
         subdevices: engine.scanned_count().unwrap_or(0) as u32,

@@ -40,6 +40,11 @@ fn configure_activate_loop_brings_all_to_op_with_complete_data() {
         println!("{count}: OP after {time:?}, {} changes of outputs compared", ecrt.witness.compared);
         ecrt.deactivate().expect("all follow");
         assert_idle(&mut ecrt, "deactivated");
+        let all = ecrt.master_state();
+        assert_eq!((usize::from(all.responding), all.is_up), (count, true), "{count}: {all:?}");
+        ecrt.pause(Duration::from_millis(40));
+        let all = ecrt.master_state();
+        assert_eq!((usize::from(all.responding), all.al_states, all.is_up), (count, 2, true));
         assert_eq!(ecrt.deactivate(), Err(Errno::Inval), "it is not active any more");
         assert!(count < 2 || ecrt.witness.compared > 40, "{}", ecrt.witness.compared);
     }

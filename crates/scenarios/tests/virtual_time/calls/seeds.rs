@@ -18,7 +18,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::register::map;
-use scenarios::calls::configure::syncs_of;
+use scenarios::calls::configure::ChosenPdos;
 use scenarios::calls::errno::Errno;
 use scenarios::calls::master::Ecrt;
 use scenarios::dice::Dice;
@@ -96,7 +96,7 @@ impl Sequence {
         let (alias, position) = if self.dice.one_in(8) { (7, at) } else { (0, at) };
         let Ok(config) = self.ecrt.slave_config(alias, position as u16, identity) else { return };
         let entries = if self.dice.one_in(3) {
-            let syncs = syncs_of(&device);
+            let syncs = self.dice.pick(&ChosenPdos::ALL).of(&device);
             self.ecrt.pdos(config, &syncs);
             Ecrt::entries_of(&syncs)
         } else {
@@ -147,7 +147,16 @@ impl Sequence {
 
     fn use_mailbox(&mut self) {
         let at = self.dice.below(self.described.len() as u64 + 1) as u16;
-        match self.dice.below(4) {
+        match self.dice.below(6) {
+            // Another assignment, by a program that knows the device; a part of one, by a program that is killed.
+            4 => {
+                let other = [(0x1C12, 0, &[0][..]), (0x1C12, 1, &[1, 0x16]), (0x1C12, 0, &[1])];
+                let count = 1 + self.dice.below(3) as usize;
+                other[..count].iter().for_each(|(index, sub_index, data)| {
+                    let _ = self.ecrt.sdo_download(at, *index, *sub_index, data);
+                });
+            }
+            5 => drop(self.ecrt.sdo_download(at, 0x1C13, 0, &[0])),
             0 => drop(self.ecrt.sdo_upload(at, 0x1018, 1, 4)),
             1 => drop(self.ecrt.sdo_upload(at, 0x1008, 0, 64)),
             2 => drop(self.ecrt.sdo_download(at, 0x5FFF, 0, &[1, 2])),

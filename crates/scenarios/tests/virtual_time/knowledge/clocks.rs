@@ -122,7 +122,7 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
             main_device.attend(Duration::from_secs(1));
             let first = lock(main_device, &frames, &text);
             assert!(first.latches > 2 * WITHOUT_MEASUREMENT, "{text}: {} latches measure it", first.latches);
-            let mut application = first.application;
+            let (mut application, mut fastest) = (first.application, Duration::MAX);
             for round in 0..2 {
                 let (links, bytes) = left(application, *handover);
                 let (mut main_device, seen) = watched(links);
@@ -133,8 +133,10 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
                 let now = lock(main_device, &frames, &text);
                 println!("{text}: {} latches, {:?}; then {}, {:?}", first.latches, first.took, now.latches, now.took);
                 assert!(now.latches <= WITHOUT_MEASUREMENT, "{text}, round {round}: {} latches", now.latches);
-                // In a tree of 40 some sample is out of the window, at another time in each run: see the next test.
-                let is_exact = count != 40;
+                fastest = fastest.min(now.took);
+                // In a tree of 40 and a ring of 50 some sample may be out of the window, which depends on the moment of
+                // the activation. The next test has the average of a tree.
+                let is_exact = count < 40;
                 assert!(
                     !is_exact || now.took <= first.took,
                     "{text}, round {round}: {:?} after {:?}",
@@ -144,6 +146,7 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
                 assert_eq!(now.delays, first.delays, "{text}, round {round}");
                 application = now.application;
             }
+            assert!(count == 40 || fastest <= first.took, "{text}: {fastest:?} after {:?}", first.took);
         }
     }
 }

@@ -17,7 +17,8 @@ fn go_on(links: Tap, bytes: &[u8], what: &str) -> MainDevice<Tap> {
         main_device.attend(Duration::from_millis(1));
     }
     main_device.attend(Duration::from_millis(200));
-    assert!(statuses(&mut main_device).iter().all(|status| *status == PREOP), "{what}");
+    let now = statuses(&mut main_device);
+    assert!(now.iter().all(|status| *status == PREOP), "{what}: {now:?}, {:?}", events(&mut main_device));
     exchange_sdos(&mut main_device);
     let left: usize = main_device.links_mut().network().devices().map(left_behind).sum();
     assert_eq!(left, 0, "{what}: FMMUs, SYNC signals or ports of the former owner");

@@ -1,34 +1,21 @@
-//! Lines for the operator about a bus, as users search for them: link, SubDevices, states, scans, working counters, and
-//! once a second what was lost.
-//!
-//! [`Lines`] decides from samples and events what is worth a line; [`Messenger`] takes both ten times a second in a
-//! thread of its own and prints. Neither touches the cyclic path.
+//! Which lines a bus is worth: decided from samples and events.
 
 use std::collections::BTreeMap;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
-use std::time::Duration;
 
-use ringcat::daemon::serving;
-use ringcat::{Event, Instant, Link, Services, SupervisorThread, TimedEvent};
+use ringcat_engine::event::{Event, TimedEvent};
+use ringcat_engine::time::Instant;
+use ringcat_link::operator::Priority;
 
-use crate::code::report;
-use crate::host::be_an_ordinary_thread;
+use crate::daemon::ownership::Ownership;
 
-/// Interval of looks.
-const LOOK: Duration = Duration::from_millis(100);
-/// Looks between two summaries.
-const LOOKS_PER_SUMMARY: u32 = 10;
 /// Looks without an answer until the SubDevices count as gone: a scan knows them before the supervision does.
 const SILENT_LOOKS: u32 = 3;
-/// Stack of the thread.
-const STACK_BYTES: usize = 256 << 10;
 /// Names of the AL states by bit.
 const STATES: [&str; 4] = ["INIT", "PREOP", "SAFEOP", "OP"];
 
 /// What is compared from look to look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sample {
+pub(super) struct Sample {
     /// A link is up.
     pub is_up: bool,
     /// SubDevices that answer.
@@ -39,7 +26,7 @@ pub struct Sample {
 
 /// What is counted from summary to summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub(super) struct Counts {
     /// Datagrams and copies of frames that did not come back in time.
     pub timed_out: u64,
     /// Frames that came too late, twice, or with other datagrams than were sent.
@@ -63,13 +50,21 @@ pub struct Lines {
     counts: Counts,
     skipped: u64,
     scan_begun: Option<Instant>,
+    ownership: Option<Ownership>,
     domains: BTreeMap<usize, WorkingCounter>,
-    lines: Vec<String>,
+    lines: Vec<Line>,
 }
 
+/// A line with its priority.
+pub(super) type Line = (Priority, String);
+
 impl Lines {
+    fn push(&mut self, priority: Priority, text: String) {
+        self.lines.push((priority, text));
+    }
+
     /// Takes a sample.
-    pub fn look(&mut self, now: Sample) {
+    pub(super) fn look(&mut self, now: Sample) {
         let is_silent = now.responding == 0 && self.before.responding > 0;
         self.silent_looks = if is_silent { self.silent_looks + 1 } else { 0 };
         if is_silent && self.silent_looks < SILENT_LOOKS {
@@ -77,36 +72,56 @@ impl Lines {
         }
         let before = std::mem::replace(&mut self.before, now);
         if now.is_up != before.is_up {
-            self.lines.push(format!("Link state changed to {}.", if now.is_up { "UP" } else { "DOWN" }));
+            let (priority, state) = if now.is_up { (Priority::Info, "UP") } else { (Priority::Warning, "DOWN") };
+            self.push(priority, format!("Link state changed to {state}."));
         }
         if now.responding != before.responding {
-            self.lines.push(format!("Slave(s) responding: {}.", now.responding));
+            self.push(Priority::Info, format!("Slave(s) responding: {}.", now.responding));
         }
         if now.al_states != before.al_states && now.responding > 0 {
             let states = STATES.iter().enumerate().filter(|(bit, _)| now.al_states >> bit & 1 != 0);
             let names: Vec<&str> = states.map(|(_, name)| *name).collect();
-            self.lines.push(format!("Slave states: {}.", names.join(", ")));
+            self.push(Priority::Info, format!("Slave states: {}.", names.join(", ")));
         }
     }
 
+    /// Takes whether this process has the bus still, and why not.
+    pub(super) fn own(&mut self, now: Ownership, cause: &str) {
+        if self.ownership.replace(now) == Some(now) {
+            return;
+        }
+        let (priority, text) = match now {
+            Ownership::TakenBack => {
+                let told = format!("The master was taken back by ringcatd: {cause}.");
+                (Priority::Error, told + " Calls of this process have no effect until it is requested again.")
+            }
+            Ownership::DaemonEnded => {
+                (Priority::Warning, "ringcatd has ended; this process drives the master on.".to_owned())
+            }
+            _ => return,
+        };
+        self.push(priority, text);
+    }
+
     /// Takes an event.
-    pub fn take(&mut self, event: &TimedEvent) {
+    pub(super) fn take(&mut self, event: &TimedEvent) {
         match &event.event {
             Event::Counted { main, redundant } => {
                 let responding = main.saturating_add(*redundant);
                 self.look(Sample { is_up: self.before.is_up || responding > 0, responding, ..self.before });
                 self.scan_begun = Some(event.at);
-                self.lines.push("Scanning bus.".into());
+                self.push(Priority::Info, "Scanning bus.".to_owned());
             }
-            Event::ScanFinished { .. } => {
+            // Without an application a change of the segment is scanned.
+            Event::ScanFinished { .. } | Event::SegmentChanged { .. } => {
                 if let Some(begun) = self.scan_begun.take() {
                     let time = event.at.since(begun).as_millis();
-                    self.lines.push(format!("Bus scanning completed in {time} ms."));
+                    self.push(Priority::Info, format!("Bus scanning completed in {time} ms."));
                 }
             }
-            Event::ScanFailed { reason } => self.lines.push(format!("Bus scanning failed: {reason}")),
+            Event::ScanFailed { reason } => self.push(Priority::Error, format!("Bus scanning failed: {reason}")),
             Event::ConfigurationFailed { subdevice, reason } => {
-                self.lines.push(format!("Slave configuration {} failed: {reason}", subdevice.0));
+                self.push(Priority::Error, format!("Slave configuration {} failed: {reason}", subdevice.0));
             }
             Event::Domain { domain, status, .. } => {
                 let (number, now) = (domain.0, (status.wkc, status.expected));
@@ -119,7 +134,8 @@ impl Lines {
                     counter.changes += 1;
                 } else {
                     counter.is_shown = true;
-                    self.lines.push(format!("Domain {number}: Working counter changed to {}/{}.", now.0, now.1));
+                    let text = format!("Domain {number}: Working counter changed to {}/{}.", now.0, now.1);
+                    self.push(Priority::Info, text);
                 }
             }
             Event::Skipped { .. } => self.skipped += 1,
@@ -128,7 +144,7 @@ impl Lines {
     }
 
     /// A second is over.
-    pub fn summarise(&mut self, now: Counts) {
+    pub(super) fn summarise(&mut self, now: Counts) {
         let before = std::mem::replace(&mut self.counts, now);
         let skipped = std::mem::take(&mut self.skipped);
         let sums = [
@@ -138,99 +154,36 @@ impl Lines {
         ];
         for (count, what) in sums.into_iter().filter(|(count, _)| *count > 0) {
             let plural = if count == 1 { "" } else { "s" };
-            self.lines.push(format!("WARNING: {count} datagram{plural} {what}!"));
+            self.push(Priority::Warning, format!("WARNING: {count} datagram{plural} {what}!"));
         }
         for (number, counter) in &mut self.domains {
             let (changes, (wkc, expected)) = (std::mem::take(&mut counter.changes), counter.now);
             counter.is_shown = changes > 0;
             if changes > 0 {
-                self.lines.push(format!(
-                    "Domain {number}: {changes} working counter change{} - now {wkc}/{expected}.",
-                    if changes == 1 { "" } else { "s" }
-                ));
+                let plural = if changes == 1 { "" } else { "s" };
+                let text = format!("Domain {number}: {changes} working counter change{plural} - now {wkc}/{expected}.");
+                self.lines.push((Priority::Info, text));
             }
+        }
+    }
+
+    /// Takes messages of the debug level, and how many there were beside them.
+    pub(super) fn debug(&mut self, messages: impl Iterator<Item = String>, left_out: u64) {
+        self.lines.extend(messages.map(|text| (Priority::Debug, text)));
+        if left_out > 0 {
+            self.push(Priority::Debug, format!("{left_out} messages were left out: there were too many."));
         }
     }
 
     /// Takes the lines that are to be printed.
-    pub fn pop(&mut self) -> Vec<String> {
+    pub(super) fn pop(&mut self) -> Vec<Line> {
         std::mem::take(&mut self.lines)
-    }
-}
-
-/// Prints the lines of a bus until it is dropped.
-#[derive(Debug)]
-pub struct Messenger {
-    end: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Messenger {
-    /// Begins.
-    ///
-    /// # Errors
-    /// The thread cannot be started.
-    pub fn begin(master: u32, supervisor: SupervisorThread) -> std::io::Result<Messenger> {
-        let (end, ends) = channel();
-        let body = move || {
-            be_an_ordinary_thread();
-            let (mut lines, mut looks) = (Lines::default(), 0_u32);
-            loop {
-                let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
-                looks += 1;
-                look(&supervisor, &mut lines, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
-                if let Some(now) = is_last.then(|| serving::look(&supervisor).ok()).flatten() {
-                    // After a release the live status may be older than the states.
-                    let (is_up, responding) = (now.is_up.contains(&true), now.responding());
-                    lines.look(Sample { is_up, responding, al_states: now.al_states });
-                }
-                for line in lines.pop() {
-                    match master {
-                        0 => report(format_args!("{line}")),
-                        _ => report(format_args!("master {master}: {line}")),
-                    }
-                }
-                if is_last {
-                    return;
-                }
-            }
-        };
-        let thread = std::thread::Builder::new().name("messages".into()).stack_size(STACK_BYTES).spawn(body)?;
-        Ok(Messenger { end: Some(end), thread: Some(thread) })
-    }
-}
-
-impl Drop for Messenger {
-    fn drop(&mut self) {
-        self.end = None;
-        if let Some(thread) = self.thread.take() {
-            // The panic handler has reported a panic of the thread.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn look(supervisor: &SupervisorThread, lines: &mut Lines, is_second_over: bool) {
-    let Ok(live) = supervisor.live_status() else { return };
-    let segment = live.segment();
-    let (is_up, responding, al_states) = (segment.is_up, segment.responding, segment.al_states);
-    lines.look(Sample { is_up, responding, al_states });
-    while let Some(event) = supervisor.pop_event() {
-        lines.take(&event);
-    }
-    if is_second_over {
-        let counters = supervisor.counters();
-        let lost: u64 = Link::ALL.into_iter().map(|link| live.lost(link).copies).sum();
-        lines.summarise(Counts {
-            timed_out: counters.timed_out.saturating_add(lost),
-            unmatched: counters.late.saturating_add(counters.corrupt),
-        });
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use ringcat::{DomainId, DomainStatus};
+    use ringcat_engine::domain::{DomainId, DomainStatus};
 
     use super::*;
 
@@ -238,7 +191,12 @@ mod tests {
         TimedEvent::new(Instant(ms * 1_000_000), event)
     }
 
-    // covers: c-interface
+    /// The texts of all lines.
+    fn texts(lines: &mut Lines) -> Vec<String> {
+        lines.pop().into_iter().map(|(_, text)| text).collect()
+    }
+
+    // covers: c-interface, daemon
     #[test]
     fn a_scan_and_its_surroundings_are_printed_as_in_the_manual() {
         let mut lines = Lines::default();
@@ -251,16 +209,49 @@ mod tests {
             "Scanning bus.",
             "Bus scanning completed in 431 ms.",
         ];
-        assert_eq!(lines.pop(), wanted);
+        assert_eq!(texts(&mut lines), wanted);
         lines.look(Sample { is_up: true, responding: 5, al_states: 2 });
-        assert_eq!(lines.pop(), ["Slave states: PREOP."]);
+        assert_eq!(texts(&mut lines), ["Slave states: PREOP."]);
+        lines.take(&at(900, Event::Counted { main: 4, redundant: 0 }));
+        lines.take(&at(920, Event::SegmentChanged { subdevices: 4, added: 0, removed: 1 }));
+        let wanted = ["Slave(s) responding: 4.", "Scanning bus.", "Bus scanning completed in 20 ms."];
+        assert_eq!(texts(&mut lines), wanted);
+        lines.look(Sample { is_up: true, responding: 5, al_states: 2 });
+        assert_eq!(texts(&mut lines), ["Slave(s) responding: 5."]);
         lines.look(Sample { is_up: true, responding: 5, al_states: 2 });
         (1..SILENT_LOOKS).for_each(|_| lines.look(Sample::default()));
         lines.look(Sample { is_up: true, responding: 5, al_states: 2 });
-        assert!(lines.pop().is_empty(), "nothing has changed");
+        assert!(texts(&mut lines).is_empty(), "nothing has changed");
         lines.look(Sample { is_up: true, responding: 5, al_states: 10 });
         (0..SILENT_LOOKS).for_each(|_| lines.look(Sample::default()));
-        assert_eq!(lines.pop(), ["Slave states: PREOP, OP.", "Link state changed to DOWN.", "Slave(s) responding: 0."]);
+        assert_eq!(
+            texts(&mut lines),
+            ["Slave states: PREOP, OP.", "Link state changed to DOWN.", "Slave(s) responding: 0."]
+        );
+    }
+
+    // covers: c-interface, daemon
+    #[test]
+    fn the_loss_of_a_bus_is_printed_once_with_its_cause() {
+        let mut lines = Lines::default();
+        lines.own(Ownership::Held, "");
+        lines.own(Ownership::TakenBack, "its process was stopped");
+        lines.own(Ownership::TakenBack, "its process was stopped");
+        let wanted = "The master was taken back by ringcatd: its process was stopped. Calls of this process have no \
+                      effect until it is requested again.";
+        assert_eq!(texts(&mut lines), [wanted]);
+        lines.own(Ownership::Released, "");
+        assert!(texts(&mut lines).is_empty());
+    }
+
+    // covers: daemon
+    #[test]
+    fn messages_of_the_debug_level_are_lines_and_what_is_left_out_is_counted() {
+        let mut lines = Lines::default();
+        lines.debug(["step".to_owned()].into_iter(), 0);
+        lines.debug(std::iter::empty(), 7);
+        let expected = ["step", "7 messages were left out: there were too many."];
+        assert_eq!(lines.pop(), expected.map(|text| (Priority::Debug, text.to_owned())));
     }
 
     // covers: c-interface
@@ -276,7 +267,7 @@ mod tests {
             lines.take(&changed(wkc));
             lines.take(&at(0, Event::Skipped { domain: DomainId(0) }));
         }
-        assert_eq!(lines.pop(), ["Domain 0: Working counter changed to 5/5."]);
+        assert_eq!(texts(&mut lines), ["Domain 0: Working counter changed to 5/5."]);
         lines.summarise(Counts { timed_out: 7, unmatched: 1 });
         let wanted = [
             "WARNING: 7 datagrams TIMED OUT!",
@@ -284,8 +275,8 @@ mod tests {
             "WARNING: 4 datagrams SKIPPED!",
             "Domain 0: 3 working counter changes - now 3/5.",
         ];
-        assert_eq!(lines.pop(), wanted);
+        assert_eq!(texts(&mut lines), wanted);
         lines.summarise(Counts { timed_out: 7, unmatched: 1 });
-        assert!(lines.pop().is_empty());
+        assert!(texts(&mut lines).is_empty());
     }
 }

@@ -1,0 +1,232 @@
+//! Commands about descriptions of networks and devices, as a user calls them: files in, files out, differences by name.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+/// Descriptions of an invented vendor.
+pub const ACME: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/tests/files");
+
+/// A folder of its own, removed on drop.
+pub struct Place(PathBuf);
+
+impl Place {
+    pub fn new(name: &str) -> Place {
+        let place = Place(std::env::temp_dir().join(format!("ringcat-files-{}-{name}", std::process::id())));
+        fs::create_dir_all(&place.0).expect("a temporary folder");
+        place
+    }
+
+    pub fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    pub fn write(&self, name: &str, text: &str) -> String {
+        fs::write(self.0.join(name), text).expect("it is ours");
+        self.path(name)
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What a command printed.
+pub struct Said {
+    pub code: Option<i32>,
+    pub out: String,
+    pub errors: String,
+}
+
+impl Said {
+    /// All that was said, for messages.
+    pub fn all(&self) -> String {
+        format!("{:?}\n{}\n{}", self.code, self.out, self.errors)
+    }
+
+    /// The last line, which is the verdict.
+    pub fn verdict(&self) -> &str {
+        self.errors.lines().chain(self.out.lines()).rfind(|line| line.starts_with("result: ")).unwrap_or("")
+    }
+}
+
+/// Runs the program with these arguments.
+pub fn ringcat(arguments: &[&str]) -> Said {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ringcat"));
+    let output = command.args(arguments).stdin(Stdio::null()).output().expect("the program starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    Said { code: output.status.code(), out: text(&output.stdout), errors: text(&output.stderr) }
+}
+
+/// A coupler, terminals, a drive.
+fn segment(inputs: usize) -> String {
+    format!(
+        "[[device]]\ntype = \"coupler\"\n\n[[device]]\ntype = \"digital-input-8\"\ncount = {inputs}\n\n\
+         [[device]]\ntype = \"servo\"\n"
+    )
+}
+
+// covers: network-file
+#[test]
+fn a_network_file_is_made_of_a_scan_compared_and_never_replaced_by_chance() {
+    let place = Place::new("init");
+    let (bus, other) = (place.write("bus.toml", &segment(2)), place.write("other.toml", &segment(1)));
+    let out = place.path("machine.toml");
+    let made = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert_eq!(made.code, Some(0), "{}", made.all());
+    assert!(made.verdict().starts_with("result: ok: 4 SubDevices with "), "{}", made.all());
+    let text = place.read("machine.toml");
+    assert!(text.starts_with("ringcat_network = 1\n") && text.contains("name = \"digital-input-8 2\""), "{text}");
+    let again = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert!(again.code == Some(2) && again.verdict().contains("exists: name another file"), "{}", again.all());
+    assert_eq!(place.read("machine.toml"), text, "it is as it was");
+    let replaced = ringcat(&["init", "--sim", &bus, "--out", &out, "--overwrite", "--revisions", "equal"]);
+    assert!(replaced.code == Some(0) && place.read("machine.toml").contains("check_revision"), "{}", replaced.all());
+    let same = ringcat(&["compare", "--sim", &bus, "--network", &out]);
+    assert_eq!((same.code, same.verdict()), (Some(0), "result: ok: 4 SubDevices, as in the file"), "{}", same.all());
+    let differs = ringcat(&["compare", "--sim", &other, "--network", &out]);
+    assert_eq!(differs.code, Some(1), "{}", differs.all());
+    assert!(differs.out.contains("! missing       \"digital-input-8 2\" (position 2,"), "{}", differs.all());
+    assert_eq!(differs.verdict(), "result: FAILED: 1 difference from the file, 1 of them prevent OP");
+    let clocked = ringcat(&["init", "--sim", &bus, "--out", &out, "--overwrite", "--sync", "auto"]);
+    let with_signals = place.read("machine.toml");
+    for part in ["[clocks]", "[subdevice.sync]\nassign_activate = 0x0300\nsync0_cycle = \"1ms\""] {
+        assert!(clocked.code == Some(0) && with_signals.contains(part), "{}{with_signals}", clocked.all());
+    }
+    let wrong = place.write("wrong.toml", &text.replacen("direction", "directoin", 1));
+    let refused = ringcat(&["compare", "--sim", &bus, "--network", &wrong]);
+    assert!(refused.code == Some(2) && refused.verdict().contains("wrong.toml:"), "{}", refused.all());
+}
+
+// covers: network-file, esi-use, ES-72, ES-73
+#[test]
+fn names_that_a_device_does_not_have_come_from_its_description() {
+    let place = Place::new("names");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    let bare = text
+        .replace("<Name>Status__Underrange</Name>", "<Name></Name>")
+        .replace("<Name>AI Channel 2</Name>", "<Name></Name>")
+        .replace("<Name>Value</Name><DataType>INT</DataType></Entry>", "<Name></Name></Entry>");
+    assert_ne!(bare, text);
+    place.write("bare.xml", &bare);
+    let terminals = "[[device]]\nesi = \"bare.xml\"\ntype = \"AA02\"\n\n[[device]]\ntype = \"digital-input-8\"\n";
+    let bus = place.write("bus.toml", terminals);
+    fs::create_dir(place.path("esi")).expect("it is ours");
+    let described = text.replacen("<Name>Status__Underrange</Name>", "<Name></Name>", 1);
+    place.write("esi/acme.xml", &described);
+    for folder in ["", "esi/"] {
+        let modules = format!("{folder}modules/acme-modules.xml");
+        fs::create_dir(place.path(&format!("{folder}modules"))).expect("it is ours");
+        fs::copy(format!("{ACME}/modules/acme-modules.xml"), place.path(&modules)).expect("it is ours");
+    }
+    let out = place.path("machine.toml");
+    let init = |more: &[&str]| ringcat(&[&["init", "--sim", &bus, "--out", &out, "--overwrite"], more].concat());
+    let without = init(&[]);
+    assert!(without.code == Some(0) && !place.read("machine.toml").contains("name = \"Value\""), "{}", without.all());
+    let with = init(&["--esi", &place.path("esi")]);
+    assert_eq!(with.code, Some(0), "{}", with.all());
+    assert!(with.out.contains("1 SubDevice described, 4 names from descriptions"), "{}", with.all());
+    assert!(with.errors.contains("position 1 \"digital-input-8\": no description of product"), "{}", with.all());
+    let made = place.read("machine.toml");
+    for part in [
+        "name = \"AI Standard Channel 1\"",
+        "name = \"AI Channel 2\"",
+        "{ index = 0x6000, sub = 1, bits = 1, name = \"Underrange\", type = \"BOOL\" }",
+        "{ index = 0x6010, sub = 17, bits = 16, name = \"Value\", type = \"INT\" }",
+    ] {
+        assert!(made.contains(part), "{part}: {made}");
+    }
+    let same = ringcat(&["compare", "--sim", &bus, "--network", &out]);
+    assert_eq!(same.code, Some(0), "names are no difference: {}", same.all());
+    let gone = init(&["--esi", &place.path("no-such")]);
+    assert!(gone.code == Some(2) && gone.verdict().contains("no-such"), "{}", gone.all());
+}
+
+// covers: esi-read, ES-29
+#[test]
+fn a_folder_of_descriptions_is_listed_and_searched() {
+    let place = Place::new("esi");
+    let list = |more: &[&str]| ringcat(&[&["esi", "list", ACME, "--no-index"], more].concat());
+    let all = list(&[]);
+    assert!(all.code == Some(0) && all.out.contains("AD08") && all.out.contains("acme.xml:"), "{}", all.all());
+    assert!(all.verdict().starts_with("result: ok: ") && all.errors.contains("left out: "), "{}", all.all());
+    let found = list(&["--find", "modular"]);
+    assert!(found.out.contains("AM01") && !found.out.contains("AD08"), "{}", found.all());
+    let of_bus = ["--vendor", "0xc47", "--product", "0x1008", "--revision", "0x00150000"];
+    let older = list(&of_bus);
+    assert!(older.out.contains("0x00120000") && older.out.contains("(older)"), "{}", older.all());
+    let none = list(&["--vendor", "0xc47", "--product", "0x1008", "--revision", "0x00110000"]);
+    assert_eq!((none.code, none.verdict()), (Some(1), "result: FAILED: no description fits"));
+    let broken = place.write("broken.xml", "<EtherCATInfo>");
+    let refused = ringcat(&["esi", "list", &place.path(""), "--no-index"]);
+    assert!(refused.errors.contains("broken.xml:1: ") && refused.code == Some(1), "{broken}: {}", refused.all());
+}
+
+// covers: esi-use, ES-81, ES-102, ES-105
+#[test]
+fn images_are_built_compared_and_described_again() {
+    let place = Place::new("sii");
+    let acme = format!("{ACME}/acme.xml");
+    let image = place.path("ad08.bin");
+    let built = ringcat(&["sii", "build", &acme, "--type", "AD08", "--serial", "7", "--out", &image]);
+    assert_eq!(built.code, Some(0), "{}", built.all());
+    let same = ringcat(&["sii", "compare", &image, "--esi", &acme]);
+    assert_eq!(
+        (same.code, same.verdict()),
+        (Some(0), "result: ok: 1 image as described, 0 with differences, 0 not compared")
+    );
+    let mut bytes = fs::read(&image).expect("it was written");
+    bytes[0x90] ^= 0x20;
+    fs::write(&image, &bytes).expect("it is ours");
+    let differs = ringcat(&["sii", "compare", &image, "--esi", &acme]);
+    assert!(differs.code == Some(1) && differs.out.contains("string"), "{}", differs.all());
+    let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
+    assert!(skeleton.code == Some(0) && place.read("again.xml").contains("ProductCode"), "{}", skeleton.all());
+    let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
+    assert!(unknown.code == Some(2) && unknown.all().contains("there is no such device"), "{}", unknown.all());
+    let odd =
+        place.write("odd.xml", &fs::read_to_string(&acme).unwrap().replacen("<Su Frame", "<Su Foo=\"1\" Frame", 1));
+    let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--out", &image]);
+    assert!(noted.code == Some(0) && noted.errors.contains("odd.xml: line 31: Su@Foo is not known"), "{}", noted.all());
+}
+
+// covers: esi-declare
+#[test]
+fn a_device_is_shown_and_declared_with_choices_or_refused_by_file_line_and_device() {
+    let place = Place::new("declare");
+    let acme = format!("{ACME}/acme.xml");
+    let shown = ringcat(&["esi", "show", &acme, "--type", "AA02"]);
+    assert_eq!(shown.code, Some(0), "{}", shown.all());
+    for part in
+        ["TxPdo       0x1a00 SM 3   32 bits \"AI Standard Channel 1\", fixed, excludes 0x1a01", "mailbox     CoE, FoE"]
+    {
+        assert!(shown.out.contains(part), "{}", shown.all());
+    }
+    let drive = ringcat(&["esi", "show", &acme, "--type", "AM01"]);
+    assert!(drive.out.contains("slot        \"Axis 1\", 1 to 1: csp axis, status axis"), "{}", drive.all());
+    assert!(drive.out.contains("mode        \"DC\" 0x0300 SYNC0"), "{}", drive.all());
+    let out = place.path("machine.toml");
+    let declare = |more: &[&str]| ringcat(&[&["esi", "declare", &acme, "--out", &out], more].concat());
+    let analog = declare(&["--type", "AA02", "--with", "0x1A01", "--without", "0x1A00", "--set", "0x8000:3=2c01"]);
+    assert_eq!(analog.code, Some(0), "{}", analog.all());
+    assert!(analog.verdict().starts_with("result: ok: \"AA02\", 2 PDOs with 2 variables and 2 start-up commands"));
+    let again = declare(&["--type", "AD08"]);
+    assert!(again.code == Some(2) && again.verdict().contains("add --append or --overwrite"), "{}", again.all());
+    let second = declare(&["--type", "AM01", "--mode", "DC4", "--module", "csp axis", "--name", "Axis", "--append"]);
+    assert_eq!(second.code, Some(0), "{}", second.all());
+    let text = place.read("machine.toml");
+    for part in ["name = \"AA02\"", "name = \"Axis\"", "[clocks]", "sync0_cycle = \"250us\"", "index = 0x1a01"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let wrong = declare(&["--type", "AA02", "--without", "0x1A02", "--append"]);
+    assert_eq!(wrong.code, Some(2), "{}", wrong.all());
+    let reason = "device \"AA02\": PDO 0x1a02 \"AI Channel 2\": it is mandatory: it has to be assigned";
+    assert!(wrong.verdict().contains("acme.xml:1") && wrong.verdict().contains(reason), "{}", wrong.all());
+    assert_eq!(place.read("machine.toml"), text, "the file is as it was");
+}

@@ -1,0 +1,138 @@
+//! PDOs of the dictionaries: what was read or written replaces what was known, in the list and in the last scan.
+
+use alloc::rc::Rc;
+use alloc::string::ToString;
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::al::AlState;
+
+use crate::event::Event;
+use crate::info::{PdoSource, SubDeviceInfo};
+use crate::segment::choices::ReadPdos;
+use crate::segment::effect::{Effects, Task};
+use crate::segment::key::SubDeviceKey;
+use crate::segment::model::Segment;
+use crate::segment::pdo_finding::PdoFinding;
+use crate::segment::undeclared::{PdoReading, Upkeep, UpkeepProgress};
+
+/// Dictionaries of SubDevices in their states that are read at once: requests of the application do not wait for those
+/// of 100.
+const READ_AT_ONCE: usize = 8;
+
+impl Segment {
+    /// Processes a finding about the PDOs of the SubDevice with a station address.
+    pub(in crate::segment) fn observe_pdos(
+        &mut self,
+        station: StationAddress,
+        finding: PdoFinding<'_>,
+        effects: &mut Effects,
+    ) {
+        let Some(before) = self.subdevices.at(station).and_then(|it| it.knowledge.info()).cloned() else { return };
+        let mut info = (*before).clone();
+        match finding {
+            PdoFinding::Outdated => info.pdo_source = PdoSource::Outdated,
+            PdoFinding::Unreadable => return,
+            PdoFinding::Held(held) => {
+                for warning in info.take_dictionary(held) {
+                    effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+                }
+            }
+        }
+        if info != *before {
+            self.replace_info(&before, info);
+        }
+    }
+
+    /// More is known of a SubDevice. Where the list and the last scan share their data they do so afterwards, too.
+    fn replace_info(&mut self, before: &Rc<SubDeviceInfo>, info: SubDeviceInfo) {
+        let now = Rc::new(info);
+        self.subdevices.replace(before, &now);
+        let Some(scanned) = self.stage.scanned_mut() else { return };
+        let is_it = |it: &&mut Rc<SubDeviceInfo>| it.station == now.station && it.identity == now.identity;
+        if let Some(known) = Rc::make_mut(&mut scanned.found).subdevices.iter_mut().find(is_it) {
+            if Rc::ptr_eq(known, before) {
+                known.clone_from(&now);
+            } else {
+                let (pdos, pdo_source) = (now.pdos.clone(), now.pdo_source);
+                *known = Rc::new(SubDeviceInfo { pdos, pdo_source, ..(**known).clone() });
+            }
+        }
+    }
+
+    /// What is found about the PDOs of a SubDevice without a declaration.
+    pub(in crate::segment) fn observe_undeclared_pdos(
+        &mut self,
+        key: SubDeviceKey,
+        finding: PdoFinding<'_>,
+        effects: &mut Effects,
+    ) {
+        let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
+        if let Some(upkeep) = &mut it.upkeep {
+            upkeep.reading = match finding {
+                PdoFinding::Outdated | PdoFinding::Held(_) => PdoReading::Open,
+                PdoFinding::Unreadable => PdoReading::Ended,
+            };
+        }
+        self.observe_pdos(key.station, finding, effects);
+    }
+
+    /// Whether the dictionary of a SubDevice without a declaration is to be read in PREOP. `from_init`: it comes from
+    /// INIT, where a dictionary that was written may have fallen back to that of power-on.
+    pub fn wants_pdos(&self, info: &SubDeviceInfo, from_init: bool) -> bool {
+        let is_open = match info.pdo_source {
+            PdoSource::Sii | PdoSource::Outdated => true,
+            PdoSource::Written => from_init,
+            PdoSource::Dictionary => false,
+        };
+        is_open
+            && info.has_dictionary_of_pdos()
+            && match self.choices.pdos {
+                ReadPdos::Never => false,
+                ReadPdos::Missing => info.pdo_source == PdoSource::Outdated || info.lacks_pdos(),
+                ReadPdos::Always => true,
+            }
+    }
+
+    /// Whether dictionaries are about to be read, or are being read, of SubDevices on their first way to a state with
+    /// mail, or in it.
+    pub fn are_pdos_awaited(&self) -> bool {
+        self.subdevices.unassigned().filter(|it| it.is_undeclared()).any(|it| {
+            let is_open = it.knowledge.info().is_some_and(|info| self.wants_pdos(info, false));
+            is_open
+                && match &it.upkeep {
+                    None => self.choices.idle_operation,
+                    Some(upkeep) if !has_mail(upkeep.target) => false,
+                    Some(upkeep) if upkeep.progress == UpkeepProgress::Reached => upkeep.reading != PdoReading::Ended,
+                    Some(upkeep) => upkeep.is_on_its_first_way(),
+                }
+        })
+    }
+
+    /// Has dictionaries read of SubDevices that are in their states already: those of another owner, and those that
+    /// were written since.
+    pub(in crate::segment) fn read_open_pdos(&mut self, effects: &mut Effects) {
+        if self.choices.pdos == ReadPdos::Never {
+            return;
+        }
+        let kept = || self.subdevices.unassigned().filter_map(|it| Some((it, it.unassigned.upkeep.as_ref()?)));
+        let in_state = || kept().filter(|(_, upkeep)| upkeep.progress == UpkeepProgress::Reached);
+        let under_way = in_state().filter(|(_, upkeep)| upkeep.reading == PdoReading::UnderWay).count();
+        let is_open = |upkeep: &Upkeep| upkeep.reading == PdoReading::Open && has_mail(upkeep.target);
+        let due = in_state().filter(|(it, upkeep)| {
+            is_open(upkeep) && it.knowledge.info().is_some_and(|info| self.wants_pdos(info, false))
+        });
+        let due = due.map(|(it, upkeep)| (it.key, upkeep.attempt)).take(READ_AT_ONCE.saturating_sub(under_way));
+        let due: Vec<(SubDeviceKey, u32)> = due.collect();
+        for (key, attempt) in due {
+            let upkeep = self.subdevices.unassigned_mut(key).and_then(|(_, it)| it.upkeep.as_mut());
+            upkeep.into_iter().for_each(|upkeep| upkeep.reading = PdoReading::UnderWay);
+            effects.start(Task::ReadPdos { key, attempt });
+        }
+    }
+}
+
+/// Whether a dictionary can be read in a state.
+const fn has_mail(state: AlState) -> bool {
+    matches!(state, AlState::PreOp | AlState::SafeOp | AlState::Op)
+}

@@ -1,0 +1,123 @@
+//! PDOs in the dictionaries: when they are read, and what replaces what was known.
+
+use ringcat_wire::sii::{MailboxLayout, MailboxProtocols, SiiSyncManager, SyncManagerKind};
+
+use super::*;
+use crate::config::{PdoAssignment, PdoMapping};
+use crate::direction::Direction;
+use crate::info::PdoSource;
+
+/// Three SubDevices that are kept; that at position 1 has a dictionary, with this source of its PDOs.
+fn with_dictionary(pdo_source: PdoSource) -> Idle {
+    let mut scan = found(&THREE);
+    let unused =
+        SiiSyncManager { start: 0, length: 0, control: 0, status: 0, enable: 1, kind: SyncManagerKind::Unused };
+    let inputs = SiiSyncManager { length: 4, kind: SyncManagerKind::Inputs, ..unused };
+    let info = &mut scan.subdevices[1];
+    info.mailbox = Some(MailboxLayout::default());
+    info.protocols = MailboxProtocols(MailboxProtocols::COE);
+    info.sync_managers = vec![unused, unused, inputs];
+    info.pdo_source = pdo_source;
+    let mut segment = Segment::new(Choices { idle_operation: true, pdos: ReadPdos::Always, ..choices() });
+    segment.observe(Observation::ScanBegun, Instant(0));
+    segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));
+    Idle { segment, now: Instant(0) }
+}
+
+/// The others are in PREOP already; the effects are those of the last one.
+fn keep(idle: &mut Idle) -> Vec<Effect> {
+    idle.seen(UndeclaredObservation::TakenOver);
+    let begun = attempts(&idle.seen(UndeclaredObservation::AttemptsDue));
+    let [first, second, third] = begun[..] else { panic!("{begun:?}") };
+    idle.end(first, None);
+    idle.end(third, None);
+    idle.end(second, None)
+}
+
+fn readings(effects: &[Effect]) -> Vec<(SubDeviceKey, u32)> {
+    let begun = |effect: &Effect| match effect {
+        Effect::Start(Task::ReadPdos { key, attempt }) => Some((*key, *attempt)),
+        _ => None,
+    };
+    effects.iter().filter_map(begun).collect()
+}
+
+fn held(pdo: u16) -> [PdoAssignment; 1] {
+    [PdoAssignment::new(2, Direction::Inputs, vec![PdoMapping::of(pdo, [])])]
+}
+
+impl Idle {
+    fn pdos(&mut self, key: SubDeviceKey, finding: PdoFinding<'_>) -> Vec<Effect> {
+        self.seen(UndeclaredObservation::Pdos { key, finding })
+    }
+
+    /// Source and PDOs, in the list and in the last scan.
+    fn known(&self) -> [(PdoSource, Vec<u16>); 2] {
+        let of = |info: &SubDeviceInfo| (info.pdo_source, info.assigned_pdos(2).map(|pdo| pdo.index).collect());
+        let listed = self.segment.subdevices().at(StationAddress(0x1002)).and_then(|it| it.knowledge.info()).unwrap();
+        [of(listed), of(&self.segment.found().unwrap().subdevices[1])]
+    }
+}
+
+#[test]
+fn a_dictionary_is_read_once_in_preop_unless_it_is_known() {
+    for (source, is_read) in [(PdoSource::Sii, true), (PdoSource::Outdated, true), (PdoSource::Dictionary, false)] {
+        let mut idle = with_dictionary(source);
+        let begun = readings(&keep(&mut idle));
+        assert_eq!(begun, if is_read { vec![(idle.key(1), 1)] } else { vec![] }, "{source:?}");
+        assert_eq!(readings(&idle.seen(UndeclaredObservation::AttemptsDue)), [], "{source:?}: once");
+    }
+    // What was written since power-on is known as long as it has not been in INIT.
+    let written = with_dictionary(PdoSource::Written);
+    let info = written.segment.found().unwrap().subdevices[1].clone();
+    assert!(!written.segment.wants_pdos(&info, false) && written.segment.wants_pdos(&info, true));
+}
+
+#[test]
+fn what_a_dictionary_holds_replaces_what_was_known_everywhere() {
+    for (source, after) in [(PdoSource::Sii, PdoSource::Dictionary), (PdoSource::Outdated, PdoSource::Written)] {
+        let mut idle = with_dictionary(source);
+        keep(&mut idle);
+        let key = idle.key(1);
+        assert_eq!(idle.pdos(key, PdoFinding::Held(&held(0x1A00))), []);
+        assert_eq!(idle.known(), [(after, vec![0x1A00]), (after, vec![0x1A00])]);
+        // It is written by mail: read again, and nothing is of power-on any more.
+        assert_eq!(readings(&idle.pdos(key, PdoFinding::Outdated)), [(key, 1)]);
+        assert_eq!(idle.known()[1], (PdoSource::Outdated, vec![0x1A00]));
+        assert_eq!(idle.pdos(key, PdoFinding::Held(&held(0x1A01))), []);
+        assert_eq!(idle.known(), [(PdoSource::Written, vec![0x1A01]), (PdoSource::Written, vec![0x1A01])]);
+    }
+}
+
+#[test]
+fn a_dictionary_that_cannot_be_read_is_tried_again_with_the_next_attempt() {
+    let mut idle = with_dictionary(PdoSource::Outdated);
+    keep(&mut idle);
+    let key = idle.key(1);
+    assert_eq!(idle.pdos(key, PdoFinding::Unreadable), []);
+    assert_eq!(readings(&idle.seen(UndeclaredObservation::AttemptsDue)), []);
+    let next = attempts(&idle.request(1, PREOP))[0];
+    assert_eq!(readings(&idle.end(next, None)), [(key, 2)]);
+    // After it has got another address, findings are refused.
+    idle.segment.observe(Observation::Readdressing(&[key.station]), idle.now);
+    assert_eq!(idle.pdos(key, PdoFinding::Held(&held(0x1A00))), []);
+    assert_eq!(idle.segment.found().unwrap().subdevices[1].pdo_source, PdoSource::Outdated);
+}
+
+/// A program that waits for the PDOs does not wait for a SubDevice whose state has no mail.
+#[test]
+fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
+    for (state, is_awaited) in [(PREOP, true), (AlState::Op, true), (AlState::Boot, false), (AlState::Init, false)] {
+        let mut idle = with_dictionary(PdoSource::Sii);
+        assert!(idle.segment.are_pdos_awaited(), "{state:?}: nothing is requested yet");
+        keep(&mut idle);
+        assert!(idle.segment.are_pdos_awaited(), "{state:?}: they are being read");
+        let begun = attempts(&idle.request(1, state))[0];
+        assert_eq!(idle.segment.are_pdos_awaited(), is_awaited, "{state:?}, on its way");
+        idle.end(begun, None);
+        assert_eq!(idle.segment.are_pdos_awaited(), is_awaited, "{state:?}, reached");
+        let key = idle.key(1);
+        idle.pdos(key, PdoFinding::Held(&held(0x1A00)));
+        assert!(!idle.segment.are_pdos_awaited(), "{state:?}, known");
+    }
+}

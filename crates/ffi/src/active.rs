@@ -1,0 +1,119 @@
+//! The application of a handle between activation and deactivation, for cyclic calls.
+//!
+//! A bus that the daemon has taken back, because the process was stopped, shows with the next call that receives: from
+//! then on all cyclic calls are refused until the handle is deactivated or released.
+
+use ringcat::daemon::OwnershipWatch;
+use ringcat::{Application, Instant, SupervisorThread};
+
+use crate::any_links::AnyLinks;
+use crate::code::{Code, Outcome};
+
+/// The application of a handle.
+type App = Application<AnyLinks, SupervisorThread>;
+
+/// The place of the application.
+#[derive(Debug, Default)]
+pub enum Slot {
+    /// There is none.
+    #[default]
+    Empty,
+    /// It runs.
+    Active(Active),
+    /// Its bus was taken back.
+    Lost(Active),
+}
+
+impl Slot {
+    /// Uses the application; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`Code::GONE`]: its bus was taken back.
+    #[inline(always)]
+    pub fn use_now<R>(&mut self, work: impl FnOnce(&mut Active) -> R) -> Outcome<Option<R>> {
+        match self {
+            Slot::Active(active) => Ok(Some(work(active))),
+            Slot::Empty => Ok(None),
+            Slot::Lost(_) => Err(Code::GONE),
+        }
+    }
+
+    /// Receives the frames that have arrived, as [`Slot::use_now`], and sees whether the bus was taken back.
+    ///
+    /// # Errors
+    /// As [`Slot::use_now`].
+    #[inline(always)]
+    pub fn receive(&mut self) -> Outcome<Option<()>> {
+        match self {
+            Slot::Active(active) if active.is_taken_back() => {
+                self.lose();
+                Err(Code::GONE)
+            }
+            _ => self.use_now(|active| active.application.receive()),
+        }
+    }
+
+    #[cold]
+    fn lose(&mut self) {
+        *self = match std::mem::take(self) {
+            Slot::Active(active) => Slot::Lost(active),
+            other => other,
+        };
+    }
+
+    /// Takes the application out.
+    pub fn take(&mut self) -> Option<Active> {
+        match std::mem::take(self) {
+            Slot::Active(active) | Slot::Lost(active) => Some(active),
+            Slot::Empty => None,
+        }
+    }
+}
+
+/// The application, and the times of its last cycle.
+#[derive(Debug)]
+pub struct Active {
+    /// The application.
+    pub application: App,
+    /// The last call of send.
+    sent_at: Instant,
+    /// The call of send before that one: what is read from its frame is not old, whether or not the domain was
+    /// processed since the last call of receive.
+    awaited: Instant,
+    has_clock: bool,
+    /// Of a bus from a daemon.
+    ownership: Option<OwnershipWatch>,
+}
+
+impl Active {
+    /// An application that has not sent anything.
+    pub fn new(application: App, has_clock: bool, ownership: Option<OwnershipWatch>) -> Active {
+        let now = application.now();
+        Active { application, sent_at: now, awaited: now, has_clock, ownership }
+    }
+
+    #[inline(always)]
+    fn is_taken_back(&self) -> bool {
+        self.ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back)
+    }
+
+    /// Sends what was queued. Nothing is sent while the acyclic half measures the delays of clocks, for which the wire
+    /// must be empty: here frames count as on the wire from one send to the next receive.
+    #[inline(always)]
+    pub fn send(&mut self) {
+        if self.has_clock {
+            if self.application.pauses() {
+                return;
+            }
+            self.awaited = self.sent_at;
+            self.sent_at = self.application.now();
+        }
+        self.application.send();
+    }
+
+    /// The time of the reference clock, if one of the last two frames has returned with it.
+    pub fn reference_time(&self) -> Option<u64> {
+        let read = self.application.exchange().reference_time()?;
+        (read.sent_at >= self.awaited).then_some(read.time)
+    }
+}

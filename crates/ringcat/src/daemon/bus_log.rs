@@ -1,0 +1,167 @@
+//! Lines for the operator about a bus, as users search for them: link, SubDevices, states, scans, working counters, and
+//! once a second what was lost; messages of the debug level (`ethercat debug`); the loss of the bus.
+//!
+//! [`Lines`] decides what is worth a line; [`BusLog`] takes samples and events ten times a second in a thread of its
+//! own, and passes the lines on. The process that drives a bus has one: the daemon, a program with the C interface, and
+//! a Rust application that wants it. Neither touches the cyclic path.
+
+mod lines;
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ringcat_engine::link::Link;
+use ringcat_engine::main_device::LiveStatus;
+pub use ringcat_link::operator::{OperatorLines, Priority};
+
+pub use self::lines::Lines;
+use self::lines::{Counts, Sample};
+use super::ownership::OwnershipWatch;
+use super::serving;
+use crate::services::Services;
+use crate::supervisor_thread::SupervisorThread;
+use crate::text::message;
+
+/// Interval of looks.
+const LOOK: Duration = Duration::from_millis(100);
+/// Looks between two summaries.
+const LOOKS_PER_SUMMARY: u32 = 10;
+/// Stack of the thread.
+const STACK_BYTES: usize = 256 << 10;
+/// Most messages of the debug level in a look.
+const MOST_MESSAGES: usize = 500;
+
+/// What a bus log follows.
+#[derive(Clone, Debug)]
+pub struct Followed {
+    supervisor: SupervisorThread,
+    ownership: Option<OwnershipWatch>,
+    lines: Arc<Mutex<Lines>>,
+}
+
+impl Followed {
+    /// The acyclic half of a bus. All its events are taken from it.
+    pub fn new(supervisor: SupervisorThread) -> Followed {
+        Followed { supervisor, ownership: None, lines: Arc::default() }
+    }
+
+    /// Also whether the bus of a daemon was taken back.
+    #[must_use]
+    pub fn with_ownership(mut self, ownership: Option<OwnershipWatch>) -> Followed {
+        self.ownership = ownership;
+        self
+    }
+
+    /// Goes on with what was printed of this bus before: only changes are printed.
+    #[must_use]
+    pub fn with_lines(mut self, lines: Arc<Mutex<Lines>>) -> Followed {
+        self.lines = lines;
+        self
+    }
+}
+
+/// Passes the lines of a bus on until it is dropped.
+#[derive(Debug)]
+pub struct BusLog {
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl BusLog {
+    /// Begins. `prepare` runs first in its thread, which calls `print` with each line; it must not wait for long.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn start(
+        followed: Followed,
+        prepare: impl FnOnce() + Send + 'static,
+        print: impl FnMut(Priority, &str) + Send + 'static,
+    ) -> std::io::Result<BusLog> {
+        let (end, ends) = channel();
+        let body = move || {
+            prepare();
+            run(&followed, &ends, print);
+        };
+        let thread = std::thread::Builder::new().name("bus log".into()).stack_size(STACK_BYTES).spawn(body)?;
+        Ok(BusLog { end: Some(end), thread: Some(thread) })
+    }
+
+    /// Ends without waiting for the last lines, which may still come for a moment.
+    pub fn end_soon(mut self) {
+        self.thread = None;
+    }
+}
+
+impl Drop for BusLog {
+    fn drop(&mut self) {
+        self.end = None;
+        if let Some(thread) = self.thread.take() {
+            // The panic handler has reported a panic of the thread.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority, &str)) {
+    let Followed { supervisor, ownership, lines } = followed;
+    let (mut looks, mut next_message) = (0_u32, 0);
+    loop {
+        let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
+        looks += 1;
+        let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(ownership) = ownership {
+            lines.own(ownership.now(), ownership.cause());
+        }
+        take_messages(supervisor, &mut lines, &mut next_message);
+        look(supervisor, &mut lines, is_last, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
+        let all = lines.pop();
+        drop(lines);
+        for (priority, line) in all {
+            print(priority, &line);
+        }
+        if is_last {
+            return;
+        }
+    }
+}
+
+/// Takes the messages since the last look, as far as there are not too many.
+fn take_messages(supervisor: &SupervisorThread, lines: &mut Lines, next: &mut u64) {
+    let Ok(since) = supervisor.messages_since(*next) else { return };
+    *next = since.next;
+    let beyond = since.messages.len().saturating_sub(MOST_MESSAGES);
+    lines.debug(since.messages.iter().take(MOST_MESSAGES).map(message), since.missed + beyond as u64);
+}
+
+/// What is seen of the segment: words of the active application, or the answers to a broadcast.
+fn sample(supervisor: &SupervisorThread, live: &LiveStatus, is_last: bool) -> Option<Sample> {
+    // After a release the live status may be older than the states.
+    if supervisor.observer().is_some() && !is_last {
+        let segment = live.segment();
+        let (is_up, responding, al_states) = (segment.is_up, segment.responding, segment.al_states);
+        return Some(Sample { is_up, responding, al_states });
+    }
+    let seen = serving::look(supervisor).ok()?;
+    Some(Sample { is_up: seen.is_up.contains(&true), responding: seen.responding(), al_states: seen.al_states })
+}
+
+fn look(supervisor: &SupervisorThread, lines: &mut Lines, is_last: bool, is_second_over: bool) {
+    let Ok(live) = supervisor.live_status() else { return };
+    let seen = sample(supervisor, &live, is_last);
+    while let Some(event) = supervisor.pop_event() {
+        lines.take(&event);
+    }
+    if let Some(seen) = seen {
+        lines.look(seen);
+    }
+    if is_second_over {
+        let counters = supervisor.counters();
+        let lost: u64 = Link::ALL.into_iter().map(|link| live.lost(link).copies).sum();
+        lines.summarise(Counts {
+            timed_out: counters.timed_out.saturating_add(lost),
+            unmatched: counters.late.saturating_add(counters.corrupt),
+        });
+    }
+}

@@ -1,0 +1,69 @@
+//! A bus as it arrives from a daemon: links, a lock, network interfaces, what is known of the segment.
+
+use std::os::fd::OwnedFd;
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat_control::connection::Connection;
+use ringcat_control::message::{Content, HandedBus};
+use ringcat_control::refusal::Refusal;
+use ringcat_control::wire::Limits;
+use ringcat_engine::knowledge::Knowledge;
+
+use super::error::DaemonError;
+use super::links::{DaemonLinks, adopt_links};
+use super::orders::Orders;
+use crate::either_links::EitherLinks;
+
+/// The daemon hands a bus over within this time: it waits for the end of a scan.
+const TAKE: Duration = Duration::from_secs(30);
+
+/// A bus that has arrived.
+#[derive(Debug)]
+pub(super) struct Received {
+    /// What it is.
+    pub bus: HandedBus,
+    /// Links of the cyclic half.
+    pub cyclic: DaemonLinks,
+    /// Links of the acyclic half.
+    pub acyclic: DaemonLinks,
+    /// A daemon that is started anew sees by it that this process has the bus.
+    pub lock: Option<OwnedFd>,
+    /// Network interfaces of EoE.
+    pub interfaces: Vec<OwnedFd>,
+    /// What is known of the segment.
+    pub knowledge: Option<Knowledge>,
+}
+
+impl Received {
+    /// Asks for the bus of a master, and waits for it. Its links order what they cannot do themselves.
+    ///
+    /// # Errors
+    /// The daemon refuses or gives no answer, or what it has sent cannot be used.
+    pub fn take(connection: &Connection, master: u32, orders: &Arc<Orders>) -> Result<Received, DaemonError> {
+        connection.send(&Content::Take { master, ethernet: cfg!(feature = "eoe") }.into())?;
+        let (message, descriptors) = connection.receive_with_descriptors(Limits::OWNER, Some(TAKE))?;
+        let bus = match message.content {
+            Content::Taken(bus) => bus,
+            Content::Refused(refusal) => return Err(refusal.into()),
+            _ => return Err(unexpected("links of a master")),
+        };
+        let (links, lock) = (bus.links.descriptors(), usize::from(bus.has_lock));
+        if descriptors.len() != links + lock + bus.interfaces.len() {
+            return Err(unexpected("a descriptor for each part of a bus"));
+        }
+        let mut descriptors = descriptors.into_iter();
+        let (cyclic, acyclic) = adopt_links(&bus.links, descriptors.by_ref().take(links).collect())?;
+        let acyclic = match acyclic {
+            EitherLinks::First(links) if bus.can_switch => EitherLinks::First(links.with_switch(orders.clone())),
+            links => links,
+        };
+        let lock = descriptors.by_ref().take(lock).next();
+        let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
+        Ok(Received { bus, cyclic, acyclic, lock, interfaces: descriptors.collect(), knowledge })
+    }
+}
+
+fn unexpected(expected: &str) -> DaemonError {
+    Refusal::Unexpected { expected: expected.to_owned() }.into()
+}

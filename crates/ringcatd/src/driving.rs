@@ -1,0 +1,160 @@
+//! The daemon drives a master: the acyclic half in this process, and its lines for the operator.
+
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
+use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
+use ringcat::{
+    Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, StateScope,
+    SupervisorThread,
+};
+
+use crate::ethernet::EthernetInterfaces;
+use crate::log::{print, say};
+use crate::opened::Opened;
+
+/// A hand-over waits so long for the end of a scan.
+const SCAN: Duration = Duration::from_secs(20);
+/// A hand-over waits so long for SubDevices that change their states.
+const SETTLE: Duration = Duration::from_secs(3);
+/// States that do not change for this time stay as they are.
+const STILL: Duration = Duration::from_millis(100);
+/// SubDevices reach their safe state within this time.
+const LEAD: Duration = Duration::from_secs(10);
+/// Interval of looks at a scan.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// What outlasts hand-overs of a master.
+#[derive(Debug)]
+pub struct Lasting<'a> {
+    /// Number of the master.
+    pub number: u32,
+    /// What is known of the segment; empty if nothing is.
+    pub knowledge: &'a [u8],
+    /// What was printed of the bus before.
+    pub lines: Arc<Mutex<Lines>>,
+    /// Level of messages.
+    pub debug_level: u32,
+    /// Network interfaces of EoE; `None`: there are none.
+    pub interfaces: Option<Arc<EthernetInterfaces>>,
+}
+
+/// The daemon drives a master.
+#[derive(Debug)]
+pub struct Driving {
+    supervisor: SupervisorThread,
+    log: BusLog,
+    /// Moves frames of EoE.
+    ethernet: Option<Ethernet>,
+}
+
+impl Driving {
+    /// Drives a master on fresh links, and goes on with what is known.
+    ///
+    /// # Errors
+    /// What is wrong, for the operator.
+    pub fn start(opened: &Opened, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
+        let adopted = adopt_links(opened.links(), opened.duplicates()?);
+        let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
+        let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
+        let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
+            Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
+            // Nothing is known yet.
+            Err(_) => SupervisorThread::start(acyclic, &options, || ()),
+        };
+        let supervisor = supervisor.map_err(|error| error.to_string())?;
+        let level = LogFilter::new(LogLevel::from_number(lasting.debug_level));
+        supervisor.set_log_filter(level).map_err(|error| error.to_string())?;
+        let followed = Followed::new(supervisor.clone()).with_lines(lasting.lines.clone());
+        let number = lasting.number;
+        let log = BusLog::start(
+            followed,
+            || (),
+            move |priority, line| match number {
+                0 => print(priority, format!("EtherCAT: {line}")),
+                _ => print(priority, format!("EtherCAT: master {number}: {line}")),
+            },
+        );
+        let log = log.map_err(|error| format!("a thread cannot be started: {error}"))?;
+        let ethernet = lasting.interfaces.clone().zip(u16::try_from(number).ok());
+        let ethernet = ethernet.map(|(interfaces, index)| {
+            let options = EthernetOptions::new(index, cyclic.addresses().main.0);
+            supervisor.start_lasting_ethernet(options, move |name, mac| interfaces.make(name, mac).map(Some))
+        });
+        let ethernet = ethernet.transpose().map_err(|error| error.to_string())?;
+        Ok(Driving { supervisor, log, ethernet })
+    }
+
+    /// The acyclic half, for questions.
+    pub fn supervisor(&self) -> &SupervisorThread {
+        &self.supervisor
+    }
+
+    /// What has changed with network interfaces of EoE, for the operator.
+    pub fn changes(&self) -> Vec<EthernetEvent> {
+        self.ethernet.as_ref().map(Ethernet::take_events).unwrap_or_default()
+    }
+
+    /// Ends it without a further frame. What is known of the segment; empty if nothing is.
+    pub fn hand_over(self) -> Vec<u8> {
+        let Driving { supervisor, log, ethernet: _ethernet } = self;
+        wait_for_scan(&supervisor);
+        wait_until_settled(&supervisor);
+        // What has changed last is printed by the next process that drives the master.
+        log.end_soon();
+        // A thread that has ended knows nothing.
+        let knowledge = supervisor.hand_over().ok().flatten();
+        knowledge.as_ref().map(Knowledge::to_bytes).unwrap_or_default()
+    }
+
+    /// Brings all SubDevices to the safe state, in a thread: PREOP needs none.
+    pub fn lead_to(&self, state: AlState, number: u32) {
+        if state == AlState::PreOp {
+            return;
+        }
+        let supervisor = self.supervisor.clone();
+        let lead = move || {
+            wait_for_scan(&supervisor);
+            match supervisor.request_state_of_all(state, StateScope::All, LEAD) {
+                // The next application has the master already.
+                Ok(()) | Err(Error::Gone) => {}
+                Err(error) => say(format_args!("master {number}: not all SubDevices are in {state}: {error}")),
+            }
+        };
+        if let Err(error) = std::thread::Builder::new().name("safe state".into()).spawn(lead) {
+            say(format_args!("master {number}: all SubDevices stay in PREOP: {error}"));
+        }
+    }
+}
+
+/// Waits until no SubDevice changes its state any more: after the end of an application, or when they have just got
+/// power, they are on their way to PREOP, and what leads them there is not interrupted. An application
+/// reaches OP without it, since its activation leads each SubDevice on from where it is; one that asks for mailboxes
+/// first finds them in use.
+fn wait_until_settled(supervisor: &SupervisorThread) {
+    let settled = AlState::PreOp.code();
+    let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());
+    while let Ok(seen) = serving::look(supervisor) {
+        if seen.al_states != last {
+            (last, since) = (seen.al_states, Instant::now());
+        }
+        // Some may be in a safe state, or in an error that nothing ends.
+        let is_still = since.elapsed() >= STILL || begin.elapsed() >= SETTLE;
+        if seen.al_states == settled || seen.responding() == 0 || is_still {
+            return;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Waits for the end of a scan that runs.
+fn wait_for_scan(supervisor: &SupervisorThread) {
+    let begin = Instant::now();
+    while begin.elapsed() < SCAN {
+        match supervisor.with(|engine| engine.snapshot().activity) {
+            Ok(Activity::Scanning) => std::thread::sleep(LOOK),
+            _ => return,
+        }
+    }
+}

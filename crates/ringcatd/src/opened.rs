@@ -1,0 +1,187 @@
+//! Open links of a master, which a process drives: their descriptors, their interfaces as these come and go, and their
+//! end.
+
+use std::os::fd::{AsFd, OwnedFd};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use ringcat_control::message::{HandedLink, HandedLinks};
+use ringcat_link::capabilities::{self, Capabilities};
+use ringcat_link::packet_socket::binding::{give, given};
+use ringcat_link::{LinkError, PresentInterface, interface, revoke};
+
+use crate::opener::SLOTS;
+
+/// Address that stands for an interface that was never seen: locally administered, with the number of the link.
+const UNSEEN: [u8; 6] = [0x02, b'R', b'C', 0, 0, 0];
+
+/// Open links, to be duplicated for the process that drives them.
+#[derive(Debug)]
+pub struct Opened {
+    links: HandedLinks,
+    /// In the order of [`HandedLinks`].
+    descriptors: Vec<OwnedFd>,
+    state: Mutex<State>,
+}
+
+/// What the sockets lead to.
+#[derive(Debug)]
+enum State {
+    /// A simulated segment.
+    Pipes,
+    /// These interfaces.
+    Interfaces(Vec<Followed>),
+    /// Nothing any more: another process may still have them.
+    Revoked,
+}
+
+/// An interface that may come and go.
+#[derive(Debug)]
+struct Followed {
+    name: String,
+    is_there: bool,
+    /// An owner has ordered it switched off.
+    is_off: bool,
+}
+
+impl Opened {
+    /// Pipes to a simulated segment.
+    pub fn pipes(links: HandedLinks, descriptors: Vec<OwnedFd>) -> Opened {
+        Opened { links, descriptors, state: Mutex::new(State::Pipes) }
+    }
+
+    /// Sockets that get the interfaces with these names, as far as they are there.
+    ///
+    /// # Errors
+    /// None is there, one is no Ethernet interface, or there are not two sockets for each; for the operator.
+    pub fn interfaces(names: &[String], sockets: Vec<OwnedFd>) -> Result<Opened, String> {
+        let failed = |error: LinkError| error.to_string();
+        let mut followed = Vec::new();
+        let mut links = Vec::new();
+        for (number, name) in names.iter().enumerate() {
+            let found = PresentInterface::find(name).map_err(failed)?;
+            if let Some(found) = found {
+                for socket in of_link(&sockets, number, names.len()) {
+                    give(socket.as_fd(), name, found).map_err(failed)?;
+                }
+            }
+            let [a, b, c, d, e, _] = UNSEEN;
+            let absent_mac = found.is_none().then_some([a, b, c, d, e, number as u8]);
+            links.push(HandedLink::Interface { name: name.clone(), slots: SLOTS, absent_mac });
+            followed.push(Followed { name: name.clone(), is_there: found.is_some(), is_off: false });
+        }
+        if let Some(missing) = names.first().filter(|_| !followed.iter().any(|it| it.is_there)) {
+            let present = interface::list().into_iter().map(|it| it.name).collect();
+            return Err(failed(LinkError::NoInterface { name: missing.clone(), present }));
+        }
+        let mut links = links.into_iter();
+        let main = links.next().ok_or_else(|| "a master has no link".to_owned())?;
+        let links = HandedLinks { main, redundant: links.next() };
+        Ok(Opened { links, descriptors: sockets, state: Mutex::new(State::Interfaces(followed)) })
+    }
+
+    /// What the links are.
+    pub fn links(&self) -> &HandedLinks {
+        &self.links
+    }
+
+    /// The descriptors in the order of [`HandedLinks`].
+    pub fn descriptors(&self) -> &[OwnedFd] {
+        &self.descriptors
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Duplicates, for this process.
+    ///
+    /// # Errors
+    /// The process has no more descriptors.
+    pub fn duplicates(&self) -> Result<Vec<OwnedFd>, String> {
+        self.descriptors.iter().map(OwnedFd::try_clone).collect::<Result<_, _>>().map_err(|error| error.to_string())
+    }
+
+    /// Whether links can be switched off and on: they are interfaces, and this process may.
+    pub fn can_switch(&self) -> bool {
+        matches!(&*self.state(), State::Interfaces(_)) && capabilities::has(Capabilities::ADMIN)
+    }
+
+    /// Whether no network device is there: all interfaces were removed.
+    pub fn is_without_device(&self) -> bool {
+        matches!(&*self.state(), State::Interfaces(all) if !all.iter().any(|it| it.is_there))
+    }
+
+    /// Gives the sockets interfaces that have come, or come back, whichever process has them; a removed interface takes
+    /// nothing with it but its frames. What has changed, for the operator.
+    pub fn follow_interfaces(&self) -> Vec<String> {
+        let mut state = self.state();
+        let State::Interfaces(all) = &mut *state else { return Vec::new() };
+        let count = all.len();
+        let mut changes = Vec::new();
+        for (number, one) in all.iter_mut().enumerate() {
+            let sockets = || of_link(&self.descriptors, number, count);
+            let found = PresentInterface::find(&one.name).ok().flatten();
+            let Some(found) = found else {
+                if std::mem::replace(&mut one.is_there, false) {
+                    changes.push(format!("interface {} was removed", one.name));
+                }
+                continue;
+            };
+            let has_it = |socket: &OwnedFd| given(socket.as_fd()).is_ok_and(|index| index == Some(found.index));
+            if sockets().all(has_it) {
+                continue;
+            }
+            // It may be gone again; the next look tries again.
+            let is_given = sockets().all(|socket| give(socket.as_fd(), &one.name, found).is_ok());
+            if is_given && !std::mem::replace(&mut one.is_there, true) {
+                changes.push(format!("interface {} is there", one.name));
+            } else if is_given {
+                changes.push(format!("interface {} is another one now", one.name));
+            }
+        }
+        changes
+    }
+
+    /// Switches the interface of a link off or on, as an owner orders it. It is on again when the owner's time ends.
+    ///
+    /// # Errors
+    /// There is no such interface, or the daemon may not; for the operator.
+    pub fn switch(&self, link: usize, up: bool) -> Result<(), String> {
+        let mut state = self.state();
+        let one = match &mut *state {
+            State::Interfaces(all) => all.get_mut(link),
+            State::Pipes | State::Revoked => None,
+        };
+        let one = one.ok_or_else(|| "there is no interface to be switched".to_owned())?;
+        if !interface::switch(&one.name, up) {
+            return Err(format!("interface {} cannot be switched: it is gone, or CAP_NET_ADMIN is missing", one.name));
+        }
+        one.is_off = !up;
+        Ok(())
+    }
+
+    /// Takes the interfaces away from all processes that have these descriptors, and switches those on that were
+    /// switched off. Pipes end when fresh ones are opened.
+    pub fn revoke(&self) {
+        let before = std::mem::replace(&mut *self.state(), State::Revoked);
+        let State::Interfaces(all) = before else { return };
+        // The kernel waits for all processors with each: they wait together.
+        std::thread::scope(|scope| {
+            for socket in &self.descriptors {
+                // It was opened as a packet socket; nothing else can be wrong with it.
+                let take = || _ = revoke(socket.as_fd());
+                if std::thread::Builder::new().name("revoke".into()).spawn_scoped(scope, take).is_err() {
+                    take();
+                }
+            }
+        });
+        for one in all.iter().filter(|one| one.is_off) {
+            interface::switch(&one.name, true);
+        }
+    }
+}
+
+/// The sockets of a link: of the cyclic and of the acyclic half.
+fn of_link(sockets: &[OwnedFd], link: usize, links: usize) -> impl Iterator<Item = &OwnedFd> {
+    [sockets.get(link), sockets.get(links + link)].into_iter().flatten()
+}

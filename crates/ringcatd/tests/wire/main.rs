@@ -1,0 +1,9 @@
+//! The daemon on network interfaces: veth pairs between two namespaces, as root with `RINGCAT_ON_THE_WIRE=1`.
+//!
+//! The segment, the daemon and the applications are processes; the applications run as a user without a right.
+
+mod bench;
+mod ends;
+mod ethernet;
+mod interfaces;
+mod roles;
