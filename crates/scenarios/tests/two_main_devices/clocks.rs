@@ -9,7 +9,7 @@ use ringcat_sim::network::builder::SegmentBuilder;
 use ringcat_sim::network::{Network, NetworkOptions};
 use scenarios::clocks::{clocked, config, spread, with_clocks};
 use scenarios::segments::devices;
-use scenarios::two::{CYCLE, Two};
+use scenarios::two::{CYCLE, Declare, Two};
 
 use super::standby;
 
@@ -55,7 +55,7 @@ fn watch(two: &mut Two, time: Duration) -> (i64, Duration) {
 }
 
 /// Both with locked clocks; the second one is ready.
-fn locked(near: Host, declare: fn(&Scan) -> Declaration) -> Two {
+fn locked(near: Host, declare: Declare) -> Two {
     let mut two = Two::new(ring(near), declare, standby());
     two.controllers[0].begin_active();
     two.until(Duration::from_secs(10), "locked, and the partner is ready", |two| {
@@ -76,7 +76,7 @@ fn offset(two: &Two) -> u64 {
 // covers: 7.2, 7.5, dc-ring, standby
 #[test]
 fn clocks_of_33_subdevices_keep_together_through_a_takeover() {
-    let declarations: [(&str, fn(&Scan) -> Declaration); 2] = [("free", free_running), ("SYNC0", with_signals)];
+    let declarations: [(&str, Declare); 2] = [("free", free_running), ("SYNC0", with_signals)];
     for (kind, declare) in declarations {
         let mut two = locked(Host::First, declare);
         let before = watch(&mut two, Duration::from_millis(200)).0;
